@@ -1,0 +1,103 @@
+"""Scalars: one set of functions over floats, NumPy arrays and JAX tracers.
+
+No vectors, no matrices here. Everything in `algebra` is built from these scalars as a structure of arrays: a
+formula written once is a float computation at one pose, a NumPy computation (any precision) over many, or, under
+`jax.vmap`, one fused SIMD loop. A Python float that is exactly 0.0 is a structural zero: it drops out of products and
+sums while the formula is traced, so that sparse screws cost what their non-zeros cost.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+Scalar: TypeAlias = Any
+"""A float, a NumPy array or a JAX array: whatever carries + - * / and, if not a float, `__array_namespace__`."""
+
+
+def is_zero(a: Scalar) -> bool:
+    """Whether `a` is a structural zero: the Python float 0.0 itself, never an array that happens to hold zeros."""
+    return type(a) is float and a == 0.0
+
+
+def is_one(a: Scalar) -> bool:
+    """Whether `a` is a structural one: the Python float 1.0 itself."""
+    return type(a) is float and a == 1.0
+
+
+def times(a: Scalar, b: Scalar) -> Scalar:
+    """a * b, without a multiplication where either is a structural zero or one."""
+    if is_zero(a) or is_zero(b):
+        return 0.0
+    if is_one(a):
+        return b
+    return a if is_one(b) else a * b
+
+
+def plus(a: Scalar, b: Scalar) -> Scalar:
+    """a + b, without an operation where either is a structural zero."""
+    if is_zero(a):
+        return b
+    return a if is_zero(b) else a + b
+
+
+def minus(a: Scalar, b: Scalar) -> Scalar:
+    """a - b, without a subtraction where either is a structural zero."""
+    if is_zero(b):
+        return a
+    return -b if is_zero(a) else a - b
+
+
+def total(terms: list[Scalar]) -> Scalar:
+    """Sum of `terms`, left to right; 0.0 when there are none."""
+    result: Scalar = 0.0
+    for term in terms:
+        result = plus(result, term)
+    return result
+
+
+def sqrt(a: Scalar) -> Scalar:
+    """Square root; NaN for a negative argument, as arrays do, so that a caller can mask it with a status."""
+    if isinstance(a, float):
+        return math.sqrt(a) if a >= 0.0 else math.nan
+    return a.__array_namespace__().sqrt(a)
+
+
+@dataclass(frozen=True)
+class Angle:
+    """An angle known by its cosine and sine: what `cos` and `sin` take in place of rad to leave no trigonometry."""
+
+    cos: Scalar
+    sin: Scalar
+
+
+def sin(a: Scalar) -> Scalar:
+    """Sine of an angle in rad, or of an `Angle`."""
+    if isinstance(a, Angle):
+        return a.sin
+    return math.sin(a) if isinstance(a, float) else a.__array_namespace__().sin(a)
+
+
+def cos(a: Scalar) -> Scalar:
+    """Cosine of an angle in rad, or of an `Angle`."""
+    if isinstance(a, Angle):
+        return a.cos
+    return math.cos(a) if isinstance(a, float) else a.__array_namespace__().cos(a)
+
+
+def where(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
+    """`a` where the condition holds, `b` elsewhere."""
+    if not hasattr(condition, "__array_namespace__"):
+        return a if condition else b
+    return condition.__array_namespace__().where(condition, a, b)
+
+
+def smaller(a: Scalar, b: Scalar) -> Scalar:
+    """The smaller of the two."""
+    return where(a < b, a, b)
+
+
+def reciprocal(a: Scalar) -> Scalar:
+    """1 / a for a >= 0 with the ends of the scale exchanged exactly: 0 gives infinity, infinity gives 0."""
+    if isinstance(a, float):
+        return 1.0 / a if a != 0.0 else math.inf
+    return 1.0 / a

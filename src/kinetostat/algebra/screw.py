@@ -1,0 +1,80 @@
+"""Screws: twists and wrenches, their reciprocal product, and their transport to another point or other axes.
+
+Rotation first, as everywhere in kinetostat: a twist is [omega; v], a wrench [moment; force]. Nothing here knows legs.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+from kinetostat.algebra.scalar import Scalar, plus
+from kinetostat.algebra.vector import ZERO, Rotation, Vector
+
+COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")
+"""Names of the six components, in order, in every array, table, file and axis label."""
+
+
+@dataclass(frozen=True)
+class Screw:
+    """Six scalars in two vectors: what twists and wrenches have in common."""
+
+    rotational: Vector
+    translational: Vector
+
+    def components(self) -> tuple[Scalar, ...]:
+        """The six scalars in the order rx ry rz x y z."""
+        return self.rotational.components() + self.translational.components()
+
+    def __add__(self, other: Self) -> Self:
+        return type(self)(self.rotational + other.rotational, self.translational + other.translational)
+
+    def __sub__(self, other: Self) -> Self:
+        return type(self)(self.rotational - other.rotational, self.translational - other.translational)
+
+    def __mul__(self, factor: Scalar) -> Self:
+        return type(self)(self.rotational * factor, self.translational * factor)
+
+    def rotated(self, rotation: Rotation) -> Self:
+        """The same screw carried along by a rotation of everything about the reference point."""
+        return type(self)(rotation.apply(self.rotational), rotation.apply(self.translational))
+
+
+@dataclass(frozen=True)
+class Twist(Screw):
+    """Angular velocity (rad/s) and velocity of the reference point (m/s), or a small displacement (rad; m)."""
+
+    def moved(self, offset: Vector) -> "Twist":
+        """The same motion referred to the point at `offset` (m) from the present one: v' = v + omega x offset."""
+        return Twist(self.rotational, self.translational + self.rotational.cross(offset))
+
+
+@dataclass(frozen=True)
+class Wrench(Screw):
+    """Moment about the reference point (N·m) and force (N)."""
+
+    def moved(self, offset: Vector) -> "Wrench":
+        """The same load referred to the point at `offset` (m) from the present one: m' = m + force x offset."""
+        return Wrench(self.rotational + self.translational.cross(offset), self.translational)
+
+    def work(self, twist: Twist) -> Scalar:
+        """Reciprocal product: the power (W) of this wrench on that twist, both at one point in the same axes."""
+        return plus(self.rotational.dot(twist.rotational), self.translational.dot(twist.translational))
+
+
+def rotation_about(axis: Vector, arm: Vector) -> Twist:
+    """Unit twist of a revolute with unit direction `axis`, at the point that lies at `arm` (m) from the joint."""
+    return Twist(axis, axis.cross(arm))
+
+
+def translation_along(axis: Vector) -> Twist:
+    """Unit twist of a prismatic joint with unit direction `axis`; the same at every point."""
+    return Twist(ZERO, axis)
+
+
+def force_along(axis: Vector, arm: Vector) -> Wrench:
+    """Unit force along the unit vector `axis` through the point at `arm` (m) from the reference point."""
+    return Wrench(arm.cross(axis), axis)
+
+
+def pure_moment(axis: Vector) -> Wrench:
+    """Moment about the vector `axis`; the same at every point."""
+    return Wrench(axis, ZERO)

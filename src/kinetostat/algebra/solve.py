@@ -1,0 +1,142 @@
+"""Small dense factorisations, unrolled over scalars: dual basis and complement by Householder, inverse by Cholesky.
+
+Every loop runs over a size known while tracing, so that under `jax.vmap` no loop and no LAPACK call is left. Structural
+zeros are used: sparse vectors are taken first and only their non-zero rows are touched.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kinetostat.algebra.scalar import (
+    Scalar,
+    is_zero,
+    minus,
+    reciprocal,
+    smaller,
+    sqrt,
+    times,
+    total,
+    where,
+)
+
+Row = list[Scalar]
+
+
+@dataclass(frozen=True)
+class _Triangular:
+    """Q^T V = R for given vectors V: `vectors` holds R and `turned` Q^T, both by columns.
+
+    Vector `order[k]` ends in row `pivots[k]`; `free` are the rows without a pivot.
+    """
+
+    vectors: list[Row]
+    turned: list[Row]
+    order: list[int]
+    pivots: list[int]
+    free: list[int]
+    regularity: Scalar
+
+
+def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
+    """The n vectors xi_a with xi_a . w_b = 1 if a = b, else 0, for n vectors w_b of n components.
+
+    With the w_b as columns of W, the xi_a are the rows of W^-1.
+
+    Args:
+        basis: the vectors w_b, each of n scalars; components of comparable size (scale rows before).
+
+    Returns:
+        The n dual vectors, and the regularity: the smallest distance of a w_b from the span of those taken before it
+        (at most 1), 0 where the w_b are dependent and the dual vectors meaningless.
+    """
+    solved = _triangularise(basis)
+    dual: list[Row] = [[] for _ in basis]
+    for k in reversed(range(len(basis))):
+        here, row = solved.order[k], solved.pivots[k]
+        later = solved.order[k + 1 :]
+        inverse = reciprocal(solved.vectors[here][row])
+        for column, turned in enumerate(solved.turned):
+            known = total([times(solved.vectors[j][row], dual[j][column]) for j in later])
+            dual[here].append(times(minus(turned[row], known), inverse))
+    return dual, solved.regularity
+
+
+def complement(vectors: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
+    """An orthonormal basis of what is orthogonal to a independent vectors of n components, a < n.
+
+    Returns:
+        The n - a basis vectors, and the regularity of the given ones as in `dual_basis`.
+    """
+    solved = _triangularise(vectors)
+    return [[column[row] for column in solved.turned] for row in solved.free], solved.regularity
+
+
+def _triangularise(vectors: Sequence[Sequence[Scalar]]) -> _Triangular:
+    """Householder QR, backward stable without pivoting, so that it needs no data-dependent branch."""
+    size = len(vectors[0])
+    reduced = [list(vector) for vector in vectors]
+    turned: list[Row] = [[1.0 if i == j else 0.0 for i in range(size)] for j in range(size)]
+    waiting, free = list(range(len(vectors))), list(range(size))
+    order: list[int] = []
+    pivots: list[int] = []
+    regularity: Scalar = 1.0
+    while waiting:
+        here = min(waiting, key=lambda j: sum(not is_zero(reduced[j][i]) for i in free))
+        waiting.remove(here)
+        filled = [i for i in free if not is_zero(reduced[here][i])] or free[:1]
+        _reflect(reduced[here], [*(reduced[j] for j in waiting), *turned], filled)
+        order.append(here)
+        pivots.append(filled[0])
+        free.remove(filled[0])
+        regularity = smaller(abs(reduced[here][filled[0]]), regularity)
+    return _Triangular(reduced, turned, order, pivots, free, regularity)
+
+
+def _reflect(column: Row, others: list[Row], rows: list[int]) -> None:
+    """Reflect all in place such that of `rows` the `column` keeps only the first."""
+    if len(rows) == 1:
+        return
+    pivot = sqrt(total([times(column[i], column[i]) for i in rows]))
+    pivot = where(column[rows[0]] < 0.0, pivot, -pivot)
+    normal = [minus(column[rows[0]], pivot), *(column[i] for i in rows[1:])]
+    weight = reciprocal(times(pivot, -normal[0]))
+    for other in others:
+        share = times(weight, total([times(a, other[i]) for a, i in zip(normal, rows, strict=True)]))
+        for a, i in zip(normal, rows, strict=True):
+            other[i] = minus(other[i], times(share, a))
+    for i in rows:
+        column[i] = 0.0
+    column[rows[0]] = pivot
+
+
+def cholesky(matrix: Sequence[Sequence[Scalar]]) -> list[Row]:
+    """Lower factor L with L L^T = matrix, for a symmetric positive definite n x n matrix; rows of n scalars.
+
+    Where the matrix is not positive definite the factor holds NaN, for the caller to mask.
+    """
+    factor: list[Row] = []
+    for i in range(len(matrix)):
+        row: Row = []
+        for j in range(i + 1):
+            known = total([times(row[k], (factor[j] if j < i else row)[k]) for k in range(j)])
+            rest = minus(matrix[i][j], known)
+            row.append(sqrt(rest) if i == j else times(rest, reciprocal(factor[j][j])))
+        factor.append(row)
+    return factor
+
+
+def inverse_positive(matrix: Sequence[Sequence[Scalar]]) -> list[Row]:
+    """Inverse of a symmetric positive definite n x n matrix, by Cholesky; rows of n scalars."""
+    size = len(matrix)
+    factor = cholesky(matrix)
+    columns: list[Row] = []
+    for j in range(size):
+        column: Row = [0.0] * j
+        for i in range(j, size):
+            known = total([times(factor[i][k], column[k]) for k in range(j, i)])
+            column.append(times(minus(1.0 if i == j else 0.0, known), reciprocal(factor[i][i])))
+        columns.append(column)
+    return [
+        [total([times(columns[i][k], columns[j][k]) for k in range(max(i, j), size)]) for j in range(size)]
+        for i in range(size)
+    ]

@@ -1,0 +1,114 @@
+"""Vectors of three scalars, and the rotations and rigid displacements that act on them.
+
+No screws here (see `screw`) and no machine. All components are in the axes the caller names; lengths are in m.
+"""
+
+from dataclasses import dataclass
+
+from kinetostat.algebra.scalar import Scalar, cos, minus, plus, sin, sqrt, times, total
+
+
+@dataclass(frozen=True)
+class Vector:
+    """A free vector or the coordinates of a point: three scalars (x, y, z)."""
+
+    x: Scalar
+    y: Scalar
+    z: Scalar
+
+    def components(self) -> tuple[Scalar, Scalar, Scalar]:
+        """The three scalars in order."""
+        return self.x, self.y, self.z
+
+    def __add__(self, other: "Vector") -> "Vector":
+        return Vector(plus(self.x, other.x), plus(self.y, other.y), plus(self.z, other.z))
+
+    def __sub__(self, other: "Vector") -> "Vector":
+        return Vector(minus(self.x, other.x), minus(self.y, other.y), minus(self.z, other.z))
+
+    def __mul__(self, factor: Scalar) -> "Vector":
+        return Vector(times(self.x, factor), times(self.y, factor), times(self.z, factor))
+
+    def __neg__(self) -> "Vector":
+        return ZERO - self
+
+    def dot(self, other: "Vector") -> Scalar:
+        """Inner product."""
+        return total([times(a, b) for a, b in zip(self.components(), other.components(), strict=True)])
+
+    def cross(self, other: "Vector") -> "Vector":
+        """Vector product self x other."""
+        return Vector(
+            minus(times(self.y, other.z), times(self.z, other.y)),
+            minus(times(self.z, other.x), times(self.x, other.z)),
+            minus(times(self.x, other.y), times(self.y, other.x)),
+        )
+
+    def norm(self) -> Scalar:
+        """Euclidean length."""
+        return sqrt(self.dot(self))
+
+
+ZERO = Vector(0.0, 0.0, 0.0)
+X_AXIS = Vector(1.0, 0.0, 0.0)
+Y_AXIS = Vector(0.0, 1.0, 0.0)
+Z_AXIS = Vector(0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """A rotation Q held by its three columns: the images of the x, y and z axes."""
+
+    x: Vector
+    y: Vector
+    z: Vector
+
+    def apply(self, v: Vector) -> Vector:
+        """Q v."""
+        return self.x * v.x + self.y * v.y + self.z * v.z
+
+    def __matmul__(self, other: "Rotation") -> "Rotation":
+        return Rotation(self.apply(other.x), self.apply(other.y), self.apply(other.z))
+
+    def inverse(self) -> "Rotation":
+        """Q^T, which is Q^-1."""
+        rows = zip(self.x.components(), self.y.components(), self.z.components(), strict=True)
+        return Rotation(*(Vector(*row) for row in rows))
+
+
+IDENTITY = Rotation(X_AXIS, Y_AXIS, Z_AXIS)
+
+
+def rotation_x(c: Scalar, s: Scalar) -> Rotation:
+    """Rotation about x by the angle whose cosine is c and sine s."""
+    return Rotation(X_AXIS, Vector(0.0, c, s), Vector(0.0, -s, c))
+
+
+def rotation_y(c: Scalar, s: Scalar) -> Rotation:
+    """Rotation about y by the angle whose cosine is c and sine s."""
+    return Rotation(Vector(c, 0.0, -s), Y_AXIS, Vector(s, 0.0, c))
+
+
+def polar(radius: Scalar, angle: Scalar) -> Vector:
+    """The point of the x-y plane at `radius` (m) from the origin and `angle` (rad) from x."""
+    return Vector(times(radius, cos(angle)), times(radius, sin(angle)), 0.0)
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """A rigid displacement: rotate by `rotation`, then translate by `translation` (m)."""
+
+    rotation: Rotation
+    translation: Vector
+
+    def apply(self, point: Vector) -> Vector:
+        """Where a point goes."""
+        return self.rotation.apply(point) + self.translation
+
+    def __matmul__(self, other: "Displacement") -> "Displacement":
+        return Displacement(self.rotation @ other.rotation, self.apply(other.translation))
+
+    def inverse(self) -> "Displacement":
+        """The displacement that undoes this one."""
+        back = self.rotation.inverse()
+        return Displacement(back, -back.apply(self.translation))

@@ -1,0 +1,1 @@
+"""Pose to leg configurations: reach, singularity, status."""

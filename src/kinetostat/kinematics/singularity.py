@@ -1,0 +1,71 @@
+"""Singularities of one pose from its screws: which leg locks up, and which twist the locked machine leaves free."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.algebra.screw import COMPONENTS, Screw
+from kinetostat.machine.leg import LegScrews
+
+PURE = 1e-9
+"""Share of rotation below which a twist counts as a pure translation."""
+
+Array = npt.NDArray[np.float64]
+
+
+def columns(screws: Sequence[Screw], rotational_scale: float, translational_scale: float) -> Array:
+    """Screws as columns [6 x n], scaled so that rotations and translations compare."""
+    rows = [screw.components() for screw in screws]
+    scale = np.repeat([rotational_scale, translational_scale], 3)
+    return np.array(rows, dtype=float).T * scale[:, None]
+
+
+def conditioning(legs: Sequence[LegScrews], length: float) -> Array:
+    """Singular values of W with moments divided by `length` (m), decreasing: their ratio is dimensionless."""
+    wrenches = [wrench for leg in legs for wrench in leg.wrenches]
+    return np.linalg.svd(columns(wrenches, 1.0 / length, 1.0), compute_uv=False)
+
+
+def free_twist(legs: Sequence[LegScrews], length: float) -> list[float]:
+    """The twist that the wrenches of all legs resist least: at a singularity, the one they leave free.
+
+    Returns:
+        [omega; v] at P in base axes: of 1 rad, or of 1 m where it is a pure translation.
+    """
+    wrenches = [wrench for leg in legs for wrench in leg.wrenches]
+    left, _, _ = np.linalg.svd(columns(wrenches, 1.0 / length, 1.0))
+    angular, linear = left[:3, -1] / length, left[3:, -1]
+    turning = np.linalg.norm(angular) * length > PURE
+    size = np.linalg.norm(angular if turning else linear)
+    return [float(c / size) for c in (*angular, *linear)]
+
+
+def why_singular(names: Sequence[str], legs: Sequence[LegScrews], length: float, tolerance: float) -> str:
+    """One sentence per cause.
+
+    Args:
+        names: of the legs.
+        legs: their screws at P, base axes.
+        length: characteristic length, m.
+        tolerance: regularity below which a leg counts as locked.
+    """
+    locked = [name for name, leg in zip(names, legs, strict=True) if not leg.regularity > tolerance]
+    if locked:
+        return (
+            f"The passive joints of the {' and the '.join(locked)} lock up here (links stretched, folded or aligned), "
+            "so that the leg loses a freedom; move the pose away from this limit."
+        )
+    motion = describe(free_twist(legs, length), ("rad", "m"))
+    return f"With all actuators locked the platform can still move, by the twist {motion}; move the pose or the joints."
+
+
+def describe(screw: Sequence[float], units: tuple[str, str]) -> str:
+    """A screw in words: its components beyond rounding, with their units (rotational, translational)."""
+    size = max(abs(c) for c in screw)
+    shown = [
+        f"{name} {value:+.4g} {units[i // 3]}"
+        for i, (name, value) in enumerate(zip(COMPONENTS, screw, strict=True))
+        if abs(value) > 1e-9 * size
+    ]
+    return ", ".join(shown)

@@ -1,0 +1,1 @@
+"""Leg to (W, G), assembly to K and C, attribution, indices: one pose at a time."""

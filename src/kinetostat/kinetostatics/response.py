@@ -1,0 +1,66 @@
+"""A machine at a pose to K, C and a status: the whole derivation in one function, for one pose.
+
+It holds for floats (one pose), NumPy arrays and, under `jax.vmap`, for millions; results where the status is not OK
+are meaningless and are masked by whoever collects them.
+"""
+
+from dataclasses import dataclass
+
+from kinetostat.algebra.scalar import Scalar, smaller, where
+from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.kinematics.reach import within_reach
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.assembly import Isostatic, compliance_matrix, isostatic, stiffness_matrix
+from kinetostat.machine.leg import LegScrews
+from kinetostat.machine.machine import Configuration, Machine
+
+SINGULAR = 1e-9
+"""Regularity below which a pose counts as singular: results have then lost more than half of their digits."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """What a machine answers at a pose.
+
+    Attributes:
+        configuration: where everything is.
+        legs: screws of every leg at P, base axes.
+        statics: how the springs share loads.
+        stiffness, compliance: K (N·m/rad, N/rad, N/m) and C (rad/(N·m), rad/N, m/N) at P, base axes.
+        regularity: distance from a singularity, 0 to 1 (dimensionless); the smaller of the legs' and the platform's.
+        status: a `Status` code.
+    """
+
+    configuration: Configuration
+    legs: tuple[LegScrews, ...]
+    statics: Isostatic
+    stiffness: Symmetric6
+    compliance: Symmetric6
+    regularity: Scalar
+    status: Scalar
+
+
+def respond(machine: Machine) -> Response:
+    """K, C and status of a machine at its pose."""
+    configuration = machine.configure()
+    reference, length = configuration.platform.translation, configuration.length
+    legs = tuple(leg.screws(reference, length) for leg in configuration.legs)
+    statics = isostatic(legs, length)
+    regularity = statics.regularity
+    for leg in legs:
+        regularity = smaller(leg.regularity, regularity)
+    return Response(
+        configuration,
+        legs,
+        statics,
+        stiffness_matrix(statics),
+        compliance_matrix(statics),
+        regularity,
+        pose_status(within_reach(configuration), regularity),
+    )
+
+
+def pose_status(reached: Scalar, regularity: Scalar) -> Scalar:
+    """Status code of a pose, the most fundamental obstacle first; a regularity of NaN counts as singular."""
+    solvable = where(regularity > SINGULAR, int(Status.OK), int(Status.SINGULAR))
+    return where(reached, solvable, int(Status.OUT_OF_REACH))

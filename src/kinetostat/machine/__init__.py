@@ -1,0 +1,1 @@
+"""Joints, links, legs, the machine: frozen data, one file per family in `catalogue`."""

@@ -1,0 +1,86 @@
+"""Files to machines: the bundled ones by name, any other by path, with overrides."""
+
+import difflib
+from collections.abc import Sequence
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from kinetostat.machine.catalogue import families
+from kinetostat.machine.machine import Family, Machine
+from kinetostat.spec import document as documents
+from kinetostat.spec.document import Document
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.fields import SECTIONS, quantities
+from kinetostat.spec.validation import file_model, validate
+
+SUFFIX = ".toml"
+
+
+@cache
+def bundled() -> dict[str, str]:
+    """The text of every bundled machine file by name, in alphabetical order."""
+    found = (resources.files("kinetostat.machine") / "bundled").iterdir()
+    files = sorted((f for f in found if f.name.endswith(SUFFIX)), key=lambda f: f.name)
+    return {f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files}
+
+
+def load(machine: str | Path, settings: Sequence[str] = ()) -> Machine:
+    """A machine from a file, or a bundled one by its name.
+
+    Args:
+        machine: path of a TOML file, or a name from `bundled()`.
+        settings: overrides "path=value", as `--set` takes them.
+
+    Raises:
+        InputError: no such machine, or a mistake in the file or an override.
+    """
+    name = str(machine)
+    shipped = bundled()
+    if name in shipped:
+        return build(documents.parse(shipped[name], name), name, settings)
+    path = Path(machine)
+    if not path.exists():
+        near = difflib.get_close_matches(name, shipped, 1)
+        hint = f'did you mean "{near[0]}"?' if near else f"bundled machines: {', '.join(shipped)}."
+        raise InputError(f"{shorten(name)} is neither a file nor a bundled machine; {hint}")
+    return build(documents.read(path), name, settings)
+
+
+def build(document: Document, origin: str, settings: Sequence[str] = ()) -> Machine:
+    """A machine from a document; `origin` names it in messages.
+
+    Raises:
+        InputError: a mistake in the document or an override.
+    """
+    family = _family(document.get("family"), origin)
+    sections = sections_of(family)
+    written = documents.override(document, settings, _counts(family))
+    data: Any = validate(written, origin, file_model(family.name, sections), sections)
+    return Machine(data.name, family, data.geometry, data.stiffness, data.pose)
+
+
+def sections_of(family: Family) -> dict[str, type]:
+    """The sections of a family's machine files by name."""
+    return {name: getattr(family, name) for name in SECTIONS}
+
+
+def _counts(family: Family) -> dict[str, int]:
+    return {
+        f"{name}.{field}": quantity.count
+        for name, section in sections_of(family).items()
+        for field, quantity in quantities(section).items()
+        if quantity.count is not None
+    }
+
+
+def _family(name: object, origin: str) -> Family:
+    known = families()
+    if isinstance(name, str) and name in known:
+        return known[name]
+    if name is None:
+        raise InputError(f'"{origin}": family is missing; add family = "..." with one of: {", ".join(known)}.')
+    near = difflib.get_close_matches(str(name), known, 1)
+    hint = f'did you mean "{near[0]}"?' if near else f"known families: {', '.join(known)}."
+    raise InputError(f'"{origin}": family is {shorten(name)}, which is not known; {hint}')

@@ -1,0 +1,80 @@
+"""The scalars of a machine by path ("geometry.base_radius", "stiffness.passive_links.0"): list, find, replace."""
+
+import difflib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from kinetostat.algebra.scalar import Scalar
+from kinetostat.machine.machine import Family, Machine
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.fields import SECTIONS, Quantity, leaves, quantities
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A field of a machine file, or one entry of a field that holds several.
+
+    Attributes:
+        path: as people write it.
+        quantity: kind, meaning and bounds of its values.
+        leaves: paths of the scalars it stands for: one, or every entry of the field together.
+    """
+
+    path: str
+    quantity: Quantity
+    leaves: tuple[str, ...]
+
+
+def parameters(family: Family) -> Iterator[Parameter]:
+    """All parameters of a family: every field, and every entry of fields that hold several."""
+    for section in SECTIONS:
+        for name, quantity in quantities(getattr(family, section)).items():
+            paths = tuple(leaves(f"{section}.{name}", quantity))
+            yield Parameter(f"{section}.{name}", quantity, paths)
+            if quantity.count is not None:
+                yield from (Parameter(path, quantity, (path,)) for path in paths)
+
+
+def find(family: Family, text: str) -> Parameter:
+    """The parameter people mean: its path, or the end of its path where only one parameter ends so.
+
+    Raises:
+        InputError: none or several; the message lists what is near.
+    """
+    known = {parameter.path: parameter for parameter in parameters(family)}
+    if text in known:
+        return known[text]
+    ends = [path for path in known if path.endswith(f".{text}")]
+    if len(ends) == 1:
+        return known[ends[0]]
+    if ends:
+        raise InputError(f'"{text}" may be {" or ".join(ends)}; write one of them.')
+    near = difflib.get_close_matches(text, [*known, *(path.split(".", 1)[1] for path in known)], 1)
+    hint = f"did you mean {near[0]}?" if near else f"the fields are {', '.join(known)}."
+    raise InputError(f'"{text}" is not a field of family {family.name}; {hint}')
+
+
+def values(machine: Machine) -> dict[str, Scalar]:
+    """Every scalar of a machine by path, SI."""
+    found: dict[str, Scalar] = {}
+    for section in SECTIONS:
+        data = getattr(machine, section)
+        for name, quantity in quantities(type(data)).items():
+            held = getattr(data, name)
+            entries = (held,) if quantity.count is None else held
+            found.update(zip(leaves(f"{section}.{name}", quantity), entries, strict=True))
+    return found
+
+
+def with_values(machine: Machine, changes: Mapping[str, Any]) -> Machine:
+    """The machine with some scalars replaced, by leaf path; the values may be floats or traced scalars."""
+    new = {**values(machine), **changes}
+    sections = {}
+    for section in SECTIONS:
+        made = {}
+        for name, quantity in quantities(getattr(machine.family, section)).items():
+            entries = tuple(new[path] for path in leaves(f"{section}.{name}", quantity))
+            made[name] = entries[0] if quantity.count is None else entries
+        sections[section] = getattr(machine.family, section)(**made)
+    return replace(machine, **sections)

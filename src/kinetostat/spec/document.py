@@ -1,0 +1,118 @@
+"""Machine files as text: read safely, override, write. Nothing is interpreted here; see `validation`."""
+
+import copy
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from kinetostat.spec.errors import InputError, shorten
+
+LARGEST_FILE = 1 << 20
+"""Bytes. A machine file has a few hundred; a megabyte is a mistake or an attack."""
+
+Document = dict[str, Any]
+
+
+def read(path: Path) -> Document:
+    """The TOML document in a file.
+
+    Raises:
+        InputError: no such file, not a file, too large, not text, or not TOML.
+    """
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(LARGEST_FILE + 1)
+    except IsADirectoryError:
+        raise InputError(f'"{path}" is a folder; give the machine file in it.') from None
+    except OSError as error:
+        raise InputError(f'"{path}" cannot be read: {error.strerror}.') from None
+    if len(data) > LARGEST_FILE:
+        raise InputError(f'"{path}" is larger than {LARGEST_FILE >> 20} MiB; a machine file is a short TOML text.')
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f'"{path}" is not text: byte {error.start} is not UTF-8; a machine file is TOML, saved as UTF-8.'
+        ) from None
+    return parse(text, str(path))
+
+
+def parse(text: str, origin: str) -> Document:
+    """The TOML document in a text; `origin` names it in messages.
+
+    Raises:
+        InputError: not TOML; the message gives line and column.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f'"{origin}" is not valid TOML: {error}. Text values need quotes, e.g. x = "2 cm".') from None
+    except RecursionError:
+        raise InputError(f'"{origin}" is nested too deeply; a machine file has tables of values and lists.') from None
+
+
+def override(document: Document, settings: Sequence[str], counts: Mapping[str, int]) -> Document:
+    """A copy of the document with each "path=value" put in; the value is TOML, and what is not TOML is text.
+
+    Args:
+        document: what was written.
+        settings: the overrides, in order.
+        counts: entries of each field that holds a list; where one value was written for all and an override names
+            an entry, the value is first repeated.
+
+    Raises:
+        InputError: no "=", an empty path, or a path that leads through something that is not a table or list.
+    """
+    result = copy.deepcopy(document)
+    for setting in settings:
+        path, equals, text = setting.partition("=")
+        if not equals or not path.strip():
+            raise InputError(f'--set {shorten(setting)} must be path=value, e.g. --set geometry.base_radius="26 cm".')
+        _repeat(result, path.strip(), counts)
+        _put(result, path.strip(), _value(text.strip()))
+    return result
+
+
+def _repeat(document: Document, path: str, counts: Mapping[str, int]) -> None:
+    field, _, entry = path.rpartition(".")
+    section, _, name = field.partition(".")
+    table = document.get(section)
+    if field not in counts or not entry.isdecimal() or not isinstance(table, dict):
+        return
+    if name in table and not isinstance(table[name], list):
+        table[name] = [table[name]] * counts[field]
+
+
+def _value(text: str) -> object:
+    try:
+        return tomllib.loads(f"value = {text}\n")["value"]
+    except (tomllib.TOMLDecodeError, RecursionError):
+        return text
+
+
+def _put(document: Document, path: str, value: object) -> None:
+    at: Any = document
+    *parents, last = path.split(".")
+    for key in parents:
+        at = _child(at, key, path)
+    if isinstance(at, list):
+        at[_index(at, last, path)] = value
+    elif isinstance(at, dict):
+        at[last] = value
+    else:
+        raise InputError(f"--set {path}: nothing can be set inside {shorten(at)}; give a shorter path.")
+
+
+def _child(at: Any, key: str, path: str) -> Any:
+    if isinstance(at, dict):
+        return at.setdefault(key, {})
+    if isinstance(at, list):
+        return at[_index(at, key, path)]
+    raise InputError(f"--set {path}: {shorten(at)} has no part called {key}; give a shorter path.")
+
+
+def _index(entries: list[Any], key: str, path: str) -> int:
+    if not key.isdecimal() or int(key[:9]) >= len(entries):
+        raise InputError(f"--set {path}: {key} is not an entry; the list has entries 0 to {len(entries) - 1}.")
+    return int(key)

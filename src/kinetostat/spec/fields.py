@@ -1,0 +1,124 @@
+"""The vocabulary in which a family declares what people may write: quantities with a kind, bounds and a meaning.
+
+A family's sections are plain frozen dataclasses whose fields are annotated with `Quantity`. From those annotations come
+the validation, the JSON Schema, the field paths and the messages; no family writes any of them.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import MISSING, dataclass, fields
+from typing import Any, TypeVar, dataclass_transform, get_type_hints
+
+from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import PydanticCustomError, core_schema
+
+from kinetostat.spec.errors import shorten
+from kinetostat.units import KINDS, RIGID, UnitError, parse
+
+SECTIONS = ("geometry", "stiffness", "pose")
+"""The tables of a machine file that hold quantities, in the order people read them."""
+
+LARGEST = {"length": 1e6, "angle": 1e3, "linear stiffness": 1e20, "torsional stiffness": 1e20}
+"""Bounds on size, in SI: far beyond any machine, well inside float64."""
+
+Section = TypeVar("Section")
+
+
+@dataclass_transform(frozen_default=True)
+def section(cls: type[Section]) -> type[Section]:
+    """Declare a section of a machine file: a frozen dataclass that refuses keys it does not have."""
+    made = dataclass(frozen=True)(cls)
+    made.__pydantic_config__ = ConfigDict(extra="forbid")  # type: ignore[attr-defined]
+    return made
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a field holds: annotate `float` with it, or a tuple of floats where `count` is given.
+
+    Attributes:
+        kind: a key of `units.KINDS`.
+        meaning: one phrase for people, also the comment in templates.
+        positive: zero and negative values are refused; stiffness may be zero (free) but never negative.
+        count: how many values; one value in the file stands for all of them.
+    """
+
+    kind: str
+    meaning: str
+    positive: bool = False
+    count: int | None = None
+
+    @property
+    def stiff(self) -> bool:
+        """Whether it is a stiffness: from 0 (free) to "rigid"."""
+        return "stiffness" in self.kind
+
+    def read(self, value: object) -> float | tuple[float, ...]:
+        """Validate what was written: SI value, or a tuple of `count` of them.
+
+        Raises:
+            PydanticCustomError: with the sentence for people.
+        """
+        if self.count is None:
+            return self._read_one(value)
+        if not isinstance(value, list | tuple):
+            return (self._read_one(value),) * self.count
+        if len(value) != self.count:
+            raise PydanticCustomError(
+                "count",
+                "it has {found} entries; give {count}, or one value for all",
+                {"found": len(value), "count": self.count},
+            )
+        return tuple(self._read_one(entry, f"entry {i}: ") for i, entry in enumerate(value))
+
+    def _read_one(self, value: object, where: str = "") -> float:
+        try:
+            number = parse(value, self.kind)
+            self._check(number)
+        except UnitError as error:
+            said = f"{where}{shorten(value)}: " if where else ""
+            raise PydanticCustomError("quantity", "{said}{reason}", {"said": said, "reason": str(error)}) from None
+        return number
+
+    def _check(self, number: float) -> None:
+        kind = KINDS[self.kind]
+        example = f'e.g. "{kind.example}"'
+        if self.stiff and number < 0:
+            raise UnitError(f'a stiffness cannot be negative; write 0 for a free element, {example}, or "{RIGID}"')
+        if self.positive and number <= 0:
+            raise UnitError(f"it must be greater than 0, {example}")
+        if abs(number) > LARGEST[self.kind] and not math.isinf(number):
+            advice = f'; write "{RIGID}"' if self.stiff else ""
+            raise UnitError(f"it must not exceed {LARGEST[self.kind]:g} {kind.unit}{advice}")
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+    def __get_pydantic_json_schema__(self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler) -> Any:
+        kind = KINDS[self.kind]
+        one = {"type": ["number", "string"], "examples": [kind.example]}
+        rule = f"{self.meaning}; a {kind.name} with its unit, or a bare number in {kind.unit}"
+        rule += f', or "{RIGID}"' if self.stiff else ""
+        if self.count is None:
+            return {**one, "description": rule}
+        many = {"type": "array", "items": one, "minItems": self.count, "maxItems": self.count}
+        return {"anyOf": [one, many], "description": f"{rule}; one for all, or a list of {self.count}"}
+
+
+def quantities(section_type: type) -> dict[str, Quantity]:
+    """The fields of a section by name."""
+    hints = get_type_hints(section_type, include_extras=True)
+    return {field.name: hints[field.name].__metadata__[0] for field in fields(section_type)}
+
+
+def optional(section_type: type) -> set[str]:
+    """Names of the fields of a section that may be left out."""
+    return {field.name for field in fields(section_type) if field.default is not MISSING}
+
+
+def leaves(name: str, quantity: Quantity) -> Iterator[str]:
+    """Names of the scalars of a field: itself, or one for each entry."""
+    if quantity.count is None:
+        yield name
+    else:
+        yield from (f"{name}.{i}" for i in range(quantity.count))

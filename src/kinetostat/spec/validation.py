@@ -1,0 +1,88 @@
+"""A document against the sections of a family: validated SI data, or one paragraph that says what to mend.
+
+The model of a file is made by pydantic from the family's own dataclasses; this module only words its findings.
+"""
+
+import difflib
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from kinetostat.spec.document import Document
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.fields import SECTIONS, quantities
+from kinetostat.units import KINDS
+
+SCHEMA_VERSION = 1
+
+
+def file_model(family: str, sections: Mapping[str, type]) -> type[BaseModel]:
+    """The model of a machine file of one family."""
+    content: dict[str, Any] = {
+        "schema_version": (
+            Literal[1],
+            Field(alias="schema", description="version of the file format", default=SCHEMA_VERSION),
+        ),
+        "name": (str, Field(description="what people call the machine", min_length=1, max_length=80)),
+        "family": (Literal[family], Field(description="kind of machine, see `kinetostat list`")),
+    }
+    for name in SECTIONS:
+        content[name] = (sections[name], Field(description=f"the machine's {name}"))
+    return create_model("MachineFile", __config__=ConfigDict(extra="forbid"), **content)
+
+
+def validate(document: Document, origin: str, model: type[BaseModel], sections: Mapping[str, type]) -> BaseModel:
+    """The document as validated data.
+
+    Args:
+        document: what was written.
+        origin: name of the file, for messages.
+        model, sections: from `file_model` and the family.
+
+    Raises:
+        InputError: one sentence for each mistake, at most five.
+    """
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        found = [_sentence(dict(mistake), document, sections) for mistake in error.errors()]
+        more = f" (and {len(found) - 5} more)" if len(found) > 5 else ""
+        raise InputError(f'"{origin}": {" ".join(found[:5])}{more}') from None
+
+
+def _sentence(mistake: dict[str, Any], document: Document, sections: Mapping[str, type]) -> str:
+    path = [str(part) for part in mistake["loc"]]
+    name, last = ".".join(path), path[-1]
+    known = quantities(sections[path[0]]) if len(path) == 2 and path[0] in sections else {}
+    if mistake["type"] in ("missing", "missing_argument"):
+        return _missing(path, name, last, known)
+    if mistake["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+        allowed = list(known) or ["schema", "name", "family", *SECTIONS]
+        close = difflib.get_close_matches(last, allowed, 1)
+        hint = f"did you mean {close[0]}?" if close else f"it may hold {', '.join(allowed)}."
+        return f"{name} is not known; {hint}"
+    value = shorten(_look_up(document, path))
+    if mistake["type"] == "dataclass_type":
+        return f"{name} is {value}; it must be a table, written as [{name}] with one line for each value."
+    if name == "schema":
+        return f"schema is {value}; this version reads schema = {SCHEMA_VERSION}."
+    if name == "name":
+        return f'name is {value}; it must be text of 1 to 80 characters, e.g. name = "my machine".'
+    return f"{name} is {value}: {mistake['msg']}."
+
+
+def _missing(path: list[str], name: str, last: str, known: Mapping[str, Any]) -> str:
+    if last in known:
+        quantity = known[last]
+        return f'{name} is missing ({quantity.meaning}); add {last} = "{KINDS[quantity.kind].example}" to [{path[0]}].'
+    if last in SECTIONS:
+        return f"the table [{last}] is missing; `kinetostat new` prints a complete file."
+    return f'{name} is missing; add {last} = "..." at the top of the file.'
+
+
+def _look_up(document: Document, path: list[str]) -> object:
+    at: Any = document
+    for key in path:
+        at = at.get(key) if isinstance(at, dict) else at
+    return at

@@ -1,0 +1,113 @@
+"""Text with a unit to an SI float and back: the only place that converts.
+
+A bare number is SI. What a number may mean (its kind) is fixed by the field that holds it; see `KINDS`.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cache
+
+import pint
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of quantity: its SI unit, as people read it, and an example of how to write it."""
+
+    name: str
+    unit: str
+    example: str
+
+
+KINDS = {
+    kind.name: kind
+    for kind in (
+        Kind("length", "m", "12 cm"),
+        Kind("angle", "rad", "30 deg"),
+        Kind("linear stiffness", "N/m", "20 N/um"),
+        Kind("torsional stiffness", "N·m/rad", "1e7 N*m/rad"),
+    )
+}
+
+RIGID = "rigid"
+"""How people write an infinite stiffness."""
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+_UNIT = re.compile(r"[A-Za-zµμ°]+(?:\s*(?:[*/·]|\*\*|\^)\s*(?:[A-Za-zµμ°]+|[1-3](?![0-9])))*")
+_LONGEST = 64
+
+
+class UnitError(ValueError):
+    """A value that is not a quantity of the wanted kind; the message says what is wrong with it and what is allowed."""
+
+
+def parse(value: object, kind: str) -> float:
+    """SI value of a number or of text such as "12 cm".
+
+    Args:
+        value: a finite number (SI), or text: a number and a unit.
+        kind: a key of `KINDS`; for stiffness, the text "rigid" gives infinity.
+
+    Raises:
+        UnitError: not a number, no unit, an unknown unit, or a unit of another kind.
+    """
+    wanted = KINDS[kind]
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise UnitError(f"it must be {_allowed(wanted)}")
+    if isinstance(value, str):
+        return _parse_text(value, wanted)
+    try:
+        return _finite(float(value), wanted)
+    except OverflowError:
+        raise UnitError(f"it is too large; write {_allowed(wanted)}") from None
+
+
+def show(value: float, kind: str, digits: int = 6) -> str:
+    """An SI value as text that `parse` reads back, e.g. "0.22 m"; infinity is "rigid"."""
+    if math.isinf(value):
+        return RIGID
+    return f"{value:.{digits}g} {KINDS[kind].unit}"
+
+
+def _parse_text(text: str, wanted: Kind) -> float:
+    if text.strip().lower() == RIGID and "stiffness" in wanted.name:
+        return math.inf
+    match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
+    if match is None:
+        raise UnitError(f"it must be {_allowed(wanted)}")
+    number, unit = float(match[1]), match[2]
+    return _finite(number * _factor(unit, wanted) if unit else number, wanted)
+
+
+def _finite(number: float, wanted: Kind) -> float:
+    if not math.isfinite(number):
+        raise UnitError(f"it is not a finite number; write {_allowed(wanted)}")
+    return number
+
+
+def _allowed(wanted: Kind) -> str:
+    rigid = f', or "{RIGID}"' if "stiffness" in wanted.name else ""
+    article = "an" if wanted.name[0] in "aeiou" else "a"
+    return f'{article} {wanted.name} with its unit, e.g. "{wanted.example}"{rigid}, or a bare number in {wanted.unit}'
+
+
+@cache
+def _registry() -> "pint.UnitRegistry[float]":
+    return pint.UnitRegistry()
+
+
+@cache
+def _factor(unit: str, wanted: Kind) -> float:
+    """SI value of one `unit`."""
+    if _UNIT.fullmatch(unit) is None:
+        raise UnitError(f'"{unit}" is not a unit; write {_allowed(wanted)}')
+    try:
+        one = _registry().Quantity(1.0, unit.replace("·", "*")).to_root_units()
+        target = _registry().Quantity(1.0, wanted.unit.replace("·", "*")).to_root_units()
+    except (pint.UndefinedUnitError, pint.OffsetUnitCalculusError, pint.DefinitionSyntaxError):
+        raise UnitError(f'the unit "{unit}" is unknown; write {_allowed(wanted)}') from None
+    turning = wanted.name == "angle"
+    if one.dimensionality != target.dimensionality or (turning and one.units != target.units):
+        raise UnitError(f'"{unit}" is no unit of {wanted.name}; write {_allowed(wanted)}')
+    return float(one.magnitude / target.magnitude)

@@ -1,0 +1,1 @@
+"""Answers as people see them: tables, figures, pages. Computes nothing."""
