@@ -63,11 +63,9 @@ def parse(value: object, kind: str) -> float:
         raise UnitError(f"it is too large; write {_allowed(wanted)}") from None
 
 
-def show(value: float, kind: str, digits: int = 6) -> str:
-    """An SI value as text that `parse` reads back, e.g. "0.22 m"; infinity is "rigid"."""
-    if math.isinf(value):
-        return RIGID
-    return f"{value:.{digits}g} {KINDS[kind].unit}"
+def show(value: float, kind: str) -> str:
+    """An SI value as text, e.g. "0.22 m", that `parse` reads back exactly; infinity is "rigid"."""
+    return RIGID if math.isinf(value) else f"{value!r} {KINDS[kind].unit}"
 
 
 def _parse_text(text: str, wanted: Kind) -> float:

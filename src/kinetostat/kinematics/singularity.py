@@ -24,7 +24,7 @@ def columns(screws: Sequence[Screw], rotational_scale: float, translational_scal
 def conditioning(legs: Sequence[LegScrews], length: float) -> Array:
     """Singular values of W with moments divided by `length` (m), decreasing: their ratio is dimensionless."""
     wrenches = [wrench for leg in legs for wrench in leg.wrenches]
-    return np.linalg.svd(columns(wrenches, 1.0 / length, 1.0), compute_uv=False)
+    return np.asarray(np.linalg.svd(columns(wrenches, 1.0 / length, 1.0), compute_uv=False), dtype=float)
 
 
 def free_twist(legs: Sequence[LegScrews], length: float) -> list[float]:

@@ -1,11 +1,15 @@
 """A leg as (W, G): how it yields when it carries a wrench. One leg at a time; the platform is `assembly`'s."""
 
+from collections.abc import Sequence
+
 from kinetostat.algebra.scalar import Scalar, times, total
 from kinetostat.machine.leg import LegScrews
 
 
-def loads(leg: LegScrews) -> list[list[Scalar]]:
+def loads(leg: LegScrews) -> Sequence[Sequence[Scalar]]:
     """J_e^T W [b x m]: the load in each spring per unit of each wrench the leg carries (principle of virtual work)."""
+    if leg.loads is not None:
+        return leg.loads
     return [[wrench.work(twist) for wrench in leg.wrenches] for twist in leg.elastic]
 
 

@@ -63,6 +63,7 @@ class LegScrews:
         compliance: of each spring (diagonal of S): 0 rigid, infinity free; m/N or rad/(N·m).
         wrenches: basis of what the leg can carry (W): no work on any passive twist.
         regularity: 0 where the passive joints lock up, 1 where they are orthogonal (dimensionless).
+        loads: load in each spring per unit of each wrench (J_e^T W), where the leg type knows it in closed form.
     """
 
     passive: tuple[Twist, ...]
@@ -70,6 +71,7 @@ class LegScrews:
     compliance: tuple[Scalar, ...]
     wrenches: tuple[Wrench, ...]
     regularity: Scalar
+    loads: tuple[tuple[Scalar, ...], ...] | None = None
 
 
 class Leg(Protocol):
@@ -129,6 +131,7 @@ class TwoForceLeg:
             compliance=(reciprocal(self.stiffness),),
             wrenches=(force_along(along, self.platform_joint - reference),),
             regularity=1.0,
+            loads=((1.0,),),
         )
 
 

@@ -1,11 +1,15 @@
 """Files to machines: the bundled ones by name, any other by path, with overrides."""
 
 import difflib
+import json
+import operator
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, reduce
 from importlib import resources
 from pathlib import Path
 from typing import Any
+
+from pydantic import TypeAdapter
 
 from kinetostat.machine.catalogue import families
 from kinetostat.machine.machine import Family, Machine
@@ -13,7 +17,8 @@ from kinetostat.spec import document as documents
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import SECTIONS, quantities
-from kinetostat.spec.validation import file_model, validate
+from kinetostat.spec.validation import SCHEMA_VERSION, file_model, validate
+from kinetostat.units import show
 
 SUFFIX = ".toml"
 
@@ -84,3 +89,38 @@ def _family(name: object, origin: str) -> Family:
     near = difflib.get_close_matches(str(name), known, 1)
     hint = f'did you mean "{near[0]}"?' if near else f"known families: {', '.join(known)}."
     raise InputError(f'"{origin}": family is {shorten(name)}, which is not known; {hint}')
+
+
+def as_toml(machine: Machine) -> str:
+    """A machine file that `load` reads back as the same machine; numbers in SI with their units, all digits."""
+    lines = [
+        f"schema = {SCHEMA_VERSION}",
+        f"name   = {json.dumps(machine.name, ensure_ascii=False)}",
+        f'family = "{machine.family.name}"',
+    ]
+    for name, section in sections_of(machine.family).items():
+        lines += ["", f"[{name}]"]
+        for field, quantity in quantities(section).items():
+            held = getattr(getattr(machine, name), field)
+            texts = [f'"{show(value, quantity.kind)}"' for value in (held if quantity.count else (held,))]
+            written = f"[{', '.join(texts)}]" if quantity.count else texts[0]
+            lines.append(f"{field} = {written}")
+    return "\n".join(lines) + "\n"
+
+
+def template(family: str) -> str:
+    """The text of a commented machine file of a family: a bundled machine to start from.
+
+    Raises:
+        InputError: no such family.
+    """
+    wanted = _family(family, "kinetostat new")
+    return next(text for text in bundled().values() if documents.parse(text, "")["family"] == wanted.name)
+
+
+def machine_schema() -> dict[str, Any]:
+    """The JSON Schema of machine files of every family."""
+    models = [file_model(family.name, sections_of(family)) for family in families().values()]
+    union: Any = reduce(operator.or_, models)
+    schema = TypeAdapter(union).json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "kinetostat machine file", **schema}

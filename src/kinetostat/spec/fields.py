@@ -74,13 +74,18 @@ class Quantity:
     def _read_one(self, value: object, where: str = "") -> float:
         try:
             number = parse(value, self.kind)
-            self._check(number)
+            self.check(number)
         except UnitError as error:
             said = f"{where}{shorten(value)}: " if where else ""
             raise PydanticCustomError("quantity", "{said}{reason}", {"said": said, "reason": str(error)}) from None
         return number
 
-    def _check(self, number: float) -> None:
+    def check(self, number: float) -> None:
+        """Refuse an SI value that is out of bounds.
+
+        Raises:
+            UnitError: with the reason.
+        """
         kind = KINDS[self.kind]
         example = f'e.g. "{kind.example}"'
         if self.stiff and number < 0:

@@ -1,0 +1,348 @@
+"""Traced scalars: run a formula once on them and its arithmetic is left behind as a graph. Compiles nothing.
+
+Equal expressions are one node, constants are folded, and signs move outward, so that what is left is what has to be
+computed. Every rewriting is exact in IEEE arithmetic, infinities and NaN included, up to the sign of a zero.
+"""
+
+import math
+import operator
+from collections.abc import Callable, Iterable
+from typing import Any, NoReturn, TypeAlias
+
+from kinetostat.algebra.scalar import where
+
+Operand: TypeAlias = "Node | float"
+
+COMMUTATIVE = {"add", "mul", "and"}
+
+
+class Node:
+    """One value of a graph: an operation and its operands. Two equal values of one graph are the same object.
+
+    Attributes:
+        operation: "input", "add", "sub", "mul", "div", "neg", "abs", "sqrt", "lt", "le", "and" or "where".
+        operands: nodes and floats; empty for an input.
+        number: position in the graph; operands have smaller ones.
+        fixed: whether it depends on inputs alone that are the same at all points.
+        ordinary: whether it is known to be neither zero nor infinite nor NaN.
+    """
+
+    __slots__ = ("fixed", "graph", "number", "operands", "operation", "ordinary")
+
+    def __init__(
+        self, graph: "Graph", operation: str, operands: tuple[Operand, ...], fixed: bool, ordinary: bool
+    ) -> None:
+        self.graph = graph
+        self.operation = operation
+        self.operands = operands
+        self.number = len(graph.nodes)
+        self.fixed = fixed
+        self.ordinary = ordinary
+        graph.nodes.append(self)
+
+    def __array_namespace__(self) -> "Namespace":
+        return NAMESPACE
+
+    def __bool__(self) -> NoReturn:
+        raise TypeError("a traced value has no truth value; choose with kinetostat.algebra.scalar.where")
+
+
+class Condition(Node):
+    """A traced truth value."""
+
+    __slots__ = ()
+
+    def __and__(self, other: "Condition | bool") -> "Condition | bool":
+        if isinstance(other, Condition):
+            return self if other is self else self.graph.condition("and", self, other)
+        return self if other else False
+
+    __rand__ = __and__
+
+
+class Traced(Node):
+    """A traced number: takes part in arithmetic like a float."""
+
+    __slots__ = ()
+
+    def __add__(self, other: Operand) -> Operand:
+        return _add(self, other)
+
+    def __radd__(self, other: Operand) -> Operand:
+        return _add(other, self)
+
+    def __sub__(self, other: Operand) -> Operand:
+        return _sub(self, other)
+
+    def __rsub__(self, other: Operand) -> Operand:
+        return _sub(other, self)
+
+    def __mul__(self, other: Operand) -> Operand:
+        return _mul(self, other)
+
+    def __rmul__(self, other: Operand) -> Operand:
+        return _mul(other, self)
+
+    def __truediv__(self, other: Operand) -> Operand:
+        return _div(self, other)
+
+    def __rtruediv__(self, other: Operand) -> Operand:
+        return _div(other, self)
+
+    def __neg__(self) -> "Traced":
+        inner = _negated(self)
+        return self.graph.number("neg", self) if inner is None else inner
+
+    def __abs__(self) -> "Traced":
+        inner = self if _negated(self) is None else _negated(self)
+        return inner if inner.operation in {"abs", "sqrt"} else self.graph.number("abs", inner)
+
+    def __lt__(self, other: Operand) -> Condition | bool:
+        return _compare("lt", self, other)
+
+    def __le__(self, other: Operand) -> Condition | bool:
+        return _compare("le", self, other)
+
+    def __gt__(self, other: Operand) -> Condition | bool:
+        return _compare("lt", other, self)
+
+    def __ge__(self, other: Operand) -> Condition | bool:
+        return _compare("le", other, self)
+
+
+class Namespace:
+    """What `__array_namespace__` of a traced value offers."""
+
+    @staticmethod
+    def sqrt(a: Traced) -> Traced:
+        """Square root, NaN for a negative argument."""
+        return a.graph.number("sqrt", a)
+
+    @staticmethod
+    def where(condition: Condition, a: Operand, b: Operand) -> Operand:
+        """`a` where the condition holds, `b` elsewhere."""
+        a, b = _operand(a), _operand(b)
+        if a is b or (isinstance(a, float) and isinstance(b, float) and a == b):
+            return a
+        return condition.graph.number("where", condition, a, b)
+
+    @staticmethod
+    def cos(a: Traced) -> Operand:
+        """Cosine of an angle in rad, see `cos_and_sin`."""
+        return cos_and_sin(a)[0]
+
+    @staticmethod
+    def sin(a: Traced) -> Operand:
+        """Sine of an angle in rad, see `cos_and_sin`."""
+        return cos_and_sin(a)[1]
+
+
+NAMESPACE = Namespace()
+
+
+class Graph:
+    """The arithmetic of a formula.
+
+    Attributes:
+        nodes: all values, operands before what uses them.
+    """
+
+    def __init__(self) -> None:
+        self.nodes: list[Node] = []
+        self._known: dict[tuple[Any, ...], Any] = {}
+
+    def input(self, fixed: bool = False, ordinary: bool = False) -> Traced:
+        """A new input: the same at all points if `fixed`; never zero, infinite or NaN if `ordinary`."""
+        return Traced(self, "input", (), fixed, ordinary)
+
+    def number(self, operation: str, *operands: Operand) -> Traced:
+        """The number that an operation gives."""
+        return self._node(Traced, operation, operands)
+
+    def condition(self, operation: str, *operands: Operand) -> Condition:
+        """The condition that an operation gives."""
+        return self._node(Condition, operation, operands)
+
+    def known(self, operation: str, *operands: Operand) -> Any:
+        """The node of an operation if it has been traced already, else None."""
+        return self._known.get(_key(operation, operands))
+
+    def _node(self, kind: Callable[..., Any], operation: str, operands: tuple[Operand, ...]) -> Any:
+        key = _key(operation, operands)
+        if key not in self._known:
+            fixed = all(isinstance(operand, float) or operand.fixed for operand in operands)
+            self._known[key] = kind(self, operation, operands, fixed, _ordinary(operation, operands))
+        return self._known[key]
+
+
+def needed(results: Iterable[Any]) -> list[Node]:
+    """The nodes that some results need, operands first, each result's in turn: what is used together is near."""
+    order: list[Node] = []
+    seen: set[Node] = set()
+    for result in results:
+        waiting: list[tuple[Any, bool]] = [(result, False)]
+        while waiting:
+            node, ready = waiting.pop()
+            if not isinstance(node, Node) or (node in seen):
+                continue
+            if ready:
+                seen.add(node)
+                order.append(node)
+            else:
+                waiting.append((node, True))
+                waiting.extend((operand, False) for operand in reversed(node.operands))
+    return order
+
+
+def _key(operation: str, operands: tuple[Operand, ...]) -> tuple[Any, ...]:
+    names: list[Any] = [o.number if isinstance(o, Node) else repr(o) for o in operands]
+    if operation in COMMUTATIVE:
+        names.sort(key=str)
+    return operation, *names
+
+
+def _ordinary(operation: str, operands: tuple[Operand, ...]) -> bool:
+    """An ordinary number stays ordinary under a change of sign and in a reciprocal."""
+    last = operands[-1]
+    if operation == "div" and operands[0] != 1.0:
+        return False
+    return operation in {"neg", "abs", "div"} and isinstance(last, Node) and last.ordinary
+
+
+def _operand(a: Any) -> Any:
+    """A number as an operand: any Python or NumPy number is a float."""
+    return a if isinstance(a, Node) else float(a)
+
+
+def _negated(a: Operand) -> Any:
+    """b where `a` is -b by its form, else None."""
+    return a.operands[0] if isinstance(a, Node) and a.operation == "neg" else None
+
+
+def _is(a: Operand, value: float) -> bool:
+    return isinstance(a, float) and a == value
+
+
+def _binary(operation: str, a: Operand, b: Operand) -> Traced:
+    return (a if isinstance(a, Node) else b).graph.number(operation, a, b)  # type: ignore[union-attr]
+
+
+def _add(a: Any, b: Any) -> Any:
+    a, b = _operand(a), _operand(b)
+    if _is(a, 0.0):
+        return b
+    if _is(b, 0.0):
+        return a
+    if (minus := _negated(b)) is not None:
+        return _sub(a, minus)
+    if (minus := _negated(a)) is not None:
+        return _sub(b, minus)
+    return _binary("add", a, b)
+
+
+def _sub(a: Any, b: Any) -> Any:
+    a, b = _operand(a), _operand(b)
+    if _is(b, 0.0):
+        return a
+    if _is(a, 0.0):
+        return -b
+    if (minus := _negated(b)) is not None:
+        return _add(a, minus)
+    if (minus := _negated(a)) is not None:
+        return -_add(minus, b)
+    graph = (a if isinstance(a, Node) else b).graph
+    opposite = graph.known("sub", b, a)
+    return _binary("sub", a, b) if opposite is None else -opposite
+
+
+def _mul(a: Any, b: Any) -> Any:
+    a, b = _operand(a), _operand(b)
+    if isinstance(a, float):
+        a, b = b, a
+    if _is(b, 1.0):
+        return a
+    if isinstance(b, float) and math.copysign(1.0, b) < 0.0:
+        return -_mul(a, -b)
+    if (minus := _negated(a)) is not None:
+        return -_mul(minus, b)
+    if (minus := _negated(b)) is not None:
+        return -_mul(a, minus)
+    return _binary("mul", a, b)
+
+
+def _div(a: Any, b: Any) -> Any:
+    a, b = _operand(a), _operand(b)
+    if _is(b, 1.0):
+        return a
+    if (minus := _negated(a)) is not None:
+        return -_div(minus, b)
+    if (minus := _negated(b)) is not None:
+        return -_div(a, minus)
+    return _binary("div", a, b)
+
+
+_COMPARISONS = {"lt": operator.lt, "le": operator.le}
+
+
+def _compare(operation: str, a: Any, b: Any) -> Condition | bool:
+    a, b = _operand(a), _operand(b)
+    if isinstance(a, Node) and a.ordinary and _is(b, math.inf):
+        return True
+    return (a if isinstance(a, Node) else b).graph.condition(operation, a, b)
+
+
+LARGEST_ANGLE = 1e6
+"""Up to here (rad) the quarter turns taken off an angle fit 20 bits, so that their products with `QUARTER` are exact."""
+QUARTER = (float.fromhex("0x1.921fb544p+0"), float.fromhex("0x1.0b4611a6p-34"), float.fromhex("0x1.3198a2e037073p-69"))
+"""pi / 2 in three parts, the first two of 33 bits (fdlibm, e_rem_pio2.c)."""
+ROUNDING = 1.5 * 2.0**52
+"""Added to a smaller number and taken off again, it leaves the nearest integer."""
+SINE = (
+    -1.66666666666666324348e-01,
+    8.33333333332248946124e-03,
+    -1.98412698298579493134e-04,
+    2.75573137070700676789e-06,
+    -2.50507602534068634195e-08,
+    1.58969099521155010221e-10,
+)
+"""sin r = r + r^3 (SINE[0] + SINE[1] r^2 + ...) for |r| <= pi / 4 (fdlibm, k_sin.c)."""
+COSINE = (
+    4.16666666666666019037e-02,
+    -1.38888888888741095749e-03,
+    2.48015872894767294178e-05,
+    -2.75573143513906633035e-07,
+    2.08757232129817482790e-09,
+    -1.13596475577881948265e-11,
+)
+"""cos r = 1 - r^2 / 2 + r^4 (COSINE[0] + COSINE[1] r^2 + ...) for |r| <= pi / 4 (fdlibm, k_cos.c)."""
+
+
+def cos_and_sin(angle: Any) -> tuple[Any, Any]:
+    """Cosine and sine of an angle (rad, at most `LARGEST_ANGLE`) by arithmetic alone, to two units in the last place.
+
+    Take off the nearest number of quarter turns q, use the series for the rest r, and turn back by q modulo 4.
+    """
+    quarters = _nearest(angle * (2.0 / math.pi))
+    rest = angle
+    for part in QUARTER:
+        rest = rest - quarters * part
+    square = rest * rest
+    sine = rest + rest * square * _polynomial(SINE, square)
+    half = 0.5 * square
+    most = 1.0 - half
+    cosine = most + ((1.0 - most - half) + square * square * _polynomial(COSINE, square))
+    turn = quarters - 4.0 * _nearest(0.25 * quarters)  # -2 to 2
+    odd = (abs(turn) > 0.5) & (abs(turn) < 1.5)
+    sign = where(odd, turn, 1.0 - 0.5 * turn * turn)
+    return sign * where(odd, -sine, cosine), sign * where(odd, cosine, sine)
+
+
+def _nearest(a: Any) -> Any:
+    return (a + ROUNDING) - ROUNDING
+
+
+def _polynomial(coefficients: tuple[float, ...], x: Any) -> Any:
+    result: Any = coefficients[-1]
+    for coefficient in reversed(coefficients[:-1]):
+        result = result * x + coefficient
+    return result

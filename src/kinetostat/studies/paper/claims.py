@@ -1,0 +1,228 @@
+"""The paper's design guidelines (i)-(vii) and its three further facts, each put to the test instead of quoted.
+
+Statements are in our words. Where one holds only in part, the figures say where, and `limits` says why.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.studies.paper.tables import at, coefficients
+
+FREE = (0, 1, 3, 5)
+"""Components that the passive leg leaves free at the reference configuration: rx, ry, x, z."""
+HELD = (2, 4)
+"""Components that it holds: rz, y."""
+NEGLIGIBLE = 1e-12
+"""Relative size below which a coefficient is zero."""
+
+
+class Finding(StrEnum):
+    """What the test of a statement found."""
+
+    HOLDS = "holds"
+    PARTLY = "holds with limits"
+    FAILS = "fails"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the paper and its test.
+
+    Attributes:
+        place: e.g. "Guideline (i)".
+        statement: what it says, in our words.
+        measured: the figures of the test.
+        finding: verdict.
+        limits: where and why it holds only in part.
+    """
+
+    place: str
+    statement: str
+    measured: str
+    finding: Finding
+    limits: str = ""
+
+
+def claims() -> Iterator[Claim]:
+    """All ten, in the paper's order."""
+    yield _nearly_rigid()
+    yield _proportional()
+    yield _only_held_directions()
+    yield _held_by_both()
+    yield _first_link()
+    yield _stiff_enough()
+    yield _largest()
+    yield _link_length()
+    yield _platform_size()
+    yield _nonlinear()
+
+
+def _judge(fully: bool, partly: bool = False) -> Finding:
+    if fully:
+        return Finding.HOLDS
+    return Finding.PARTLY if partly else Finding.FAILS
+
+
+def _nearly_rigid() -> Claim:
+    rigid = np.array(at("stiffness.passive_links=rigid").compliance_diagonal)[list(FREE)]
+    ratios = [10.0**n for n in range(8)]
+    gaps = [
+        float(np.max(np.array(at(f"stiffness.passive_links={1e3 * r}").compliance_diagonal)[list(FREE)] / rigid - 1))
+        for r in ratios
+    ]
+    within = next(r for r, gap in zip(ratios, gaps, strict=True) if gap < 0.01)
+    falling = all(later < earlier for earlier, later in zip(gaps, gaps[1:], strict=False))
+    return Claim(
+        "Guideline (i)",
+        "Stiffer links bring the machine close to the one with rigid links; only at 1e7 times the actuator stiffness "
+        "may it be called rigid.",
+        f"Largest excess of a free direction's compliance over the rigid machine: {gaps[0]:.1%} at ratio 1, "
+        f"{gaps[2]:.2%} at 1e2, {gaps[7]:.0e} at 1e7.",
+        _judge(falling and within == ratios[7], falling and gaps[7] < 0.01),
+        f"It converges as stated, but 1e7 is far on the safe side: in the free directions {within:g} suffices for 1 %.",
+    )
+
+
+def _proportional() -> Claim:
+    here = coefficients()
+    clean = all(here[k][i] <= NEGLIGIBLE for k in ("k52", "k54") for i in FREE)
+    tilted = coefficients("pose.theta5=-50 deg")["k54"][0]
+    return Claim(
+        "Guideline (ii)",
+        "Stiffness is proportional to actuator stiffness and independent of the passive leg, but for the directions "
+        "that the leg constrains.",
+        "Coefficients of k52 and k54 in K_rx, K_ry, K_x, K_z: all zero at the reference pose.",
+        _judge(clean and tilted <= NEGLIGIBLE, clean),
+        f"True in base axes while the platform's pitch is zero. At theta5 = -50 deg the constrained moment tilts and "
+        f"k54 enters K_rx with {tilted:.3g}.",
+    )
+
+
+def _only_held_directions() -> Claim:
+    here = coefficients()
+    touched = {COMPONENTS[i] for k in ("k52", "k54") for i in range(6) if here[k][i] > NEGLIGIBLE}
+    return Claim(
+        "Guideline (iii)",
+        "The stiffness of the passive leg does not enter every direction; its part is to keep the platform to the "
+        "desired motions.",
+        f"Directions with a coefficient of k52 or k54: {', '.join(sorted(touched))}.",
+        _judge(touched == {COMPONENTS[i] for i in HELD}),
+    )
+
+
+def _held_by_both() -> Claim:
+    here = coefficients()
+    figures = "; ".join(
+        f"K_{COMPONENTS[i]} = {here['Ka'][i]:.6g} Ka + {here['k52'][i]:.6g} k52 + {here['k54'][i]:.6g} k54"
+        for i in HELD
+    )
+    return Claim(
+        "Guideline (iv)",
+        "What limits rotation about z and translation along y is actuator stiffness and passive leg stiffness together.",
+        f"{figures}.",
+        _judge(all(here[k][i] > NEGLIGIBLE for k in here for i in HELD)),
+    )
+
+
+def _first_link() -> Claim:
+    here = coefficients()
+    ratios = [here["k52"][i] / here["k54"][i] for i in HELD]
+    return Claim(
+        "Guideline (v)",
+        "The first passive link matters more than the second for holding the constrained directions.",
+        f"Coefficient of k52 over that of k54: {ratios[0]:.4g} in K_rz, {ratios[1]:.4g} in K_y.",
+        _judge(min(ratios) > 1 + 1e-9, max(ratios) > 1 and min(ratios) > 1 - 1e-9),
+        "For rotation about z the first link counts four times as much; along y both count exactly the same. In "
+        "compliance the second link even has the larger share of C_y.",
+    )
+
+
+def _stiff_enough() -> Claim:
+    here = coefficients()
+    shares = {
+        ratio: min(1 - here["Ka"][i] / (here["Ka"][i] + ratio * (here["k52"][i] + here["k54"][i])) for i in HELD)
+        for ratio in (1.0, 10.0, 100.0)
+    }
+    return Claim(
+        "Guideline (vi)",
+        "The passive leg limits rotation about z and translation along y only if it has at least 1e2 times the "
+        "stiffness of an actuator.",
+        f"Least share of the passive leg in K_rz and K_y: {shares[1.0]:.2%} at ratio 1, {shares[10.0]:.2%} at 10, "
+        f"{shares[100.0]:.2%} at 1e2.",
+        _judge(shares[100.0] >= 0.99 > shares[10.0]),
+        "Read as a share of at least 99 %, which 1e2 is the first power of ten to reach.",
+    )
+
+
+def _largest() -> Claim:
+    table = {ratio: at(f"stiffness.passive_links={1e3 * ratio}").stiffness_diagonal for ratio in (1.0, 100.0)}
+    along_z = {ratio: k[5] >= max(k[3:]) for ratio, k in table.items()}
+    about_z = all(k[2] > k[0] for k in table.values())
+    first, stiff = table[1.0], table[100.0]
+    here = coefficients()
+    crossing = (here["Ka"][5] - here["Ka"][4]) / (here["k52"][4] + here["k54"][4])
+    return Claim(
+        "Guideline (vii)",
+        "Stiffness along z is the largest of all, and that about z exceeds that about x.",
+        f"Ratio 1: K_x, K_y, K_z = {first[3]:.4g}, {first[4]:.4g}, {first[5]:.4g} N/m; K_rz / K_rx = "
+        f"{first[2] / first[0]:.3g}. Ratio 1e2: K_y = {stiff[4]:.4g} N/m.",
+        _judge(all(along_z.values()) and about_z, along_z[1.0] and about_z),
+        "Along z it is the largest of the free directions always, but K_y grows with the passive leg and passes it "
+        f"from a ratio of {crossing:.3g} on. Rotational and translational stiffness have different units and are not compared.",
+    )
+
+
+def _link_length() -> Claim:
+    lengths = (0.64, 0.68, 0.72)
+    fixed = _stiffness_over([(f"geometry.passive_links={length}",) for length in lengths])
+    grown = _stiffness_over([(f"geometry.passive_links={length}", f"pose.z={length}") for length in lengths])
+    down_fixed, down_grown = np.diff(fixed, axis=0) < 0, np.diff(grown, axis=0) < 0
+    exceptions = [COMPONENTS[i] for i in range(6) if not down_grown[:, i].all()]
+    return Claim(
+        "Further fact (i)",
+        "For a given platform, longer links make every stiffness smaller.",
+        f"Links 64 to 68 to 72 cm: with z fixed, K falls in {_count(down_fixed[0])} then {_count(down_fixed[1])} of six "
+        f"directions; with z growing alike, in {_count(down_grown.all(axis=0))} of six (not in {', '.join(exceptions)}).",
+        _judge(bool(down_fixed.all() and down_grown.all()), bool(down_fixed[0].all())),
+        "True up to the reference design. Beyond it, at fixed z, the platform pitches and K_rx rises again; with a "
+        "higher machine the legs stand steeper, so that K_ry and K_z rise.",
+    )
+
+
+def _count(flags: object) -> int:
+    return int(np.count_nonzero(flags))
+
+
+def _stiffness_over(settings: list[tuple[str, ...]]) -> npt.NDArray[np.float64]:
+    return np.array([at(*setting).stiffness_diagonal for setting in settings])
+
+
+def _platform_size() -> Claim:
+    found = _stiffness_over([(f"geometry.platform_radius={radius}",) for radius in np.linspace(0.06, 0.18, 13)])
+    steps = np.diff(found, axis=0)
+    up, down = bool((steps[:, :2] > 0).all()), bool((steps[:, [3, 5]] < 0).all())
+    return Claim(
+        "Further fact (ii)",
+        "For given links, a larger platform (within a range) is stiffer about x and y and softer along x and z.",
+        f"Rp from 6 to 18 cm: K_rx {found[0, 0]:.3g} to {found[-1, 0]:.3g}, K_ry {found[0, 1]:.3g} to "
+        f"{found[-1, 1]:.3g} N·m/rad; K_x {found[0, 3]:.4g} to {found[-1, 3]:.4g}, K_z {found[0, 5]:.4g} to "
+        f"{found[-1, 5]:.4g} N/m, all without a turn.",
+        _judge(up and down),
+    )
+
+
+def _nonlinear() -> Claim:
+    found = _stiffness_over([(f"geometry.platform_radius={radius}",) for radius in (0.06, 0.12, 0.18)])
+    bend = np.abs(found[0] - 2 * found[1] + found[2]) / np.abs(found[2] - found[0])
+    return Claim(
+        "Further fact (iii)",
+        "Stiffness depends on the structural parameters nonlinearly, so that optimising them makes sense.",
+        f"Second difference over the change of K for Rp = 6, 12, 18 cm: {bend.min():.2f} to {bend.max():.2f} "
+        "(a linear law gives 0).",
+        _judge(bool(bend.min() > 0.01)),
+    )

@@ -1,0 +1,148 @@
+"""Equations 1-32 by a second route: the paper's own matrices A, B, J and J' in NumPy, against this program's (W, G).
+
+Each check is a statement that must vanish, its residual, and the tolerance with its reason.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.kinetostatics.assembly import flexible_stiffness
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.leg import SerialLeg, TwoForceLeg
+from kinetostat.machine.library import load
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import values, with_values
+from kinetostat.studies.paper import printed
+
+Array = npt.NDArray[np.float64]
+
+STEP = 1e-6
+"""Of central differences, rad and m: error about step² + rounding/step."""
+DIFFERENCE = 1e-8
+"""Tolerance of a central difference with that step."""
+EXACT = 1e-11
+"""Tolerance of two algebraic routes in float64 at condition numbers near 100."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One equation of the paper, tested numerically.
+
+    Attributes:
+        equation: its number(s).
+        statement: what is tested, in our words.
+        residual: relative; should vanish.
+        tolerance: what it may be.
+    """
+
+    equation: str
+    statement: str
+    residual: float
+    tolerance: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the residual is within the tolerance."""
+        return self.residual <= self.tolerance
+
+
+def derivation() -> Iterator[Check]:
+    """The chain of equations at the reference configuration, in the paper's order."""
+    machine = load(printed.MACHINE)
+    response = respond(machine)
+    a, b, jacobian, virtual = _matrices(response)
+    rates, lengths_rate, twist = _velocities(machine)
+    yield Check("1-4", "A t = B rho', leg rates by differences", _off(a @ twist, b @ lengths_rate), DIFFERENCE)
+    yield Check("7", "t = J theta', passive joint rates by differences", _off(jacobian @ rates, twist), DIFFERENCE)
+    aj = a @ jacobian
+    load_on_tool = np.array([0.3, -0.2, 0.5, 4.0, -3.0, 7.0])
+    forces = b.T @ np.linalg.solve(aj.T, jacobian.T @ load_on_tool)
+    work = forces @ np.linalg.solve(b, aj), load_on_tool @ jacobian
+    yield Check("5-11", "actuator forces do the work of the wrench on every feasible twist", _off(*work), EXACT)
+    actuator = np.eye(4) / printed.ACTUATOR
+    inner = np.linalg.solve(aj, b)
+    rigid = jacobian @ inner @ actuator @ inner.T @ jacobian.T
+    ours = _rows(respond(load(printed.MACHINE, ["stiffness.passive_links=rigid"])).compliance)
+    yield Check("12-21", "C of the rigid machine equals W^-T G W^-1", _off(rigid, ours), EXACT)
+    deflection = ours @ load_on_tool
+    yield Check("13, 16, 22", "C w deflects the actuators by C tau", _off(a @ deflection, b @ actuator @ forces), EXACT)
+    values_of_c = np.linalg.eigvalsh(ours)
+    yield Check(
+        "21", "C of the rigid machine has rank 4 and no negative eigenvalue", _rank_excess(values_of_c, 4), EXACT
+    )
+    full = np.hstack([jacobian, virtual])
+    springs = np.diag([0.0] * 4 + [1000.0, 1000.0])
+    back = np.linalg.inv(full)
+    stiffness = (
+        back.T @ springs @ back + a.T @ np.linalg.inv(b).T @ (printed.ACTUATOR * np.eye(4)) @ np.linalg.inv(b) @ a
+    )
+    ours_k, ours_c = _rows(response.stiffness), _rows(response.compliance)
+    yield Check("23-32", "K of the flexible machine equals sum of W G^-1 W^T", _off(stiffness, ours_k), EXACT)
+    yield Check("32", "K by springs equals K by legs", _off(_rows(flexible_stiffness(response.legs)), ours_k), EXACT)
+    yield Check("22, 31", "K C = 1 for the flexible machine", float(np.abs(ours_k @ ours_c - np.eye(6)).max()), EXACT)
+
+
+def _rows(matrix: Symmetric6) -> Array:
+    return np.array(matrix.rows())
+
+
+def _off(found: Array, expected: Array) -> float:
+    return float(np.abs(found - expected).max() / np.abs(expected).max())
+
+
+def _rank_excess(eigenvalues: Array, rank: int) -> float:
+    """Zero where just `rank` eigenvalues are positive and the rest vanish beside them."""
+    ordered = np.sort(eigenvalues)
+    rest, least = np.abs(ordered[: 6 - rank]).max(), ordered[6 - rank]
+    return float(rest / ordered[-1]) if least > 0 else math.inf
+
+
+def _matrices(response: Response) -> tuple[Array, Array, Array, Array]:
+    """A [4 x 6], B [4 x 4] (eqs. 3, 4), J [6 x 4] and the columns of J' for the virtual joints [6 x 2]."""
+    reference = np.array(response.configuration.platform.translation.components())
+    a, lengths = [], []
+    for leg in response.configuration.legs:
+        if isinstance(leg, TwoForceLeg):
+            joint, foot = np.array(leg.platform_joint.components()), np.array(leg.base_joint.components())
+            a.append(np.concatenate([np.cross(joint - reference, joint - foot), joint - foot]))
+            lengths.append(np.linalg.norm(joint - foot))
+    passive = response.legs[0]
+    jacobian = np.array([twist.components() for twist in passive.passive]).T
+    virtual = np.array([twist.components() for twist in passive.elastic]).T
+    return np.array(a), np.diag(lengths), jacobian, virtual
+
+
+def _velocities(machine: Machine) -> tuple[Array, Array, Array]:
+    """Passive joint rates, leg rates and platform twist along one motion of the task coordinates, by differences."""
+    motion = {"pose.x": 0.02, "pose.z": -0.03, "pose.theta5": 0.05, "pose.theta6": -0.04}
+    states = []
+    for sign in (1.0, -1.0):
+        moved = {path: values(machine)[path] + sign * STEP * rate for path, rate in motion.items()}
+        states.append(respond(with_values(machine, moved)))
+    ahead, behind = (_state(response) for response in states)
+    angles, lengths, position = ((p - q) / (2 * STEP) for p, q in zip(ahead[:3], behind[:3], strict=True))
+    spin = (ahead[3] @ behind[3].T - behind[3] @ ahead[3].T) / (4 * STEP)
+    return angles, lengths, np.concatenate([[spin[2, 1], spin[0, 2], spin[1, 0]], position])
+
+
+def _state(response: Response) -> tuple[Array, Array, Array, Array]:
+    """Passive joint angles, leg lengths, P and Q of a configuration."""
+    configuration = response.configuration
+    _, b, _, _ = _matrices(response)
+    passive = cast(SerialLeg, configuration.legs[0])
+    points = [np.array(joint.point.components()) for joint in passive.passive if joint.point is not None]
+    lower, upper = points[1] - points[0], points[2] - points[1]
+    turn = configuration.platform.rotation
+    rotation = np.array([axis.components() for axis in (turn.x, turn.y, turn.z)]).T
+    first = -math.atan2(lower[2], lower[0])
+    second = -math.atan2(upper[2], upper[0]) - first
+    pitch = math.atan2(-rotation[2, 0], rotation[0, 0])
+    roll = math.atan2(-rotation[1, 2], rotation[1, 1])
+    angles = np.array([first, second, pitch - first - second, roll])
+    return angles, np.diag(b).copy(), np.array(configuration.platform.translation.components()), rotation

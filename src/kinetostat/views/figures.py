@@ -1,0 +1,190 @@
+"""Figures for print: contour maps and curves of a dataset from `studies.grid`. Every axis has its unit."""
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from kinetostat.studies.grid import failures
+from kinetostat.studies.storage import replacing
+from kinetostat.views.display import Scale, coordinate_scale, prefixed_scale
+
+STYLE: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8.0,
+    "axes.titlesize": 9.0,
+    "axes.labelsize": 8.0,
+    "axes.linewidth": 0.6,
+    "axes.edgecolor": "#444444",
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.5,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "lines.linewidth": 1.6,
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "kinetostat",
+    "pdf.fonttype": 42,
+    "figure.dpi": 200,
+}
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""Okabe and Ito: distinct for colour-blind readers and in grey."""
+DASHES = ("-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
+LEVELS = 12
+FLAT = 1e-9
+"""Relative spread below which a map is constant and has no contours."""
+
+Array = npt.NDArray[np.float64]
+
+
+def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
+    """One panel per quantity over the two dimensions of the dataset, contours labelled with their values.
+
+    Args:
+        dataset: two-dimensional, from `studies.grid.evaluate_grid`.
+        names: which quantities.
+        title: over the whole figure.
+    """
+    across, up = dataset["status"].dims
+    columns = min(3, len(names))
+    rows = -(-len(names) // columns)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(2.75 * columns + 0.3, 2.45 * rows + 0.4), layout="constrained")
+        panels = figure.subplots(rows, columns, squeeze=False).flat
+        x, x_label = _coordinate(dataset, str(across))
+        y, y_label = _coordinate(dataset, str(up))
+        for panel, name in zip(panels, names, strict=False):
+            _contour_panel(panel, x, y, dataset[name].transpose(up, across))
+            panel.set(xlabel=x_label, ylabel=y_label)
+            _axis_scales(panel, dataset, str(across), str(up))
+        for unused in list(figure.axes)[len(names) : rows * columns]:
+            unused.remove()
+        figure.suptitle(title, fontsize=10)
+        _note_failures(figure, dataset)
+        _fix_layout(figure)
+    return figure
+
+
+def curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
+    """Quantities over the one dimension of the dataset, one panel for each unit; logarithmic where the range is.
+
+    Args:
+        dataset: one-dimensional, from `studies.grid.evaluate_grid`.
+        names: which quantities.
+        title: over the whole figure.
+    """
+    (across,) = dataset["status"].dims
+    units = list(dict.fromkeys(dataset[name].attrs["units"] for name in names))
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(3.4 * len(units) + 0.2, 3.0), layout="constrained")
+        for panel, unit in zip(figure.subplots(1, len(units), squeeze=False).flat, units, strict=True):
+            shown = [name for name in names if dataset[name].attrs["units"] == unit]
+            _curve_panel(panel, dataset, str(across), shown)
+        figure.suptitle(title, fontsize=10)
+        _note_failures(figure, dataset)
+        _fix_layout(figure)
+    return figure
+
+
+def save(figure: Figure, stem: Path) -> list[Path]:
+    """Write a figure as PNG (200 dpi), SVG and PDF beside each other; returns the paths."""
+    paths = [stem.with_name(f"{stem.name}.{suffix}") for suffix in ("png", "svg", "pdf")]
+    for path in paths:
+        dateless: Any = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[path.suffix[1:]]
+        with replacing(path) as temporary, mpl.rc_context(STYLE):
+            figure.savefig(temporary, metadata=dateless)
+    return paths
+
+
+def as_svg(figure: Figure) -> str:
+    """A figure as one SVG element, to stand inside a page."""
+    text = io.StringIO()
+    with mpl.rc_context({**STYLE, "svg.fonttype": "path"}):
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    return text.getvalue()[text.getvalue().index("<svg") :]
+
+
+def _fix_layout(figure: Figure) -> None:
+    """Lay out once, not again for each file format."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+
+
+def _note_failures(figure: Figure, dataset: xr.Dataset) -> None:
+    counts = [f"{status.word.replace('_', ' ')}: {count:,}" for status, count in failures(dataset).items()]
+    if counts:
+        text = f"no result at {', '.join(counts)} of {dataset['status'].size:,} poses"
+        figure.supxlabel(text, fontsize=7, color="#555555")
+
+
+def _coordinate(dataset: xr.Dataset, name: str) -> tuple[Array, str]:
+    coordinate = dataset[name]
+    scale = coordinate_scale(coordinate.attrs["kind"], coordinate.attrs["units"], coordinate.values)
+    return coordinate.values * scale.factor, scale.label(_plain(name))
+
+
+def _plain(path: str) -> str:
+    """A path as an axis label: "pose.x" to "x", "stiffness.passive_links" to "stiffness: passive links"."""
+    section, _, field = path.partition(".")
+    words = field.replace("_", " ").replace(".", " ")
+    return words if section == "pose" else f"{section}: {words}"
+
+
+def _axis_scales(panel: Axes, dataset: xr.Dataset, across: str, up: str) -> None:
+    lengths = [dataset[name].attrs["kind"] == "length" for name in (across, up)]
+    spans = [np.ptp(dataset[name].values) for name in (across, up)]
+    if all(lengths) and 0.5 < spans[0] / spans[1] < 2.0:
+        panel.set_aspect("equal")
+    if dataset[across].attrs["log"]:
+        panel.set_xscale("log")
+    if dataset[up].attrs["log"]:
+        panel.set_yscale("log")
+
+
+def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray) -> None:
+    scale = prefixed_scale(data.attrs["units"], data.values)
+    values = np.ma.masked_invalid(data.values * scale.factor)
+    panel.set_title(scale.label(data.attrs["symbol"]))
+    panel.set_facecolor("#eeeeee")
+    panel.grid(visible=False)
+    panel.set(xlim=(x.min(), x.max()), ylim=(y.min(), y.max()))
+    if values.count() == 0:
+        _note(panel, "no value here")
+    elif np.ptp(values.compressed()) <= FLAT * np.abs(values).max():
+        panel.set_facecolor("#b5dbe3")
+        _note(panel, f"constant: {values.compressed()[0]:.6g} {scale.unit}")
+    else:
+        filled = panel.contourf(x, y, values, LEVELS, cmap="viridis")
+        lines = panel.contour(filled, levels=np.asarray(filled.levels)[::2], colors="white", linewidths=0.5)
+        panel.clabel(lines, fontsize=6, fmt="%.6g")
+        colour_bar = panel.figure.colorbar(filled, ax=panel, shrink=0.85, pad=0.03)
+        colour_bar.outline.set_linewidth(0.4)
+        colour_bar.ax.tick_params(labelsize=6.5, width=0.4)
+
+
+def _note(panel: Axes, text: str) -> None:
+    panel.text(0.5, 0.5, text, transform=panel.transAxes, ha="center", va="center", fontsize=7.5)
+
+
+def _curve_panel(panel: Axes, dataset: xr.Dataset, across: str, names: Sequence[str]) -> None:
+    x, x_label = _coordinate(dataset, across)
+    logarithmic = bool(dataset[across].attrs["log"])
+    values = np.concatenate([dataset[name].values for name in names])
+    unit = dataset[names[0]].attrs["units"]
+    scale = Scale(1.0, unit) if logarithmic else prefixed_scale(unit, values)
+    for name, colour, dash in zip(names, COLOURS, DASHES, strict=False):
+        panel.plot(x, dataset[name].values * scale.factor, dash, color=colour, label=dataset[name].attrs["symbol"])
+    if logarithmic:
+        panel.set(xscale="log", yscale="log" if np.nanmin(values) > 0 else "linear")
+    panel.set(xlabel=x_label, ylabel=scale.label(names[0].split("_")[0]))
+    panel.margins(x=0.0)
+    panel.legend(loc="best")

@@ -1,0 +1,153 @@
+"""Answers as tables on a terminal, with units. Nothing is computed here but rounding and percent."""
+
+import math
+import sys
+from collections.abc import Sequence
+
+import xarray as xr
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.machine.catalogue import families
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import parameters, values
+from kinetostat.studies.analysis import Analysis, Rows
+from kinetostat.studies.grid import failures
+from kinetostat.units import show
+
+Number = float | None
+
+UNITS_OF_K = "N·m/rad, N/rad, N/m"
+UNITS_OF_C = "rad/(N·m), rad/N, m/N"
+
+
+def print_machines(console: Console, bundled: Sequence[Machine], names: Sequence[str]) -> None:
+    """The bundled machines, and the families a file can name."""
+    table = _table("Bundled machines", "name", "machine", "family")
+    for name, machine in zip(names, bundled, strict=True):
+        table.add_row(name, machine.name, machine.family.name)
+    console.print(table)
+    table = _table("Families (kinetostat new FAMILY prints a commented file)", "family", "machine")
+    for family in families().values():
+        table.add_row(family.name, family.summary)
+    console.print(table)
+
+
+def print_machine(console: Console, machine: Machine) -> None:
+    """Every value of a machine with its meaning."""
+    table = _table(f"{machine.name} ({machine.family.name})", "field", "value", "meaning")
+    held = values(machine)
+    for parameter in parameters(machine.family):
+        if len(parameter.leaves) == 1 and parameter.leaves[0] in held:
+            value = held[parameter.leaves[0]]
+            table.add_row(
+                parameter.path, show(float(f"{value:.10g}"), parameter.quantity.kind), parameter.quantity.meaning
+            )
+    console.print(table)
+
+
+def print_analysis(console: Console, analysis: Analysis) -> None:
+    """K, C, attribution and indices at one pose."""
+    console.print(f"[bold]{analysis.machine.name}[/bold]  {analysis.status.word}")
+    console.print(analysis.message, highlight=False)
+    console.print(f"Components rx ry rz x y z at the platform point P, base axes. Rank {analysis.rank}.", style="dim")
+    _print_matrix(console, "Stiffness K", UNITS_OF_K, analysis.stiffness, analysis.stiffness_diagonal, "rigid")
+    _print_matrix(console, "Compliance C", UNITS_OF_C, analysis.compliance, analysis.compliance_diagonal, "free")
+    _print_shares(console, analysis)
+    _print_indices(console, analysis)
+
+
+def print_dataset(console: Console, dataset: xr.Dataset, names: Sequence[str]) -> None:
+    """A one-dimensional dataset as a table; of a larger one, the extremes of each quantity."""
+    if len(dataset["status"].dims) == 1 and dataset["status"].size <= 60:
+        _print_curve(console, dataset, names)
+    else:
+        _print_extremes(console, dataset, names)
+    for status, count in failures(dataset).items():
+        console.print(f"{count:,} of {dataset['status'].size:,} points: {status.word}. {status.sentence}")
+
+
+def terminal() -> Console:
+    """The console of this process: as wide as the terminal, wide enough for six columns where there is none."""
+    return Console() if sys.stdout.isatty() else Console(width=100)
+
+
+def number(value: Number, endless: str = "∞") -> str:
+    """A number for a table: at most ten characters, a word where it is infinite, a dash where there is none."""
+    if value is None or math.isnan(value):
+        return "–"
+    if math.isinf(value):
+        return endless
+    return f"{value:.6g}" if value == 0.0 or 1e-2 <= abs(value) < 1e6 else f"{value:.4g}"
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="left" if i == 0 else "default")
+    return table
+
+
+def _numeric(title: str, first: str, columns: Sequence[str]) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column(first, no_wrap=True)
+    for column in columns:
+        table.add_column(column, justify="right", no_wrap=True)
+    return table
+
+
+def _print_matrix(
+    console: Console, title: str, units: str, rows: Rows | None, diagonal: Sequence[float], endless: str
+) -> None:
+    table = _numeric(f"{title} ({units})", "", COMPONENTS)
+    if rows is None:
+        table.add_row("diagonal", *(number(value, endless) for value in diagonal))
+    else:
+        for name, row in zip(COMPONENTS, rows, strict=True):
+            table.add_row(name, *(number(value) for value in row))
+    console.print(table)
+
+
+def _print_shares(console: Console, analysis: Analysis) -> None:
+    table = _numeric("Attribution: share of each spring in the diagonal of C", "spring", COMPONENTS)
+    for share in analysis.shares:
+        table.add_row(share.name, *("–" if part is None else f"{100 * part:.1f} %" for part in share.compliance))
+    console.print(table)
+
+
+def _print_indices(console: Console, analysis: Analysis) -> None:
+    table = _numeric("Principal compliances", "", ["least", "middle", "largest", "softest direction"])
+    for unit, found in zip(("rad/(N·m)", "m/N"), (analysis.principal or {}).values(), strict=False):
+        direction = " ".join(f"{component:+.3f}" for component in found.directions[-1])
+        table.add_row(unit, *(number(value) for value in found.compliances), direction)
+    if table.row_count:
+        console.print(table)
+    console.print(
+        f"Condition of the leg wrenches: {number(analysis.condition)} "
+        f"(moments divided by the characteristic length {number(analysis.length)} m)",
+        highlight=False,
+    )
+
+
+def _print_curve(console: Console, dataset: xr.Dataset, names: Sequence[str]) -> None:
+    (across,) = dataset["status"].dims
+    coordinate = dataset[across]
+    title = f"{dataset.attrs['machine']}: {', '.join(dict.fromkeys(name.split('_')[0] for name in names))}"
+    heads = [f"{name.split('_', 1)[-1]}\n{QUANTITIES[name].unit}" for name in names]
+    table = _numeric(title, f"{across}\n{coordinate.attrs['units']}", heads)
+    for i, value in enumerate(coordinate.values):
+        table.add_row(number(float(value)), *(number(float(dataset[name].values[i])) for name in names))
+    console.print(table)
+
+
+def _print_extremes(console: Console, dataset: xr.Dataset, names: Sequence[str]) -> None:
+    size = " x ".join(f"{dataset.sizes[dim]} {dim}" for dim in dataset["status"].dims)
+    table = _numeric(f"{dataset.attrs['machine']}: {size}", "quantity", ["unit", "least", "mean", "largest"])
+    for name in names:
+        data = dataset[name]
+        statistics = (float(data.min()), float(data.mean()), float(data.max()))
+        table.add_row(name, data.attrs["units"], *(number(value) for value in statistics))
+    console.print(table)
