@@ -282,7 +282,7 @@ def _show_grid(dataset: "xr.Dataset", as_json: bool, written: Sequence[Path]) ->
 
 
 def _reproduce(options: argparse.Namespace) -> int:
-    from kinetostat.studies.paper import reproduce
+    from kinetostat.studies.paper.reproduction import reproduce
     from kinetostat.views.paper import print_summary, write_all
     from kinetostat.views.progress import progress_bar
 

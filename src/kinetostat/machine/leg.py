@@ -75,7 +75,7 @@ class LegScrews:
 
 
 class Leg(Protocol):
-    """A leg type: geometry that can be moved and turned into screws. A new one needs these two methods."""
+    """A leg type: geometry that can be moved and turned into screws. A new one needs these members."""
 
     @property
     def name(self) -> str:
@@ -84,6 +84,10 @@ class Leg(Protocol):
     @property
     def springs(self) -> tuple[Spring, ...]:
         """Its elastic coordinates."""
+
+    @property
+    def path(self) -> tuple[Vector, ...]:
+        """Its joint centres from base to platform, base frame, m: what a drawing connects."""
 
     def displaced(self, motion: Displacement) -> "Leg":
         """The leg after a rigid displacement of the whole machine."""
@@ -111,6 +115,11 @@ class TwoForceLeg:
     def springs(self) -> tuple[Spring, ...]:
         """The actuator."""
         return (Spring(f"{self.name} actuator", Joint(self._direction()), self.stiffness),)
+
+    @property
+    def path(self) -> tuple[Vector, ...]:
+        """Its two joint centres, base frame, m."""
+        return self.base_joint, self.platform_joint
 
     def _direction(self) -> Vector:
         line = self.platform_joint - self.base_joint
@@ -148,6 +157,11 @@ class SerialLeg:
     name: str
     passive: tuple[Joint, ...]
     springs: tuple[Spring, ...]
+
+    @property
+    def path(self) -> tuple[Vector, ...]:
+        """The centres of its passive revolutes in order, base frame, m."""
+        return tuple(joint.point for joint in self.passive if joint.point is not None)
 
     def displaced(self, motion: Displacement) -> "SerialLeg":
         """The leg after a rigid displacement of the whole machine."""

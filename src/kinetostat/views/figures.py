@@ -70,7 +70,7 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
             unused.remove()
         figure.suptitle(title, fontsize=10)
         _note_failures(figure, dataset)
-        _fix_layout(figure)
+        fix_layout(figure)
     return figure
 
 
@@ -91,7 +91,7 @@ def curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
             _curve_panel(panel, dataset, str(across), shown)
         figure.suptitle(title, fontsize=10)
         _note_failures(figure, dataset)
-        _fix_layout(figure)
+        fix_layout(figure)
     return figure
 
 
@@ -113,7 +113,7 @@ def as_svg(figure: Figure) -> str:
     return text.getvalue()[text.getvalue().index("<svg") :]
 
 
-def _fix_layout(figure: Figure) -> None:
+def fix_layout(figure: Figure) -> None:
     """Lay out once, not again for each file format."""
     figure.draw_without_rendering()
     figure.set_layout_engine("none")

@@ -26,11 +26,11 @@ UNITS_OF_C = "rad/(N·m), rad/N, m/N"
 
 def print_machines(console: Console, bundled: Sequence[Machine], names: Sequence[str]) -> None:
     """The bundled machines, and the families a file can name."""
-    table = _table("Bundled machines", "name", "machine", "family")
+    table = text_table("Bundled machines", "name", "machine", "family")
     for name, machine in zip(names, bundled, strict=True):
         table.add_row(name, machine.name, machine.family.name)
     console.print(table)
-    table = _table("Families (kinetostat new FAMILY prints a commented file)", "family", "machine")
+    table = text_table("Families (kinetostat new FAMILY prints a commented file)", "family", "machine")
     for family in families().values():
         table.add_row(family.name, family.summary)
     console.print(table)
@@ -38,7 +38,7 @@ def print_machines(console: Console, bundled: Sequence[Machine], names: Sequence
 
 def print_machine(console: Console, machine: Machine) -> None:
     """Every value of a machine with its meaning."""
-    table = _table(f"{machine.name} ({machine.family.name})", "field", "value", "meaning")
+    table = text_table(f"{machine.name} ({machine.family.name})", "field", "value", "meaning")
     held = values(machine)
     for parameter in parameters(machine.family):
         if len(parameter.leaves) == 1 and parameter.leaves[0] in held:
@@ -84,7 +84,8 @@ def number(value: Number, endless: str = "∞") -> str:
     return f"{value:.6g}" if value == 0.0 or 1e-2 <= abs(value) < 1e6 else f"{value:.4g}"
 
 
-def _table(title: str, *columns: str) -> Table:
+def text_table(title: str, *columns: str) -> Table:
+    """A table without rules between its rows."""
     table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
     for i, column in enumerate(columns):
         table.add_column(column, justify="left" if i == 0 else "default")

@@ -6,6 +6,8 @@ Statements are in our words. Where one holds only in part, the figures say where
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -76,7 +78,7 @@ def _nearly_rigid() -> Claim:
         for r in ratios
     ]
     within = next(r for r, gap in zip(ratios, gaps, strict=True) if gap < 0.01)
-    falling = all(later < earlier for earlier, later in zip(gaps, gaps[1:], strict=False))
+    falling = all(later < earlier for earlier, later in pairwise(gaps))
     return Claim(
         "Guideline (i)",
         "Stiffer links bring the machine close to the one with rigid links; only at 1e7 times the actuator stiffness "
@@ -118,12 +120,11 @@ def _only_held_directions() -> Claim:
 def _held_by_both() -> Claim:
     here = coefficients()
     figures = "; ".join(
-        f"K_{COMPONENTS[i]} = {here['Ka'][i]:.6g} Ka + {here['k52'][i]:.6g} k52 + {here['k54'][i]:.6g} k54"
-        for i in HELD
+        f"K_{COMPONENTS[i]} = " + " + ".join(f"{factor[i]:.6g} {name}" for name, factor in here.items()) for i in HELD
     )
     return Claim(
         "Guideline (iv)",
-        "What limits rotation about z and translation along y is actuator stiffness and passive leg stiffness together.",
+        "Actuator stiffness and passive leg stiffness together limit rotation about z and translation along y.",
         f"{figures}.",
         _judge(all(here[k][i] > NEGLIGIBLE for k in here for i in HELD)),
     )
@@ -173,7 +174,8 @@ def _largest() -> Claim:
         f"{first[2] / first[0]:.3g}. Ratio 1e2: K_y = {stiff[4]:.4g} N/m.",
         _judge(all(along_z.values()) and about_z, along_z[1.0] and about_z),
         "Along z it is the largest of the free directions always, but K_y grows with the passive leg and passes it "
-        f"from a ratio of {crossing:.3g} on. Rotational and translational stiffness have different units and are not compared.",
+        f"from a ratio of {crossing:.3g} on. Rotational and translational stiffness have different units and cannot be "
+        "compared.",
     )
 
 
@@ -186,15 +188,15 @@ def _link_length() -> Claim:
     return Claim(
         "Further fact (i)",
         "For a given platform, longer links make every stiffness smaller.",
-        f"Links 64 to 68 to 72 cm: with z fixed, K falls in {_count(down_fixed[0])} then {_count(down_fixed[1])} of six "
-        f"directions; with z growing alike, in {_count(down_grown.all(axis=0))} of six (not in {', '.join(exceptions)}).",
+        f"Links 64 to 68 to 72 cm: with z fixed, K falls in {_count(down_fixed[0])} then {_count(down_fixed[1])} of "
+        f"six directions; with z growing alike, in {6 - len(exceptions)} of six (not in {', '.join(exceptions)}).",
         _judge(bool(down_fixed.all() and down_grown.all()), bool(down_fixed[0].all())),
         "True up to the reference design. Beyond it, at fixed z, the platform pitches and K_rx rises again; with a "
         "higher machine the legs stand steeper, so that K_ry and K_z rise.",
     )
 
 
-def _count(flags: object) -> int:
+def _count(flags: npt.NDArray[Any]) -> int:
     return int(np.count_nonzero(flags))
 
 
@@ -203,16 +205,17 @@ def _stiffness_over(settings: list[tuple[str, ...]]) -> npt.NDArray[np.float64]:
 
 
 def _platform_size() -> Claim:
-    found = _stiffness_over([(f"geometry.platform_radius={radius}",) for radius in np.linspace(0.06, 0.18, 13)])
+    found = _stiffness_over([(f"geometry.platform_radius={radius}",) for radius in np.linspace(0.07, 0.18, 12)])
     steps = np.diff(found, axis=0)
     up, down = bool((steps[:, :2] > 0).all()), bool((steps[:, [3, 5]] < 0).all())
     return Claim(
         "Further fact (ii)",
         "For given links, a larger platform (within a range) is stiffer about x and y and softer along x and z.",
-        f"Rp from 6 to 18 cm: K_rx {found[0, 0]:.3g} to {found[-1, 0]:.3g}, K_ry {found[0, 1]:.3g} to "
+        f"Rp from 7 to 18 cm: K_rx {found[0, 0]:.3g} to {found[-1, 0]:.3g}, K_ry {found[0, 1]:.3g} to "
         f"{found[-1, 1]:.3g} N·m/rad; K_x {found[0, 3]:.4g} to {found[-1, 3]:.4g}, K_z {found[0, 5]:.4g} to "
         f"{found[-1, 5]:.4g} N/m, all without a turn.",
         _judge(up and down),
+        "The range: below 7 cm K_z turns, above 19 cm K_x does.",
     )
 
 

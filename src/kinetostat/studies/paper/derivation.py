@@ -6,7 +6,7 @@ Each check is a statement that must vanish, its residual, and the tolerance with
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -73,9 +73,7 @@ def derivation() -> Iterator[Check]:
     deflection = ours @ load_on_tool
     yield Check("13, 16, 22", "C w deflects the actuators by C tau", _off(a @ deflection, b @ actuator @ forces), EXACT)
     values_of_c = np.linalg.eigvalsh(ours)
-    yield Check(
-        "21", "C of the rigid machine has rank 4 and no negative eigenvalue", _rank_excess(values_of_c, 4), EXACT
-    )
+    yield Check("21", "rigid machine: C has rank 4, no eigenvalue below 0", _rank_excess(values_of_c, 4), EXACT)
     full = np.hstack([jacobian, virtual])
     springs = np.diag([0.0] * 4 + [1000.0, 1000.0])
     back = np.linalg.inv(full)
@@ -96,7 +94,7 @@ def _off(found: Array, expected: Array) -> float:
     return float(np.abs(found - expected).max() / np.abs(expected).max())
 
 
-def _rank_excess(eigenvalues: Array, rank: int) -> float:
+def _rank_excess(eigenvalues: npt.NDArray[Any], rank: int) -> float:
     """Zero where just `rank` eigenvalues are positive and the rest vanish beside them."""
     ordered = np.sort(eigenvalues)
     rest, least = np.abs(ordered[: 6 - rank]).max(), ordered[6 - rank]

@@ -1,0 +1,66 @@
+"""A machine at its pose in three views: front, side and plan. Geometry is the configuration's, styles are here."""
+
+import math
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from kinetostat.algebra.vector import Vector
+from kinetostat.machine.leg import Leg
+from kinetostat.machine.machine import Configuration
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout
+
+VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
+MILLIMETRES = 1e3
+LEG, CONSTRAINT, PLATE = COLOURS[0], COLOURS[1], "#555555"
+
+Loop = list[Vector]
+
+
+def three_views(configuration: Configuration, title: str) -> Figure:
+    """Front, side and plan of a machine, to scale, in mm; actuated legs blue, passive legs orange."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.6, 3.3), layout="constrained")
+        for panel, (name, across, up) in zip(figure.subplots(1, 3), VIEWS, strict=True):
+            _draw_view(panel, configuration, across, up)
+            panel.set(title=name, xlabel=f"{across} (mm)", ylabel=f"{up} (mm)", aspect="equal")
+            panel.margins(0.08)
+        figure.suptitle(title, fontsize=10)
+        fix_layout(figure)
+    return figure
+
+
+def _draw_view(panel: Axes, configuration: Configuration, across: str, up: str) -> None:
+    reference = configuration.platform.translation
+    actuated = [leg for leg in configuration.legs if len(leg.path) == 2]
+    for plate in (_loop([leg.path[0] for leg in actuated]), _loop([leg.path[-1] for leg in actuated])):
+        panel.fill(*_flat(plate, across, up), facecolor="#dddddd", edgecolor=PLATE, linewidth=0.8, alpha=0.8)
+    for leg in configuration.legs:
+        _draw_leg(panel, leg, across, up, leg in actuated)
+    (x,), (y,) = _flat([reference], across, up)
+    panel.plot(x, y, "+", color="black", markersize=7, markeredgewidth=1.2)
+    panel.annotate("P", (x, y), textcoords="offset points", xytext=(4, 4))
+
+
+def _draw_leg(panel: Axes, leg: Leg, across: str, up: str, actuated: bool) -> None:
+    x, y = _flat(list(leg.path), across, up)
+    colour = LEG if actuated else CONSTRAINT
+    panel.plot(x, y, "-", color=colour, linewidth=1.4 if actuated else 2.2, solid_capstyle="round")
+    panel.plot(x, y, "o", color="white", markeredgecolor=colour, markersize=4 if actuated else 5, markeredgewidth=1.0)
+    if actuated:
+        middle = [0.45 * ends[0] + 0.55 * ends[1] for ends in (x, y)]
+        panel.plot([x[0], middle[0]], [y[0], middle[1]], color=colour, linewidth=3.2, solid_capstyle="butt")
+        panel.annotate(
+            leg.name.removeprefix("leg "), (x[0], y[0]), textcoords="offset points", xytext=(-8, -3), color=colour
+        )
+
+
+def _loop(points: Loop) -> Loop:
+    """Points in the order of their angle about their centre in the x-y plane."""
+    cx, cy = sum(p.x for p in points) / len(points), sum(p.y for p in points) / len(points)
+    return sorted(points, key=lambda p: math.atan2(p.y - cy, p.x - cx))
+
+
+def _flat(points: Loop, across: str, up: str) -> tuple[list[float], list[float]]:
+    return [MILLIMETRES * getattr(p, across) for p in points], [MILLIMETRES * getattr(p, up) for p in points]

@@ -1,0 +1,177 @@
+"""The reproduction of the paper as one self-contained HTML page: no script, no request, pictures inside."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from importlib.metadata import version
+from itertools import groupby
+
+from matplotlib.figure import Figure
+
+from kinetostat.studies.paper import printed
+from kinetostat.studies.paper.claims import Finding
+from kinetostat.studies.paper.comparison import Comparison, Verdict
+from kinetostat.studies.paper.reproduction import Reproduction
+from kinetostat.views.figures import as_svg
+
+MARKS = {
+    Verdict.EQUAL: "good",
+    Verdict.MISPRINT: "note",
+    Verdict.DIFFERS: "bad",
+    Finding.HOLDS: "good",
+    Finding.PARTLY: "note",
+    Finding.FAILS: "bad",
+}
+
+STYLE = """
+:root { color-scheme: light; --ink: #1c2430; --soft: #5a6675; --line: #d9dfe6; --paper: #ffffff; --blue: #0072b2; }
+* { box-sizing: border-box; }
+body { margin: 0 auto; max-width: 62rem; padding: 2.5rem 1.5rem 4rem; background: var(--paper); color: var(--ink);
+  font: 15px/1.55 system-ui, "Segoe UI", "Helvetica Neue", "DejaVu Sans", sans-serif; }
+h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 .3rem; }
+h2 { font-size: 1.2rem; margin: 2.6rem 0 .6rem; padding-top: .8rem; border-top: 1px solid var(--line); }
+h3 { font-size: 1rem; margin: 1.6rem 0 .4rem; }
+p { max-width: 46rem; margin: .5rem 0; }
+.soft { color: var(--soft); }
+.tiles { display: flex; flex-wrap: wrap; gap: .8rem; margin: 1.4rem 0; }
+.tile { border: 1px solid var(--line); border-radius: .5rem; padding: .7rem 1rem; min-width: 9.5rem; }
+.tile b { display: block; font-size: 1.6rem; line-height: 1.2; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; margin: .6rem 0 1rem; font-variant-numeric: tabular-nums; }
+caption { text-align: left; font-weight: 600; padding: .3rem 0; }
+th { text-align: left; font-weight: 600; color: var(--soft); }
+th, td { padding: .22rem .9rem .22rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }
+td.n, th.n { text-align: right; white-space: nowrap; }
+.mark { border-radius: .3rem; padding: .05rem .45rem; font-size: .85rem; white-space: nowrap; }
+.good { background: #dff3e4; color: #14532d; } .note { background: #fdf0cf; color: #6b4400; }
+.bad { background: #fde0df; color: #7f1d1d; }
+figure { margin: 1rem 0; } figure svg { max-width: 100%; height: auto; }
+figcaption { color: var(--soft); font-size: .9rem; max-width: 46rem; }
+dl dt { font-weight: 600; margin-top: 1rem; } dl dd { margin: .15rem 0 0 0; max-width: 46rem; }
+@media print { h2 { break-after: avoid; } table, figure, dd { break-inside: avoid; } body { font-size: 11px; } }
+"""
+
+CAPTIONS = {
+    "machine": "Four U-P-S legs (blue, thick: cylinder) and the passive leg (orange) that leaves four freedoms. The "
+    "paper's figures are lost in the text this program was made from; the geometry is a reconstruction that the "
+    "printed numbers fix completely.",
+    "figure-4": "K_rz and K_y grow with the passive links, the other four do not depend on them at this pose.",
+    "figure-5": "The paper's section of the workspace. The machine itself cannot move along y: there, y shifts the "
+    "plane of its passive leg, and the platform with it.",
+}
+
+
+def page(found: Reproduction, figures: Mapping[str, Figure]) -> str:
+    """The page.
+
+    Args:
+        found: what to show.
+        figures: by name, drawn; each name has a caption here.
+    """
+    pictures = {name: f"<figure>{as_svg(figures[name])}<figcaption>{escape(CAPTIONS[name])}</figcaption></figure>"
+                for name in figures}  # fmt: skip
+    body = [
+        "<h1>Zhang and Gosselin's machine, reproduced</h1>",
+        '<p class="soft">D. Zhang and C. M. Gosselin, "Parallel kinematic machine design with kinetostatic model", '
+        f"beside what kinetostat {escape(version('kinetostat'))} computes. Order of components: rx ry rz x y z; "
+        "SI units, base axes, at the platform point P.</p>",
+        _tiles(found),
+        "<h2>The machine</h2>",
+        pictures["machine"],
+        "<h2>Numbers</h2>",
+        "<p>A number is equal to print if it rounds to the digits that are printed. A misprint is listed only where "
+        "the corrected digits are reached, with the reason.</p>",
+        *_numbers(found.comparisons),
+        "<h2>Equations 1 to 32</h2>",
+        _equations(found),
+        "<h2>Stiffness against link stiffness</h2>",
+        pictures["figure-4"],
+        "<h2>Compliance over the workspace</h2>",
+        pictures["figure-5"],
+        "<h2>Design guidelines and further facts, tested</h2>",
+        _statements(found),
+        "<h2>Slips of typography</h2>",
+        f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in printed.TYPOGRAPHY)}</ul>",
+    ]
+    head = (
+        '<!doctype html>\n<html lang="en-GB">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>Zhang and Gosselin's machine, reproduced by kinetostat</title>\n<style>{STYLE}</style>\n</head>\n"
+    )
+    return f"{head}<body>\n" + "\n".join(body) + "\n</body>\n</html>\n"
+
+
+def _tiles(found: Reproduction) -> str:
+    equal = sum(one.verdict is Verdict.EQUAL for one in found.comparisons)
+    misprints = sum(one.verdict is Verdict.MISPRINT for one in found.comparisons)
+    differing = len(found.comparisons) - equal - misprints
+    equations = f"{sum(check.holds for check in found.checks)} of {len(found.checks)}"
+    holding = sum(claim.finding is Finding.HOLDS for claim in found.claims)
+    limited = sum(claim.finding is Finding.PARTLY for claim in found.claims)
+    tiles = [
+        (equal, "numbers equal to print"),
+        (misprints, "known misprints"),
+        (differing, "numbers differ"),
+        (equations, "groups of equations hold"),
+        (f"{holding} + {limited}", "statements hold + with limits"),
+    ]
+    cells = "".join(f'<div class="tile"><b>{figure}</b>{escape(text)}</div>' for figure, text in tiles)
+    return f'<div class="tiles">{cells}</div>'
+
+
+def _numbers(comparisons: Sequence[Comparison]) -> Iterable[str]:
+    for head, group in groupby(comparisons, key=lambda one: one.place.split(",")[0].split(" ")[0]):
+        titles = {"Table": "Tables III and IV", "Eq.": "Equations 33 to 38", "Section": "Designs of section 4.3"}
+        rows = [
+            (
+                one.place,
+                one.component,
+                one.printed,
+                f"{one.computed:.9g}",
+                one.unit,
+                _mark(one.verdict) + (f" {escape(one.reason)}" if one.reason else ""),
+            )
+            for one in group
+        ]
+        yield _table(titles.get(head, head), ("place", "quantity", "printed", "computed", "unit", "verdict"), rows, 2)
+
+
+def _equations(found: Reproduction) -> str:
+    rows = [
+        (
+            check.equation,
+            check.statement,
+            f"{check.residual:.1e}",
+            f"{check.tolerance:.0e}",
+            _mark(Finding.HOLDS if check.holds else Finding.FAILS),
+        )
+        for check in found.checks
+    ]
+    heads = ("equation", "statement", "residual", "tolerance", "verdict")
+    return _table("The paper's own matrices A, B, J and J' against legs as (W, G)", heads, rows, 2)
+
+
+def _statements(found: Reproduction) -> str:
+    entries = [
+        f"<dt>{escape(claim.place)} {_mark(claim.finding)}</dt><dd>{escape(claim.statement)}</dd>"
+        f'<dd class="soft">{escape(claim.measured)} {escape(claim.limits)}</dd>'
+        for claim in found.claims
+    ]
+    return f"<dl>{''.join(entries)}</dl>"
+
+
+def _mark(verdict: Verdict | Finding) -> str:
+    return f'<span class="mark {MARKS[verdict]}">{escape(verdict.value)}</span>'
+
+
+def _table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[str]], numeric: int) -> str:
+    """A table whose two columns from `numeric` on hold numbers, and whose last column is HTML."""
+    classes = [' class="n"' if numeric <= i < numeric + 2 else "" for i in range(len(heads))]
+    top = "".join(f"<th{kind}>{escape(head)}</th>" for head, kind in zip(heads, classes, strict=True))
+    lines = []
+    for *texts, last in rows:
+        cells = "".join(f"<td{kind}>{escape(text)}</td>" for text, kind in zip(texts, classes, strict=False))
+        lines.append(f"<tr>{cells}<td>{last}</td></tr>")
+    return (
+        f'<div class="scroll"><table><caption>{escape(caption)}</caption><thead><tr>{top}</tr></thead>'
+        f"<tbody>{''.join(lines)}</tbody></table></div>"
+    )
