@@ -1,4 +1,4 @@
-"""Legs to the platform: K and C from what the legs carry and how they yield (DESIGN section 2).
+"""Legs to the platform: K and C from what the legs carry and how they yield (theory section 2).
 
 One form serves rigid and flexible machines: springs enter by compliance, and a rigid or free one is exact.
 """
@@ -45,7 +45,7 @@ def isostatic(legs: Sequence[LegScrews], length: Scalar) -> Isostatic:
         legs: at P, base axes; together they carry six wrenches, and each has as many springs as wrenches.
         length: characteristic length, m; scales rows, the result does not depend on it.
 
-    Source: DESIGN section 2, C = W^-T G W^-1 with G = S in the basis dual to the springs; eqs. 21 and 32.
+    Source: theory section 2, C = W^-T G W^-1 with G = S in the basis dual to the springs; eqs. 21 and 32.
     """
     twists, regularity = dual_twists([wrench for leg in legs for wrench in leg.wrenches], length)
     flexibility: list[Twist] = []
@@ -79,7 +79,7 @@ def stiffness_matrix(statics: Isostatic) -> Symmetric6:
 def flexible_stiffness(legs: Sequence[LegScrews]) -> Symmetric6:
     """K = sum_i W_i G_i^-1 W_i^T for legs that all yield (G_i > 0), however many; NaN if one does not.
 
-    Source: DESIGN section 2, eq. 32. A second route to `stiffness_matrix`, and the only one for redundant legs.
+    Source: theory section 2, eq. 32. A second route to `stiffness_matrix`, and the only one for redundant legs.
     """
     terms = []
     for leg in legs:

@@ -6,7 +6,7 @@ from kinetostat.kinetostatics.assembly import Isostatic, weighted_sum
 
 
 def compliance_shares(statics: Isostatic) -> list[Symmetric6]:
-    """Per spring s_e xi_e xi_e^T: what C would lose if this spring became rigid (DESIGN section 2)."""
+    """Per spring s_e xi_e xi_e^T: what C would lose if this spring became rigid (theory section 2)."""
     pairs = zip(statics.compliance, statics.flexibility, strict=True)
     return [weighted_sum([s], [twist]) for s, twist in pairs]
 

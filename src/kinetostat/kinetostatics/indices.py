@@ -1,4 +1,4 @@
-"""Indices: one number (or one direction) at one pose. Rotation and translation are never mixed (DESIGN section 1)."""
+"""Indices: one number (or one direction) at one pose. Rotation and translation are never mixed (theory section 1)."""
 
 from dataclasses import dataclass
 

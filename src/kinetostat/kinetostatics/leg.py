@@ -16,7 +16,7 @@ def loads(leg: LegScrews) -> Sequence[Sequence[Scalar]]:
 def leg_compliance(leg: LegScrews) -> list[list[Scalar]]:
     """G = W^T J_e S J_e^T W [m x m], symmetric and >= 0: W^T t = G lambda.
 
-    Source: DESIGN section 2. Zero for a rigid leg; infinite where a free spring is loaded.
+    Source: theory section 2. Zero for a rigid leg; infinite where a free spring is loaded.
     """
     load = loads(leg)
     size = range(len(leg.wrenches))

@@ -55,7 +55,7 @@ class Spring:
 
 @dataclass(frozen=True)
 class LegScrews:
-    """What a leg is to the platform: screws at P in base axes (DESIGN section 2).
+    """What a leg is to the platform: screws at P in base axes (theory section 2).
 
     Attributes:
         passive: unit twists that span what the passive joints allow (J_p).
@@ -169,7 +169,7 @@ class SerialLeg:
         return replace(self, passive=tuple(joint.displaced(motion) for joint in self.passive), springs=springs)
 
     def screws(self, reference: Vector, length: Scalar) -> LegScrews:
-        """Jacobians from the joints; the wrenches are the space reciprocal to the passive twists (DESIGN section 2)."""
+        """Jacobians from the joints; the wrenches are the space reciprocal to the passive twists (theory section 2)."""
         passive = tuple(joint.twist(reference) for joint in self.passive)
         wrenches, regularity = reciprocal_wrenches(passive, length)
         return LegScrews(

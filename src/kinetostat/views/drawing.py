@@ -25,7 +25,7 @@ def three_views(configuration: Configuration, title: str) -> Figure:
         for panel, (name, across, up) in zip(figure.subplots(1, 3), VIEWS, strict=True):
             _draw_view(panel, configuration, across, up)
             panel.set(title=name, xlabel=f"{across} (mm)", ylabel=f"{up} (mm)", aspect="equal")
-            panel.margins(0.08)
+            panel.margins(0.12)
         figure.suptitle(title, fontsize=10)
         fix_layout(figure)
     return figure
@@ -51,9 +51,16 @@ def _draw_leg(panel: Axes, leg: Leg, across: str, up: str, actuated: bool) -> No
     if actuated:
         middle = [0.45 * ends[0] + 0.55 * ends[1] for ends in (x, y)]
         panel.plot([x[0], middle[0]], [y[0], middle[1]], color=colour, linewidth=3.2, solid_capstyle="butt")
-        panel.annotate(
-            leg.name.removeprefix("leg "), (x[0], y[0]), textcoords="offset points", xytext=(-8, -3), color=colour
-        )
+        if up == "y":
+            _number(panel, leg, x[0], y[0], colour)
+
+
+def _number(panel: Axes, leg: Leg, x: float, y: float, colour: str) -> None:
+    """The leg's number, outside its base joint as seen from the origin."""
+    far = math.hypot(x, y) or 1.0
+    offset = (9 * x / far, 9 * y / far)
+    text = leg.name.removeprefix("leg ")
+    panel.annotate(text, (x, y), textcoords="offset points", xytext=offset, color=colour, ha="center", va="center")
 
 
 def _loop(points: Loop) -> Loop:

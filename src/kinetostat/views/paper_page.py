@@ -33,14 +33,14 @@ h3 { font-size: 1rem; margin: 1.6rem 0 .4rem; }
 p { max-width: 46rem; margin: .5rem 0; }
 .soft { color: var(--soft); }
 .tiles { display: flex; flex-wrap: wrap; gap: .8rem; margin: 1.4rem 0; }
-.tile { border: 1px solid var(--line); border-radius: .5rem; padding: .7rem 1rem; min-width: 9.5rem; }
+.tile { border: 1px solid var(--line); border-radius: .5rem; padding: .6rem .9rem; }
 .tile b { display: block; font-size: 1.6rem; line-height: 1.2; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; margin: .6rem 0 1rem; font-variant-numeric: tabular-nums; }
 caption { text-align: left; font-weight: 600; padding: .3rem 0; }
 th { text-align: left; font-weight: 600; color: var(--soft); }
 th, td { padding: .22rem .9rem .22rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }
-td.n, th.n { text-align: right; white-space: nowrap; }
+td.n, th.n { text-align: right; white-space: nowrap; } td:first-child { white-space: nowrap; }
 .mark { border-radius: .3rem; padding: .05rem .45rem; font-size: .85rem; white-space: nowrap; }
 .good { background: #dff3e4; color: #14532d; } .note { background: #fdf0cf; color: #6b4400; }
 .bad { background: #fde0df; color: #7f1d1d; }
@@ -119,20 +119,22 @@ def _tiles(found: Reproduction) -> str:
 
 
 def _numbers(comparisons: Sequence[Comparison]) -> Iterable[str]:
-    for head, group in groupby(comparisons, key=lambda one: one.place.split(",")[0].split(" ")[0]):
-        titles = {"Table": "Tables III and IV", "Eq.": "Equations 33 to 38", "Section": "Designs of section 4.3"}
-        rows = [
-            (
-                one.place,
-                one.component,
-                one.printed,
-                f"{one.computed:.9g}",
-                one.unit,
-                _mark(one.verdict) + (f" {escape(one.reason)}" if one.reason else ""),
-            )
-            for one in group
-        ]
-        yield _table(titles.get(head, head), ("place", "quantity", "printed", "computed", "unit", "verdict"), rows, 2)
+    titles = {"Table": "Tables III and IV", "Eq.": "Equations 33 to 38", "Section": "Designs of section 4.3"}
+    heads = ("place", "quantity", "printed", "computed", "unit", "verdict")
+    for head, group in groupby(comparisons, key=lambda one: one.place.split(" ")[0]):
+        rows = []
+        for place, members in groupby(group, key=lambda one: one.place):
+            rows += [_number_row(one, place if first else "") for one, first in _marking_first(members)]
+        yield _table(titles[head], heads, rows, 2)
+
+
+def _marking_first(members: Iterable[Comparison]) -> Iterable[tuple[Comparison, bool]]:
+    return ((one, i == 0) for i, one in enumerate(members))
+
+
+def _number_row(one: Comparison, place: str) -> tuple[str, ...]:
+    verdict = _mark(one.verdict) + (f" {escape(one.reason)}" if one.reason else "")
+    return place, one.component, one.printed, f"{one.computed:.9g}", one.unit, verdict
 
 
 def _equations(found: Reproduction) -> str:

@@ -1,6 +1,6 @@
 """The paper's machine: four U-P-S legs and a passive leg R - link - R - link - Hooke that leaves four freedoms.
 
-What people may write about it and its closed-form kinematics (DESIGN section 3). Its stiffness is computed elsewhere,
+What people may write about it and its closed-form kinematics (theory section 3). Its stiffness is computed elsewhere,
 as for any machine.
 """
 
