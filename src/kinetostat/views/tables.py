@@ -40,13 +40,20 @@ def print_machine(console: Console, machine: Machine) -> None:
     """Every value of a machine with its meaning."""
     table = text_table(f"{machine.name} ({machine.family.name})", "field", "value", "meaning")
     held = values(machine)
-    for parameter in parameters(machine.family):
-        if len(parameter.leaves) == 1 and parameter.leaves[0] in held:
-            value = held[parameter.leaves[0]]
-            table.add_row(
-                parameter.path, show(float(f"{value:.10g}"), parameter.quantity.kind), parameter.quantity.meaning
-            )
+    whole = [parameter for parameter in parameters(machine.family) if parameter.path.count(".") == 1]
+    for parameter in whole:
+        texts = [_readable(held[leaf], parameter.quantity.kind) for leaf in parameter.leaves]
+        alike = f"{len(texts)} x {texts[0]}" if len(texts) > 1 else texts[0]
+        shown = alike if len(set(texts)) == 1 else ", ".join(texts)
+        table.add_row(parameter.path, shown, parameter.quantity.meaning)
     console.print(table)
+
+
+def _readable(value: float, kind: str) -> str:
+    """A value for a table: ten digits, angles in degrees."""
+    if kind == "angle":
+        return f"{math.degrees(value):.10g} deg"
+    return show(float(f"{value:.10g}"), kind)
 
 
 def print_analysis(console: Console, analysis: Analysis) -> None:
@@ -113,7 +120,7 @@ def _print_matrix(
 
 
 def _print_shares(console: Console, analysis: Analysis) -> None:
-    table = _numeric("Attribution: share of each spring in the diagonal of C", "spring", COMPONENTS)
+    table = _numeric("Attribution: shares in the diagonal of C", "spring", COMPONENTS)
     for share in analysis.shares:
         table.add_row(share.name, *("–" if part is None else f"{100 * part:.1f} %" for part in share.compliance))
     console.print(table)

@@ -1,0 +1,338 @@
+"""Machine code against the same formulas pose by pose on floats, and against them on NumPy arrays."""
+
+import math
+import struct
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from kinetostat.algebra.scalar import Angle, cos, reciprocal, sin, smaller, sqrt, where
+from kinetostat.algebra.symmetric import POSITIONS
+from kinetostat.engine.kernel import slab_kernel
+from kinetostat.engine.native import Body, Program, host_lanes
+from kinetostat.engine.trace import Graph, Traced, needed
+from kinetostat.engine.trigonometry import cos_and_sin
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.library import load
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import values, with_values
+from machines import CASES, Case, every_machine
+
+Array = npt.NDArray[np.float64]
+Columns = dict[str, Array]
+
+NAMES = tuple(QUANTITIES)
+DIAGONALS = (*GROUPS["compliance"], *GROUPS["stiffness"])
+AGREEMENT = 1e-12
+"""Of an entry of K or C against the geometric mean of its two diagonal entries: some hundred roundings, times the
+condition of W at a regular pose."""
+REGULAR = 0.05
+"""Regularity from which numbers are compared so sharply; statuses are compared everywhere."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """Every quantity [quantities x points] and the status at some points; NaN where the status is not OK."""
+
+    values: Array
+    status: npt.NDArray[np.int8]
+
+
+def native(machine: Machine, columns: Columns, names: tuple[str, ...] = NAMES) -> Found:
+    count = len(next(iter(columns.values())))
+    found = Found(np.full((len(names), count), 7.0), np.full(count, 7, dtype=np.int8))
+    slab_kernel(machine, tuple(columns), names).run(columns, found.values, found.status)
+    return found
+
+
+def by_floats(machine: Machine, columns: Columns) -> Found:
+    poses = zip(*(column.tolist() for column in columns.values()), strict=True)
+    responses = [respond(with_values(machine, dict(zip(columns, pose, strict=True)))) for pose in poses]
+    return Found(np.array([read(r) for r in responses]).T, np.array([r.status for r in responses], dtype=np.int8))
+
+
+def by_arrays(machine: Machine, columns: Columns) -> Found:
+    count = len(next(iter(columns.values())))
+    with np.errstate(all="ignore"):
+        response = respond(with_values(machine, columns))
+        status = np.broadcast_to(response.status, count).astype(np.int8)
+        found = [np.broadcast_to(q.value(response), count) for q in QUANTITIES.values()]
+    return Found(np.where(status == Status.OK, found, np.nan), status)
+
+
+def read(response: Response) -> list[float]:
+    return [q.value(response) if response.status == Status.OK else math.nan for q in QUANTITIES.values()]
+
+
+def scales(found: Array) -> Array:
+    """What each quantity is compared with: for entries of K and C the mean of their diagonals, else itself."""
+    result = np.abs(found)
+    for first in (0, len(POSITIONS)):
+        diagonal = [first + POSITIONS.index((i, i)) for i in range(6)]
+        for k, (i, j) in enumerate(POSITIONS, first):
+            mean = np.sqrt(np.abs(found[diagonal[i]])) * np.sqrt(np.abs(found[diagonal[j]]))
+            result[k] = np.where(np.isfinite(mean), mean, result[k])
+    return result
+
+
+def assert_same(actual: Found, expected: Found) -> None:
+    np.testing.assert_array_equal(actual.status, expected.status)
+    np.testing.assert_array_equal(np.isnan(actual.values), np.isnan(expected.values))
+    endless = np.isinf(expected.values)
+    np.testing.assert_array_equal(np.isinf(actual.values), endless)
+    np.testing.assert_array_equal(actual.values[endless], expected.values[endless])
+    compared = np.isfinite(expected.values) & (expected.values[NAMES.index("regularity")] > REGULAR)
+    error = np.abs(actual.values[compared] - expected.values[compared])
+    assert np.all(error <= AGREEMENT * scales(expected.values)[compared])
+
+
+def drawn(case: Case, section: str, count: int, seed: int = 1) -> Columns:
+    rng = np.random.default_rng(seed)
+    ranges = {path: bounds for path, bounds in case.ranges.items() if path.startswith(section)}
+    return {path: rng.uniform(low, high, count) for path, (low, high) in ranges.items()}
+
+
+def springs(machine: Machine) -> list[str]:
+    return [path for path in values(machine) if path.startswith("stiffness.")]
+
+
+@every_machine
+@pytest.mark.parametrize("section", ["pose.", "geometry.", ""])
+def test_equals_floats(case: Case, section: str) -> None:
+    machine, columns = load(case.name), drawn(case, section, 203)
+    assert_same(native(machine, columns), by_floats(machine, columns))
+
+
+@every_machine
+@pytest.mark.parametrize("section", ["pose.", ""])
+def test_equals_arrays(case: Case, section: str) -> None:
+    machine, columns = load(case.name), drawn(case, section, 10_001, seed=2)
+    found = native(machine, columns)
+    assert_same(found, by_arrays(machine, columns))
+    assert np.mean(found.status == Status.OK) > 0.3
+
+
+@every_machine
+def test_all_stiffnesses_varied(case: Case) -> None:
+    machine, rng = load(case.name), np.random.default_rng(3)
+    columns = drawn(case, "pose.", 200) | {path: 10.0 ** rng.uniform(3, 6, 200) for path in springs(machine)}
+    assert_same(native(machine, columns), by_floats(machine, columns))
+
+
+@every_machine
+@pytest.mark.parametrize("stiffness", [0.0, math.inf], ids=["free", "rigid"])
+@pytest.mark.parametrize("varied", [False, True], ids=["fixed", "varied"])
+def test_rigid_and_free_springs(case: Case, stiffness: float, varied: bool) -> None:
+    machine, columns = load(case.name), drawn(case, "pose.", 40)
+    for path in springs(machine):
+        one = with_values(machine, {} if varied else {path: stiffness})
+        more = columns | ({path: np.resize([stiffness, 5e3], 40)} if varied else {})
+        found = native(one, more)
+        assert_same(found, by_floats(one, more))
+        assert np.isinf(found.values).any()
+
+
+@every_machine
+def test_all_rigid(case: Case) -> None:
+    machine, columns = load(case.name), drawn(case, "pose.", 40)
+    stiff = with_values(machine, dict.fromkeys(springs(machine), math.inf))
+    found = native(stiff, columns)
+    assert_same(found, by_floats(stiff, columns))
+    assert np.all(found.values[: len(POSITIONS), found.status == Status.OK] == 0.0)
+
+
+FOUR = "zhang-gosselin-4dof"
+OBSTACLES = [
+    ({"pose.z": 1.5}, Status.OUT_OF_REACH),
+    ({"pose.x": 0.0, "pose.z": 1.36}, Status.SINGULAR),  # the passive leg stretched
+    ({"pose.theta6": 0.0}, Status.SINGULAR),
+    ({"pose.theta6": math.pi}, Status.SINGULAR),
+    ({"pose.z": math.nan}, Status.OUT_OF_REACH),
+]
+
+
+@pytest.mark.parametrize(("obstacle", "status"), OBSTACLES, ids=str)
+@pytest.mark.parametrize("varied", [False, True], ids=["fixed", "varied"])
+def test_bad_poses(obstacle: dict[str, float], status: Status, varied: bool) -> None:
+    columns = {path: np.full(9, value) for path, value in drawn(CASES[0], "pose.", 1).items()}
+    machine = with_values(load(FOUR), {} if varied else obstacle)
+    rest = {path: column for path, column in columns.items() if varied or path not in obstacle}
+    found = native(machine, rest | ({path: np.full(9, value) for path, value in obstacle.items()} if varied else {}))
+    assert np.all(found.status == status)
+    assert np.all(np.isnan(found.values))
+
+
+def test_a_bad_pose_leaves_its_neighbours_alone() -> None:
+    machine, columns = load(FOUR), drawn(CASES[0], "pose.", 50)
+    for k, (obstacle, _) in enumerate(OBSTACLES[:3]):
+        for path, value in obstacle.items():
+            columns[path][7 * k + 3] = value
+    found = native(machine, columns)
+    assert_same(found, by_floats(machine, columns))
+    assert np.flatnonzero(found.status).tolist() == [3, 10, 17]
+
+
+@pytest.mark.parametrize("turns", [1.0, 1e4, 1e7])
+def test_any_turn_of_an_angle(turns: float) -> None:
+    """Whole turns change nothing but the rounding of the angle itself."""
+    machine, columns = load(FOUR), drawn(CASES[0], "pose.", 100)
+    turned = columns | {"pose.theta6": columns["pose.theta6"] + turns * 2.0 * math.pi}
+    expected = by_floats(machine, turned)
+    assert_same(native(machine, turned), expected)
+    fixed = with_values(machine, {"pose.theta6": float(turned["pose.theta6"][0])})
+    first = {path: column[:1] for path, column in columns.items() if path != "pose.theta6"}
+    np.testing.assert_allclose(native(fixed, first).values[0, 0], expected.values[0, 0], rtol=AGREEMENT)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 5, 7, 8, 9, 15, 16, 17, 100])
+def test_any_number_of_points(count: int) -> None:
+    """Slabs write their own points, whatever their number, and nothing beside."""
+    machine, columns = load(FOUR), drawn(CASES[0], "pose.", 100)
+    whole = native(machine, columns, DIAGONALS)
+    values_around, status_around = np.full((12, count + 6), 7.0), np.full(count + 6, 7, dtype=np.int8)
+    inner = slice(3, count + 3)
+    part = {path: column[:count] for path, column in columns.items()}
+    slab_kernel(machine, tuple(part), DIAGONALS).run(part, values_around[:, inner], status_around[inner])
+    np.testing.assert_array_equal(values_around[:, inner], whole.values[:, :count])
+    np.testing.assert_array_equal(status_around[inner], whole.status[:count])
+    assert np.all(np.delete(values_around, np.r_[inner], axis=1) == 7.0)
+    assert np.all(np.delete(status_around, np.r_[inner]) == 7)
+
+
+def test_columns_of_any_kind() -> None:
+    machine, columns = load(FOUR), drawn(CASES[0], "pose.", 20)
+    apart = {path: np.repeat(column, 2)[::2] for path, column in columns.items()}
+    np.testing.assert_array_equal(native(machine, apart).values, native(machine, columns).values)
+    whole_numbers = columns | {"stiffness.actuator.0": np.full(20, 2000)}
+    doubled = with_values(machine, {"stiffness.actuator.0": 2000.0})
+    assert_same(native(machine, whole_numbers), native(doubled, columns))
+
+
+def test_arrays_that_do_not_fit_are_refused() -> None:
+    columns = drawn(CASES[0], "pose.", 20)
+    kernel = slab_kernel(load(FOUR), tuple(columns), DIAGONALS)
+    with pytest.raises(ValueError, match="contiguous"):
+        kernel.run(columns, np.empty((12, 40))[:, ::2], np.empty(20, dtype=np.int8))
+    with pytest.raises(ValueError, match="one length"):
+        kernel.run(columns, np.empty((12, 19)), np.empty(20, dtype=np.int8))
+
+
+def test_a_program_serves_all_machines_of_one_form() -> None:
+    machine, columns = load(FOUR), drawn(CASES[0], "pose.", 20)
+    other = with_values(machine, {"geometry.base_radius": 0.3, "stiffness.actuator.1": 4e4})
+    first, second = (slab_kernel(m, tuple(columns), NAMES) for m in (machine, other))
+    assert first.program is second.program
+    assert_same(native(other, columns), by_floats(other, columns))
+
+
+def test_threads_share_a_program() -> None:
+    machine, columns = load(FOUR), drawn(CASES[0], "pose.", 4000)
+    expected = native(machine, columns)
+    with ThreadPoolExecutor(4) as pool:
+        for found in pool.map(lambda _: native(machine, columns), range(16)):
+            np.testing.assert_array_equal(found.values, expected.values)
+
+
+def test_results_that_nothing_varies() -> None:
+    """C does not depend on an actuator that is a column, where only the regularity is asked for."""
+    machine = load(FOUR)
+    found = native(machine, {"stiffness.actuator.0": np.linspace(1.0, 2.0, 30)}, ("regularity",))
+    assert np.all(found.values == found.values[0, 0])
+    assert found.values[0, 0] == pytest.approx(respond(machine).regularity, rel=AGREEMENT)
+
+
+def run_one(graph: Graph, x: Traced, result: object, at: Array) -> Array:
+    found = np.empty((1, len(at)))
+    Program(Body([], [x], [result], 0.0)).run(np.empty(0), [at], found, np.empty(len(at), dtype=np.int8))
+    return found[0]
+
+
+SPECIAL = np.array([0.0, 1.0, -1.0, 2.5, -0.3, math.inf, -math.inf, math.nan, 1e-320, 1e300])
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        lambda x: 2.0 * x - 1.0,
+        lambda x: 1.0 - 3.0 / x,
+        lambda x: -(x - 4.0) * -x,
+        lambda x: abs(-x) + x,
+        lambda x: 1.0 / (1.0 / x),
+        lambda x: sqrt(x),
+        lambda x: reciprocal(x),
+        lambda x: smaller(x, 1.0),
+        lambda x: smaller(1.0, -x),
+        lambda x: where((x > 0.0) & (x < 2.0), x, -1.0),
+        lambda x: where((x >= 1.0) & True, x * x, math.inf),
+        lambda x: where(x <= 1.0, math.nan, 0.0),
+        lambda x: x - x,
+        lambda x: (2.0 - x) - (x - 2.0),
+    ],
+    ids=range(14),
+)
+def test_operations_keep_infinities_and_nan(formula) -> None:
+    graph = Graph()
+    x = graph.input()
+    with np.errstate(all="ignore"):
+        np.testing.assert_array_equal(run_one(graph, x, formula(x), SPECIAL), formula(SPECIAL))
+
+
+def test_equal_expressions_are_one_node() -> None:
+    graph = Graph()
+    x, y = graph.input(), graph.input()
+    assert x + y is y + x
+    assert x * y is y * x
+    assert x - y is not y - x
+    assert (x - y) is -(y - x)
+    assert -abs(x) is -abs(-x)
+    assert x * -1.0 is -x
+    assert (-x) * y is -(x * y)
+    assert x + 0.0 is x
+    assert x * 1.0 is x
+    assert x / 1.0 is x
+    assert len(needed([x * y + x * y])) == 4
+
+
+def test_what_depends_on_fixed_inputs_is_fixed() -> None:
+    graph = Graph()
+    a, x = graph.input(fixed=True), graph.input()
+    assert sqrt(a * 2.0).fixed
+    assert not (a * x).fixed
+    assert where(a < 1.0, 2.0, a).fixed
+
+
+def test_ordinary_numbers_are_finite() -> None:
+    graph = Graph()
+    a, b = graph.input(fixed=True, ordinary=True), graph.input(fixed=True)
+    assert (reciprocal(reciprocal(a)) < math.inf) is True
+    assert (reciprocal(b) < math.inf) is not True
+
+
+def test_traced_values_cannot_steer_python() -> None:
+    x = Graph().input()
+    with pytest.raises(TypeError, match="where"):
+        bool(x < 1.0)
+    with pytest.raises(TypeError, match="where"):
+        bool(x)
+
+
+@pytest.mark.parametrize("largest", [1.0, 7.0, 1e3, 1e6])
+def test_cosine_and_sine(largest: float) -> None:
+    graph = Graph()
+    x = graph.input()
+    quarters = np.arange(-20, 20) * (math.pi / 2)
+    at = np.concatenate([np.random.default_rng(4).uniform(-largest, largest, 5000), quarters[abs(quarters) <= largest]])
+    cosine, sine = (run_one(graph, x, result, at) for result in cos_and_sin(x))
+    np.testing.assert_array_max_ulp(cosine, np.cos(at), 3)
+    np.testing.assert_array_max_ulp(sine, np.sin(at), 3)
+    assert cos(x) is cos_and_sin(x)[0]
+    assert sin(Angle(1.0, x)) is x
+
+
+def test_lanes_fit_the_processor() -> None:
+    assert host_lanes() * struct.calcsize("d") in {16, 32, 64}

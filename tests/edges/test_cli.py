@@ -1,0 +1,163 @@
+"""The commands as a new user types them: exit codes, messages, output."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
+from kinetostat.machine.library import load
+
+MACHINE = "zhang-gosselin-4dof"
+
+ANSWERED = [
+    (["list"], ["zhang-gosselin-4dof", "passive-leg-4dof"]),
+    (["new", "passive-leg-4dof"], ["[geometry]", 'base_radius        = "22 cm"']),
+    (["schema", "machine"], ["json-schema.org", "platform_radius"]),
+    (["check", MACHINE], ["geometry.base_radius", "0.22 m", "-60 deg"]),
+    (["analyze", MACHINE], ["3628.32", "leg 3 actuator", "rad/(N·m)"]),
+    (["analyze", MACHINE, "--set", "stiffness.passive_links=rigid"], ["Rigid: passive link 1", "0.516397", "rigid"]),
+    (["analyze", MACHINE, "--set", "stiffness.actuator.0=0"], ["Free: leg 1 actuator", "free"]),
+    (["sweep", MACHINE, "--vary", "stiffness.passive_links=1e3:1e10:8:log"], ["7.407e+06", "743.982"]),
+    (["sweep", MACHINE, "--vary", "z=60 cm:200 cm:5"], ["2 of 5 points: out_of_reach"]),
+    (
+        ["map", MACHINE, "--over", "x=-2 cm:2 cm:3", "--over", "z=66 cm:70 cm:3"],
+        ["compliance_rx", "3 pose.x x 3 pose.z"],
+    ),
+    (["--version"], ["kinetostat 0."]),
+    ([], ["commands:", "examples:"]),
+]
+
+REFUSED = [
+    (["analyze"], ["MACHINE", "--help"]),
+    (["analyse"], ["invalid choice: 'analyse'", "analyze"]),
+    (["analyze", "nope"], ['"nope"', "zhang-gosselin-4dof"]),
+    (["analyze", "zhang-gosselin-4dfo"], ['did you mean "zhang-gosselin-4dof"?']),
+    (["analyze", MACHINE, "--set", "pose.x=2 kg"], ["pose.x", '"2 kg"', "length", '"12 cm"']),
+    (["new", "hexapd"], ['"hexapd"', "passive-leg-4dof"]),
+    (["sweep", MACHINE, "--vary", "passive_links=1:2:3"], ["geometry.passive_links or stiffness.passive_links"]),
+    (["sweep", MACHINE, "--vary", "q=1:2:3"], ['"q" is not a field', "pose.theta5"]),
+    (["sweep", MACHINE, "--vary", "z=1:3"], ['"z=1:3" is not a range', "from:to:count"]),
+    (["sweep", MACHINE, "--vary", "z=1:3:1"], ['count is "1"', "2 to"]),
+    (["sweep", MACHINE, "--vary", "z=-1:3:5:log"], ["z", "above 0", "-1.0 m"]),
+    (["sweep", MACHINE, "--vary", "z=1 kg:2 kg:3"], ["z", '"1 kg"', "length"]),
+    (["sweep", MACHINE, "--vary", "geometry.base_radius=-1:2:3"], ["base_radius", "greater than 0"]),
+    (["sweep", MACHINE, "--vary", "stiffness.actuator=1:rigid:3"], ["stiffness.actuator", "rigid"]),
+    (["sweep", MACHINE, "--vary", "x=0:1:3", "--vary", "z=0:1:3"], ["one parameter", "map"]),
+    (["map", MACHINE, "--over", "x=0:1:3"], ["two --over", "sweep"]),
+    (["map", MACHINE, "--over", "x=0:1:3", "--over", "x=0:1:3"], ["pose.x is varied twice"]),
+    (["map", MACHINE, "--over", "x=0:1:3000", "--over", "z=0:1:3000"], ["9,000,000", "lower the counts"]),
+    (["map", MACHINE, "--over", "x=0:1:3", "--over", "z=0:1:3", "--quantity", "q"], ['"q" is not a quantity']),
+]
+
+
+@pytest.mark.parametrize(("arguments", "expected"), ANSWERED, ids=lambda part: " ".join(part)[:50])
+def test_answers(arguments, expected, capsys):
+    assert main(arguments) == DONE
+    output = capsys.readouterr()
+    assert output.err == ""
+    for words in expected:
+        assert words in output.out
+
+
+@pytest.mark.parametrize(("arguments", "expected"), REFUSED, ids=lambda part: " ".join(part)[:50])
+def test_bad_input_is_one_clear_paragraph(arguments, expected, capsys):
+    try:
+        code = main(arguments)
+    except SystemExit as stop:
+        code = stop.code
+    output = capsys.readouterr()
+    assert code == BAD_INPUT
+    assert output.out == ""
+    assert "Traceback" not in output.err
+    assert output.err.count("\n") == 1
+    for words in expected:
+        assert words in output.err
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"), [("pose.z=2 m", "at most 1.36 m"), ("pose.z=1.36 m", "passive leg lock up")]
+)
+def test_a_pose_without_answer_exits_1_and_says_why(setting, words, capsys):
+    for command in ("analyze", "check"):
+        assert main([command, MACHINE, "--set", setting]) == NO_ANSWER
+        assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("settings", "status", "missing"),
+    [
+        ([], "ok", None),
+        (["stiffness.passive_links=rigid"], "ok", "stiffness"),
+        (["stiffness.actuator=0"], "ok", "compliance"),
+        (["pose.z=2 m"], "out_of_reach", "compliance"),
+    ],
+)
+def test_json_is_all_that_stdout_holds(settings, status, missing, capsys):
+    overrides = [word for setting in settings for word in ("--set", setting)]
+    main(["analyze", MACHINE, "--json", *overrides])
+    output = capsys.readouterr()
+    found = json.loads(output.out)
+    assert output.err == ""
+    assert found["status"] == status
+    assert found["order"] == ["rx", "ry", "rz", "x", "y", "z"]
+    if missing:
+        assert found[missing] is None
+    else:
+        assert found["stiffness"][5][5] == pytest.approx(3628.31866241, rel=1e-11)
+        assert found["rank"] == 6
+
+
+def test_json_of_a_sweep_has_null_and_a_status_where_there_is_no_answer(capsys):
+    assert main(["sweep", MACHINE, "--vary", "z=60 cm:200 cm:5", "--json"]) == DONE
+    found = json.loads(capsys.readouterr().out)
+    assert found["status"][-1] == "out_of_reach"
+    assert found["variables"]["stiffness_z"]["values"][-1] is None
+    assert found["coordinates"]["pose.z"]["units"] == "m"
+    assert found["coordinates"]["pose.z"]["values"] == pytest.approx([0.6, 0.95, 1.3, 1.65, 2.0])
+
+
+def test_a_sweep_without_any_answer_exits_1(capsys):
+    assert main(["sweep", MACHINE, "--vary", "z=2 m:3 m:3"]) == NO_ANSWER
+    assert "3 of 3 points: out_of_reach" in capsys.readouterr().out
+
+
+def test_the_template_is_the_machine_it_was_made_from(tmp_path, capsys):
+    main(["new", "passive-leg-4dof"])
+    file = tmp_path / "mine.toml"
+    file.write_text(capsys.readouterr().out)
+    assert load(file) == load(MACHINE)
+
+
+@pytest.mark.parametrize(("output", "words"), [("/proc/nowhere", "cannot be written"), ("file", "cannot be written")])
+def test_an_unwritable_folder_is_bad_input(output, words, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    folder = output if output.startswith("/") else str(tmp_path / output / "folder")
+    assert main(["sweep", MACHINE, "--vary", "x=0:1 cm:3", "-o", folder]) == BAD_INPUT
+    assert words in capsys.readouterr().err
+
+
+def test_help_imports_no_heavy_library():
+    script = (
+        "import sys, kinetostat.cli\n"
+        "try: kinetostat.cli.main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "print('LOADED', sorted({name.split('.')[0] for name in sys.modules}))\n"
+    )
+    output = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+    loaded = output.split("LOADED")[1]
+    for heavy in ("jax", "numpy", "pint", "pydantic", "matplotlib", "rich", "xarray"):
+        assert f"'{heavy}'" not in loaded
+
+
+def test_one_pose_needs_no_jax_and_no_matplotlib():
+    script = (
+        "import sys, kinetostat.cli\n"
+        f"kinetostat.cli.main(['analyze', '{MACHINE}', '--json'])\n"
+        "print('LOADED', sorted({name.split('.')[0] for name in sys.modules}))\n"
+    )
+    output = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+    loaded = output.split("LOADED")[1]
+    for heavy in ("jax", "matplotlib", "xarray"):
+        assert f"'{heavy}'" not in loaded

@@ -1,0 +1,151 @@
+"""What sweeps and maps leave behind: labelled NetCDF that reads back, figures with units, and no half-written file."""
+
+import math
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from kinetostat.cli import main
+from kinetostat.machine.library import as_toml, build, load
+from kinetostat.spec.document import parse
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.analysis import analyze
+from kinetostat.studies.grid import evaluate_grid, failures, resolve_quantities
+from kinetostat.studies.storage import replacing, write_dataset, write_text
+from kinetostat.views.display import coordinate_scale, prefixed_scale
+from kinetostat.views.figures import contour_maps, curves
+
+MACHINE = "zhang-gosselin-4dof"
+
+
+@pytest.fixture(scope="module")
+def section():
+    ranges = ["pose.x=-20 cm:20 cm:5", "pose.z=60 cm:150 cm:4"]
+    return evaluate_grid(load(MACHINE), ranges, ["compliance", "stiffness", "compliance_rx_z", "regularity"])
+
+
+def test_a_dataset_is_labelled_with_names_units_and_origin(section):
+    assert section["compliance_rx"].dims == ("pose.x", "pose.z")
+    assert section["compliance_rx"].attrs["units"] == "rad/(N·m)"
+    assert section["compliance_rx_z"].attrs["units"] == "rad/N"
+    assert section["pose.x"].attrs["units"] == "m"
+    assert section["status"].attrs["flag_meanings"].split()[1] == "out_of_reach"
+    assert build(parse(section.attrs["machine_file"], "attribute"), "attribute") == load(MACHINE)
+
+
+def test_every_point_equals_the_analysis_of_that_pose(section):
+    for i, x in enumerate(section["pose.x"].values):
+        for j, z in enumerate(section["pose.z"].values):
+            alone = analyze(load(MACHINE, [f"pose.x={float(x)!r}", f"pose.z={float(z)!r}"]))
+            assert section["status"].values[i, j] == alone.status
+            if alone.compliance:
+                assert section["compliance_x"].values[i, j] == pytest.approx(alone.compliance[3][3], rel=1e-12)
+                assert section["compliance_rx_z"].values[i, j] == pytest.approx(alone.compliance[0][5], rel=1e-12)
+                assert section["stiffness_ry"].values[i, j] == pytest.approx(alone.stiffness[1][1], rel=1e-12)
+
+
+def test_no_value_is_missing_without_a_status(section):
+    bad = section["status"].values != 0
+    assert bad.any()
+    assert not bad.all()
+    for name in resolve_quantities(["compliance", "stiffness", "regularity"]):
+        assert (np.isnan(section[name].values) == bad).all()
+    assert sum(failures(section).values()) == bad.sum()
+
+
+def test_one_range_over_a_list_moves_all_its_entries_together():
+    found = evaluate_grid(load(MACHINE), ["stiffness.passive_links=1e3:1e10:8:log"], ["stiffness_rz", "stiffness_y"])
+    assert found["stiffness_rz"].values[0] == pytest.approx(743.98162658, rel=1e-11)
+    assert found["stiffness_y"].values[-1] == pytest.approx(19223375926.0, rel=1e-11)
+
+
+def test_a_machine_file_written_from_a_machine_reads_back_as_it():
+    machine = load(MACHINE, ["stiffness.passive_links.0=rigid", "pose.x=1.2345678901234567 mm", 'name="ä \\" b"'])
+    assert build(parse(as_toml(machine), "text"), "text") == machine
+
+
+@pytest.mark.parametrize("command", ["sweep", "map"])
+def test_commands_write_data_and_figures(command, tmp_path, capsys):
+    ranges = ["--vary", "x=-1 cm:1 cm:5"]
+    if command == "map":
+        ranges = ["--over", "x=-1 cm:1 cm:5", "--over", "theta5=-70 deg:-50 deg:4"]
+    assert main([command, MACHINE, *ranges, "-o", str(tmp_path / "out")]) == 0
+    written = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert written == [f"{command}.nc", f"{command}.pdf", f"{command}.png", f"{command}.svg"]
+    assert (tmp_path / "out" / f"{command}.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "out" / f"{command}.pdf").read_bytes().startswith(b"%PDF")
+    ElementTree.parse(tmp_path / "out" / f"{command}.svg")
+    with xr.open_dataset(tmp_path / "out" / f"{command}.nc", engine="h5netcdf") as dataset:
+        assert dataset["status"].size == (20 if command == "map" else 5)
+
+
+def test_every_axis_of_a_map_has_its_unit(section):
+    figure = contour_maps(section, ["compliance_rx", "compliance_z", "regularity"], "title")
+    panels = [axes for axes in figure.axes if axes.get_xlabel()]
+    assert [axes.get_xlabel() for axes in panels] == ["x (mm)"] * 3
+    assert [axes.get_ylabel() for axes in panels] == ["z (m)"] * 3
+    titles = [axes.get_title() for axes in panels]
+    assert "rad/(N·m)" in titles[0]
+    assert "m/N" in titles[1]
+    texts = [text.get_text() for text in figure.texts] + [figure._supxlabel.get_text()]
+    assert any("out of reach: 5 of 20 poses" in text for text in texts)
+
+
+def test_stiffness_curves_are_log_log_with_one_panel_per_unit():
+    dataset = evaluate_grid(load(MACHINE), ["stiffness.passive_links=1e3:1e10:8:log"], ["stiffness"])
+    figure = curves(dataset, resolve_quantities(["stiffness"]), "title")
+    assert [axes.get_ylabel() for axes in figure.axes] == ["stiffness (N·m/rad)", "stiffness (N/m)"]
+    assert {(axes.get_xscale(), axes.get_yscale()) for axes in figure.axes} == {("log", "log")}
+
+
+def test_a_constant_map_says_so_instead_of_drawing_noise():
+    ranges = ["stiffness.actuator=1e3:2e3:3", "pose.x=0:1e-12:3"]
+    dataset = evaluate_grid(load(MACHINE), ranges, ["compliance_y"])
+    figure = contour_maps(dataset, ["compliance_y"], "title")
+    assert "constant: 578 µm/N" in [text.get_text() for axes in figure.axes for text in axes.texts]
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "shown"),
+    [([5.78e-4], "m/N", "578 µm/N"), ([3628.0], "N/m", "3.628 kN/m"), ([0.0], "m/N", "0 m/N"), ([0.06], "1", "0.06 1")],
+)
+def test_results_are_shown_with_a_prefix(values, unit, shown):
+    scale = prefixed_scale(unit, np.array(values))
+    assert f"{values[0] * scale.factor:.4g} {scale.unit}" == shown
+
+
+def test_angles_are_shown_in_degrees_and_short_lengths_in_millimetres():
+    assert coordinate_scale("angle", "rad", np.array([math.pi])).factor * math.pi == pytest.approx(180.0)
+    assert coordinate_scale("length", "m", np.array([0.02])).unit == "mm"
+    assert coordinate_scale("length", "m", np.array([2.0])).unit == "m"
+
+
+def test_an_interrupted_write_leaves_the_old_file_and_no_other(tmp_path):
+    path = tmp_path / "result.txt"
+    write_text(path, "old")
+
+    def interrupted():
+        with replacing(path) as temporary:
+            temporary.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert path.read_text() == "old"
+    assert [file.name for file in tmp_path.iterdir()] == ["result.txt"]
+
+
+def test_a_dataset_file_is_replaced_whole(tmp_path, section):
+    path = tmp_path / "deep" / "map.nc"
+    for _ in range(2):
+        write_dataset(path, section)
+    with xr.open_dataset(path, engine="h5netcdf") as dataset:
+        assert dataset.identical(section)
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="cannot be written"):
+        write_text(tmp_path / "file" / "result.txt", "text")

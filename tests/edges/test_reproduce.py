@@ -1,0 +1,87 @@
+"""The paper, reproduced: verdicts are earned, files are complete, the page stands alone."""
+
+import csv
+import json
+import re
+from collections import Counter
+
+import pytest
+
+from kinetostat.cli import DONE, NO_ANSWER, main
+from kinetostat.studies.paper import printed
+from kinetostat.studies.paper.claims import Finding
+from kinetostat.studies.paper.comparison import Verdict, compare, rounds_to
+from kinetostat.studies.paper.reproduction import reproduce
+
+
+@pytest.fixture(scope="module")
+def found():
+    return reproduce()
+
+
+def test_nothing_differs_unexplained(found):
+    assert found.explained
+    assert Counter(one.verdict for one in found.comparisons) == {Verdict.EQUAL: 82, Verdict.MISPRINT: 6}
+    assert all(check.holds for check in found.checks)
+    assert Counter(claim.finding for claim in found.claims) == {Finding.HOLDS: 5, Finding.PARTLY: 5}
+
+
+def test_every_erratum_is_met_once(found):
+    met = [(one.place, one.component) for one in found.comparisons if one.verdict is Verdict.MISPRINT]
+    assert sorted(met) == sorted(printed.ERRATA)
+
+
+def test_every_claim_with_limits_says_which(found):
+    assert len({claim.place for claim in found.claims}) == 10
+    assert all(claim.limits for claim in found.claims if claim.finding is Finding.PARTLY)
+
+
+@pytest.mark.parametrize(
+    ("computed", "text", "equal"),
+    [
+        (26.2118, "26.21", True),
+        (26.216, "26.21", False),
+        (1.9223676e7, "1.92e7", True),
+        (1.95e7, "1.92e7", False),
+        (7407410.648, "7.40741e6", True),
+        (0.0, "0.0", True),
+        (1e-3, "0.0", True),
+        (2223.56, "2223.51", False),
+    ],
+)
+def test_a_number_equals_print_by_its_printed_digits(computed, text, equal):
+    assert rounds_to(computed, text) is equal
+
+
+def test_a_misprint_is_excused_only_if_the_correction_is_reached():
+    assert compare("Table IV, row 1", "y", "2223.51", 2223.5602, "N/m").verdict is Verdict.MISPRINT
+    assert compare("Table IV, row 1", "y", "2223.51", 2223.4, "N/m").verdict is Verdict.DIFFERS
+    assert compare("Table IV, row 2", "y", "2223.51", 2223.5602, "N/m").verdict is Verdict.DIFFERS
+
+
+def test_the_command_writes_tables_figures_and_one_page_that_stands_alone(tmp_path, capsys):
+    folder = tmp_path / "reproduce"
+    assert main(["reproduce", "-o", str(folder)]) == DONE
+    assert "82 equal to print, 6 known misprints, 0 differ" in " ".join(capsys.readouterr().out.split())
+    names = {path.name for path in folder.iterdir()}
+    assert {"index.html", "reproduction.json", "numbers.csv", "equations.csv", "statements.csv"} <= names
+    assert {
+        f"{figure}.{kind}" for figure in ("machine", "figure-4", "figure-5") for kind in ("png", "svg", "pdf")
+    } <= names
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    assert page.count("<svg") == 3
+    assert "<script" not in page
+    assert not re.search(r'(src|href)="(?!#)', page)
+    rows = list(csv.DictReader((folder / "numbers.csv").read_text(encoding="utf-8").splitlines()))
+    assert len(rows) == 88
+    assert json.loads((folder / "reproduction.json").read_text(encoding="utf-8"))["explained"] is True
+
+
+def test_a_wrong_model_is_found_out(monkeypatch, tmp_path, capsys):
+    wrong = (printed.TABLE_4[0].__class__("1000", "1001 N*m/rad", printed.TABLE_4[0].values), *printed.TABLE_4[1:])
+    monkeypatch.setattr(printed, "TABLE_4", wrong)
+    assert main(["reproduce", "-o", str(tmp_path), "--json"]) == NO_ANSWER
+    found = json.loads(capsys.readouterr().out)
+    assert found["explained"] is False
+    differing = [one for one in found["comparisons"] if one["verdict"] == "differs"]
+    assert [one["component"] for one in differing] == ["rz", "y"]

@@ -1,0 +1,69 @@
+"""Reach and status: whether legs close, and the words and codes for it."""
+
+import pytest
+
+from kinetostat.kinematics.reach import clearance, why_out_of_reach, within_reach
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import SINGULAR, pose_status
+from kinetostat.machine.library import load
+from kinetostat.machine.machine import Closure, Configuration
+
+
+def spanning(*closures):
+    whole = load("zhang-gosselin-4dof").configure()
+    return Configuration(whole.platform, whole.legs, closures, whole.length)
+
+
+NEAR = Closure("near leg", span=0.1, shortest=0.2, longest=1.0)
+GOOD = Closure("good leg", span=0.5, shortest=0.2, longest=1.0)
+FAR = Closure("far leg", span=1.25, shortest=0.2, longest=1.0)
+
+
+def test_clearance_is_the_distance_from_the_nearest_limit():
+    assert clearance(NEAR) == pytest.approx(-0.1)
+    assert clearance(GOOD) == pytest.approx(0.3)
+    assert clearance(FAR) == pytest.approx(-0.25)
+
+
+def test_every_leg_must_close():
+    assert within_reach(spanning(GOOD))
+    assert within_reach(spanning())
+    assert not within_reach(spanning(GOOD, NEAR))
+    assert not within_reach(spanning(FAR, GOOD))
+
+
+def test_the_sentence_names_leg_figures_and_way_out():
+    message = why_out_of_reach(spanning(GOOD, FAR, NEAR))
+    for words in ("far leg", "1.25 m", "at most 1 m", "nearer", "near leg", "0.1 m", "at least 0.2 m", "away"):
+        assert words in message
+    assert "good leg" not in message
+
+
+def test_the_codes_of_a_status_are_those_of_saved_files():
+    assert {status.word: int(status) for status in Status} == {
+        "ok": 0,
+        "out_of_reach": 1,
+        "joint_limit": 2,
+        "singular": 3,
+        "not_converged": 4,
+    }
+
+
+@pytest.mark.parametrize("status", Status)
+def test_every_status_has_its_own_sentence(status):
+    assert status.sentence.endswith(".")
+    assert [other.sentence for other in Status].count(status.sentence) == 1
+
+
+@pytest.mark.parametrize(
+    ("reached", "regularity", "status"),
+    [
+        (True, 1.0, Status.OK),
+        (True, SINGULAR / 2, Status.SINGULAR),
+        (True, float("nan"), Status.SINGULAR),
+        (False, 1.0, Status.OUT_OF_REACH),
+        (False, float("nan"), Status.OUT_OF_REACH),
+    ],
+)
+def test_the_most_fundamental_obstacle_comes_first(reached, regularity, status):
+    assert pose_status(reached, regularity) == status

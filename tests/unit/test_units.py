@@ -1,0 +1,152 @@
+"""Quantities as people write them: what is read, what is refused and with which words."""
+
+import math
+
+import pytest
+
+from kinetostat.units import KINDS, UnitError, parse, show
+
+GOOD = [
+    ("12 cm", "length", 0.12),
+    ("12cm", "length", 0.12),
+    ("  12   cm  ", "length", 0.12),
+    ("+12. cm", "length", 0.12),
+    (".5 m", "length", 0.5),
+    ("-3e-2 m", "length", -0.03),
+    ("1E2 mm", "length", 0.1),
+    ("0.68", "length", 0.68),
+    (0.68, "length", 0.68),
+    (2, "length", 2.0),
+    (0, "length", 0.0),
+    ("5 um", "length", 5e-6),
+    ("5 µm", "length", 5e-6),
+    ("5 μm", "length", 5e-6),
+    ("10 in", "length", 0.254),
+    ("1 m^2/m", "length", 1.0),
+    ("1 m**2/m", "length", 1.0),
+    ("30 deg", "angle", math.pi / 6),
+    ("-60 degree", "angle", -math.pi / 3),
+    ("100 mrad", "angle", 0.1),
+    ("0.5 turn", "angle", math.pi),
+    ("1000 N/m", "linear stiffness", 1000.0),
+    ("20 N/um", "linear stiffness", 2e7),
+    ("20 N / um", "linear stiffness", 2e7),
+    ("1 kN/mm", "linear stiffness", 1e6),
+    ("1e7 N*m/rad", "torsional stiffness", 1e7),
+    ("1e7 N·m/rad", "torsional stiffness", 1e7),
+    ("1 N*m/deg", "torsional stiffness", 180 / math.pi),
+    ("rigid", "linear stiffness", math.inf),
+    (" Rigid ", "torsional stiffness", math.inf),
+    ("0 N/m", "linear stiffness", 0.0),
+]
+
+
+@pytest.mark.parametrize(("written", "kind", "value"), GOOD)
+def test_good_quantities(written, kind, value):
+    assert parse(written, kind) == pytest.approx(value, rel=1e-15)
+
+
+FIX = {"length": "12 cm", "angle": "30 deg", "linear stiffness": "20 N/um", "torsional stiffness": "1e7 N*m/rad"}
+"""The example that a message about each kind must show."""
+
+BAD = [
+    ("12 kg", "length", '"kg" is no unit of length'),
+    ("12 cm2", "length", '"cm2" is not a unit'),
+    ("12 parsnips", "length", '"parsnips" is unknown'),
+    ("cm", "length", "it must be a length"),
+    ("", "length", "it must be a length"),
+    ("   ", "length", "it must be a length"),
+    ("twelve cm", "length", "it must be a length"),
+    ("1,5 m", "length", "is not a unit"),
+    ("1_000 m", "length", "is not a unit"),
+    ("0x10 m", "length", "is not a unit"),
+    ("1 m 2 cm", "length", "is not a unit"),
+    ("- 3 m", "length", "it must be a length"),
+    ("rigid", "length", "it must be a length"),
+    ("rigid", "angle", "it must be an angle"),
+    ("nan", "length", "it must be a length"),
+    ("inf m", "length", "it must be a length"),
+    (math.nan, "length", "not a finite number"),
+    (math.inf, "linear stiffness", "not a finite number"),
+    (-math.inf, "length", "not a finite number"),
+    ("1e999 m", "length", "not a finite number"),
+    ("1e308 km", "length", "not a finite number"),
+    (10**400, "length", "too large"),
+    (True, "length", "it must be a length"),
+    (False, "linear stiffness", '"rigid"'),
+    (None, "length", "it must be a length"),
+    ([1.0], "length", "it must be a length"),
+    ({"m": 1}, "length", "it must be a length"),
+    (b"1 m", "length", "it must be a length"),
+    (1 + 0j, "length", "it must be a length"),
+    ("30 percent", "angle", "is no unit of angle"),
+    ("30 %", "angle", "is not a unit"),
+    ("2 radian**2", "angle", "is no unit of angle"),
+    ("2 m/m", "angle", "is no unit of angle"),
+    ("2 pi", "angle", "is no unit of angle"),
+    ("30 m", "angle", "is no unit of angle"),
+    ("20 N*m/rad", "linear stiffness", "is no unit of linear stiffness"),
+    ("20 N/m", "torsional stiffness", "is no unit of torsional stiffness"),
+    ("20 degC", "length", "is no unit of length"),
+    ("20 degC/m", "length", '"degC/m"'),
+    ("20 degC**2", "length", '"degC**2"'),
+    ("3 m/3", "length", '"m/3"'),
+    ("3 nan", "length", '"nan"'),
+    ("3 inf", "length", '"inf"'),
+]
+
+
+@pytest.mark.parametrize(("written", "kind", "words"), BAD)
+def test_bad_quantities_say_what_is_allowed(written, kind, words):
+    with pytest.raises(UnitError) as refused:
+        parse(written, kind)
+    assert words in str(refused.value)
+    assert FIX[kind] in str(refused.value)
+
+
+ATTACKS = [
+    "3 9**9**9",
+    "3 m**9**9**9",
+    "3 m^99999999",
+    "3 m^3^3",
+    "3 m^3^3^3^3",
+    "3 m**3**3**3**3**3",
+    "3 m**2**3**3**3*m",
+    "3 (m)",
+    "3 m)",
+    "3 __import__('os')",
+    "3 m;m",
+    "3 m.real",
+    "3 [m]",
+    "3 m\n[m]",
+    "3 \x00",
+    "9" * 10_000 + " m",
+    "3 " + "m*" * 100_000 + "m",
+    "3 " + "m" * 1_000_000,
+    " " * 1_000_000 + "x",
+    "1" * 63 + "x" * 1_000_000,
+]
+
+
+@pytest.mark.parametrize("written", ATTACKS, ids=lambda text: text[:12])
+def test_attacks_are_refused_before_they_are_evaluated(written, monkeypatch):
+    """Towers of powers, code and endless text: pint would compute 3**3**3**3 for hours, so it must never see one."""
+    monkeypatch.setattr("kinetostat.units._registry", lambda: pytest.fail("the unit was evaluated"))
+    with pytest.raises(UnitError):
+        parse(written, "length")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("value", [0.0, 0.22, 1.0, 1e-7, 1e10, 1 / 3])
+def test_what_is_shown_is_read_back_exactly(kind, value):
+    assert parse(show(value, kind), kind) == value
+
+
+def test_what_is_shown_has_its_unit():
+    assert show(0.22, "length") == "0.22 m"
+    assert show(math.inf, "linear stiffness") == "rigid"
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+def test_every_example_is_a_quantity_of_its_kind(kind):
+    assert parse(kind.example, kind.name) > 0.0
