@@ -273,7 +273,8 @@ def _show_grid(dataset: "xr.Dataset", as_json: bool, written: Sequence[Path]) ->
 
         _print_json(as_plain_data(dataset))
         return
-    from kinetostat.views.tables import print_dataset, terminal
+    from kinetostat.views.grid_tables import print_dataset
+    from kinetostat.views.tables import terminal
 
     console = terminal()
     print_dataset(console, dataset, [str(name) for name in dataset.data_vars if name != "status"])

@@ -18,7 +18,7 @@ from kinetostat.machine.parameters import with_values
 STIFF = 1e14
 """N/m or N·m/rad: 1e8 times and more the other springs here."""
 REACHED = 1e-9
-"""Share of its twist (rotation and translation apart) below which a component may as well be rounding; see `exact`."""
+"""Share of a twist or wrench, in one unit, below which a component is small enough to be doubtful; see `reached`."""
 
 
 def some_springs(machine):
@@ -68,7 +68,8 @@ def test_a_rigid_spring_adds_nothing_to_c_and_is_never_nan(case, data):
     assert np.linalg.matrix_rank(dimensionless(response.compliance, length, Twist), 1e-12, hermitian=True) <= 6 - len(paths)
     stiffness = array(response.stiffness)
     assert not np.any(np.isnan(stiffness))
-    assert np.array_equal(np.isinf(stiffness), reached(response.statics.resistance, chosen(response, math.inf)))
+    held = reached(response.statics.resistance, chosen(response, math.inf), 1.0 / length)
+    assert np.array_equal(np.isinf(stiffness), held)
 
 
 @every_machine
@@ -81,15 +82,19 @@ def test_a_free_spring_leaves_k_finite_and_frees_just_what_it_moves(case, data):
     assert_psd(response.stiffness, length, Wrench)
     compliance = array(response.compliance)
     assert not np.any(np.isnan(compliance))
-    assert np.array_equal(np.isinf(compliance), reached(response.statics.flexibility, chosen(response, 0.0)))
+    freed = reached(response.statics.flexibility, chosen(response, 0.0), length)
+    assert np.array_equal(np.isinf(compliance), freed)
 
 
-def reached(screws, indices):
-    """Entries [6 x 6] to which the screws of these springs contribute beyond rounding; refuses doubtful machines."""
+def reached(screws, indices, length):
+    """Entries [6 x 6] to which the screws of these springs contribute beyond rounding; refuses doubtful machines.
+
+    For twists `length` is that of the machine (m), for wrenches its inverse: then all six components compare.
+    """
     touched = np.zeros((6, 6), dtype=bool)
     for e in indices:
-        parts = screw(screws[e])
-        share = abs(parts) / np.repeat([np.linalg.norm(parts[:3]) or 1.0, np.linalg.norm(parts[3:]) or 1.0], 3)
+        parts = abs(screw(screws[e])) * np.repeat([length, 1.0], 3)
+        share = parts / np.linalg.norm(parts)
         assume(not np.any((share > 100 * U) & (share < REACHED)))
         touched |= np.outer(share > REACHED, share > REACHED)
     return touched

@@ -1,21 +1,18 @@
-"""Answers as tables on a terminal, with units. Nothing is computed here but rounding and percent."""
+"""Machines and analyses as tables on a terminal, with units. Nothing is computed here but rounding and percent."""
 
 import math
 import sys
 from collections.abc import Sequence
 
-import xarray as xr
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.catalogue import families
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.studies.analysis import Analysis, Rows
-from kinetostat.studies.grid import failures
 from kinetostat.units import show
 
 Number = float | None
@@ -67,16 +64,6 @@ def print_analysis(console: Console, analysis: Analysis) -> None:
     _print_indices(console, analysis)
 
 
-def print_dataset(console: Console, dataset: xr.Dataset, names: Sequence[str]) -> None:
-    """A one-dimensional dataset as a table; of a larger one, the extremes of each quantity."""
-    if len(dataset["status"].dims) == 1 and dataset["status"].size <= 60:
-        _print_curve(console, dataset, names)
-    else:
-        _print_extremes(console, dataset, names)
-    for status, count in failures(dataset).items():
-        console.print(f"{count:,} of {dataset['status'].size:,} points: {status.word}. {status.sentence}")
-
-
 def terminal() -> Console:
     """The console of this process: as wide as the terminal, wide enough for six columns where there is none."""
     return Console() if sys.stdout.isatty() else Console(width=100)
@@ -99,7 +86,8 @@ def text_table(title: str, *columns: str) -> Table:
     return table
 
 
-def _numeric(title: str, first: str, columns: Sequence[str]) -> Table:
+def numeric_table(title: str, first: str, columns: Sequence[str]) -> Table:
+    """A table whose columns after the first hold numbers."""
     table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column(first, no_wrap=True)
     for column in columns:
@@ -110,7 +98,7 @@ def _numeric(title: str, first: str, columns: Sequence[str]) -> Table:
 def _print_matrix(
     console: Console, title: str, units: str, rows: Rows | None, diagonal: Sequence[float], endless: str
 ) -> None:
-    table = _numeric(f"{title} ({units})", "", COMPONENTS)
+    table = numeric_table(f"{title} ({units})", "", COMPONENTS)
     if rows is None:
         table.add_row("diagonal", *(number(value, endless) for value in diagonal))
     else:
@@ -120,14 +108,14 @@ def _print_matrix(
 
 
 def _print_shares(console: Console, analysis: Analysis) -> None:
-    table = _numeric("Attribution: shares in the diagonal of C", "spring", COMPONENTS)
+    table = numeric_table("Attribution: shares in the diagonal of C", "spring", COMPONENTS)
     for share in analysis.shares:
         table.add_row(share.name, *("–" if part is None else f"{100 * part:.1f} %" for part in share.compliance))
     console.print(table)
 
 
 def _print_indices(console: Console, analysis: Analysis) -> None:
-    table = _numeric("Principal compliances", "", ["least", "middle", "largest", "softest direction"])
+    table = numeric_table("Principal compliances", "", ["least", "middle", "largest", "softest direction"])
     for unit, found in zip(("rad/(N·m)", "m/N"), (analysis.principal or {}).values(), strict=False):
         direction = " ".join(f"{component:+.3f}" for component in found.directions[-1])
         table.add_row(unit, *(number(value) for value in found.compliances), direction)
@@ -138,24 +126,3 @@ def _print_indices(console: Console, analysis: Analysis) -> None:
         f"(moments divided by the characteristic length {number(analysis.length)} m)",
         highlight=False,
     )
-
-
-def _print_curve(console: Console, dataset: xr.Dataset, names: Sequence[str]) -> None:
-    (across,) = dataset["status"].dims
-    coordinate = dataset[across]
-    title = f"{dataset.attrs['machine']}: {', '.join(dict.fromkeys(name.split('_')[0] for name in names))}"
-    heads = [f"{name.split('_', 1)[-1]}\n{QUANTITIES[name].unit}" for name in names]
-    table = _numeric(title, f"{across}\n{coordinate.attrs['units']}", heads)
-    for i, value in enumerate(coordinate.values):
-        table.add_row(number(float(value)), *(number(float(dataset[name].values[i])) for name in names))
-    console.print(table)
-
-
-def _print_extremes(console: Console, dataset: xr.Dataset, names: Sequence[str]) -> None:
-    size = " x ".join(f"{dataset.sizes[dim]} {dim}" for dim in dataset["status"].dims)
-    table = _numeric(f"{dataset.attrs['machine']}: {size}", "quantity", ["unit", "least", "mean", "largest"])
-    for name in names:
-        data = dataset[name]
-        statistics = (float(data.min()), float(data.mean()), float(data.max()))
-        table.add_row(name, data.attrs["units"], *(number(value) for value in statistics))
-    console.print(table)
