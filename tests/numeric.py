@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
+from hypothesis import assume
 
 from kinetostat.algebra.screw import Screw, Twist, Wrench
 from kinetostat.algebra.symmetric import Symmetric6
@@ -16,6 +17,8 @@ Array = npt.NDArray[np.float64]
 U = float(np.finfo(float).eps)
 """Rounding unit of float64, 2.2e-16."""
 BLOCKS = (slice(0, 3), slice(3, 6))
+REACHED = 1e-9
+"""Share of a screw, in one unit, above which a component is surely no rounding; see `reached`."""
 
 
 def array(symmetric: Symmetric6) -> Array:
@@ -54,7 +57,7 @@ def twist_transport(turn: Array, offset: Array) -> Array:
 
 
 def dimensionless(symmetric: Symmetric6, length: float, kind: type[Screw]) -> Array:
-    """K (kind Wrench) or C (kind Twist) with moments divided, angles multiplied by `length` (m): one unit, N/m or m/N."""
+    """K (kind Wrench) or C (kind Twist), moments divided and angles multiplied by `length` (m): all in N/m or m/N."""
     scale = np.repeat([1.0 / length if kind is Wrench else length, 1.0], 3)
     return scale[:, None] * array(symmetric) * scale
 
@@ -108,3 +111,17 @@ def matrices(statics: Isostatic) -> tuple[Array, Array]:
 def columns(screws: Sequence[Screw]) -> Array:
     """Screws as the columns of an array [6 x n]."""
     return np.array([s.components() for s in screws], dtype=float).T
+
+
+def reached(screws: Sequence[Screw], indices: Sequence[int], length: float) -> npt.NDArray[np.bool_]:
+    """Entries [6 x 6] to which the screws of these springs contribute beyond rounding; refuses doubtful machines.
+
+    For twists `length` is that of the machine (m), for wrenches its inverse: then all six components compare.
+    """
+    touched = np.zeros((6, 6), dtype=bool)
+    for e in indices:
+        parts = abs(screw(screws[e])) * np.repeat([length, 1.0], 3)
+        share = parts / np.linalg.norm(parts)
+        assume(not np.any((share > 100 * U) & (share < REACHED)))
+        touched |= np.outer(share > REACHED, share > REACHED)
+    return touched

@@ -34,7 +34,8 @@ RIGID = "rigid"
 """How people write an infinite stiffness."""
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
-_UNIT = re.compile(r"[A-Za-zµμ°]+(?:\s*(?:[*/·]|\*\*|\^)\s*(?:[A-Za-zµμ°]+|[1-3](?![0-9])))*")
+_NAME = r"[A-Za-zµμ°]+(?:\s*(?:\*\*|\^)\s*[1-3])?"
+_UNIT = re.compile(rf"{_NAME}(?:\s*[*/·]\s*{_NAME})*")
 _LONGEST = 64
 
 
@@ -103,7 +104,7 @@ def _factor(unit: str, wanted: Kind) -> float:
     try:
         one = _registry().Quantity(1.0, unit.replace("·", "*")).to_root_units()
         target = _registry().Quantity(1.0, wanted.unit.replace("·", "*")).to_root_units()
-    except (pint.UndefinedUnitError, pint.OffsetUnitCalculusError, pint.DefinitionSyntaxError):
+    except (pint.PintError, ValueError):
         raise UnitError(f'the unit "{unit}" is unknown; write {_allowed(wanted)}') from None
     turning = wanted.name == "angle"
     if one.dimensionality != target.dimensionality or (turning and one.units != target.units):

@@ -1,10 +1,19 @@
 """What may not matter: where the machine stands, how it is turned, the point of reference, order of legs and units."""
 
+import math
+
 import numpy as np
 import pytest
-from geometry import displacements, vectors
 from hypothesis import given
 from hypothesis import strategies as st
+
+from geometry import displacements, vectors
+from kinetostat.algebra.vector import ZERO
+from kinetostat.kinetostatics.assembly import isostatic
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.library import load
+from kinetostat.machine.machine import Configuration
+from kinetostat.machine.parameters import parameters, values, with_values
 from machines import CONTRASTING, MODERATE, every_machine, regular, regular_machines, stiffness_paths
 from numeric import (
     array,
@@ -17,12 +26,6 @@ from numeric import (
     vector,
     wrench_transport,
 )
-
-from kinetostat.algebra.vector import ZERO
-from kinetostat.kinetostatics.assembly import isostatic
-from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.machine import Configuration
-from kinetostat.machine.parameters import parameters, values, with_values
 
 INVARIANT = 1e-12
 """Of each 3x3 block, norm-wise: some rounding units times the condition of W, which regularity 0.02 holds below 1e3.
@@ -100,21 +103,32 @@ def in_other_units(machine, metre, newton):
     return with_values(machine, {p.path: now[p.path] * size[p.quantity.kind] for p in leaves})
 
 
+def unit_of_stiffness(metre, newton):
+    """What an entry of K in the other units has to be multiplied by [6 x 6]; its inverse is for C."""
+    motion = np.repeat([1.0, metre], 3)
+    return np.outer(motion, motion) / (newton * metre)
+
+
 @every_machine
-@pytest.mark.parametrize("rigid", [False, True], ids=["flexible", "with a rigid spring"])
-@given(data=st.data(), metre=st.sampled_from([1e-9, 1e-3, 1e3, 1e6]))
-def test_the_units_of_length_and_of_force(case, metre, rigid, data):
-    """Written in mm or km and mN, the machine has the same K and C: no threshold compares metres with radians."""
-    newton = 1e3
+@given(data=st.data(), metre=st.sampled_from([1e-9, 1e-3, 1e3, 1e6]), newton=st.sampled_from([1.0, 1e3]))
+def test_the_units_of_length_and_of_force(case, metre, newton, data):
+    """Written in mm or km and mN, the machine has the same status, regularity, K and C."""
     machine = data.draw(regular_machines(case))
-    if rigid:
-        machine = with_values(machine, {data.draw(st.sampled_from(stiffness_paths(machine))): float("inf")})
     here, there = respond(machine), respond(in_other_units(machine, metre, newton))
     assert there.status == here.status
     assert there.regularity == pytest.approx(here.regularity, rel=1e-9)
-    unit = np.outer(np.repeat([1.0, metre], 3), np.repeat([1.0, metre], 3)) / (newton * metre)
-    stiffness = array(there.stiffness) * unit
+    unit = unit_of_stiffness(metre, newton)
+    assert_blocks_close(array(there.stiffness) * unit, array(here.stiffness), INVARIANT)
     assert_blocks_close(array(there.compliance) / unit, array(here.compliance), INVARIANT)
-    assert np.array_equal(np.isfinite(stiffness), np.isfinite(array(here.stiffness)))
-    if not rigid:
-        assert_blocks_close(stiffness, array(here.stiffness), INVARIANT)
+
+
+@every_machine
+@pytest.mark.parametrize("metre", [1e-12, 1e-6, 1e-3, 1e3, 1e6, 1e12])
+@pytest.mark.parametrize("end", [0.0, math.inf], ids=["free", "rigid"])
+def test_what_is_rigid_or_free_does_not_depend_on_units(case, end, metre):
+    """At the reference design, spring by spring: no threshold compares metres with radians (DESIGN section 1)."""
+    for path in stiffness_paths(load(case.name)):
+        machine = with_values(load(case.name), {path: end})
+        here, there = respond(machine), respond(in_other_units(machine, metre, 1.0))
+        assert np.array_equal(np.isfinite(array(there.stiffness)), np.isfinite(array(here.stiffness))), path
+        assert np.array_equal(np.isfinite(array(there.compliance)), np.isfinite(array(here.compliance))), path

@@ -8,11 +8,11 @@ import math
 
 import numpy as np
 from hypothesis import assume, given
-from machines import CASES, REGULAR, machines
-from numeric import array, assert_blocks_close
 
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.parameters import values, with_values
+from machines import CASES, REGULAR, machines
+from numeric import array, assert_blocks_close
 
 CASE = next(case for case in CASES if case.name == "zhang-gosselin-4dof")
 WELL = 1e6
@@ -65,7 +65,9 @@ def inverse_jacobian(design):
     base, top = design["geometry.base_angle"], design["geometry.platform_angle"]
     quarter = math.pi / 2
     rows, lengths = [], []
-    for b, p in zip((base, quarter + base, -quarter - base, -base), (top, quarter + top, -quarter - top, -top), strict=True):
+    for b, p in zip(
+        (base, quarter + base, -quarter - base, -base), (top, quarter + top, -quarter - top, -top), strict=True
+    ):
         arm = turn @ (design["geometry.platform_radius"] * np.array([math.cos(p), math.sin(p), 0.0]))
         leg = tip + arm - design["geometry.base_radius"] * np.array([math.cos(b), math.sin(b), 0.0])
         rows.append(np.concatenate([np.cross(arm, leg), leg]))

@@ -4,21 +4,19 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
-from machines import CASES, every_machine, regular_machines, stiffness_paths
-from numeric import U, array, assert_blocks_close, assert_psd, dimensionless, screw
 
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.library import load
 from kinetostat.machine.machine import springs
 from kinetostat.machine.parameters import with_values
+from machines import CASES, every_machine, regular_machines, stiffness_paths
+from numeric import array, assert_blocks_close, assert_psd, dimensionless, reached, screw
 
 STIFF = 1e14
 """N/m or N·m/rad: 1e8 times and more the other springs here."""
-REACHED = 1e-9
-"""Share of a twist or wrench, in one unit, below which a component is small enough to be doubtful; see `reached`."""
 
 
 def some_springs(machine):
@@ -65,7 +63,9 @@ def test_a_rigid_spring_adds_nothing_to_c_and_is_never_nan(case, data):
     response = respond(with_springs(machine, paths, math.inf))
     length = float(response.configuration.length)
     assert_psd(response.compliance, length, Twist)
-    assert np.linalg.matrix_rank(dimensionless(response.compliance, length, Twist), 1e-12, hermitian=True) <= 6 - len(paths)
+    assert np.linalg.matrix_rank(dimensionless(response.compliance, length, Twist), 1e-12, hermitian=True) <= 6 - len(
+        paths
+    )
     stiffness = array(response.stiffness)
     assert not np.any(np.isnan(stiffness))
     held = reached(response.statics.resistance, chosen(response, math.inf), 1.0 / length)
@@ -84,20 +84,6 @@ def test_a_free_spring_leaves_k_finite_and_frees_just_what_it_moves(case, data):
     assert not np.any(np.isnan(compliance))
     freed = reached(response.statics.flexibility, chosen(response, 0.0), length)
     assert np.array_equal(np.isinf(compliance), freed)
-
-
-def reached(screws, indices, length):
-    """Entries [6 x 6] to which the screws of these springs contribute beyond rounding; refuses doubtful machines.
-
-    For twists `length` is that of the machine (m), for wrenches its inverse: then all six components compare.
-    """
-    touched = np.zeros((6, 6), dtype=bool)
-    for e in indices:
-        parts = abs(screw(screws[e])) * np.repeat([length, 1.0], 3)
-        share = parts / np.linalg.norm(parts)
-        assume(not np.any((share > 100 * U) & (share < REACHED)))
-        touched |= np.outer(share > REACHED, share > REACHED)
-    return touched
 
 
 @every_machine

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from machines import every_machine, is_regular, machines, regular_machines
-from numeric import U, array, assert_blocks_close, columns, trace_product
 
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.library import load
 from kinetostat.machine.parameters import values, with_values
+from machines import every_machine, is_regular, machines, regular_machines
+from numeric import U, array, assert_blocks_close, columns, trace_product
 
 SAME = 1e-11
 """Norm-wise per block; XLA contracts a * b + c and reorders sums, which costs rounding times the condition of W."""

@@ -5,15 +5,22 @@ import re
 import jax
 import numpy as np
 import pytest
-from numeric import U
 
-from kinetostat.algebra.solve import complement, dual_basis, inverse_positive
+from kinetostat.algebra.solve import complement, diagonalise, dual_basis
 from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import Vector, rotation_x, rotation_y
+from numeric import U
 
 BATCH = 7
 SPARSE = np.array(
-    [[1, 0, 0, 0, 1, 1], [0, 1, 0, 1, 0, 1], [1, 1, 0, 0, 0, 1], [0, 0, 1, 1, 1, 0], [1, 1, 1, 1, 1, 1], [0, 0, 0, 1, 0, 0]]
+    [
+        [1, 0, 0, 0, 1, 1],
+        [0, 1, 0, 1, 0, 1],
+        [1, 1, 0, 0, 0, 1],
+        [0, 0, 1, 1, 1, 0],
+        [1, 1, 1, 1, 1, 1],
+        [0, 0, 0, 1, 0, 0],
+    ]
 )
 """Where the sparse basis has its non-zeros; elsewhere it holds structural zeros."""
 
@@ -34,9 +41,9 @@ def sparse_complement(a, b, c, d):
     return [*(c for row in rows for c in row), regularity]
 
 
-def inverse(a, b, c):
-    rows = inverse_positive([[a * a + 1.0, a * b, 0.0], [a * b, b * b + 1.0, b * c], [0.0, b * c, c * c + 1.0]])
-    return [entry for row in rows for entry in row]
+def diagonal_form(a, b, c):
+    rows, pivots = diagonalise([[a * a + 1.0, a * b, 0.0], [a * b, b * b + 1.0, b * c], [0.0, b * c, c * c + 1.0]])
+    return [*(entry for row in rows for entry in row), *pivots]
 
 
 def triangle(x, z, first, second):
@@ -53,7 +60,7 @@ FORMULAS = {
     "sparse dual basis": (sparse_dual, int(SPARSE.sum())),
     "dense dual basis": (dense_dual, 16),
     "complement": (sparse_complement, 4),
-    "inverse": (inverse, 3),
+    "diagonal form": (diagonal_form, 3),
     "triangle": (triangle, 4),
     "rotation": (turning, 4),
 }

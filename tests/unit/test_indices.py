@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from machines import every_machine, regular
-from numeric import BLOCKS, array
 
 from kinetostat.kinetostatics.indices import principal_compliances
+from machines import every_machine, regular
+from numeric import BLOCKS, array
 
 ROUNDING = 1e-12
 DIRECTIONS = np.random.default_rng(0).normal(size=(50, 3))

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from geometry import displacements, rotations, vectors
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from numeric import U, screw
 
+from geometry import displacements, rotations, vectors
 from kinetostat.algebra.screw import force_along
 from kinetostat.algebra.vector import X_AXIS, Y_AXIS, Z_AXIS, ZERO, Vector
 from kinetostat.kinetostatics.leg import leg_compliance, loads
 from kinetostat.machine.leg import Joint, SerialLeg, Spring, TwoForceLeg, reciprocal_wrenches, revolutes
+from numeric import U, screw
 
 AXES = (X_AXIS, Y_AXIS, Z_AXIS)
 FEW = 1e3 * U

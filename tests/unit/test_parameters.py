@@ -3,11 +3,11 @@
 from dataclasses import FrozenInstanceError
 
 import pytest
-from machines import every_machine
 
 from kinetostat.machine.library import load
 from kinetostat.machine.parameters import find, parameters, values, with_values
 from kinetostat.spec.errors import InputError
+from machines import every_machine
 
 MACHINE = load("zhang-gosselin-4dof")
 

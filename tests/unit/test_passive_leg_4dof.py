@@ -4,16 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from geometry import about_x, about_y
 from hypothesis import given
 from hypothesis import strategies as st
-from machines import CASES, machines
-from numeric import matrix, screw, vector
 
+from geometry import about_x, about_y
 from kinetostat.algebra.vector import Y_AXIS
 from kinetostat.machine.leg import SerialLeg, TwoForceLeg
 from kinetostat.machine.library import load
 from kinetostat.machine.parameters import values, with_values
+from machines import CASES, machines
+from numeric import matrix, screw, vector
 
 CASE = next(case for case in CASES if case.name == "zhang-gosselin-4dof")
 TASK = ("pose.x", "pose.z", "pose.theta5", "pose.theta6")
@@ -53,7 +53,9 @@ def twist(machine, path):
 def test_the_reference_pose_has_the_published_leg_lengths():
     """REFERENCE.md; with both links 68 cm, P straight above O and theta5 = -60 deg, el2 is 150 deg and the pitch 0."""
     machine = load(CASE.name)
-    assert [length(leg) for leg in actuated(machine)] == pytest.approx([0.797602, 0.764484, 0.665658, 0.625594], abs=5e-7)
+    assert [length(leg) for leg in actuated(machine)] == pytest.approx(
+        [0.797602, 0.764484, 0.665658, 0.625594], abs=5e-7
+    )
     assert np.allclose(matrix(machine.configure().platform.rotation), matrix(about_x(math.radians(120))), atol=1e-15)
     elbow = passive(machine).passive[1].point
     assert elbow.components() == pytest.approx((0.68 * math.cos(math.pi / 6), 0.0, 0.34))

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kinetostat.algebra.scalar import (
-    Angle,
     cos,
     is_one,
     is_zero,
@@ -71,12 +70,6 @@ def test_square_root_of_a_negative_number_is_nan():
     assert math.isnan(sqrt(-1.0))
     with np.errstate(invalid="ignore"):
         assert np.array_equal(sqrt(np.array([4.0, -1.0])), [2.0, np.nan], equal_nan=True)
-
-
-def test_an_angle_may_be_known_by_cosine_and_sine():
-    known = Angle(cos=0.6, sin=0.8)
-    assert cos(known) == 0.6
-    assert sin(known) == 0.8
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.longdouble])

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from geometry import displacements, rotations, unit_vectors, vectors
 from hypothesis import given
 from hypothesis import strategies as st
-from numeric import U, matrix, screw, twist_transport, vector, wrench_transport
 
+from geometry import displacements, rotations, unit_vectors, vectors
 from kinetostat.algebra.screw import (
     COMPONENTS,
     Twist,
@@ -18,6 +17,7 @@ from kinetostat.algebra.screw import (
 )
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.machine.leg import Joint
+from numeric import U, matrix, screw, twist_transport, vector, wrench_transport
 
 FAR = 2.0
 FEW = 64 * U * FAR**2

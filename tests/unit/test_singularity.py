@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from machines import every_machine, regular
-from numeric import U, columns
 
 from kinetostat.algebra.screw import Twist, force_along
 from kinetostat.algebra.vector import X_AXIS, Y_AXIS, Z_AXIS, ZERO, Vector
 from kinetostat.kinematics.singularity import conditioning, describe, free_twist, why_singular
 from kinetostat.machine.leg import LegScrews
+from machines import every_machine, regular
+from numeric import U, columns
 
 SIX = [
     force_along(X_AXIS, Z_AXIS),
@@ -46,7 +46,9 @@ def test_the_free_twist_is_the_one_no_leg_resists(free, kept, length):
 def test_conditioning_does_not_depend_on_the_unit_of_length():
     wrenches = SIX
     metres = conditioning(legs_of(wrenches), 0.5)
-    millimetres = [force_along(w.translational, Vector(*(1000.0 * c for c in arm))) for w, arm in zip(SIX, _arms(), strict=True)]
+    millimetres = [
+        force_along(w.translational, Vector(*(1000.0 * c for c in arm))) for w, arm in zip(SIX, _arms(), strict=True)
+    ]
     assert conditioning(legs_of(millimetres), 500.0) == pytest.approx(metres, rel=1e-12)
     assert all(a >= b for a, b in pairwise(metres))
 

@@ -1,13 +1,13 @@
 """Symmetric 6x6 matrices held as 21 scalars."""
 
 import numpy as np
-from geometry import vectors
 from hypothesis import given
 from hypothesis import strategies as st
-from numeric import array, screw
 
+from geometry import vectors
 from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.symmetric import POSITIONS, Symmetric6
+from numeric import array, screw
 
 twists = st.builds(Twist, vectors(), vectors())
 NUMBERED = Symmetric6(tuple(float(k) for k in range(21)))

@@ -5,10 +5,10 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numeric import U
 
 from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import Vector
+from numeric import U
 
 sides = st.floats(0.1, 2.0)
 bends = st.floats(0.01, math.pi - 0.01)

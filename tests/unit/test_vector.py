@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from geometry import ANGLES, TINY, about_x, about_y, displacements, rotations, vectors
 from hypothesis import given
 from hypothesis import strategies as st
-from numeric import U, matrix, vector
 
+from geometry import ANGLES, TINY, about_x, about_y, displacements, rotations, vectors
 from kinetostat.algebra.vector import (
     IDENTITY,
     X_AXIS,
@@ -19,6 +18,7 @@ from kinetostat.algebra.vector import (
     Rotation,
     polar,
 )
+from numeric import U, matrix, vector
 
 FEW = 16 * U
 """A dozen roundings of numbers of size 1."""

@@ -1,17 +1,16 @@
-"""Scalars: one set of functions over floats, NumPy arrays and JAX tracers.
+"""Scalars: one set of functions over floats, NumPy arrays and traced values.
 
 No vectors, no matrices here. Everything in `algebra` is built from these scalars as a structure of arrays: a
-formula written once is a float computation at one pose, a NumPy computation (any precision) over many, or, under
-`jax.vmap`, one fused SIMD loop. A Python float that is exactly 0.0 is a structural zero: it drops out of products and
-sums while the formula is traced, so that sparse screws cost what their non-zeros cost.
+formula written once is a float computation at one pose, a NumPy computation (any precision) over many or, traced by
+the engine (or by JAX), one fused SIMD loop. A Python float that is exactly 0.0 is a structural zero: it drops out of
+products and sums while the formula is traced, so that sparse screws cost what their non-zeros cost.
 """
 
 import math
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 Scalar: TypeAlias = Any
-"""A float, a NumPy array or a JAX array: whatever carries + - * / and, if not a float, `__array_namespace__`."""
+"""A float, a NumPy array or a traced value: whatever carries + - * / and, if not a float, `__array_namespace__`."""
 
 
 def is_zero(a: Scalar) -> bool:
@@ -62,25 +61,13 @@ def sqrt(a: Scalar) -> Scalar:
     return a.__array_namespace__().sqrt(a)
 
 
-@dataclass(frozen=True)
-class Angle:
-    """An angle known by its cosine and sine: what `cos` and `sin` take in place of rad to leave no trigonometry."""
-
-    cos: Scalar
-    sin: Scalar
-
-
 def sin(a: Scalar) -> Scalar:
-    """Sine of an angle in rad, or of an `Angle`."""
-    if isinstance(a, Angle):
-        return a.sin
+    """Sine of an angle in rad."""
     return math.sin(a) if isinstance(a, float) else a.__array_namespace__().sin(a)
 
 
 def cos(a: Scalar) -> Scalar:
-    """Cosine of an angle in rad, or of an `Angle`."""
-    if isinstance(a, Angle):
-        return a.cos
+    """Cosine of an angle in rad."""
     return math.cos(a) if isinstance(a, float) else a.__array_namespace__().cos(a)
 
 
@@ -92,7 +79,7 @@ def where(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
 
 
 def smaller(a: Scalar, b: Scalar) -> Scalar:
-    """The smaller of the two."""
+    """The smaller of the two; `b` where either is NaN, so that a NaN that comes last is kept."""
     return where(a < b, a, b)
 
 

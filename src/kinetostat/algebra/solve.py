@@ -1,6 +1,6 @@
-"""Small dense factorisations, unrolled over scalars: dual basis and complement by Householder, inverse by Cholesky.
+"""Small dense factorisations, unrolled over scalars: dual basis and complement by Householder, diagonal form by Gauss.
 
-Every loop runs over a size known while tracing, so that under `jax.vmap` no loop and no LAPACK call is left. Structural
+Every loop runs over a size known while tracing, so that traced code has no loop and no LAPACK call. Structural
 zeros are used: sparse vectors are taken first and only their non-zero rows are touched.
 """
 
@@ -20,6 +20,9 @@ from kinetostat.algebra.scalar import (
 )
 
 Row = list[Scalar]
+
+ZERO_PIVOT = 1e-12
+"""Share of its diagonal entry below which a pivot of a semi-definite matrix is the rounding of zero."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,7 @@ def _triangularise(vectors: Sequence[Sequence[Scalar]]) -> _Triangular:
         order.append(here)
         pivots.append(filled[0])
         free.remove(filled[0])
-        regularity = smaller(abs(reduced[here][filled[0]]), regularity)
+        regularity = smaller(regularity, abs(reduced[here][filled[0]]))
     return _Triangular(reduced, turned, order, pivots, free, regularity)
 
 
@@ -109,34 +112,21 @@ def _reflect(column: Row, others: list[Row], rows: list[int]) -> None:
     column[rows[0]] = pivot
 
 
-def cholesky(matrix: Sequence[Sequence[Scalar]]) -> list[Row]:
-    """Lower factor L with L L^T = matrix, for a symmetric positive definite n x n matrix; rows of n scalars.
+def diagonalise(matrix: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Row]:
+    """T and d >= 0 with T H T^T = diag(d), T unit lower triangular, for a symmetric n x n matrix H >= 0; rows of n.
 
-    Where the matrix is not positive definite the factor holds NaN, for the caller to mask.
+    A pivot that is but the rounding of its diagonal entry is zero: H is then singular, and d_k = 0.
     """
-    factor: list[Row] = []
-    for i in range(len(matrix)):
-        row: Row = []
-        for j in range(i + 1):
-            known = total([times(row[k], (factor[j] if j < i else row)[k]) for k in range(j)])
-            rest = minus(matrix[i][j], known)
-            row.append(sqrt(rest) if i == j else times(rest, reciprocal(factor[j][j])))
-        factor.append(row)
-    return factor
-
-
-def inverse_positive(matrix: Sequence[Sequence[Scalar]]) -> list[Row]:
-    """Inverse of a symmetric positive definite n x n matrix, by Cholesky; rows of n scalars."""
     size = len(matrix)
-    factor = cholesky(matrix)
-    columns: list[Row] = []
-    for j in range(size):
-        column: Row = [0.0] * j
-        for i in range(j, size):
-            known = total([times(factor[i][k], column[k]) for k in range(j, i)])
-            column.append(times(minus(1.0 if i == j else 0.0, known), reciprocal(factor[i][i])))
-        columns.append(column)
-    return [
-        [total([times(columns[i][k], columns[j][k]) for k in range(max(i, j), size)]) for j in range(size)]
-        for i in range(size)
-    ]
+    left = [list(row) for row in matrix]
+    turned: list[Row] = [[1.0 if i == j else 0.0 for j in range(size)] for i in range(size)]
+    pivots: Row = []
+    for k in range(size):
+        alive = left[k][k] > ZERO_PIVOT * matrix[k][k]
+        pivots.append(where(alive, left[k][k], 0.0))
+        inverse = where(alive, reciprocal(where(alive, left[k][k], 1.0)), 0.0)
+        for i in range(k + 1, size):
+            factor = times(left[i][k], inverse)
+            left[i] = [minus(a, times(factor, b)) for a, b in zip(left[i], left[k], strict=True)]
+            turned[i] = [minus(a, times(factor, b)) for a, b in zip(turned[i], turned[k], strict=True)]
+    return turned, pivots

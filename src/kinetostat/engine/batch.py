@@ -1,6 +1,6 @@
 """Many points at once: the engine chooses arithmetic, slab size and threads. Holds no formula.
 
-Small batches run through NumPy, because that starts at once; large ones through compiled code. Both evaluate the very
+Small batches run through NumPy, because that starts at once; large ones through machine code. Both evaluate the very
 same functions.
 """
 
@@ -8,27 +8,29 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.scalar import Angle
 from kinetostat.engine.points import Array, Points
 from kinetostat.engine.threads import available_cores
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.machine.parameters import with_values
 
-COMPILE_FROM = 100_000
-"""Points from which importing and compiling (some seconds) pays: NumPy does about 0.4 million poses/s."""
+NATIVE_FROM = 50_000
+"""Points from which loading LLVM and compiling (0.2 s) pays: NumPy does some 0.4 million poses/s."""
 NUMPY_SLAB = 4096
 """Points per NumPy call: intermediates stay in the second cache level."""
+NATIVE_SLAB = 32768
+"""Points per call of machine code: 2 ms of work, so that calls cost little and an interrupt is soon heard."""
 
 Progress = Callable[[int, int], None]
 """Told (points done, points in all) after each slab."""
+
+Codes = npt.NDArray[np.int8]
 
 
 def silent(_done: int, _total: int) -> None:
@@ -45,7 +47,7 @@ class Evaluation:
     """
 
     values: dict[str, Array]
-    status: npt.NDArray[np.int8]
+    status: Codes
 
 
 def evaluate(machine: Machine, points: Points, quantities: Sequence[str], progress: Progress = silent) -> Evaluation:
@@ -57,69 +59,44 @@ def evaluate(machine: Machine, points: Points, quantities: Sequence[str], progre
         quantities: names from `kinetostatics.quantities.QUANTITIES`.
         progress: told how far the work is.
     """
-    compiled = points.size >= COMPILE_FROM
-    angles = {p.path for p in parameters(machine.family) if p.quantity.kind == "angle"}
-    fixed = {path: value for path, value in values(machine).items() if path not in points.paths}
-    work = _compiled_work if compiled else _numpy_work
-    slab, call = work(machine, _with_angles(fixed, angles, compiled), tuple(quantities))
+    native = points.size >= NATIVE_FROM
+    slab, threads = (NATIVE_SLAB, available_cores()) if native else (NUMPY_SLAB, 1)
+    fill = (_native_fill if native else _numpy_fill)(machine, points.paths, quantities)
     results = np.empty((len(quantities), points.size))
     status = np.empty(points.size, dtype=np.int8)
 
-    def fill(start: int) -> int:
+    def work(start: int) -> int:
         stop = min(start + slab, points.size)
-        found, codes = call(_with_angles(points.columns(start, stop), angles, True), stop - start)
-        status[start:stop] = codes
-        for row, column in zip(results, found, strict=True):
-            row[start:stop] = np.where(codes == Status.OK, column, np.nan)
+        fill(points.columns(start, stop), results[:, start:stop], status[start:stop])
         return stop - start
 
     done = 0
-    for count in _in_threads(fill, range(0, points.size, slab), available_cores() if compiled else 1):
+    for count in _in_threads(work, range(0, points.size, slab), threads):
         done += count
         progress(done, points.size)
     return Evaluation(dict(zip(quantities, results, strict=True)), status)
 
 
-def _with_angles(columns: Mapping[str, Any], angles: set[str], turned: bool) -> dict[str, Any]:
-    """The columns with every angle (rad) replaced by its cosine and sine."""
-    if not turned:
-        return dict(columns)
-    return {p: Angle(np.cos(c), np.sin(c)) if p in angles else c for p, c in columns.items()}
+Fill = Callable[[Mapping[str, Array], Array, Codes], None]
+"""From the varying parameters of a slab [points] to its results [quantities x points] and status codes, in place."""
 
 
-Work = tuple[int, Callable[[Mapping[str, Any], int], tuple[list[Any], Any]]]
-"""Slab size, and a function of the varying parameters and their number that gives values and status codes."""
-
-
-def _numpy_work(machine: Machine, fixed: Mapping[str, Any], quantities: tuple[str, ...]) -> Work:
-    def call(varied: Mapping[str, Any], count: int) -> tuple[list[Any], Any]:
+def _numpy_fill(machine: Machine, _paths: Sequence[str], quantities: Sequence[str]) -> Fill:
+    def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         with np.errstate(all="ignore"):
-            response = respond(with_values(machine, {**fixed, **varied}))
-            found = [QUANTITIES[name].value(response) for name in quantities]
-        return [np.broadcast_to(value, count) for value in found], np.broadcast_to(response.status, count)
+            response = respond(with_values(machine, columns))
+            status[:] = response.status
+            for row, name in zip(results, quantities, strict=True):
+                row[:] = QUANTITIES[name].value(response)
+        results[:, status != Status.OK] = np.nan
 
-    return NUMPY_SLAB, call
-
-
-def _compiled_work(machine: Machine, fixed: Mapping[str, Any], quantities: tuple[str, ...]) -> Work:
-    from kinetostat.engine import compiled  # JAX takes seconds to import: only where it pays
-
-    kernel = compiled.slab_kernel(machine, quantities)
-
-    def call(varied: Mapping[str, Any], count: int) -> tuple[list[Any], Any]:
-        padded = {path: _padded(column, compiled.SLAB) for path, column in varied.items()}
-        found, codes = compiled.run(kernel, fixed, padded)
-        return [value[:count] for value in found], codes[:count]
-
-    return compiled.SLAB, call
+    return fill
 
 
-def _padded(column: Any, size: int) -> Any:
-    """The column lengthened to `size` by its last value."""
-    if isinstance(column, Angle):
-        return Angle(_padded(column.cos, size), _padded(column.sin, size))
-    missing = size - len(column)
-    return np.pad(column, (0, missing), mode="edge") if missing else column
+def _native_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str]) -> Fill:
+    from kinetostat.engine.kernel import slab_kernel  # LLVM takes 0.1 s to load: only where it pays
+
+    return slab_kernel(machine, paths, quantities).run
 
 
 def _in_threads(task: Callable[[int], int], starts: Sequence[int], threads: int) -> Iterator[int]:

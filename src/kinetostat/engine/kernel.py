@@ -116,9 +116,8 @@ def _program(kind: _Kind, form: _Form) -> Program:
     response = respond(with_values(kind.machine, {**dict(form.constant), **fixed, **columns}))
     accepted = response.status < Status.OK + 0.5
     results = [where(accepted, QUANTITIES[name].value(response), math.nan) for name in form.quantities]
-    return Program(
-        Body([*fixed.values()], [*columns.values()], [_number(r) for r in results], _number(response.status))
-    )
+    numbers = [_number(result) for result in results]
+    return Program(Body([*fixed.values()], [*columns.values()], numbers, _number(response.status)))
 
 
 def _number(value: Scalar) -> Operand:

@@ -175,23 +175,16 @@ class Graph:
         return self._known[key]
 
 
-def needed(results: Iterable[Any]) -> list[Node]:
-    """The nodes that some results need, operands first, each result's in turn: what is used together is near."""
-    order: list[Node] = []
-    seen: set[Node] = set()
-    for result in results:
-        waiting: list[tuple[Any, bool]] = [(result, False)]
-        while waiting:
-            node, ready = waiting.pop()
-            if not isinstance(node, Node) or (node in seen):
-                continue
-            if ready:
-                seen.add(node)
-                order.append(node)
-            else:
-                waiting.append((node, True))
-                waiting.extend((operand, False) for operand in reversed(node.operands))
-    return order
+def needed(results: Iterable[Operand]) -> list[Node]:
+    """The nodes on which some results depend, in the order in which they were traced: operands first."""
+    found: set[Node] = set()
+    waiting = list(results)
+    while waiting:
+        operand = waiting.pop()
+        if isinstance(operand, Node) and operand not in found:
+            found.add(operand)
+            waiting.extend(operand.operands)
+    return sorted(found, key=lambda node: node.number)
 
 
 def _key(operation: str, operands: tuple[Operand, ...]) -> tuple[Any, ...]:

@@ -27,6 +27,16 @@ def conditioning(legs: Sequence[LegScrews], length: float) -> Array:
     return np.asarray(np.linalg.svd(columns(wrenches, 1.0 / length, 1.0), compute_uv=False), dtype=float)
 
 
+def independent(screws: Sequence[Screw], translational_scale: float, tolerance: float) -> int:
+    """How many of the screws are independent, each taken at unit size (rank at a relative `tolerance`)."""
+    if not screws:
+        return 0
+    matrix = columns(screws, 1.0, translational_scale)
+    sizes = np.linalg.norm(matrix, axis=0)
+    values = np.linalg.svd(matrix[:, sizes > 0.0] / sizes[sizes > 0.0], compute_uv=False)
+    return int((values > tolerance * max(values, default=0.0)).sum())
+
+
 def free_twist(legs: Sequence[LegScrews], length: float) -> list[float]:
     """The twist that the wrenches of all legs resist least: at a singularity, the one they leave free.
 

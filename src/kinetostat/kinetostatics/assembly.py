@@ -5,17 +5,15 @@ One form serves rigid and flexible machines: springs enter by compliance, and a 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 from kinetostat.algebra.scalar import Scalar, reciprocal, where
 from kinetostat.algebra.screw import Screw, Twist, Wrench
-from kinetostat.algebra.solve import dual_basis, inverse_positive
+from kinetostat.algebra.solve import dual_basis
 from kinetostat.algebra.symmetric import POSITIONS, Symmetric6
 from kinetostat.algebra.vector import Vector
-from kinetostat.kinetostatics.leg import leg_compliance, loads
+from kinetostat.kinetostatics.leg import combine, leg_modes, leg_resistance, loads
 from kinetostat.machine.leg import LegScrews
 
-AnyScrew = TypeVar("AnyScrew", bound=Screw)
 INFINITE = float("inf")
 ROUNDING = 1e-26
 """Square of 1e-13: below this share of the largest, what a rigid or free spring does to a component is rounding."""
@@ -27,14 +25,18 @@ class Isostatic:
 
     Attributes:
         flexibility: per spring, the platform twist per unit deformation of it alone (xi_e).
-        resistance: per spring, the platform wrench per unit load in it alone (b_e), dual to the xi_e.
         compliance: per spring, s_e.
+        resistance: per spring, the platform wrench per unit load in it alone (b_e), dual to the xi_e.
+        stiffness: per spring, k_e = 1 / s_e; infinite also where a leg carries a load that none of its springs feels.
+        length: characteristic length, m; rotations and translations compare through it where rounding is judged.
         regularity: 0 where the six wrenches become dependent and the platform is free with locked actuators.
     """
 
     flexibility: tuple[Twist, ...]
-    resistance: tuple[Wrench, ...]
     compliance: tuple[Scalar, ...]
+    resistance: tuple[Wrench, ...]
+    stiffness: tuple[Scalar, ...]
+    length: Scalar
     regularity: Scalar
 
 
@@ -49,15 +51,13 @@ def isostatic(legs: Sequence[LegScrews], length: Scalar) -> Isostatic:
     """
     twists, regularity = dual_twists([wrench for leg in legs for wrench in leg.wrenches], length)
     flexibility: list[Twist] = []
-    resistance: list[Wrench] = []
     for leg in legs:
         own = twists[len(flexibility) : len(flexibility) + len(leg.wrenches)]
-        load = loads(leg)
-        unload, _ = dual_basis(load)
-        flexibility += [combine(own, row) for row in load]
-        resistance += [combine(leg.wrenches, row) for row in unload]
-    springs = tuple(s for leg in legs for s in leg.compliance)
-    return Isostatic(tuple(flexibility), tuple(resistance), springs, regularity)
+        flexibility += [combine(own, row) for row in loads(leg)]
+    actions = [action for leg in legs for action in leg_resistance(leg)]
+    compliance = tuple(s for leg in legs for s in leg.compliance)
+    resistance, stiffness = tuple(b for b, _ in actions), tuple(k for _, k in actions)
+    return Isostatic(tuple(flexibility), compliance, resistance, stiffness, length, regularity)
 
 
 def compliance_matrix(statics: Isostatic) -> Symmetric6:
@@ -65,7 +65,7 @@ def compliance_matrix(statics: Isostatic) -> Symmetric6:
 
     Source: eq. 21, extended to flexible links.
     """
-    return weighted_sum(statics.compliance, statics.flexibility)
+    return weighted_sum(statics.compliance, statics.flexibility, reciprocal(statics.length))
 
 
 def stiffness_matrix(statics: Isostatic) -> Symmetric6:
@@ -73,20 +73,16 @@ def stiffness_matrix(statics: Isostatic) -> Symmetric6:
 
     Source: eq. 32.
     """
-    return weighted_sum([reciprocal(s) for s in statics.compliance], statics.resistance)
+    return weighted_sum(statics.stiffness, statics.resistance, statics.length)
 
 
 def flexible_stiffness(legs: Sequence[LegScrews]) -> Symmetric6:
-    """K = sum_i W_i G_i^-1 W_i^T for legs that all yield (G_i > 0), however many; NaN if one does not.
+    """K = sum_i W_i G_i^-1 W_i^T for legs that all yield (G_i > 0), however many; infinite if one does not.
 
     Source: theory section 2, eq. 32. A second route to `stiffness_matrix`, and the only one for redundant legs.
     """
-    terms = []
-    for leg in legs:
-        inverse = inverse_positive(leg_compliance(leg))
-        for a, first in enumerate(leg.wrenches):
-            terms += [Symmetric6.dyad(first, second) * inverse[a][b] for b, second in enumerate(leg.wrenches)]
-    return Symmetric6.total(terms)
+    shares = [Symmetric6.dyad(b, b) * k for leg in legs for b, k in leg_modes(leg)]
+    return Symmetric6.total(shares)
 
 
 def dual_twists(wrenches: Sequence[Wrench], length: Scalar) -> tuple[list[Twist], Scalar]:
@@ -105,23 +101,21 @@ def dual_twists(wrenches: Sequence[Wrench], length: Scalar) -> tuple[list[Twist]
     return [Twist(Vector(*row[:3]) * shrink, Vector(*row[3:])) for row in rows], regularity
 
 
-def combine(screws: Sequence[AnyScrew], weights: Sequence[Scalar]) -> AnyScrew:
-    """Linear combination of screws of one kind."""
-    result = screws[0] * weights[0]
-    for screw, weight in zip(screws[1:], weights[1:], strict=True):
-        result = result + screw * weight
-    return result
+def weighted_sum(weights: Sequence[Scalar], screws: Sequence[Screw], length: Scalar) -> Symmetric6:
+    """sum_e w_e a_e a_e^T, where an infinite weight makes infinite just what its screw reaches beyond rounding.
 
-
-def weighted_sum(weights: Sequence[Scalar], screws: Sequence[Screw]) -> Symmetric6:
-    """sum_e w_e a_e a_e^T, where an infinite weight makes infinite just what its screw reaches beyond rounding."""
+    Args:
+        weights: >= 0, infinity included.
+        screws: as many.
+        length: what to multiply translational components by, to compare them with rotational ones.
+    """
     dyads = [Symmetric6.dyad(screw, screw) for screw in screws]
     finite = Symmetric6.total([d * where(w < INFINITE, w, 0.0) for w, d in zip(weights, dyads, strict=True)])
     endless = Symmetric6.total([d * where(w < INFINITE, 0.0, 1.0) for w, d in zip(weights, dyads, strict=True)])
-    diagonal = endless.diagonal()
-    limit = ROUNDING * sum(diagonal)
+    reached = [a * scale for a, scale in zip(endless.diagonal(), [1.0] * 3 + [length * length] * 3, strict=True)]
+    limit = ROUNDING * sum(reached)
     entries = []
     for k, (i, j) in enumerate(POSITIONS):
-        reached = (diagonal[i] > limit) & (diagonal[j] > limit)
-        entries.append(where(reached, INFINITE, finite.upper[k]))
+        beyond = (reached[i] > limit) & (reached[j] > limit)
+        entries.append(where(beyond, INFINITE, finite.upper[k]))
     return Symmetric6(tuple(entries))

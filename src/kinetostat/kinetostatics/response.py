@@ -1,7 +1,7 @@
 """A machine at a pose to K, C and a status: the whole derivation in one function, for one pose.
 
-It holds for floats (one pose), NumPy arrays and, under `jax.vmap`, for millions; results where the status is not OK
-are meaningless and are masked by whoever collects them.
+It holds for floats (one pose), for NumPy arrays and, traced by the engine, for millions; results where the status is
+not OK are meaningless and are masked by whoever collects them.
 """
 
 from dataclasses import dataclass
@@ -14,8 +14,9 @@ from kinetostat.kinetostatics.assembly import Isostatic, compliance_matrix, isos
 from kinetostat.machine.leg import LegScrews
 from kinetostat.machine.machine import Configuration, Machine
 
-SINGULAR = 1e-9
-"""Regularity below which a pose counts as singular: results have then lost more than half of their digits."""
+SINGULAR = 1e-7
+"""Regularity below which a pose counts as singular: results have then lost half of their digits. A leg exactly at its
+limit comes out at the square root of rounding, 1e-8, not at zero."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +47,10 @@ def respond(machine: Machine) -> Response:
     reference, length = configuration.platform.translation, configuration.length
     legs = tuple(leg.screws(reference, length) for leg in configuration.legs)
     statics = isostatic(legs, length)
-    regularity = statics.regularity
+    regularity: Scalar = 1.0
     for leg in legs:
-        regularity = smaller(leg.regularity, regularity)
+        regularity = smaller(regularity, leg.regularity)
+    regularity = smaller(regularity, statics.regularity)
     return Response(
         configuration,
         legs,

@@ -11,6 +11,9 @@ from kinetostat.spec.errors import InputError, shorten
 LARGEST_FILE = 1 << 20
 """Bytes. A machine file has a few hundred; a megabyte is a mistake or an attack."""
 
+DEEPEST = 8
+"""Levels of tables and lists; a machine file has three or four."""
+
 Document = dict[str, Any]
 
 
@@ -45,11 +48,23 @@ def parse(text: str, origin: str) -> Document:
         InputError: not TOML; the message gives line and column.
     """
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        document = tomllib.loads(text)
+    except ValueError as error:
         raise InputError(f'"{origin}" is not valid TOML: {error}. Text values need quotes, e.g. x = "2 cm".') from None
     except RecursionError:
-        raise InputError(f'"{origin}" is nested too deeply; a machine file has tables of values and lists.') from None
+        document = None
+    if document is None or _deeper_than(document, DEEPEST):
+        raise InputError(f'"{origin}" is nested too deeply; a machine file has tables of values and lists.')
+    return document
+
+
+def _deeper_than(document: Any, levels: int) -> bool:
+    """Whether tables and lists are nested in more than so many levels."""
+    at = [document]
+    for _ in range(levels):
+        held = [part for part in at if isinstance(part, dict | list)]
+        at = [child for part in held for child in (part.values() if isinstance(part, dict) else part)]
+    return any(isinstance(part, dict | list) for part in at)
 
 
 def override(document: Document, settings: Sequence[str], counts: Mapping[str, int]) -> Document:
@@ -86,9 +101,10 @@ def _repeat(document: Document, path: str, counts: Mapping[str, int]) -> None:
 
 def _value(text: str) -> object:
     try:
-        return tomllib.loads(f"value = {text}\n")["value"]
-    except (tomllib.TOMLDecodeError, RecursionError):
+        found = tomllib.loads(f"value = {text}\n")
+    except (ValueError, RecursionError):
         return text
+    return found["value"] if len(found) == 1 else text
 
 
 def _put(document: Document, path: str, value: object) -> None:
@@ -101,7 +117,7 @@ def _put(document: Document, path: str, value: object) -> None:
     elif isinstance(at, dict):
         at[last] = value
     else:
-        raise InputError(f"--set {path}: nothing can be set inside {shorten(at)}; give a shorter path.")
+        raise InputError(f"--set {shorten(path)}: nothing can be set inside {shorten(at)}; give a shorter path.")
 
 
 def _child(at: Any, key: str, path: str) -> Any:
@@ -109,10 +125,11 @@ def _child(at: Any, key: str, path: str) -> Any:
         return at.setdefault(key, {})
     if isinstance(at, list):
         return at[_index(at, key, path)]
-    raise InputError(f"--set {path}: {shorten(at)} has no part called {key}; give a shorter path.")
+    raise InputError(f"--set {shorten(path)}: {shorten(at)} has no part called {shorten(key)}; give a shorter path.")
 
 
 def _index(entries: list[Any], key: str, path: str) -> int:
-    if not key.isdecimal() or int(key[:9]) >= len(entries):
-        raise InputError(f"--set {path}: {key} is not an entry; the list has entries 0 to {len(entries) - 1}.")
+    if not key.isdecimal() or len(key) > 9 or int(key) >= len(entries):
+        known = f"the list has entries 0 to {len(entries) - 1}"
+        raise InputError(f"--set {shorten(path)}: {shorten(key)} is not an entry; {known}.")
     return int(key)

@@ -2,10 +2,19 @@
 
 
 class InputError(ValueError):
-    """Bad input: the message names the field, the value, what is allowed and the fix. Commands exit with 2."""
+    """Bad input: the message names the field, the value, what is allowed and the fix. Commands exit with 2.
+
+    What people wrote is quoted in messages; characters in it that cannot be printed are shown by their escapes.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__("".join(c if c.isprintable() else ascii(c)[1:-1] for c in message))
 
 
 def shorten(value: object, longest: int = 60) -> str:
     """A value as people wrote it, cut to a bounded length."""
-    text = f'"{value}"' if isinstance(value, str) else repr(value)
+    try:
+        text = f'"{value}"' if isinstance(value, str) else repr(value)
+    except ValueError:  # Python refuses to write integers of thousands of digits
+        return "a number of thousands of digits"
     return text if len(text) <= longest else f"{text[: longest - 1]}…"

@@ -1,24 +1,30 @@
-"""The first question: how stiff is this machine at this pose, and why. One pose; no JAX is needed."""
+"""The first question: how stiff is this machine at this pose, and why. One pose; nothing is compiled."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.algebra.symmetric import POSITIONS, Symmetric6
+from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.reach import why_out_of_reach
-from kinetostat.kinematics.singularity import conditioning, describe, why_singular
+from kinetostat.kinematics.singularity import conditioning, describe, independent, why_singular
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.assembly import Isostatic, compliance_matrix, stiffness_matrix
 from kinetostat.kinetostatics.attribution import compliance_shares, stiffness_shares
 from kinetostat.kinetostatics.indices import Principal, principal_compliances
+from kinetostat.kinetostatics.leg import AnyScrew
 from kinetostat.kinetostatics.response import SINGULAR, Response, respond
+from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.machine.parameters import values
 
 Rows = list[list[float]]
 
-VANISHING = 1e-28
-"""A diagonal entry below this share of the largest of its block is the square of a rounding error, and zero."""
+NEGLIGIBLE = 1e-13
+"""Share of a screw's size below which one of its components is rounding."""
+INDEPENDENT = 1e-9
+"""Relative size of a singular value below which the motions of springs are dependent."""
 
 
 @dataclass(frozen=True)
@@ -85,38 +91,42 @@ def analyze(machine: Machine) -> Analysis:
     held = springs(response.configuration)
     rigid = tuple(spring.name for spring in held if math.isinf(spring.stiffness))
     free = tuple(spring.name for spring in held if spring.stiffness == 0.0)
-    stiffness, compliance = without_rounding(response.stiffness), without_rounding(response.compliance)
+    statics = without_rounding(response.statics)
+    stiffness, compliance = stiffness_matrix(statics), compliance_matrix(statics)
+    yielding = all(math.isfinite(entry) for entry in stiffness.diagonal())
     length = float(response.configuration.length)
     extremes = conditioning(response.legs, length)
     return Analysis(
         machine,
         status,
-        _message(response, rigid, free),
-        stiffness=None if rigid else stiffness.rows(),
+        _message(response, rigid, free, yielding),
+        stiffness=stiffness.rows() if yielding else None,
         compliance=None if free else compliance.rows(),
         stiffness_diagonal=stiffness.diagonal(),
         compliance_diagonal=compliance.diagonal(),
-        rank=len(held) - len(free or rigid),
+        rank=_rank(statics, bool(free)),
         rigid=rigid,
         free=free,
-        shares=_shares(response, stiffness, compliance),
+        shares=_shares(held, statics, stiffness, compliance),
         principal=None if free else principal_compliances(compliance),
         condition=float(extremes[0] / extremes[-1]),
         length=length,
     )
 
 
-def without_rounding(matrix: Symmetric6) -> Symmetric6:
-    """The matrix with rows and columns of exact zeros where its diagonal holds but the square of a rounding error.
+def without_rounding(statics: Isostatic) -> Isostatic:
+    """The same statics with exact zeros where a screw's component is but rounding beside its others."""
+    length = statics.length
+    flexibility = tuple(_rounded(twist, 1.0 / length) for twist in statics.flexibility)
+    resistance = tuple(_rounded(wrench, length) for wrench in statics.resistance)
+    return replace(statics, flexibility=flexibility, resistance=resistance)
 
-    In a positive semi-definite matrix a zero on the diagonal makes its whole row zero.
-    """
-    diagonal = matrix.diagonal()
-    largest = [max((d for d in block if math.isfinite(d)), default=0.0) for block in (diagonal[:3], diagonal[3:])]
-    zero = [diagonal[i] <= VANISHING * largest[i // 3] for i in range(6)]
-    return Symmetric6(
-        tuple(0.0 if zero[i] or zero[j] else entry for (i, j), entry in zip(POSITIONS, matrix.upper, strict=True))
-    )
+
+def _rounded(screw: AnyScrew, length: float) -> AnyScrew:
+    """The screw without components that rounding alone explains, translations compared through `length`."""
+    sizes = [abs(c) * scale for c, scale in zip(screw.components(), [1.0] * 3 + [length] * 3, strict=True)]
+    kept = [c if size > NEGLIGIBLE * max(sizes) else 0.0 for c, size in zip(screw.components(), sizes, strict=True)]
+    return type(screw)(Vector(*kept[:3]), Vector(*kept[3:]))
 
 
 def as_json(analysis: Analysis) -> dict[str, Any]:
@@ -168,8 +178,18 @@ def _why(status: Status, response: Response) -> str:
     return f"The pose is singular. {why_singular(names, response.legs, configuration.length, SINGULAR)}"
 
 
-def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...]) -> str:
+def _rank(statics: Isostatic, free: bool) -> int:
+    """Rank of C, or of K where a spring is free; independent of how much the springs differ."""
+    if free:
+        return sum(k > 0.0 for k in statics.stiffness)
+    motions = [twist for s, twist in zip(statics.compliance, statics.flexibility, strict=True) if s > 0.0]
+    return independent(motions, 1.0 / statics.length, INDEPENDENT)
+
+
+def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...], yielding: bool) -> str:
     sentences = []
+    if not yielding and not rigid:
+        sentences.append("A leg carries a load here that none of its springs feels: K is infinite against it, C exact.")
     if rigid:
         sentences.append(f"Rigid: {', '.join(rigid)}; K is infinite in the directions that they hold, C is exact.")
     held = springs(response.configuration)
@@ -181,9 +201,10 @@ def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...]) 
     return " ".join(sentences) or Status.OK.sentence
 
 
-def _shares(response: Response, stiffness: Symmetric6, compliance: Symmetric6) -> tuple[SpringShare, ...]:
-    statics = response.statics
-    parts = zip(compliance_shares(statics), stiffness_shares(statics), springs(response.configuration), strict=True)
+def _shares(
+    held: list[Spring], statics: Isostatic, stiffness: Symmetric6, compliance: Symmetric6
+) -> tuple[SpringShare, ...]:
+    parts = zip(compliance_shares(statics), stiffness_shares(statics), held, strict=True)
     return tuple(
         SpringShare(spring.name, spring.stiffness, _ratio(soft, compliance), _ratio(stiff, stiffness))
         for soft, stiff, spring in parts

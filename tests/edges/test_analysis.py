@@ -1,0 +1,182 @@
+"""`analyze` at every kind of pose: status, message, and the machine-readable form."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.machine.library import load
+from kinetostat.machine.parameters import with_values
+from kinetostat.studies.analysis import analyze, as_json
+from machines import CASES, CONTRASTING, every_machine, machines
+
+NAME = "zhang-gosselin-4dof"
+RIGID_LINKS = "stiffness.passive_links=rigid"
+FREE_LEG = "stiffness.actuator.0=0"
+
+
+def at(*settings):
+    return analyze(load(NAME, settings))
+
+
+STATES = {
+    "ok": ((), "ok", ["can be reached", "resists every load"]),
+    "rigid": ((RIGID_LINKS,), "ok", ["Rigid: passive link 1, passive link 2", "K is infinite", "C is exact"]),
+    "free": ((FREE_LEG,), "ok", ["Free: leg 1 actuator", "no stiffness", "rx -0.4201 rad/m", "x +9.112 m/m"]),
+    "free bending": (
+        ("stiffness.passive_links.1=0",),
+        "ok",
+        ["Free: passive link 2", "rz -0.866 rad/rad", "y +0.68 m/rad"],
+    ),
+    "rigid and free": ((RIGID_LINKS, FREE_LEG), "ok", ["Rigid: passive link 1", "Free: leg 1 actuator"]),
+    "all rigid": ((RIGID_LINKS, "stiffness.actuator=rigid"), "ok", ["Rigid: passive link 1", "leg 4 actuator"]),
+    "all free": (("stiffness.actuator=0", "stiffness.passive_links=0"), "ok", ["Free: passive link 1", "Free: leg 4"]),
+    "too far": (("pose.z=1.5",), "out_of_reach", ["passive leg", "1.5 m", "at most 1.36 m", "nearer"]),
+    "too near": (
+        ("geometry.passive_links.1=50 cm", "pose.z=0.1"),
+        "out_of_reach",
+        ["passive leg", "0.1 m", "at least 0.18 m", "away"],
+    ),
+    "stretched": (("pose.z=1.36",), "singular", ["passive leg lock up", "stretched, folded or aligned"]),
+    "folded": (("pose.z=0",), "singular", ["passive leg"]),
+    "no platform": (
+        ("geometry.platform_radius=1e-12",),
+        "singular",
+        ["With all actuators locked", "still move", "rad"],
+    ),
+    "parallelogram": (
+        ("geometry.base_radius=12 cm", "geometry.platform_angle=30 deg"),
+        "singular",
+        ["With all actuators locked", "x +1 m"],
+    ),
+}
+every_state = pytest.mark.parametrize(("settings", "status", "words"), STATES.values(), ids=STATES)
+
+
+@every_state
+def test_status_and_message(settings, status, words):
+    found = at(*settings)
+    assert found.status.word == status
+    for word in words:
+        assert word in found.message
+    assert found.message.endswith(".")
+
+
+@every_state
+def test_json_has_its_shape_and_no_number_that_json_lacks(settings, status, words):
+    data = as_json(at(*settings))
+    assert json.loads(json.dumps(data, allow_nan=False)) == data
+    assert data["name"] == "Zhang & Gosselin 4-dof"
+    assert data["order"] == list(COMPONENTS)
+    assert set(data["pose"]) == {"x", "z", "theta5", "theta6"}
+    assert (data["status"], data["message"]) == (status, at(*settings).message)
+    for matrix in ("stiffness", "compliance"):
+        assert data[matrix] is None or np.array(data[matrix], dtype=float).shape == (6, 6)
+        assert data[f"{matrix}_diagonal"] is None or len(data[f"{matrix}_diagonal"]) == 6
+
+
+@pytest.mark.parametrize("state", [state for state, row in STATES.items() if row[1] != "ok"])
+def test_a_pose_without_answer_has_no_numbers(state):
+    data = as_json(at(*STATES[state][0]))
+    answers = ("stiffness", "compliance", "stiffness_diagonal", "compliance_diagonal", "rank", "condition")
+    assert [data[key] for key in answers] == [None] * 6
+    assert data["attribution"] == []
+    assert data["principal_compliances"] is None
+
+
+def test_the_reference_pose():
+    data = as_json(at())
+    assert data["rank"] == 6
+    assert (data["rigid"], data["free"]) == ([], [])
+    assert data["stiffness"][0][0] == pytest.approx(8.50551299487, rel=1e-9)
+    assert data["compliance_diagonal"] == pytest.approx([data["compliance"][i][i] for i in range(6)])
+    for shares in ("compliance_share", "stiffness_share"):
+        assert np.sum([s[shares] for s in data["attribution"]], axis=0) == pytest.approx(np.ones(6))
+    assert [s["spring"] for s in data["attribution"]][:3] == ["passive link 1", "passive link 2", "leg 1 actuator"]
+    assert set(data["principal_compliances"]) == {"rotation", "translation"}
+
+
+def test_a_rigid_passive_leg_has_no_stiffness_matrix_and_exact_zeros_in_c():
+    data = as_json(at(RIGID_LINKS))
+    assert data["stiffness"] is None
+    assert data["rank"] == 4
+    assert data["rigid"] == ["passive link 1", "passive link 2"]
+    assert [entry is None for entry in data["stiffness_diagonal"]] == [False, False, True, False, True, False]
+    zeros = [[name in ("rz", "y") for name in COMPONENTS]] * 6
+    held = np.array(zeros) | np.array(zeros).T
+    assert np.array_equal(np.array(data["compliance"]) == 0.0, held)
+    assert [s["stiffness"] for s in data["attribution"]] == ["rigid"] * 2 + [1000.0] * 4
+    assert data["attribution"][0]["compliance_share"] == [0.0, 0.0, None, 0.0, None, 0.0]
+
+
+def test_a_free_leg_has_no_compliance_matrix():
+    data = as_json(at(FREE_LEG))
+    assert data["compliance"] is None
+    assert data["principal_compliances"] is None
+    assert data["rank"] == 5
+    assert data["free"] == ["leg 1 actuator"]
+    assert [entry is None for entry in data["compliance_diagonal"]] == [True, True, False, True, False, True]
+    assert np.linalg.matrix_rank(np.array(data["stiffness"]), 1e-9) == 5
+
+
+def test_rounding_is_no_compliance_even_where_another_direction_is_free():
+    """The passive leg is rigid: about z and along y nothing moves, whether or not an actuator is free."""
+    data = as_json(at(RIGID_LINKS, FREE_LEG))
+    assert [data["compliance_diagonal"][COMPONENTS.index(name)] for name in ("rz", "y")] == [0.0, 0.0]
+    assert all(share["compliance_share"][COMPONENTS.index("rz")] is None for share in data["attribution"])
+
+
+UNSEEN = math.degrees(math.atan(math.sqrt(3) / 2))
+"""theta5 (deg) at which neither link bends under one of the two loads that the passive leg carries.
+
+There J5' of eq. 25 is singular: tan(theta5) = l52 / l51 sin(120 deg). The pose is regular and C is finite, but of rank
+5, and K is infinite about the axis of that load.
+"""
+
+
+@pytest.mark.parametrize("beside", [0.0, 1e-13, -1e-13])
+def test_a_load_that_no_spring_feels_is_held_rigidly(beside):
+    found = at(f"pose.theta5={UNSEEN + beside!r} deg")
+    data = as_json(found)
+    assert json.dumps(data, allow_nan=False)
+    assert data["status"] == "ok"
+    assert data["compliance_diagonal"] == pytest.approx(
+        [0.140456, 0.0942476, 3.7037, 0.00679752, 5.78e-4, 0.00147172], rel=1e-5
+    )
+    assert [data["stiffness_diagonal"][i] for i in (1, 3, 5)] == pytest.approx([21.1391732, 247.319412, 3425.42944])
+
+
+def limits(machine):
+    """Shortest and longest span of the passive leg."""
+    first, second = machine.geometry.passive_links
+    return abs(first - second), first + second
+
+
+@given(
+    machines(next(case for case in CASES if case.name == NAME)),
+    st.sampled_from([0, 1]),
+    st.floats(-1.0, 1.0),
+    st.sampled_from([0.0, 1e-16, -1e-16]),
+)
+def test_a_stretched_or_folded_leg_is_never_ok(machine, which, direction, beside):
+    """At the very limit rounding decides on which side the span falls; on either it is an answer, not a number."""
+    span = limits(machine)[which] * (1.0 + beside)
+    at_limit = with_values(machine, {"pose.x": span * math.sin(direction), "pose.z": span * math.cos(direction)})
+    found = analyze(at_limit)
+    assert found.status.word in ("singular", "out_of_reach")
+    assert "passive leg" in found.message
+
+
+@every_machine
+@given(data=st.data())
+def test_any_machine_has_an_answer_in_json(case, data):
+    """Whatever the design, at poses in and out of reach, with rigid and free springs."""
+    ends = st.sampled_from([0.0, math.inf])
+    machine = data.draw(machines(case, CONTRASTING | ends))
+    for path in data.draw(st.lists(st.sampled_from(sorted(case.ranges)), max_size=3)):
+        machine = with_values(machine, {path: data.draw(st.floats(0.01, 2.0), label=path)})
+    json.dumps(as_json(analyze(machine)), allow_nan=False)

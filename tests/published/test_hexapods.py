@@ -1,0 +1,79 @@
+"""Hexapods published elsewhere: tdehaeze/stewart-simscape (MIT). Six two-force legs, solved without a machine file."""
+
+import math
+
+import numpy as np
+import pytest
+
+from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
+from kinetostat.kinetostatics.assembly import compliance_matrix, stiffness_matrix
+from kinetostat.machine.leg import TwoForceLeg
+from kinetostat.machine.machine import Configuration
+from numeric import array, statics_at
+
+
+def hexapod(base, platform, reference, stiffness):
+    legs = [TwoForceLeg(f"leg {i}", b, p, stiffness) for i, (b, p) in enumerate(zip(base, platform, strict=True))]
+    placed = Configuration(Displacement(IDENTITY, reference), tuple(legs), (), 0.1)
+    return statics_at(placed, reference)
+
+
+def ring(radius, height, degrees):
+    return [Vector(radius * math.cos(a), radius * math.sin(a), height) for a in map(math.radians, degrees)]
+
+
+GENERAL = hexapod(
+    ring(0.115, 0.015, (-10, 10, 110, 130, 230, 250)),
+    ring(0.090, 0.075, (-50, 50, 70, 170, 190, -70)),
+    Vector(0.0, 0.0, 0.135),
+    20e6,
+)
+PUBLISHED = {
+    ("rx", "rx"): (5.2e-6, 5.186272e-6),
+    ("ry", "ry"): (5.2e-6, 5.186272e-6),
+    ("rz", "rz"): (1.7e-6, 1.707296e-6),
+    ("x", "x"): (4.7e-8, 4.749957e-8),
+    ("y", "y"): (4.7e-8, 4.749957e-8),
+    ("z", "z"): (2.1e-8, 2.099046e-8),
+    ("x", "ry"): (3.2e-7, 3.209330e-7),
+    ("y", "rx"): (3.2e-7, 3.209330e-7),
+}
+"""Absolute entries of C: printed to two digits there, and computed to seven (REFERENCE.md)."""
+ORDER = ("rx", "ry", "rz", "x", "y", "z")
+
+
+@pytest.mark.parametrize("entry", PUBLISHED)
+def test_a_general_hexapod(entry):
+    """To one unit in the second printed digit: x = 4.74996e-8 is printed 4.7e-8, cut or rounded."""
+    row, column = (ORDER.index(name) for name in entry)
+    value = abs(array(compliance_matrix(GENERAL))[row, column])
+    two_digits, seven_digits = PUBLISHED[entry]
+    assert value == pytest.approx(two_digits, rel=0.0125)
+    assert value == pytest.approx(seven_digits, rel=3e-7)
+
+
+def test_its_other_entries_vanish_by_symmetry():
+    compliance = abs(array(compliance_matrix(GENERAL)))
+    for i, row in enumerate(ORDER):
+        for j, column in enumerate(ORDER):
+            if (row, column) not in PUBLISHED and (column, row) not in PUBLISHED:
+                assert compliance[i, j] <= 1e-12 * math.sqrt(compliance[i, i] * compliance[j, j])
+
+
+@pytest.mark.parametrize("size", [0.01, 0.1, 3.0])
+def test_a_cubic_hexapod_has_a_diagonal_stiffness(size):
+    """Struts along the edges of a cube that stands on a corner, reference point at its centre, edge Hc sqrt(3)."""
+    edge, stiffness = size * math.sqrt(3), 1e6
+    upright = np.array([[1, -1, 0], [1, 1, -2], [1, 1, 1]]) / np.sqrt([[2], [6], [3]])
+    corners = {
+        (i, j, k): Vector(*map(float, upright @ (edge * (np.array([i, j, k]) - 0.5))))
+        for i in (0, 1)
+        for j in (0, 1)
+        for k in (0, 1)
+    }
+    low = [(1, 0, 0), (1, 0, 0), (0, 1, 0), (0, 1, 0), (0, 0, 1), (0, 0, 1)]
+    high = [(1, 1, 0), (1, 0, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (0, 1, 1)]
+    found = array(stiffness_matrix(hexapod([corners[c] for c in low], [corners[c] for c in high], ZERO, stiffness)))
+    expected = stiffness * np.diag([1.5 * size**2, 1.5 * size**2, 6 * size**2, 2, 2, 2])
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    assert np.all(abs(found - expected) <= 1e-12 * scale)
