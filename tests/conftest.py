@@ -9,6 +9,6 @@ from hypothesis import HealthCheck, settings
 QUIET = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large]
 """Poses are filtered by regularity and each costs a statics solve; neither is a fault of a test."""
 
-settings.register_profile("steady", max_examples=60, deadline=None, derandomize=True, suppress_health_check=QUIET)
+settings.register_profile("steady", max_examples=25, deadline=None, derandomize=True, suppress_health_check=QUIET)
 settings.register_profile("explore", max_examples=1000, deadline=None, suppress_health_check=QUIET)
 settings.load_profile("steady")

@@ -9,7 +9,7 @@ from hypothesis import assume
 from kinetostat.algebra.screw import Screw, Twist, Wrench
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import Displacement, Rotation, Vector
-from kinetostat.kinetostatics.assembly import Isostatic, compliance_matrix, isostatic, stiffness_matrix
+from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_statics, stiffness_matrix
 from kinetostat.machine.machine import Configuration
 
 Array = npt.NDArray[np.float64]
@@ -91,10 +91,10 @@ def assert_psd(symmetric: Symmetric6, length: float, kind: type[Screw]) -> None:
     assert eigenvalues[0] >= -20 * U * eigenvalues[-1]
 
 
-def statics_at(configuration: Configuration, reference: Vector) -> Isostatic:
+def statics_at(configuration: Configuration, reference: Vector) -> Statics:
     """Statics of a placed machine at any reference point (base frame, m)."""
     length = configuration.length
-    return isostatic([leg.screws(reference, length) for leg in configuration.legs], length)
+    return solve_statics([leg.screws(reference, length) for leg in configuration.legs], length)
 
 
 def displaced(configuration: Configuration, motion: Displacement) -> Configuration:
@@ -103,7 +103,7 @@ def displaced(configuration: Configuration, motion: Displacement) -> Configurati
     return Configuration(motion @ configuration.platform, legs, configuration.closures, configuration.length)
 
 
-def matrices(statics: Isostatic) -> tuple[Array, Array]:
+def matrices(statics: Statics) -> tuple[Array, Array]:
     """K and C as arrays [6 x 6]."""
     return array(stiffness_matrix(statics)), array(compliance_matrix(statics))
 

@@ -64,6 +64,31 @@ def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
     return dual, solved.regularity
 
 
+def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row], Scalar]:
+    """Solutions x of A x = b for n independent rows of m >= n components: x = A+ b + any mix of null vectors.
+
+    Returns:
+        A+ as m rows of n scalars (the solution of least norm); the m - n orthonormal null vectors of m scalars; and the
+        regularity of the rows as in `dual_basis`.
+    """
+    solved = _triangularise(rows)
+    size, wide = len(rows), len(rows[0])
+    steps: list[Row] = [[] for _ in rows]  # R^-T: steps[k][j] multiplies b_j in the solution's component k
+    for k in range(size):
+        here, pivot = solved.order[k], solved.pivots[k]
+        inverse = reciprocal(solved.vectors[here][pivot])
+        above = [(solved.vectors[here][solved.pivots[i]], steps[i]) for i in range(k)]
+        for j in range(size):
+            known = total([times(factor, step[j]) for factor, step in above])
+            steps[k].append(times(minus(1.0 if j == here else 0.0, known), inverse))
+    solution = [
+        [total([times(column[p], steps[k][j]) for k, p in enumerate(solved.pivots)]) for j in range(size)]
+        for column in solved.turned
+    ]
+    null = [[solved.turned[i][row] for i in range(wide)] for row in solved.free]
+    return solution, null, solved.regularity
+
+
 def complement(vectors: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
     """An orthonormal basis of what is orthogonal to a independent vectors of n components, a < n.
 
@@ -122,7 +147,7 @@ def diagonalise(matrix: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Row]:
     turned: list[Row] = [[1.0 if i == j else 0.0 for j in range(size)] for i in range(size)]
     pivots: Row = []
     for k in range(size):
-        alive = left[k][k] > ZERO_PIVOT * matrix[k][k]
+        alive = left[k][k] > (times(ZERO_PIVOT, matrix[k][k]) if k else 0.0)
         pivots.append(where(alive, left[k][k], 0.0))
         inverse = where(alive, reciprocal(where(alive, left[k][k], 1.0)), 0.0)
         for i in range(k + 1, size):
@@ -130,3 +155,20 @@ def diagonalise(matrix: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Row]:
             left[i] = [minus(a, times(factor, b)) for a, b in zip(left[i], left[k], strict=True)]
             turned[i] = [minus(a, times(factor, b)) for a, b in zip(turned[i], turned[k], strict=True)]
     return turned, pivots
+
+
+def solve_semidefinite(matrix: Sequence[Sequence[Scalar]], right: Sequence[Sequence[Scalar]]) -> list[Row]:
+    """A solution X of H X = B for a symmetric n x n matrix H >= 0 and a B in its range; rows of scalars.
+
+    Of the solutions of a singular H, the one without components along its zero pivots.
+    """
+    turned, pivots = diagonalise(matrix)
+    size, wide = len(matrix), len(right[0])
+    inverses = [where(d > 0.0, reciprocal(where(d > 0.0, d, 1.0)), 0.0) for d in pivots]
+    inner = [
+        [times(inverses[k], total([times(turned[k][i], right[i][c]) for i in range(k + 1)])) for c in range(wide)]
+        for k in range(size)
+    ]
+    return [
+        [total([times(turned[k][i], inner[k][c]) for k in range(i, size)]) for c in range(wide)] for i in range(size)
+    ]

@@ -3,6 +3,7 @@
 No screws here (see `screw`) and no machine. All components are in the axes the caller names; lengths are in m.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, cos, minus, plus, sin, sqrt, times, total
@@ -53,6 +54,7 @@ ZERO = Vector(0.0, 0.0, 0.0)
 X_AXIS = Vector(1.0, 0.0, 0.0)
 Y_AXIS = Vector(0.0, 1.0, 0.0)
 Z_AXIS = Vector(0.0, 0.0, 1.0)
+AXES = (X_AXIS, Y_AXIS, Z_AXIS)
 
 
 @dataclass(frozen=True)
@@ -89,9 +91,20 @@ def rotation_y(c: Scalar, s: Scalar) -> Rotation:
     return Rotation(Vector(c, 0.0, -s), Y_AXIS, Vector(s, 0.0, c))
 
 
+def rotation_z(c: Scalar, s: Scalar) -> Rotation:
+    """Rotation about z by the angle whose cosine is c and sine s."""
+    return Rotation(Vector(c, s, 0.0), Vector(-s, c, 0.0), Z_AXIS)
+
+
 def polar(radius: Scalar, angle: Scalar) -> Vector:
     """The point of the x-y plane at `radius` (m) from the origin and `angle` (rad) from x."""
     return Vector(times(radius, cos(angle)), times(radius, sin(angle)), 0.0)
+
+
+def ring(radius: Scalar, angles: Sequence[Scalar], height: Scalar = 0.0) -> list[Vector]:
+    """Points at `radius` (m) about z, at the given angles from x (rad) and one height (m)."""
+    flat = [polar(radius, angle) for angle in angles]
+    return [Vector(point.x, point.y, height) for point in flat]
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TypeVar
 
-from kinetostat.algebra.scalar import Scalar, reciprocal, sqrt, times, total, where
+from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, times, total, where
 from kinetostat.algebra.screw import Screw, Wrench
 from kinetostat.algebra.solve import diagonalise, dual_basis
 from kinetostat.algebra.vector import Vector
@@ -13,6 +13,8 @@ AnyScrew = TypeVar("AnyScrew", bound=Screw)
 
 UNSEEN = 1e-12
 """Sine of the angle between the loads of a leg's springs below which they are dependent, up to rounding."""
+
+INFINITE = float("inf")
 
 Action = tuple[Wrench, Scalar]
 """A wrench b (N·m, N per N or N·m of load) and a stiffness k (N/m or N·m/rad): the share k b b^T of a leg in K."""
@@ -47,22 +49,42 @@ def leg_modes(leg: LegScrews) -> list[Action]:
     return [(combine(leg.wrenches, row), reciprocal(pivot)) for row, pivot in zip(rows, pivots, strict=True)]
 
 
-def leg_resistance(leg: LegScrews) -> list[Action]:
-    """The leg's stiffness spring by spring, for as many springs as wrenches: b_e loads spring e alone, by one unit.
+def leg_resistance(leg: LegScrews) -> tuple[list[Action], list[Action]]:
+    """The leg's stiffness spring by spring: one share for each, and what is rigid whatever the springs.
 
-    Where some load of the leg is felt by no spring the b_e do not exist; the leg is rigid under that load, and the
-    shares are those of `leg_modes`.
+    With as many springs as wrenches, the share of spring e is k_e b_e b_e^T, where b_e loads e alone by one unit: exact
+    for any k_e from free to rigid. With more (springs in series) or fewer, and where a load is felt by no spring, it is
+    s_e c_e c_e^T, where c_e = W G^-1 W^T J_e is the load in e per unit twist; modes of G that vanish are rigid.
+
+    Source: theory section 2.
     """
     stiffness = [reciprocal(s) for s in leg.compliance]
     if leg.loads is not None:
-        return list(zip(leg.wrenches, stiffness, strict=True))
-    load = loads(leg)
+        return list(zip(leg.wrenches, stiffness, strict=True)), []
+    load, modes = loads(leg), leg_modes(leg)
+    rows, pivots = diagonalise(leg_compliance(leg))
+    held = [(wrench, where(pivot > 0.0, 0.0, INFINITE)) for (wrench, _), pivot in zip(modes, pivots, strict=True)]
+    yielding = [reciprocal(where(pivot > 0.0, pivot, INFINITE)) for pivot in pivots]
+    felt = [[total([times(r, c) for r, c in zip(row, one, strict=True)]) for row in rows] for one in load]
+    in_modes = [
+        (combine([w for w, _ in modes], [times(f, y) for f, y in zip(feels, yielding, strict=True)]), s)
+        for feels, s in zip(felt, leg.compliance, strict=True)
+    ]
+    if len(load) != len(leg.wrenches):
+        return in_modes, _effective(held)
     sizes = [reciprocal(sqrt(total([times(c, c) for c in row]))) for row in load]
     unload, sine = dual_basis([[times(c, size) for c in row] for row, size in zip(load, sizes, strict=True)])
     apart = sine > UNSEEN
     springwise = [combine(leg.wrenches, row) * size for row, size in zip(unload, sizes, strict=True)]
-    pairs = zip(springwise, stiffness, leg_modes(leg), strict=True)
-    return [(_either(apart, b, mode), where(apart, k, rigidity)) for b, k, (mode, rigidity) in pairs]
+    shares = [
+        (_either(apart, b, c), where(apart, k, s)) for b, k, (c, s) in zip(springwise, stiffness, in_modes, strict=True)
+    ]
+    return shares, _effective([(wrench, where(apart, 0.0, k)) for wrench, k in held])
+
+
+def _effective(actions: list[Action]) -> list[Action]:
+    """The actions without those that are known to do nothing."""
+    return [(wrench, k) for wrench, k in actions if not is_zero(k)]
 
 
 def combine(screws: Sequence[AnyScrew], weights: Sequence[Scalar]) -> AnyScrew:

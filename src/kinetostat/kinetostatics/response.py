@@ -10,7 +10,7 @@ from kinetostat.algebra.scalar import Scalar, smaller, where
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.kinematics.reach import within_reach
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.assembly import Isostatic, compliance_matrix, isostatic, stiffness_matrix
+from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_statics, stiffness_matrix
 from kinetostat.machine.leg import LegScrews
 from kinetostat.machine.machine import Configuration, Machine
 
@@ -34,7 +34,7 @@ class Response:
 
     configuration: Configuration
     legs: tuple[LegScrews, ...]
-    statics: Isostatic
+    statics: Statics
     stiffness: Symmetric6
     compliance: Symmetric6
     regularity: Scalar
@@ -46,7 +46,7 @@ def respond(machine: Machine) -> Response:
     configuration = machine.configure()
     reference, length = configuration.platform.translation, configuration.length
     legs = tuple(leg.screws(reference, length) for leg in configuration.legs)
-    statics = isostatic(legs, length)
+    statics = solve_statics(legs, length)
     regularity: Scalar = 1.0
     for leg in legs:
         regularity = smaller(regularity, leg.regularity)

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from kinetostat.algebra.scalar import Scalar, reciprocal
+from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.screw import Twist, Wrench, force_along, rotation_about, translation_along
 from kinetostat.algebra.solve import complement
-from kinetostat.algebra.vector import X_AXIS, Y_AXIS, Z_AXIS, Displacement, Vector
+from kinetostat.algebra.vector import AXES, Displacement, Vector
 
 
 @dataclass(frozen=True)
@@ -144,6 +144,14 @@ class TwoForceLeg:
         )
 
 
+def two_force_legs(
+    base_joints: Sequence[Vector], platform_joints: Sequence[Vector], stiffness: Sequence[Scalar]
+) -> list[Leg]:
+    """Actuated U-P-S legs "leg 1", "leg 2", ... between joint centres (base frame, m) with their actuators (N/m)."""
+    pairs = zip(base_joints, platform_joints, stiffness, strict=True)
+    return [TwoForceLeg(f"leg {i}", base, top, k) for i, (base, top, k) in enumerate(pairs, 1)]
+
+
 @dataclass(frozen=True)
 class SerialLeg:
     """Any chain of passive joints and springs, for instance a passive constraining leg.
@@ -181,9 +189,6 @@ class SerialLeg:
         )
 
 
-AXES = (X_AXIS, Y_AXIS, Z_AXIS)
-
-
 def reciprocal_wrenches(passive: Sequence[Twist], length: Scalar) -> tuple[tuple[Wrench, ...], Scalar]:
     """Wrenches that do no work on any of `passive`: a basis of the reciprocal space (J_p^T W = 0).
 
@@ -196,6 +201,12 @@ def reciprocal_wrenches(passive: Sequence[Twist], length: Scalar) -> tuple[tuple
         0 where the twists are dependent.
     """
     shrink = reciprocal(length)
-    scaled = [Twist(twist.rotational, twist.translational * shrink).components() for twist in passive]
-    basis, regularity = complement(scaled)
+    basis, regularity = complement([_comparable(twist, shrink) for twist in passive])
     return tuple(Wrench(Vector(*row[:3]) * length, Vector(*row[3:])) for row in basis), regularity
+
+
+def _comparable(twist: Twist, shrink: Scalar) -> tuple[Scalar, ...]:
+    """The components of a unit twist, translations shrunk to compare with rotations; a slide stays of unit size."""
+    if all(is_zero(c) for c in twist.rotational.components()):
+        return twist.components()
+    return Twist(twist.rotational, twist.translational * shrink).components()

@@ -10,7 +10,7 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.reach import why_out_of_reach
 from kinetostat.kinematics.singularity import conditioning, describe, independent, why_singular
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.assembly import Isostatic, compliance_matrix, stiffness_matrix
+from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, stiffness_matrix
 from kinetostat.kinetostatics.attribution import compliance_shares, stiffness_shares
 from kinetostat.kinetostatics.indices import Principal, principal_compliances
 from kinetostat.kinetostatics.leg import AnyScrew
@@ -114,7 +114,7 @@ def analyze(machine: Machine) -> Analysis:
     )
 
 
-def without_rounding(statics: Isostatic) -> Isostatic:
+def without_rounding(statics: Statics) -> Statics:
     """The same statics with exact zeros where a screw's component is but rounding beside its others."""
     length = statics.length
     flexibility = tuple(_rounded(twist, 1.0 / length) for twist in statics.flexibility)
@@ -178,10 +178,11 @@ def _why(status: Status, response: Response) -> str:
     return f"The pose is singular. {why_singular(names, response.legs, configuration.length, SINGULAR)}"
 
 
-def _rank(statics: Isostatic, free: bool) -> int:
+def _rank(statics: Statics, free: bool) -> int:
     """Rank of C, or of K where a spring is free; independent of how much the springs differ."""
     if free:
-        return sum(k > 0.0 for k in statics.stiffness)
+        held = [wrench for k, wrench in zip(statics.stiffness, statics.resistance, strict=True) if k > 0.0]
+        return independent(held, statics.length, INDEPENDENT)
     motions = [twist for s, twist in zip(statics.compliance, statics.flexibility, strict=True) if s > 0.0]
     return independent(motions, 1.0 / statics.length, INDEPENDENT)
 
@@ -202,7 +203,7 @@ def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...], 
 
 
 def _shares(
-    held: list[Spring], statics: Isostatic, stiffness: Symmetric6, compliance: Symmetric6
+    held: list[Spring], statics: Statics, stiffness: Symmetric6, compliance: Symmetric6
 ) -> tuple[SpringShare, ...]:
     parts = zip(compliance_shares(statics), stiffness_shares(statics), held, strict=True)
     return tuple(

@@ -9,7 +9,7 @@ from typing import Annotated
 from kinetostat.algebra.scalar import Scalar, cos, sin
 from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import Y_AXIS, Displacement, Rotation, Vector, polar, rotation_x, rotation_y
-from kinetostat.machine.leg import Joint, Leg, SerialLeg, Spring, TwoForceLeg, revolutes
+from kinetostat.machine.leg import Joint, Leg, SerialLeg, Spring, revolutes, two_force_legs
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.spec.fields import Quantity, section
 
@@ -105,7 +105,7 @@ def _passive_leg(
 def _actuated_legs(platform: Displacement, geometry: Geometry, stiffness: Stiffness) -> list[Leg]:
     base = attachments(geometry.base_radius, geometry.base_angle)
     top = attachments(geometry.platform_radius, geometry.platform_angle)
-    return [TwoForceLeg(f"leg {i + 1}", base[i], platform.apply(top[i]), stiffness.actuator[i]) for i in range(LEGS)]
+    return two_force_legs(base, [platform.apply(point) for point in top], stiffness.actuator)
 
 
 def attachments(radius: Scalar, angle: Scalar) -> list[Vector]:
