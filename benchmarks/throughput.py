@@ -25,7 +25,7 @@ from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Table
 from kinetostat.engine.threads import available_cores
 from kinetostat.kinetostatics.quantities import GROUPS
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 from numpy_4dof import ACTUATOR, BASE, BENDING, FIRST_LINK, PLATFORM, SECOND_LINK, diagonals
 
 Array = npt.NDArray[np.float64]
@@ -45,7 +45,7 @@ FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shar
 FIRST_RESULT = """
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Table
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 import numpy as np
 evaluate(load("zhang-gosselin-4dof"), Table({{"pose.x": np.linspace(-0.02, 0.02, {count})}}), {names})
 """

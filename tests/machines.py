@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 

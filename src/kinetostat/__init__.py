@@ -10,8 +10,8 @@ from importlib import import_module
 from typing import Any
 
 _HOMES = {
-    "load": "kinetostat.machine.library",
-    "bundled": "kinetostat.machine.library",
+    "load": "kinetostat.machine.loading",
+    "bundled": "kinetostat.machine.loading",
     "analyze": "kinetostat.studies.analysis",
     "evaluate_grid": "kinetostat.studies.grid",
     "reproduce": "kinetostat.studies.paper.reproduction",

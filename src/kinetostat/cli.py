@@ -150,7 +150,7 @@ def _json(command: Parser) -> None:
 
 
 def _load(options: argparse.Namespace) -> "Machine":
-    from kinetostat.machine.library import load
+    from kinetostat.machine.loading import load
 
     return load(options.machine, options.settings)
 
@@ -170,7 +170,7 @@ def _version_or_help(options: argparse.Namespace) -> int:
 
 
 def _list(options: argparse.Namespace) -> int:
-    from kinetostat.machine.library import bundled, load
+    from kinetostat.machine.loading import bundled, load
     from kinetostat.views.tables import print_machines, terminal
 
     names = list(bundled())
@@ -179,14 +179,14 @@ def _list(options: argparse.Namespace) -> int:
 
 
 def _new(options: argparse.Namespace) -> int:
-    from kinetostat.machine.library import template
+    from kinetostat.machine.loading import template
 
     print(template(options.family), end="")
     return DONE
 
 
 def _schema(options: argparse.Namespace) -> int:
-    from kinetostat.machine.library import machine_schema
+    from kinetostat.machine.loading import machine_schema
 
     _print_json(machine_schema())
     return DONE

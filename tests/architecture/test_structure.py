@@ -33,7 +33,7 @@ def test_the_parser_sees_imports():
     """Guards the tests below against passing on an empty list."""
     assert len(modules()) > 20
     assert "kinetostat.algebra.scalar" in ours("kinetostat.algebra.solve")
-    assert "kinetostat.spec.document" in ours("kinetostat.machine.library")
+    assert "kinetostat.spec.document" in ours("kinetostat.machine.loading")
     assert "pydantic" in imports("kinetostat.spec.fields")
 
 
@@ -68,7 +68,7 @@ def test_only_the_engine_knows_jax(module):
     assert not {name for name in imports(module) if name.split(".")[0] in ("jax", "jaxlib")}
 
 
-LIGHT = ["kinetostat.spec.validation", "kinetostat.machine.library", "kinetostat.studies.analysis"]
+LIGHT = ["kinetostat.spec.validation", "kinetostat.machine.loading", "kinetostat.studies.analysis"]
 
 
 def test_an_analysis_starts_without_jax():

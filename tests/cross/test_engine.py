@@ -20,7 +20,7 @@ from kinetostat.engine.trigonometry import cos_and_sin
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values
 from machines import CASES, Case, every_machine
@@ -33,6 +33,9 @@ DIAGONALS = (*GROUPS["compliance"], *GROUPS["stiffness"])
 AGREEMENT = 1e-12
 """Of an entry of K or C against the geometric mean of its two diagonal entries: some hundred roundings, times the
 condition of W at a regular pose."""
+ORDER = 0.2
+"""Regularity depends on the order in which vectors are taken, and that on which components are zero by form: a float
+that happens to be zero counts as such, a traced value never does."""
 REGULAR = 0.05
 """Regularity from which numbers are compared so sharply; statuses are compared everywhere."""
 
@@ -89,8 +92,10 @@ def assert_same(actual: Found, expected: Found) -> None:
     np.testing.assert_array_equal(np.isinf(actual.values), endless)
     np.testing.assert_array_equal(actual.values[endless], expected.values[endless])
     compared = np.isfinite(expected.values) & (expected.values[NAMES.index("regularity")] > REGULAR)
-    error = np.abs(actual.values[compared] - expected.values[compared])
-    assert np.all(error <= AGREEMENT * scales(expected.values)[compared])
+    error = np.abs(actual.values - expected.values)
+    allowed = AGREEMENT * scales(expected.values)
+    allowed[NAMES.index("regularity")] = ORDER * expected.values[NAMES.index("regularity")]
+    assert np.all(error[compared] <= allowed[compared])
 
 
 def drawn(case: Case, section: str, count: int, seed: int = 1) -> Columns:

@@ -6,7 +6,7 @@ import pytest
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinetostatics.assembly import compliance_matrix, solve_statics, stiffness_matrix
 from kinetostat.machine.leg import TwoForceLeg
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 
 EXTRA = (
     (Vector(0.3, 0.1, 0.0), Vector(0.02, 0.05, 0.13)),

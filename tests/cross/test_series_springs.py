@@ -7,7 +7,7 @@ import pytest
 
 from kinetostat.kinetostatics.attribution import compliance_shares, stiffness_shares
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 
 NAME = "passive-leg-5dof"
 POSES = [(), ("pose.x=-5 cm", "pose.y=8 cm", "pose.theta6=25 deg"), ("pose.theta5=-30 deg", "pose.z=55 cm")]

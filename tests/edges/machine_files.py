@@ -2,7 +2,7 @@
 
 import pytest
 
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 from kinetostat.spec.errors import InputError
 
 NAME = "zhang-gosselin-4dof"

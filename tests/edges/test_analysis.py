@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import with_values
 from kinetostat.studies.analysis import analyze, as_json
 from machines import CASES, CONTRASTING, every_machine, machines

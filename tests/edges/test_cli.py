@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 
 MACHINE = "zhang-gosselin-4dof"
 
@@ -35,7 +35,7 @@ REFUSED = [
     (["analyze", "nope"], ['"nope"', "zhang-gosselin-4dof"]),
     (["analyze", "zhang-gosselin-4dfo"], ['did you mean "zhang-gosselin-4dof"?']),
     (["analyze", MACHINE, "--set", "pose.x=2 kg"], ["pose.x", '"2 kg"', "length", '"12 cm"']),
-    (["new", "hexapd"], ['"hexapd"', "passive-leg-4dof"]),
+    (["new", "hexapd"], ['"hexapd"', 'did you mean "hexapod"?']),
     (["sweep", MACHINE, "--vary", "passive_links=1:2:3"], ["geometry.passive_links or stiffness.passive_links"]),
     (["sweep", MACHINE, "--vary", "q=1:2:3"], ['"q" is not a field', "pose.theta5"]),
     (["sweep", MACHINE, "--vary", "z=1:3"], ['"z=1:3" is not a range', "from:to:count"]),

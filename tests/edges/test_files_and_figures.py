@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from kinetostat.cli import main
-from kinetostat.machine.library import as_toml, build, load
+from kinetostat.machine.loading import as_toml, build, load
 from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze

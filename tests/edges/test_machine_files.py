@@ -3,7 +3,7 @@
 import pytest
 from machine_files import GOOD, HUGE_NUMBER, NAME, refusal
 
-from kinetostat.machine.library import build, bundled, load
+from kinetostat.machine.loading import build, bundled, load
 from kinetostat.spec import document
 from kinetostat.spec.errors import shorten
 

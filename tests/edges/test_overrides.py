@@ -5,7 +5,7 @@ import math
 import pytest
 from machine_files import GOOD, HUGE_NUMBER, NAME, refusal
 
-from kinetostat.machine.library import build, load
+from kinetostat.machine.loading import build, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec import document
 

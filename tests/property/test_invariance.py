@@ -11,7 +11,7 @@ from geometry import displacements, vectors
 from kinetostat.algebra.vector import ZERO
 from kinetostat.kinetostatics.assembly import solve_statics
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Configuration
 from kinetostat.machine.parameters import parameters, values, with_values
 from machines import CONTRASTING, MODERATE, every_machine, regular, regular_machines, stiffness_paths

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values, with_values
 from machines import every_machine, is_regular, machines, regular_machines
 from numeric import U, array, assert_blocks_close, columns, trace_product

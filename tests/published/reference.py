@@ -10,7 +10,7 @@ import numpy as np
 
 from kinetostat.kinetostatics.attribution import stiffness_coefficients
 from kinetostat.kinetostatics.response import Response, respond
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 from kinetostat.machine.machine import springs
 from numeric import Array, array
 

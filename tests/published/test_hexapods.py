@@ -1,4 +1,4 @@
-"""Hexapods published elsewhere: tdehaeze/stewart-simscape (MIT). Six two-force legs, solved without a machine file."""
+"""Hexapods published elsewhere: tdehaeze/stewart-simscape (MIT), as bare legs and as the bundled machines."""
 
 import math
 
@@ -8,7 +8,9 @@ import pytest
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.kinetostatics.assembly import compliance_matrix, stiffness_matrix
 from kinetostat.machine.leg import TwoForceLeg
+from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Configuration
+from kinetostat.studies.analysis import analyze
 from numeric import array, statics_at
 
 
@@ -77,3 +79,19 @@ def test_a_cubic_hexapod_has_a_diagonal_stiffness(size):
     expected = stiffness * np.diag([1.5 * size**2, 1.5 * size**2, 6 * size**2, 2, 2, 2])
     scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     assert np.all(abs(found - expected) <= 1e-12 * scale)
+
+
+def test_the_bundled_hexapod_is_the_published_one():
+    found = np.array(analyze(load("hexapod")).compliance)
+    assert np.diag(found) == pytest.approx(
+        [5.186272e-6, 5.186272e-6, 1.707296e-6, 4.749957e-8, 4.749957e-8, 2.099046e-8], rel=1e-6
+    )
+    assert [abs(found[3, 1]), abs(found[4, 0])] == pytest.approx([3.209330e-7, 3.209330e-7], rel=1e-6)
+
+
+def test_the_bundled_cubic_hexapod_has_its_closed_form():
+    height, k = 0.1, 20e6
+    expected = k * np.diag([1.5 * height**2, 1.5 * height**2, 6 * height**2, 2.0, 2.0, 2.0])
+    found = np.array(analyze(load("hexapod-cubic")).stiffness)
+    scale = np.sqrt(np.diag(expected))
+    assert np.abs((found - expected) / np.outer(scale, scale)).max() < 1e-12

@@ -4,7 +4,7 @@ from dataclasses import FrozenInstanceError
 
 import pytest
 
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import find, parameters, values, with_values
 from kinetostat.spec.errors import InputError
 from machines import every_machine

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from geometry import about_x, about_y
 from kinetostat.algebra.vector import Y_AXIS
 from kinetostat.machine.leg import SerialLeg, TwoForceLeg
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values, with_values
 from machines import CASES, machines
 from numeric import matrix, screw, vector

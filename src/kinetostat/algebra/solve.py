@@ -50,7 +50,8 @@ def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
 
     Returns:
         The n dual vectors, and the regularity: the smallest distance of a w_b from the span of those taken before it
-        (at most 1), 0 where the w_b are dependent and the dual vectors meaningless.
+        (at most 1), 0 where the w_b are dependent and the dual vectors meaningless. It tells how far dependence is to
+        within a small factor: the order, sparse vectors first, changes with what is zero by form.
     """
     solved = _triangularise(basis)
     dual: list[Row] = [[] for _ in basis]

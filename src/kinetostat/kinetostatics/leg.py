@@ -6,7 +6,7 @@ from typing import TypeVar
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, times, total, where
 from kinetostat.algebra.screw import Screw, Wrench
 from kinetostat.algebra.solve import diagonalise, dual_basis
-from kinetostat.algebra.vector import Vector
+from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.machine.leg import LegScrews
 
 AnyScrew = TypeVar("AnyScrew", bound=Screw)
@@ -79,7 +79,8 @@ def leg_resistance(leg: LegScrews) -> tuple[list[Action], list[Action]]:
     shares = [
         (_either(apart, b, c), where(apart, k, s)) for b, k, (c, s) in zip(springwise, stiffness, in_modes, strict=True)
     ]
-    return shares, _effective([(wrench, where(apart, 0.0, k)) for wrench, k in held])
+    nothing = Wrench(ZERO, ZERO)
+    return shares, _effective([(_either(apart, nothing, wrench), where(apart, 0.0, k)) for wrench, k in held])
 
 
 def _effective(actions: list[Action]) -> list[Action]:

@@ -13,7 +13,7 @@ from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
-from kinetostat.machine.library import as_toml
+from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find
 from kinetostat.spec.errors import InputError

@@ -73,7 +73,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
     tip = Vector(pose.x, geometry.passive_leg_offset, pose.z)
     first, second = geometry.passive_links
     elbow, _ = apex(foot, tip, first, second)
-    pitch = _pitch((tip - elbow) * (1.0 / second), pose.theta5)
+    pitch = platform_pitch((tip - elbow) * (1.0 / second), pose.theta5)
     platform = Displacement(pitch @ rotation_x(cos(pose.theta6), sin(pose.theta6)), tip)
     closure = Closure("passive leg", (tip - foot).norm(), abs(first - second), first + second)
     passive = _passive_leg(foot, elbow, tip, pitch.x, geometry, stiffness)
@@ -82,8 +82,8 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
     return Configuration(platform, (passive, *legs), (closure,), length)
 
 
-def _pitch(link: Vector, theta5: Scalar) -> Rotation:
-    """Ry(pitch), from the unit vector of link 2: (cos el2, 0, sin el2)."""
+def platform_pitch(link: Vector, theta5: Scalar) -> Rotation:
+    """Ry(90 deg - el2 - theta5), from the unit vector of link 2 in the leg's plane: (cos el2, 0, sin el2)."""
     c, s = cos(theta5), sin(theta5)
     return rotation_y(link.z * c + link.x * s, link.x * c - link.z * s)
 

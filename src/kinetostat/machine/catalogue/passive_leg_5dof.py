@@ -5,9 +5,10 @@ The paper names the class of 5-dof machines but no leg; this one is ours (theory
 
 from typing import Annotated
 
-from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin, sqrt
+from kinetostat.algebra.scalar import cos, reciprocal, sin, sqrt
 from kinetostat.algebra.triangle import apex
-from kinetostat.algebra.vector import X_AXIS, Y_AXIS, ZERO, Displacement, Rotation, Vector, ring, rotation_x, rotation_y
+from kinetostat.algebra.vector import X_AXIS, Y_AXIS, ZERO, Displacement, Rotation, Vector, ring, rotation_x
+from kinetostat.machine.catalogue.passive_leg_4dof import platform_pitch
 from kinetostat.machine.leg import Joint, Leg, SerialLeg, Spring, revolutes, two_force_legs
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.spec.fields import Quantity, section
@@ -67,7 +68,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
     flat_tip = Vector(pose.x, 0.0, height)
     elbow, _ = apex(ZERO, flat_tip, first, second)
     lower, upper = elbow * (1.0 / first), (flat_tip - elbow) * (1.0 / second)
-    pitch = tilt @ _pitch(upper, pose.theta5)
+    pitch = tilt @ platform_pitch(upper, pose.theta5)
     platform = Displacement(pitch @ rotation_x(cos(pose.theta6), sin(pose.theta6)), tilt.apply(flat_tip))
     passive = _passive_leg(tilt, elbow, flat_tip, (lower, upper), pitch.x, stiffness)
     base = ring(geometry.base_radius, geometry.base_angles)
@@ -76,12 +77,6 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
     closure = Closure("passive leg", flat_tip.norm(), abs(first - second), first + second)
     length = 0.5 * (geometry.base_radius + geometry.platform_radius)
     return Configuration(platform, (passive, *legs), (closure,), length)
-
-
-def _pitch(link: Vector, theta5: Scalar) -> Rotation:
-    """Ry(90 deg - el2 - theta5), from the unit vector of link 2 in the leg's plane: (cos el2, 0, sin el2)."""
-    c, s = cos(theta5), sin(theta5)
-    return rotation_y(link.z * c + link.x * s, link.x * c - link.z * s)
 
 
 def _passive_leg(

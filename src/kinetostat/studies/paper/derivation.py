@@ -15,7 +15,7 @@ from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.kinetostatics.assembly import flexible_stiffness
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.leg import SerialLeg, TwoForceLeg
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.paper import printed

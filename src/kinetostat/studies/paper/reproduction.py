@@ -7,7 +7,7 @@ from typing import Any
 import xarray as xr
 
 from kinetostat.engine.batch import Progress, silent
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.paper import printed

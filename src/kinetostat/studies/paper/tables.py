@@ -6,7 +6,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.kinetostatics.attribution import stiffness_coefficients
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.library import load
+from kinetostat.machine.loading import load
 from kinetostat.machine.machine import springs
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.paper import printed
