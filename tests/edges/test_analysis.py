@@ -148,6 +148,9 @@ def test_a_load_that_no_spring_feels_is_held_rigidly(beside):
         [0.140456, 0.0942476, 3.7037, 0.00679752, 5.78e-4, 0.00147172], rel=1e-5
     )
     assert [data["stiffness_diagonal"][i] for i in (1, 3, 5)] == pytest.approx([21.1391732, 247.319412, 3425.42944])
+    assert [data["stiffness_diagonal"][i] for i in (0, 2, 4)] == [None] * 3
+    assert data["stiffness"] is None
+    assert data["rank"] == 5
 
 
 def limits(machine):
