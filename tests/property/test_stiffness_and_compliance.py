@@ -10,7 +10,7 @@ from kinetostat.kinetostatics.assembly import flexible_stiffness
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.parameters import values, with_values
 from machines import CONTRASTING, MODERATE, every_machine, machines, regular, regular_machines, stiffness_paths
-from numeric import U, array, assert_blocks_close, assert_psd, columns, dimensionless, trace_product
+from numeric import U, array, assert_blocks_close, assert_psd, dimensionless, trace_product
 
 INVERSE = 1e-9
 """What K C may differ from 1 at moderate contrast.
