@@ -19,6 +19,11 @@ class Kind:
     unit: str
     example: str
 
+    @property
+    def stiff(self) -> bool:
+        """Whether it says how something resists: from 0 (free) to "rigid"."""
+        return self.name.endswith(("stiffness", "rigidity"))
+
 
 KINDS = {
     kind.name: kind
@@ -27,6 +32,16 @@ KINDS = {
         Kind("angle", "rad", "30 deg"),
         Kind("linear stiffness", "N/m", "20 N/um"),
         Kind("torsional stiffness", "N·m/rad", "1e7 N*m/rad"),
+        Kind("axial rigidity", "N", "2e8 N"),
+        Kind("torsional rigidity", "N·m**2", "4e4 N*m**2"),
+        Kind("bending rigidity", "N·m**2", "5e4 N*m**2"),
+        Kind("force", "N", "500 N"),
+        Kind("moment", "N·m", "20 N*m"),
+        Kind("elastic modulus", "Pa", "210 GPa"),
+        Kind("area", "m**2", "12 cm**2"),
+        Kind("second moment of area", "m**4", "80 cm**4"),
+        Kind("density", "kg/m**3", "7850 kg/m**3"),
+        Kind("direction", "", "1.0"),
     )
 }
 
@@ -34,7 +49,7 @@ RIGID = "rigid"
 """How people write an infinite stiffness."""
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
-_NAME = r"[A-Za-zµμ°]+(?:\s*(?:\*\*|\^)\s*[1-3])?"
+_NAME = r"[A-Za-zµμ°]+(?:\s*(?:\*\*|\^)\s*[1-4])?"
 _UNIT = re.compile(rf"{_NAME}(?:\s*[*/·]\s*{_NAME})*")
 _LONGEST = 64
 
@@ -48,7 +63,7 @@ def parse(value: object, kind: str) -> float:
 
     Args:
         value: a finite number (SI), or text: a number and a unit.
-        kind: a key of `KINDS`; for stiffness, the text "rigid" gives infinity.
+        kind: a key of `KINDS`; for a stiffness or rigidity, the text "rigid" gives infinity.
 
     Raises:
         UnitError: not a number, no unit, an unknown unit, or a unit of another kind.
@@ -66,11 +81,11 @@ def parse(value: object, kind: str) -> float:
 
 def show(value: float, kind: str) -> str:
     """An SI value as text, e.g. "0.22 m", that `parse` reads back exactly; infinity is "rigid"."""
-    return RIGID if math.isinf(value) else f"{value!r} {KINDS[kind].unit}"
+    return RIGID if math.isinf(value) else f"{value!r} {KINDS[kind].unit}".rstrip()
 
 
 def _parse_text(text: str, wanted: Kind) -> float:
-    if text.strip().lower() == RIGID and "stiffness" in wanted.name:
+    if text.strip().lower() == RIGID and wanted.stiff:
         return math.inf
     match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
     if match is None:
@@ -86,7 +101,7 @@ def _finite(number: float, wanted: Kind) -> float:
 
 
 def _allowed(wanted: Kind) -> str:
-    rigid = f', or "{RIGID}"' if "stiffness" in wanted.name else ""
+    rigid = f', or "{RIGID}"' if wanted.stiff else ""
     article = "an" if wanted.name[0] in "aeiou" else "a"
     return f'{article} {wanted.name} with its unit, e.g. "{wanted.example}"{rigid}, or a bare number in {wanted.unit}'
 

@@ -11,7 +11,7 @@ from kinetostat.algebra.screw import Screw, Twist, Wrench
 from kinetostat.algebra.solve import dual_basis, right_inverse, solve_semidefinite
 from kinetostat.algebra.symmetric import POSITIONS, SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
-from kinetostat.kinetostatics.leg import INFINITE, combine, leg_compliance, leg_modes, leg_resistance, loads
+from kinetostat.kinetostatics.leg import INFINITE, combine, leg_compliance, leg_modes, leg_resistance, relaxed
 from kinetostat.machine.leg import LegScrews
 
 ROUNDING = 1e-26
@@ -23,6 +23,7 @@ class Statics:
     """How the springs of a machine share any load, and resist any motion.
 
     Attributes:
+        sharing: per leg, and per wrench that it carries, its amount per unit platform wrench, as a twist.
         flexibility: per spring, the load in it per unit platform wrench (xi_e); in a machine without redundancy also
             the platform twist per unit deformation of it alone.
         compliance: per spring, s_e.
@@ -32,6 +33,7 @@ class Statics:
         regularity: 0 where the wrenches do not span all six dimensions: the platform is free with locked actuators.
     """
 
+    sharing: tuple[tuple[Twist, ...], ...]
     flexibility: tuple[Twist, ...]
     compliance: tuple[Scalar, ...]
     resistance: tuple[Wrench, ...]
@@ -40,31 +42,35 @@ class Statics:
     regularity: Scalar
 
 
-def solve_statics(legs: Sequence[LegScrews], length: Scalar) -> Statics:
+def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench] = ()) -> Statics:
     """Solve the statics of the whole machine, redundant or not, rigid or flexible.
 
     Args:
-        legs: at P, base axes; together they carry six wrenches or more.
+        legs: at the reference point, base axes; together they carry six wrenches or more.
         length: characteristic length, m; scales rows, the result does not depend on it.
+        guide: of a planar machine, the wrenches against twists that do not exist there.
 
     Source: theory section 2; eqs. 21 and 32.
     """
-    wrenches = [wrench for leg in legs for wrench in leg.wrenches]
+    balanced = list(legs)
+    if sum(len(leg.wrenches) for leg in legs) + len(guide) > SIZE:
+        balanced = [relaxed(leg) for leg in legs]
+    wrenches = [wrench for leg in balanced for wrench in leg.wrenches] + list(guide)
     if len(wrenches) == SIZE:
         twists, regularity = dual_twists(wrenches, length)
     else:
-        twists, regularity = least_energy_twists(legs, wrenches, length)
+        twists, regularity = least_energy_twists(balanced, wrenches, length)
+    sharing: list[tuple[Twist, ...]] = []
     flexibility: list[Twist] = []
-    taken = 0
-    for leg in legs:
-        own = twists[taken : taken + len(leg.wrenches)]
-        taken += len(leg.wrenches)
-        flexibility += [combine(own, row) for row in loads(leg)]
+    for leg in balanced:
+        taken = sum(len(own) for own in sharing)
+        sharing.append(tuple(twists[taken : taken + len(leg.wrenches)]))
+        flexibility += [combine(sharing[-1], row) for row in leg.loads]
     parts = [leg_resistance(leg) for leg in legs]
     actions = [action for shares, _ in parts for action in shares] + [action for _, held in parts for action in held]
     compliance = tuple(s for leg in legs for s in leg.compliance)
     resistance, stiffness = tuple(b for b, _ in actions), tuple(k for _, k in actions)
-    return Statics(tuple(flexibility), compliance, resistance, stiffness, length, regularity)
+    return Statics(tuple(sharing), tuple(flexibility), compliance, resistance, stiffness, length, regularity)
 
 
 def compliance_matrix(statics: Statics) -> Symmetric6:
@@ -145,7 +151,7 @@ def _yield(legs: Sequence[LegScrews], amounts: Sequence[Scalar]) -> list[Scalar]
     for leg in legs:
         own = amounts[len(result) : len(result) + len(leg.wrenches)]
         result += [_product(row, own) for row in leg_compliance(leg)]
-    return result
+    return result + [0.0] * (len(amounts) - len(result))  # a plane's guide does not yield
 
 
 def _product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:

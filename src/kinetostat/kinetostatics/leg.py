@@ -1,11 +1,12 @@
 """A leg as (W, G): how it yields when it carries a wrench. One leg at a time; the platform is `assembly`'s."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TypeVar
 
-from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, times, total, where
+from kinetostat.algebra.scalar import Scalar, is_one, is_zero, reciprocal, smaller, sqrt, times, total, where
 from kinetostat.algebra.screw import Screw, Wrench
-from kinetostat.algebra.solve import diagonalise, dual_basis
+from kinetostat.algebra.solve import complement, diagonalise, dual_basis
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.machine.leg import LegScrews
 
@@ -16,15 +17,10 @@ UNSEEN = 1e-12
 
 INFINITE = float("inf")
 
+NOTHING = Wrench(ZERO, ZERO)
+
 Action = tuple[Wrench, Scalar]
 """A wrench b (N·m, N per N or N·m of load) and a stiffness k (N/m or N·m/rad): the share k b b^T of a leg in K."""
-
-
-def loads(leg: LegScrews) -> Sequence[Sequence[Scalar]]:
-    """J_e^T W [b x m]: the load in each spring per unit of each wrench the leg carries (principle of virtual work)."""
-    if leg.loads is not None:
-        return leg.loads
-    return [[wrench.work(twist) for wrench in leg.wrenches] for twist in leg.elastic]
 
 
 def leg_compliance(leg: LegScrews) -> list[list[Scalar]]:
@@ -32,12 +28,40 @@ def leg_compliance(leg: LegScrews) -> list[list[Scalar]]:
 
     Source: theory section 2. Zero for a rigid leg; infinite where a free spring is loaded.
     """
-    load = loads(leg)
-    size = range(len(leg.wrenches))
-    return [
-        [total([times(s, times(row[a], row[b])) for s, row in zip(leg.compliance, load, strict=True)]) for b in size]
-        for a in size
+    size, springs = range(len(leg.wrenches)), list(zip(leg.compliance, leg.loads, strict=True))
+    return [[total([times(s, times(row[a], row[b])) for s, row in springs]) for b in size] for a in size]
+
+
+def relaxed(leg: LegScrews) -> LegScrews:
+    """The leg with its free springs turned into passive joints: it carries only what loads none of them.
+
+    Only springs that are free by form, of stiffness 0.0 itself, are meant; the others are kept.
+    """
+    free = [row for s, row in zip(leg.compliance, leg.loads, strict=True) if type(s) is float and s == INFINITE]
+    felt = [row for row in free if not all(isinstance(c, float) and abs(c) <= UNSEEN for c in row)]
+    if not free:
+        return leg
+    basis: list[list[Scalar]] = []
+    regularity = leg.regularity
+    if len(felt) < len(leg.wrenches):
+        basis, apart = complement([_unit(row) for row in felt]) if felt else ([*_identity(len(leg.wrenches))], 1.0)
+        regularity = smaller(regularity, apart)
+    weights = [0.0 if type(s) is float and s == INFINITE else s for s in leg.compliance]
+    rows = [
+        tuple(0.0 if row in free else total([times(c, b) for c, b in zip(row, column, strict=True)]) for column in basis)
+        for row in leg.loads
     ]
+    wrenches = tuple(combine(leg.wrenches, column) for column in basis)
+    return replace(leg, compliance=tuple(weights), wrenches=wrenches, loads=tuple(rows), regularity=regularity)
+
+
+def _unit(row: Sequence[Scalar]) -> list[Scalar]:
+    size = reciprocal(sqrt(total([times(c, c) for c in row])))
+    return [times(c, size) for c in row]
+
+
+def _identity(size: int) -> list[list[Scalar]]:
+    return [[1.0 if i == j else 0.0 for j in range(size)] for i in range(size)]
 
 
 def leg_modes(leg: LegScrews) -> list[Action]:
@@ -58,10 +82,14 @@ def leg_resistance(leg: LegScrews) -> tuple[list[Action], list[Action]]:
 
     Source: theory section 2.
     """
+    if len(leg.loads) != len(leg.wrenches):
+        leg = relaxed(leg)
+    if not leg.wrenches:
+        return [(NOTHING, 0.0)] * len(leg.loads), []
     stiffness = [reciprocal(s) for s in leg.compliance]
-    if leg.loads is not None:
-        return list(zip(leg.wrenches, stiffness, strict=True)), []
-    load, modes = loads(leg), leg_modes(leg)
+    if len(leg.loads) == len(leg.wrenches) == 1 and is_one(leg.loads[0][0]):
+        return [(leg.wrenches[0], stiffness[0])], []
+    load, modes = leg.loads, leg_modes(leg)
     rows, pivots = diagonalise(leg_compliance(leg))
     held = [(wrench, where(pivot > 0.0, 0.0, INFINITE)) for (wrench, _), pivot in zip(modes, pivots, strict=True)]
     yielding = [reciprocal(where(pivot > 0.0, pivot, INFINITE)) for pivot in pivots]
@@ -73,14 +101,13 @@ def leg_resistance(leg: LegScrews) -> tuple[list[Action], list[Action]]:
     if len(load) != len(leg.wrenches):
         return in_modes, _effective(held)
     sizes = [reciprocal(sqrt(total([times(c, c) for c in row]))) for row in load]
-    unload, sine = dual_basis([[times(c, size) for c in row] for row, size in zip(load, sizes, strict=True)])
+    unload, sine = dual_basis([_unit(row) for row in load])
     apart = sine > UNSEEN
     springwise = [combine(leg.wrenches, row) * size for row, size in zip(unload, sizes, strict=True)]
     shares = [
         (_either(apart, b, c), where(apart, k, s)) for b, k, (c, s) in zip(springwise, stiffness, in_modes, strict=True)
     ]
-    nothing = Wrench(ZERO, ZERO)
-    return shares, _effective([(_either(apart, nothing, wrench), where(apart, 0.0, k)) for wrench, k in held])
+    return shares, _effective([(_either(apart, NOTHING, wrench), where(apart, 0.0, k)) for wrench, k in held])
 
 
 def _effective(actions: list[Action]) -> list[Action]:

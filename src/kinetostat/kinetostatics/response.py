@@ -7,11 +7,13 @@ not OK are meaningless and are masked by whoever collects them.
 from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, smaller, where
+from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.reach import within_reach
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_statics, stiffness_matrix
-from kinetostat.machine.leg import LegScrews
+from kinetostat.machine.leg import Joint, LegScrews, reciprocal_wrenches
 from kinetostat.machine.machine import Configuration, Machine
 
 SINGULAR = 1e-7
@@ -25,14 +27,17 @@ class Response:
 
     Attributes:
         configuration: where everything is.
-        legs: screws of every leg at P, base axes.
+        reference: the tool point T (P itself unless the machine has a tool), base frame, m.
+        legs: screws of every leg at T, base axes.
         statics: how the springs share loads.
-        stiffness, compliance: K (N·m/rad, N/rad, N/m) and C (rad/(N·m), rad/N, m/N) at P, base axes.
+        stiffness, compliance: K (N·m/rad, N/rad, N/m) and C (rad/(N·m), rad/N, m/N) at T, base axes; of a planar
+            machine only rz, x, y have a meaning, and the other entries are 0.
         regularity: distance from a singularity, 0 to 1 (dimensionless); the smaller of the legs' and the platform's.
         status: a `Status` code.
     """
 
     configuration: Configuration
+    reference: Vector
     legs: tuple[LegScrews, ...]
     statics: Statics
     stiffness: Symmetric6
@@ -44,15 +49,17 @@ class Response:
 def respond(machine: Machine) -> Response:
     """K, C and status of a machine at its pose."""
     configuration = machine.configure()
-    reference, length = configuration.platform.translation, configuration.length
-    legs = tuple(leg.screws(reference, length) for leg in configuration.legs)
-    statics = solve_statics(legs, length)
+    reference, length = machine.tool_point(configuration.platform), configuration.length
+    absent, guide = _out_of_plane(configuration, reference)
+    legs = tuple(leg.screws(reference, length, absent) for leg in configuration.legs)
+    statics = solve_statics(legs, length, guide)
     regularity: Scalar = 1.0
     for leg in legs:
         regularity = smaller(regularity, leg.regularity)
     regularity = smaller(regularity, statics.regularity)
     return Response(
         configuration,
+        reference,
         legs,
         statics,
         stiffness_matrix(statics),
@@ -60,6 +67,15 @@ def respond(machine: Machine) -> Response:
         regularity,
         pose_status(within_reach(configuration), regularity),
     )
+
+
+def _out_of_plane(configuration: Configuration, reference: Vector) -> tuple[tuple[Joint, ...], tuple[Wrench, ...]]:
+    """What a planar machine does not have: freedoms, and the wrenches against them."""
+    if configuration.plane is None:
+        return (), ()
+    freedoms = [joint.twist(reference) for joint in configuration.plane.freedoms]
+    wrenches, _ = reciprocal_wrenches(freedoms, configuration.length)
+    return configuration.plane.absent, wrenches
 
 
 def pose_status(reached: Scalar, regularity: Scalar) -> Scalar:

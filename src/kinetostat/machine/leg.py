@@ -1,6 +1,6 @@
-"""Legs at one pose as geometry: joints by point and axis in the base frame, springs with their stiffness.
+"""Legs at one pose as geometry: a chain of joints, springs and flexible links from base to platform, in the base frame.
 
-Legs turn themselves into screws (J_p, J_e, W) at the platform point; how a pose places the joints is the family's
+A leg turns itself into screws (J_p, J_e, W) at a reference point; how a pose places its joints is the family's
 business (`catalogue`), what the screws do to the platform is that of `kinetostatics`.
 """
 
@@ -8,34 +8,62 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
+from kinetostat.algebra.scalar import Scalar, is_zero, plus, reciprocal
 from kinetostat.algebra.screw import Twist, Wrench, force_along, rotation_about, translation_along
 from kinetostat.algebra.solve import complement
 from kinetostat.algebra.vector import AXES, Displacement, Vector
 
+RIGID = float("inf")
+"""Stiffness of what does not yield: exact, not large."""
+
 
 @dataclass(frozen=True)
 class Joint:
-    """One freedom: a revolute about the line through `point` (m) along the unit vector `axis`, or a slide along it."""
+    """One freedom: a revolute about the line through `point` (m) along the unit vector `axis`, or a slide along it.
+
+    Attributes:
+        axis: unit vector.
+        point: on the axis, m; None for a slide.
+        name: of the joint it belongs to; a Hooke joint is two of these with one name, a spherical joint three.
+        pitch: of a screw, m/rad; 0 for a revolute.
+    """
 
     axis: Vector
     point: Vector | None = None
+    name: str = ""
+    pitch: Scalar = 0.0
+
+    @property
+    def freedoms(self) -> tuple["Joint", ...]:
+        """Itself."""
+        return (self,)
+
+    @property
+    def springs(self) -> tuple["Spring", ...]:
+        """None."""
+        return ()
+
+    @property
+    def path(self) -> tuple[Vector, ...]:
+        """Its point, if it has one."""
+        return () if self.point is None else (self.point,)
 
     def twist(self, reference: Vector) -> Twist:
         """Its unit twist at `reference` (base frame, m)."""
         if self.point is None:
             return translation_along(self.axis)
-        return rotation_about(self.axis, reference - self.point)
+        turning = rotation_about(self.axis, reference - self.point)
+        return turning if is_zero(self.pitch) else turning + translation_along(self.axis * self.pitch)
 
     def displaced(self, motion: Displacement) -> "Joint":
         """The joint after a rigid displacement of the whole machine."""
         point = None if self.point is None else motion.apply(self.point)
-        return Joint(motion.rotation.apply(self.axis), point)
+        return replace(self, axis=motion.rotation.apply(self.axis), point=point)
 
 
-def revolutes(point: Vector, axes: Sequence[Vector]) -> tuple[Joint, ...]:
+def revolutes(point: Vector, axes: Sequence[Vector], name: str = "") -> tuple[Joint, ...]:
     """Revolutes with a common point: a Hooke joint has two axes, a spherical joint three."""
-    return tuple(Joint(axis, point) for axis in axes)
+    return tuple(Joint(axis, point, name) for axis in axes)
 
 
 @dataclass(frozen=True)
@@ -46,147 +74,199 @@ class Spring:
         name: unique within the machine, e.g. "leg 1 actuator".
         joint: the freedom it resists.
         stiffness: N/m for a slide, N·m/rad for a revolute; 0 (free) and infinity (rigid) are exact.
+        part: the joint or link that it stands for, together with others of the same part; its own name if empty.
+        actuated: whether it is an actuator.
     """
 
     name: str
     joint: Joint
     stiffness: Scalar
+    part: str = ""
+    actuated: bool = False
+
+    @property
+    def freedoms(self) -> tuple[Joint, ...]:
+        """None: it is held."""
+        return ()
+
+    @property
+    def springs(self) -> tuple["Spring", ...]:
+        """Itself."""
+        return (self,)
+
+    @property
+    def path(self) -> tuple[Vector, ...]:
+        """Nothing that a drawing shows."""
+        return ()
+
+    def displaced(self, motion: Displacement) -> "Spring":
+        """The spring after a rigid displacement of the whole machine."""
+        return replace(self, joint=self.joint.displaced(motion))
+
+
+class Element(Protocol):
+    """A part of a leg's chain: a joint, a spring, or a link that yields."""
+
+    @property
+    def freedoms(self) -> tuple[Joint, ...]:
+        """What moves freely."""
+
+    @property
+    def springs(self) -> tuple[Spring, ...]:
+        """What yields."""
+
+    @property
+    def path(self) -> tuple[Vector, ...]:
+        """Points that a drawing connects, base frame, m."""
+
+    def displaced(self, motion: Displacement) -> "Element":
+        """The element after a rigid displacement of the whole machine."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line through `point` (m) along the unit vector `direction`: of a force that a leg can carry."""
+
+    point: Vector
+    direction: Vector
+
+    def wrench(self, reference: Vector) -> Wrench:
+        """The unit force along it, at `reference` (base frame, m)."""
+        return force_along(self.direction, self.point - reference)
+
+    def displaced(self, motion: Displacement) -> "Line":
+        """The line after a rigid displacement of the whole machine."""
+        return Line(motion.apply(self.point), motion.rotation.apply(self.direction))
 
 
 @dataclass(frozen=True)
 class LegScrews:
-    """What a leg is to the platform: screws at P in base axes (theory section 2).
+    """What a leg is to the platform: screws at one reference point in base axes (theory section 2).
 
     Attributes:
         passive: unit twists that span what the passive joints allow (J_p).
         elastic: unit twist of each spring (J_e).
         compliance: of each spring (diagonal of S): 0 rigid, infinity free; m/N or rad/(N·m).
         wrenches: basis of what the leg can carry (W): no work on any passive twist.
+        loads: load in each spring per unit of each wrench (J_e^T W).
         regularity: 0 where the passive joints lock up, 1 where they are orthogonal (dimensionless).
-        loads: load in each spring per unit of each wrench (J_e^T W), where the leg type knows it in closed form.
     """
 
     passive: tuple[Twist, ...]
     elastic: tuple[Twist, ...]
     compliance: tuple[Scalar, ...]
     wrenches: tuple[Wrench, ...]
+    loads: tuple[tuple[Scalar, ...], ...]
     regularity: Scalar
-    loads: tuple[tuple[Scalar, ...], ...] | None = None
 
 
-class Leg(Protocol):
-    """A leg type: geometry that can be moved and turned into screws. A new one needs these members."""
+@dataclass(frozen=True)
+class Leg:
+    """A serial chain from base to platform.
+
+    Attributes:
+        name: unique within the machine.
+        chain: its elements in order; their passive freedoms are independent unless `lines` are given.
+        lines: where it is known in closed form that the leg carries forces along these lines and nothing else.
+    """
+
+    name: str
+    chain: tuple[Element, ...]
+    lines: tuple[Line, ...] = ()
 
     @property
-    def name(self) -> str:
-        """Unique within the machine."""
+    def passive(self) -> tuple[Joint, ...]:
+        """Its passive freedoms from base to platform."""
+        return tuple(joint for element in self.chain for joint in element.freedoms)
 
     @property
     def springs(self) -> tuple[Spring, ...]:
-        """Its elastic coordinates."""
+        """Its elastic coordinates from base to platform."""
+        return tuple(spring for element in self.chain for spring in element.springs)
+
+    @property
+    def actuated(self) -> bool:
+        """Whether it has an actuator."""
+        return any(spring.actuated for spring in self.springs)
 
     @property
     def path(self) -> tuple[Vector, ...]:
-        """Its joint centres from base to platform, base frame, m: what a drawing connects."""
+        """Its joint centres and link ends from base to platform, base frame, m: what a drawing connects."""
+        points = [point for element in self.chain for point in element.path]
+        return tuple(p for i, p in enumerate(points) if i == 0 or p != points[i - 1])
 
     def displaced(self, motion: Displacement) -> "Leg":
         """The leg after a rigid displacement of the whole machine."""
+        chain = tuple(element.displaced(motion) for element in self.chain)
+        return Leg(self.name, chain, tuple(line.displaced(motion) for line in self.lines))
 
-    def screws(self, reference: Vector, length: Scalar) -> LegScrews:
-        """Its screws at `reference` (base frame, m); `length` (m) scales rows, the result does not depend on it."""
+    def screws(self, reference: Vector, length: Scalar, absent: Sequence[Joint] = ()) -> LegScrews:
+        """Its screws at a point; the wrenches are the space reciprocal to the passive twists (theory section 2).
+
+        Args:
+            reference: base frame, m.
+            length: m, scales rows; the result does not depend on it.
+            absent: freedoms that a planar machine does not have: the leg carries nothing against them.
+        """
+        passive = tuple(joint.twist(reference) for joint in (*self.passive, *absent))
+        if self.lines:
+            wrenches, regularity = tuple(line.wrench(reference) for line in self.lines), 1.0
+        else:
+            wrenches, regularity = reciprocal_wrenches(passive, length)
+        elastic = tuple(spring.joint.twist(reference) for spring in self.springs)
+        return LegScrews(
+            passive=passive,
+            elastic=elastic,
+            compliance=tuple(reciprocal(spring.stiffness) for spring in self.springs),
+            wrenches=wrenches,
+            loads=tuple(self._loads(s, twist, wrenches) for s, twist in zip(self.springs, elastic, strict=True)),
+            regularity=regularity,
+        )
+
+    def _loads(self, spring: Spring, twist: Twist, wrenches: Sequence[Wrench]) -> tuple[Scalar, ...]:
+        """Load in a spring per unit of each wrench, by virtual work; exactly 1 in a slide along the line of force."""
+        along = [spring.joint.point is None and line.direction is spring.joint.axis for line in self.lines]
+        if any(along):
+            return tuple(1.0 if own else wrench.work(twist) for own, wrench in zip(along, wrenches, strict=True))
+        return tuple(wrench.work(twist) for wrench in wrenches)
 
 
-@dataclass(frozen=True)
-class TwoForceLeg:
+def two_force_leg(
+    name: str, base_joint: Vector, platform_joint: Vector, stiffness: Scalar, axial: Scalar = RIGID
+) -> Leg:
     """U-P-S with the prismatic joint actuated: it carries a force along its line and nothing else.
 
-    Attributes:
+    Row a_i of A over rho_i in eqs. 1-4.
+
+    Args:
         name: of the leg.
         base_joint, platform_joint: centres of the universal and of the spherical joint, base frame, m.
         stiffness: of the actuator, N/m.
+        axial: EA of the leg's section, N: it yields over its whole length.
     """
-
-    name: str
-    base_joint: Vector
-    platform_joint: Vector
-    stiffness: Scalar
-
-    @property
-    def springs(self) -> tuple[Spring, ...]:
-        """The actuator."""
-        return (Spring(f"{self.name} actuator", Joint(self._direction()), self.stiffness),)
-
-    @property
-    def path(self) -> tuple[Vector, ...]:
-        """Its two joint centres, base frame, m."""
-        return self.base_joint, self.platform_joint
-
-    def _direction(self) -> Vector:
-        line = self.platform_joint - self.base_joint
-        return line * reciprocal(line.norm())
-
-    def displaced(self, motion: Displacement) -> "TwoForceLeg":
-        """The leg after a rigid displacement of the whole machine."""
-        base, platform = motion.apply(self.base_joint), motion.apply(self.platform_joint)
-        return replace(self, base_joint=base, platform_joint=platform)
-
-    def screws(self, reference: Vector, length: Scalar) -> LegScrews:
-        """The wrench [r x u; u], r from P to the platform joint: row a_i of A over rho_i in eqs. 1-4."""
-        along = self._direction()
-        ends = [*revolutes(self.base_joint, AXES), *revolutes(self.platform_joint, AXES)]
-        return LegScrews(
-            passive=tuple(joint.twist(reference) for joint in ends),
-            elastic=(translation_along(along),),
-            compliance=(reciprocal(self.stiffness),),
-            wrenches=(force_along(along, self.platform_joint - reference),),
-            regularity=1.0,
-            loads=((1.0,),),
-        )
+    span = platform_joint - base_joint
+    size = span.norm()
+    along = span * reciprocal(size)
+    yielding = [Spring(f"{name} actuator", Joint(along), stiffness, actuated=True)]
+    if not (type(axial) is float and axial == RIGID):
+        yielding.append(Spring(f"{name} rod", Joint(along), axial * reciprocal(size)))
+    chain = (
+        *revolutes(base_joint, AXES, f"{name} base joint"),
+        *yielding,
+        *revolutes(platform_joint, AXES, f"{name} platform joint"),
+    )
+    return Leg(name, chain, (Line(platform_joint, along),))
 
 
 def two_force_legs(
-    base_joints: Sequence[Vector], platform_joints: Sequence[Vector], stiffness: Sequence[Scalar]
+    base_joints: Sequence[Vector],
+    platform_joints: Sequence[Vector],
+    stiffness: Sequence[Scalar],
+    axial: Scalar = RIGID,
 ) -> list[Leg]:
     """Actuated U-P-S legs "leg 1", "leg 2", ... between joint centres (base frame, m) with their actuators (N/m)."""
     pairs = zip(base_joints, platform_joints, stiffness, strict=True)
-    return [TwoForceLeg(f"leg {i}", base, top, k) for i, (base, top, k) in enumerate(pairs, 1)]
-
-
-@dataclass(frozen=True)
-class SerialLeg:
-    """Any chain of passive joints and springs, for instance a passive constraining leg.
-
-    Attributes:
-        name: of the leg.
-        passive: its passive joints at this pose, independent of each other.
-        springs: its elastic coordinates at this pose.
-    """
-
-    name: str
-    passive: tuple[Joint, ...]
-    springs: tuple[Spring, ...]
-
-    @property
-    def path(self) -> tuple[Vector, ...]:
-        """The centres of its passive revolutes in order, base frame, m."""
-        return tuple(joint.point for joint in self.passive if joint.point is not None)
-
-    def displaced(self, motion: Displacement) -> "SerialLeg":
-        """The leg after a rigid displacement of the whole machine."""
-        springs = tuple(replace(spring, joint=spring.joint.displaced(motion)) for spring in self.springs)
-        return replace(self, passive=tuple(joint.displaced(motion) for joint in self.passive), springs=springs)
-
-    def screws(self, reference: Vector, length: Scalar) -> LegScrews:
-        """Jacobians from the joints; the wrenches are the space reciprocal to the passive twists (theory section 2)."""
-        passive = tuple(joint.twist(reference) for joint in self.passive)
-        wrenches, regularity = reciprocal_wrenches(passive, length)
-        return LegScrews(
-            passive=passive,
-            elastic=tuple(spring.joint.twist(reference) for spring in self.springs),
-            compliance=tuple(reciprocal(spring.stiffness) for spring in self.springs),
-            wrenches=wrenches,
-            regularity=regularity,
-        )
+    return [two_force_leg(f"leg {i}", base, top, k, axial) for i, (base, top, k) in enumerate(pairs, 1)]
 
 
 def reciprocal_wrenches(passive: Sequence[Twist], length: Scalar) -> tuple[tuple[Wrench, ...], Scalar]:
@@ -210,3 +290,8 @@ def _comparable(twist: Twist, shrink: Scalar) -> tuple[Scalar, ...]:
     if all(is_zero(c) for c in twist.rotational.components()):
         return twist.components()
     return Twist(twist.rotational, twist.translational * shrink).components()
+
+
+def series(stiffness: Scalar, other: Scalar) -> Scalar:
+    """Stiffness of two springs in a row: 1 / (1/k + 1/k'); exact for rigid ones."""
+    return reciprocal(plus(reciprocal(stiffness), reciprocal(other)))

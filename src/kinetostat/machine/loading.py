@@ -12,12 +12,12 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from kinetostat.machine.catalogue import families
-from kinetostat.machine.machine import Family, Machine
+from kinetostat.machine.machine import COMMON, Family, Machine
 from kinetostat.spec import document as documents
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.spec.fields import SECTIONS, quantities
-from kinetostat.spec.validation import SCHEMA_VERSION, file_model, validate
+from kinetostat.spec.fields import quantities
+from kinetostat.spec.validation import SCHEMA_VERSION, file_model, sections_in, validate
 from kinetostat.units import show
 
 SUFFIX = ".toml"
@@ -67,21 +67,16 @@ def build(document: Document, origin: str, settings: Sequence[str] = ()) -> Mach
         InputError: a mistake in the document or an override.
     """
     family = _family(document.get("family"), origin)
-    sections = sections_of(family)
+    sections = family.every_section
     written = documents.override(document, settings, _counts(family))
     data: Any = validate(written, origin, file_model(family.name, sections), sections)
-    return Machine(data.name, family, data.geometry, data.stiffness, data.pose)
-
-
-def sections_of(family: Family) -> dict[str, type]:
-    """The sections of a family's machine files by name."""
-    return {name: getattr(family, name) for name in SECTIONS}
+    return Machine(data.name, family, sections_in(data, sections))
 
 
 def _counts(family: Family) -> dict[str, int]:
     return {
         f"{name}.{field}": quantity.count
-        for name, section in sections_of(family).items()
+        for name, section in family.every_section.items()
         for field, quantity in quantities(section).items()
         if quantity.count is not None
     }
@@ -105,10 +100,12 @@ def as_toml(machine: Machine) -> str:
         f"name   = {json.dumps(machine.name, ensure_ascii=False)}",
         f'family = "{machine.family.name}"',
     ]
-    for name, section in sections_of(machine.family).items():
+    for name, section in machine.sections.items():
+        if name in COMMON and section == COMMON[name]():
+            continue
         lines += ["", f"[{name}]"]
-        for field, quantity in quantities(section).items():
-            held = getattr(getattr(machine, name), field)
+        for field, quantity in quantities(type(section)).items():
+            held = getattr(section, field)
             texts = [f'"{show(value, quantity.kind)}"' for value in (held if quantity.count else (held,))]
             written = f"[{', '.join(texts)}]" if quantity.count else texts[0]
             lines.append(f"{field} = {written}")
@@ -127,7 +124,7 @@ def template(family: str) -> str:
 
 def machine_schema() -> dict[str, Any]:
     """The JSON Schema of machine files of every family."""
-    models = [file_model(family.name, sections_of(family)) for family in families().values()]
+    models = [file_model(family.name, family.every_section) for family in families().values()]
     union: Any = reduce(operator.or_, models)
     schema = TypeAdapter(union).json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "kinetostat machine file", **schema}

@@ -3,13 +3,14 @@
 Parameters may be floats or traced scalars; nothing here validates (that is `spec`) and nothing here solves.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from kinetostat.algebra.scalar import Scalar
-from kinetostat.algebra.vector import Displacement
-from kinetostat.machine.leg import Leg, Spring
+from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
+from kinetostat.machine.leg import Joint, Leg, Spring
+from kinetostat.spec.fields import Quantity, section
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,33 @@ class Closure:
 
 
 @dataclass(frozen=True)
+class Plane:
+    """The plane of a planar machine: twists out of it are absent, neither rigid nor free.
+
+    Attributes:
+        frame: its origin (m) and axes in the base frame; z is its normal.
+    """
+
+    frame: Displacement = Displacement(IDENTITY, ZERO)
+
+    @property
+    def freedoms(self) -> tuple[Joint, ...]:
+        """The rotation and the two translations that exist: rz, x, y of the plane."""
+        axes = self.frame.rotation
+        return Joint(axes.z, self.frame.translation), Joint(axes.x), Joint(axes.y)
+
+    @property
+    def absent(self) -> tuple[Joint, ...]:
+        """The two rotations and the translation that do not exist: rx, ry, z of the plane."""
+        axes = self.frame.rotation
+        return Joint(axes.x, self.frame.translation), Joint(axes.y, self.frame.translation), Joint(axes.z)
+
+    def displaced(self, motion: Displacement) -> "Plane":
+        """The plane after a rigid displacement of the whole machine."""
+        return Plane(motion @ self.frame)
+
+
+@dataclass(frozen=True)
 class Configuration:
     """A machine at a pose.
 
@@ -37,31 +65,60 @@ class Configuration:
         legs: every leg, placed.
         closures: the conditions under which this placement exists.
         length: a characteristic length of the machine, m; scales rows in solves, no result depends on it.
+        plane: of a planar machine; None for a spatial one.
     """
 
     platform: Displacement
     legs: tuple[Leg, ...]
     closures: tuple[Closure, ...]
     length: Scalar
+    plane: Plane | None = None
 
 
-@dataclass(frozen=True)
+@section
+class Tool:
+    """Table [tool], in any machine file: where on the platform loads act and motions are given."""
+
+    offset: Annotated[
+        tuple[float, float, float],
+        Quantity("length", "tool point T from P in platform axes: x, y, z; K, C and the load are given at T", count=3),
+    ] = (0.0, 0.0, 0.0)
+
+
+@section
+class Load:
+    """Table [load], in any machine file: a wrench on the platform at the tool point, base axes."""
+
+    moment: Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3)] = (0.0, 0.0, 0.0)
+    force: Annotated[tuple[float, float, float], Quantity("force", "force along x, y, z", count=3)] = (0.0, 0.0, 0.0)
+
+
+COMMON = {"tool": Tool, "load": Load}
+"""Sections that every machine file may have."""
+
+
+@dataclass(frozen=True, eq=False)
 class Family:
-    """A kind of machine: what people must write about one, and its closed-form kinematics.
+    """A kind of machine: what people must write about one, and its kinematics.
 
     Attributes:
         name: as written in machine files.
         summary: one line for lists.
-        geometry, stiffness, pose: dataclasses whose annotated fields are the sections of a machine file.
-        configure: (geometry, stiffness, pose) to the machine at that pose.
+        sections: the tables of a machine file by name (dots for tables in tables): dataclasses of annotated fields.
+        configure: from one instance per section, by keyword, to the machine at its pose.
+        planar: whether its platform moves in the x-y plane only.
     """
 
     name: str
     summary: str
-    geometry: type
-    stiffness: type
-    pose: type
-    configure: Callable[[Any, Any, Any], Configuration]
+    sections: Mapping[str, type]
+    configure: Callable[..., Configuration]
+    planar: bool = False
+
+    @property
+    def every_section(self) -> dict[str, type]:
+        """Its own sections and the common ones."""
+        return {**self.sections, **COMMON}
 
 
 @dataclass(frozen=True)
@@ -71,18 +128,20 @@ class Machine:
     Attributes:
         name: for people.
         family: its kind.
-        geometry, stiffness, pose: instances of the family's dataclasses, SI.
+        sections: one instance per section of the family and per common one, SI.
     """
 
     name: str
     family: Family
-    geometry: Any
-    stiffness: Any
-    pose: Any
+    sections: Mapping[str, Any]
 
     def configure(self) -> Configuration:
         """The machine at its pose."""
-        return self.family.configure(self.geometry, self.stiffness, self.pose)
+        return self.family.configure(**{name: self.sections[name] for name in self.family.sections})
+
+    def tool_point(self, platform: Displacement) -> Vector:
+        """The tool point T in the base frame, m: P itself unless the file has a table [tool]."""
+        return platform.apply(Vector(*self.sections["tool"].offset))
 
 
 def springs(configuration: Configuration) -> list[Spring]:

@@ -8,7 +8,7 @@ from typing import Any
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.machine.machine import Family, Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.fields import SECTIONS, Quantity, leaves, quantities
+from kinetostat.spec.fields import Quantity, leaves, quantities
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class Parameter:
 
 def parameters(family: Family) -> Iterator[Parameter]:
     """All parameters of a family: every field, and every entry of fields that hold several."""
-    for section in SECTIONS:
-        for name, quantity in quantities(getattr(family, section)).items():
+    for section, fields in family.every_section.items():
+        for name, quantity in quantities(fields).items():
             paths = tuple(leaves(f"{section}.{name}", quantity))
             yield Parameter(f"{section}.{name}", quantity, paths)
             if quantity.count is not None:
@@ -58,8 +58,7 @@ def find(family: Family, text: str) -> Parameter:
 def values(machine: Machine) -> dict[str, Scalar]:
     """Every scalar of a machine by path, SI."""
     found: dict[str, Scalar] = {}
-    for section in SECTIONS:
-        data = getattr(machine, section)
+    for section, data in machine.sections.items():
         for name, quantity in quantities(type(data)).items():
             held = getattr(data, name)
             entries = (held,) if quantity.count is None else held
@@ -71,10 +70,10 @@ def with_values(machine: Machine, changes: Mapping[str, Any]) -> Machine:
     """The machine with some scalars replaced, by leaf path; the values may be floats or traced scalars."""
     new = {**values(machine), **changes}
     sections = {}
-    for section in SECTIONS:
+    for section, fields in machine.family.every_section.items():
         made = {}
-        for name, quantity in quantities(getattr(machine.family, section)).items():
+        for name, quantity in quantities(fields).items():
             entries = tuple(new[path] for path in leaves(f"{section}.{name}", quantity))
             made[name] = entries[0] if quantity.count is None else entries
-        sections[section] = getattr(machine.family, section)(**made)
-    return replace(machine, **sections)
+        sections[section] = fields(**made)
+    return replace(machine, sections=sections)

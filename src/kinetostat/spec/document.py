@@ -91,8 +91,10 @@ def override(document: Document, settings: Sequence[str], counts: Mapping[str, i
 
 def _repeat(document: Document, path: str, counts: Mapping[str, int]) -> None:
     field, _, entry = path.rpartition(".")
-    section, _, name = field.partition(".")
-    table = document.get(section)
+    *tables, name = field.split(".")
+    table: Any = document
+    for key in tables:
+        table = table.get(key) if isinstance(table, dict) else None
     if field not in counts or not entry.isdecimal() or not isinstance(table, dict):
         return
     if name in table and not isinstance(table[name], list):

@@ -15,11 +15,10 @@ from pydantic_core import PydanticCustomError, core_schema
 from kinetostat.spec.errors import shorten
 from kinetostat.units import KINDS, RIGID, UnitError, parse
 
-SECTIONS = ("geometry", "stiffness", "pose")
-"""The tables of a machine file that hold quantities, in the order people read them."""
-
-LARGEST = {"length": 1e6, "angle": 1e3, "linear stiffness": 1e20, "torsional stiffness": 1e20}
+LARGEST = {"length": 1e6, "angle": 1e3}
 """Bounds on size, in SI: far beyond any machine, well inside float64."""
+LARGEST_OTHER = 1e20
+"""The bound of every other kind."""
 
 Section = TypeVar("Section")
 
@@ -50,8 +49,8 @@ class Quantity:
 
     @property
     def stiff(self) -> bool:
-        """Whether it is a stiffness: from 0 (free) to "rigid"."""
-        return "stiffness" in self.kind
+        """Whether it is a stiffness or a rigidity: from 0 (free) to "rigid"."""
+        return KINDS[self.kind].stiff
 
     def read(self, value: object) -> float | tuple[float, ...]:
         """Validate what was written: SI value, or a tuple of `count` of them.
@@ -89,12 +88,13 @@ class Quantity:
         kind = KINDS[self.kind]
         example = f'e.g. "{kind.example}"'
         if self.stiff and number < 0:
-            raise UnitError(f'a stiffness cannot be negative; write 0 for a free element, {example}, or "{RIGID}"')
+            raise UnitError(f'a {self.kind.split()[-1]} cannot be negative; write 0 for a free element, {example}, or "{RIGID}"')
         if self.positive and number <= 0:
             raise UnitError(f"it must be greater than 0, {example}")
-        if abs(number) > LARGEST[self.kind] and not math.isinf(number):
+        largest = LARGEST.get(self.kind, LARGEST_OTHER)
+        if abs(number) > largest and not math.isinf(number):
             advice = f'; write "{RIGID}"' if self.stiff else ""
-            raise UnitError(f"it must not exceed {LARGEST[self.kind]:g} {kind.unit}{advice}")
+            raise UnitError(f"it must not exceed {largest:g} {kind.unit}{advice}")
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)

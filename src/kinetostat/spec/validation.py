@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.spec.fields import SECTIONS, quantities
+from kinetostat.spec.fields import optional, quantities
 from kinetostat.units import KINDS
 
 SCHEMA_VERSION = 1
@@ -27,9 +27,31 @@ def file_model(family: str, sections: Mapping[str, type]) -> type[BaseModel]:
         "name": (str, Field(description="what people call the machine", min_length=1, max_length=80)),
         "family": (Literal[family], Field(description="kind of machine, see `kinetostat list`")),
     }
-    for name in SECTIONS:
-        content[name] = (sections[name], Field(description=f"the machine's {name}"))
-    return create_model("MachineFile", __config__=ConfigDict(extra="forbid"), **content)
+    return _table_model("MachineFile", sections, content)
+
+
+def _table_model(title: str, sections: Mapping[str, type], content: dict[str, Any]) -> type[BaseModel]:
+    """The model of a table from the sections in it by dotted name; tables in tables become models in models."""
+    for i, name in enumerate(dict.fromkeys(path.partition(".")[0] for path in sections)):
+        inner = {path.partition(".")[2]: kind for path, kind in sections.items() if path.partition(".")[0] == name}
+        model = inner[""] if "" in inner else _table_model(name, inner, {})
+        may_miss = "" in inner and set(quantities(model)) == optional(model)
+        default = {"default_factory": model} if may_miss else {}
+        about: Any = Field(alias=name, description=f"the machine's {name}", **default)
+        content[f"section_{i}"] = (model, about)
+    return create_model(title, __config__=ConfigDict(extra="forbid"), **content)
+
+
+def sections_in(data: BaseModel, sections: Mapping[str, type]) -> dict[str, Any]:
+    """One instance per section, by dotted name, from a validated document."""
+    found = {}
+    for path in sections:
+        at: Any = data
+        for key in path.split("."):
+            names = {field.alias or name: name for name, field in type(at).model_fields.items()}
+            at = getattr(at, names[key])
+        found[path] = at
+    return found
 
 
 def validate(document: Document, origin: str, model: type[BaseModel], sections: Mapping[str, type]) -> BaseModel:
@@ -54,11 +76,12 @@ def validate(document: Document, origin: str, model: type[BaseModel], sections: 
 def _sentence(mistake: dict[str, Any], document: Document, sections: Mapping[str, type]) -> str:
     path = [str(part) for part in mistake["loc"]]
     name, last = ".".join(path), path[-1]
-    known = quantities(sections[path[0]]) if len(path) == 2 and path[0] in sections else {}
+    within = ".".join(path[:-1])
+    known = quantities(sections[within]) if within in sections else {}
     if mistake["type"] in ("missing", "missing_argument"):
-        return _missing(path, name, last, known)
+        return _missing(within, name, last, known)
     if mistake["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        allowed = list(known) or ["schema", "name", "family", *SECTIONS]
+        allowed = list(known) or _tables_in(within, sections)
         close = difflib.get_close_matches(last, allowed, 1)
         hint = f"did you mean {close[0]}?" if close else f"it may hold {', '.join(allowed)}."
         return f"{name} is not known; {hint}"
@@ -72,12 +95,19 @@ def _sentence(mistake: dict[str, Any], document: Document, sections: Mapping[str
     return f"{name} is {value}: {mistake['msg']}."
 
 
-def _missing(path: list[str], name: str, last: str, known: Mapping[str, Any]) -> str:
+def _tables_in(within: str, sections: Mapping[str, type]) -> list[str]:
+    """What a table of tables may hold."""
+    start = f"{within}." if within else ""
+    tables = [path.removeprefix(start).partition(".")[0] for path in sections if path.startswith(start)]
+    return list(dict.fromkeys([*([] if within else ["schema", "name", "family"]), *tables]))
+
+
+def _missing(within: str, name: str, last: str, known: Mapping[str, Any]) -> str:
     if last in known:
         quantity = known[last]
-        return f'{name} is missing ({quantity.meaning}); add {last} = "{KINDS[quantity.kind].example}" to [{path[0]}].'
-    if last in SECTIONS:
-        return f"the table [{last}] is missing; `kinetostat new` prints a complete file."
+        return f'{name} is missing ({quantity.meaning}); add {last} = "{KINDS[quantity.kind].example}" to [{within}].'
+    if name not in ("name", "family"):
+        return f"the table [{name}] is missing; `kinetostat new` prints a complete file."
     return f'{name} is missing; add {last} = "..." at the top of the file.'
 
 

@@ -66,8 +66,6 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
 FAMILY = Family(
     name="hexapod",
     summary="6 U-P-S legs (Gough-Stewart); freedoms x, y, z, roll, pitch, yaw",
-    geometry=Geometry,
-    stiffness=Stiffness,
-    pose=Pose,
+    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
 )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import AXES, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector, ring, rotation_x, rotation_y
-from kinetostat.machine.leg import Joint, SerialLeg, Spring, revolutes, two_force_legs
+from kinetostat.machine.leg import Joint, Leg, Spring, revolutes, two_force_legs
 from kinetostat.machine.machine import Configuration, Family
 from kinetostat.spec.fields import Quantity, section
 
@@ -57,7 +57,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
         Spring(f"ram {name}", Joint(axis, ZERO), k)
         for name, axis, k in zip(("bending x", "bending y", "torsion"), AXES, stiffness.ram, strict=True)
     )
-    ram = SerialLeg("ram", (Joint(Z_AXIS), *revolutes(tip, (Y_AXIS, pitch.x))), springs)
+    ram = Leg("ram", (*springs, Joint(Z_AXIS, None, "ram slide"), *revolutes(tip, (Y_AXIS, pitch.x), "ram Hooke joint")))
     base = ring(geometry.base_radius, geometry.base_angles)
     top = [platform.apply(point) for point in ring(geometry.platform_radius, geometry.platform_angles)]
     legs = two_force_legs(base, top, stiffness.actuator)
@@ -67,8 +67,6 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
 FAMILY = Family(
     name="passive-leg-3dof-pu",
     summary="3 U-P-S legs and a passive P-U ram; freedoms z, theta1, theta2",
-    geometry=Geometry,
-    stiffness=Stiffness,
-    pose=Pose,
+    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
 )

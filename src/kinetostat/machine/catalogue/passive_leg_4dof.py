@@ -9,7 +9,7 @@ from typing import Annotated
 from kinetostat.algebra.scalar import Scalar, cos, sin
 from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import Y_AXIS, Displacement, Rotation, Vector, polar, rotation_x, rotation_y
-from kinetostat.machine.leg import Joint, Leg, SerialLeg, Spring, revolutes, two_force_legs
+from kinetostat.machine.leg import Joint, Leg, Spring, revolutes, two_force_legs
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.spec.fields import Quantity, section
 
@@ -94,12 +94,14 @@ def _passive_leg(
     """Revolutes 51, 53, 55 along y and 56 along the pitched x; virtual joints 52 and 54 bend the links out of plane."""
     first, second = geometry.passive_links
     lower, upper = (elbow - foot) * (1.0 / first), (tip - elbow) * (1.0 / second)
-    passive = (Joint(Y_AXIS, foot), Joint(Y_AXIS, elbow), *revolutes(tip, (Y_AXIS, last_axis)))
-    springs = (
+    chain = (
+        Joint(Y_AXIS, foot, "passive leg foot"),
         Spring("passive link 1", Joint(Vector(-lower.z, 0.0, lower.x), foot), stiffness.passive_links[0]),
+        Joint(Y_AXIS, elbow, "passive leg elbow"),
         Spring("passive link 2", Joint(Vector(-upper.z, 0.0, upper.x), elbow), stiffness.passive_links[1]),
+        *revolutes(tip, (Y_AXIS, last_axis), "passive leg Hooke joint"),
     )
-    return SerialLeg("passive leg", passive, springs)
+    return Leg("passive leg", chain)
 
 
 def _actuated_legs(platform: Displacement, geometry: Geometry, stiffness: Stiffness) -> list[Leg]:
@@ -117,8 +119,6 @@ def attachments(radius: Scalar, angle: Scalar) -> list[Vector]:
 FAMILY = Family(
     name="passive-leg-4dof",
     summary="4 U-P-S legs and a passive R-R-Hooke leg (Zhang and Gosselin); freedoms x, z, theta5, theta6",
-    geometry=Geometry,
-    stiffness=Stiffness,
-    pose=Pose,
+    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
 )

@@ -9,7 +9,7 @@ from kinetostat.algebra.scalar import cos, reciprocal, sin, sqrt
 from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import X_AXIS, Y_AXIS, ZERO, Displacement, Rotation, Vector, ring, rotation_x
 from kinetostat.machine.catalogue.passive_leg_4dof import platform_pitch
-from kinetostat.machine.leg import Joint, Leg, SerialLeg, Spring, revolutes, two_force_legs
+from kinetostat.machine.leg import Joint, Leg, Spring, revolutes, two_force_legs
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.spec.fields import Quantity, section
 
@@ -86,19 +86,19 @@ def _passive_leg(
     normal = tilt.apply(Y_AXIS)
     knee, end = tilt.apply(elbow), tilt.apply(tip)
     bending = [tilt.apply(Vector(-link.z, 0.0, link.x)) for link in links]
-    passive = (*revolutes(ZERO, (X_AXIS, normal)), Joint(normal, knee), *revolutes(end, (normal, last_axis)))
-    springs = (
+    chain = (
+        *revolutes(ZERO, (X_AXIS, normal), "passive leg foot"),
         Spring("passive link 1", Joint(bending[0], ZERO), stiffness.passive_links[0]),
+        Joint(normal, knee, "passive leg elbow"),
         Spring("passive link 2", Joint(bending[1], knee), stiffness.passive_links[1]),
+        *revolutes(end, (normal, last_axis), "passive leg Hooke joint"),
     )
-    return SerialLeg("passive leg", passive, springs)
+    return Leg("passive leg", chain)
 
 
 FAMILY = Family(
     name="passive-leg-5dof",
     summary="5 U-P-S legs and a passive U-R-U leg; freedoms x, y, z, theta5, theta6",
-    geometry=Geometry,
-    stiffness=Stiffness,
-    pose=Pose,
+    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
 )

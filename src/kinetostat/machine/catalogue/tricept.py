@@ -7,7 +7,7 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import Y_AXIS, ZERO, Displacement, ring, rotation_x, rotation_y
-from kinetostat.machine.leg import Joint, SerialLeg, Spring, revolutes, two_force_legs
+from kinetostat.machine.leg import Joint, Leg, Spring, revolutes, two_force_legs
 from kinetostat.machine.machine import Configuration, Family
 from kinetostat.spec.fields import Quantity, section
 
@@ -60,7 +60,8 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
             ("bending x", "bending y", "torsion"), (turn.x, turn.y, turn.z), stiffness.tube, strict=True
         )
     )
-    tube = SerialLeg("tube", (*revolutes(ZERO, (Y_AXIS, pitch.x)), Joint(turn.z)), springs)
+    joints = (*revolutes(ZERO, (Y_AXIS, pitch.x), "tube Hooke joint"), Joint(turn.z, None, "tube slide"))
+    tube = Leg("tube", (*joints, *springs))
     base = ring(geometry.base_radius, geometry.base_angles)
     top = [platform.apply(point) for point in ring(geometry.platform_radius, geometry.platform_angles)]
     legs = two_force_legs(base, top, stiffness.actuator)
@@ -70,8 +71,6 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
 FAMILY = Family(
     name="tricept",
     summary="3 U-P-S legs and a passive U-P tube (Tricept); freedoms theta1, theta2, length",
-    geometry=Geometry,
-    stiffness=Stiffness,
-    pose=Pose,
+    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
 )

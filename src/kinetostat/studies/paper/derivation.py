@@ -6,7 +6,7 @@ Each check is a statement that must vanish, its residual, and the tolerance with
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,6 @@ import numpy.typing as npt
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.kinetostatics.assembly import flexible_stiffness
 from kinetostat.kinetostatics.response import Response, respond
-from kinetostat.machine.leg import SerialLeg, TwoForceLeg
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values
@@ -106,8 +105,8 @@ def _matrices(response: Response) -> tuple[Array, Array, Array, Array]:
     reference = np.array(response.configuration.platform.translation.components())
     a, lengths = [], []
     for leg in response.configuration.legs:
-        if isinstance(leg, TwoForceLeg):
-            joint, foot = np.array(leg.platform_joint.components()), np.array(leg.base_joint.components())
+        if leg.actuated:
+            foot, joint = (np.array(point.components()) for point in leg.path)
             a.append(np.concatenate([np.cross(joint - reference, joint - foot), joint - foot]))
             lengths.append(np.linalg.norm(joint - foot))
     passive = response.legs[0]
@@ -133,8 +132,7 @@ def _state(response: Response) -> tuple[Array, Array, Array, Array]:
     """Passive joint angles, leg lengths, P and Q of a configuration."""
     configuration = response.configuration
     _, b, _, _ = _matrices(response)
-    passive = cast(SerialLeg, configuration.legs[0])
-    points = [np.array(joint.point.components()) for joint in passive.passive if joint.point is not None]
+    points = [np.array(point.components()) for point in configuration.legs[0].path]
     lower, upper = points[1] - points[0], points[2] - points[1]
     turn = configuration.platform.rotation
     rotation = np.array([axis.components() for axis in (turn.x, turn.y, turn.z)]).T

@@ -1,0 +1,81 @@
+"""A wrench on the platform: how far it moves, and what every leg, spring and joint carries. One pose."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kinetostat.algebra.scalar import Scalar, times, total
+from kinetostat.algebra.screw import Twist, Wrench
+from kinetostat.algebra.symmetric import SIZE, Symmetric6
+from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.kinetostatics.leg import relaxed
+from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.leg import Leg
+
+
+@dataclass(frozen=True)
+class JointReaction:
+    """What is passed on through a joint, from its base side to its platform side.
+
+    Attributes:
+        leg, joint: names.
+        point: where the moment is taken, base frame, m.
+        wrench: moment (N·m) and force (N) on the platform side at that point, base axes.
+    """
+
+    leg: str
+    joint: str
+    point: Vector
+    wrench: Wrench
+
+
+def deflection(compliance: Symmetric6, load: Wrench) -> Twist:
+    """t = C w: small rotation (rad) and displacement (m) of the tool point under a wrench there, base axes."""
+    w = load.components()
+    rows = [total([times(compliance.entry(i, j), w[j]) for j in range(SIZE)]) for i in range(SIZE)]
+    return Twist(Vector(*rows[:3]), Vector(*rows[3:]))
+
+
+def spring_loads(response: Response, load: Wrench) -> list[Scalar]:
+    """N or N·m that each spring carries under a wrench at the tool point: xi_e times w (virtual work)."""
+    return [load.work(twist) for twist in response.statics.flexibility]
+
+
+def leg_wrenches(response: Response, load: Wrench) -> list[Wrench]:
+    """The wrench that each leg carries from the platform to the base, at the tool point, base axes.
+
+    Their sum is the load. Where rigid parts leave internal loads undecided, those are taken as zero.
+    """
+    carried = []
+    for leg, shares in zip(response.legs, response.statics.sharing, strict=True):
+        basis = leg.wrenches if len(shares) == len(leg.wrenches) else relaxed(leg).wrenches
+        parts = [wrench * load.work(share) for wrench, share in zip(basis, shares, strict=True)]
+        carried.append(sum_of(parts))
+    return carried
+
+
+def sum_of(wrenches: Sequence[Wrench]) -> Wrench:
+    """The sum of wrenches at one point."""
+    result = Wrench(ZERO, ZERO)
+    for wrench in wrenches:
+        result = result + wrench
+    return result
+
+
+def joint_reactions(response: Response, load: Wrench) -> list[JointReaction]:
+    """The wrench in every joint: that of its leg (links are without weight), referred to the joint's own point."""
+    found = []
+    for leg, wrench in zip(response.configuration.legs, leg_wrenches(response, load), strict=True):
+        for name, point in joint_points(leg):
+            found.append(JointReaction(leg.name, name, point, wrench.moved(point - response.reference)))
+    return found
+
+
+def joint_points(leg: Leg) -> list[tuple[str, Vector]]:
+    """The passive joints of a leg by name, each with a point of it; a slide is where the chain has come to."""
+    named: dict[str, Vector] = {}
+    at = next(iter(leg.path), ZERO)
+    for element in leg.chain:
+        for joint in element.freedoms:
+            named.setdefault(joint.name, joint.point or at)
+        at = element.path[-1] if element.path else at
+    return list(named.items())

@@ -1,0 +1,219 @@
+"""Links that yield: beams, lumped virtual joints, parallelograms, and a compliance matrix of one's own, all as springs.
+
+What a section and a material make of a link is `section`'s; where links lie is the family's business.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.algebra.scalar import Scalar, plus, reciprocal
+from kinetostat.algebra.vector import Displacement, Rotation, Vector
+from kinetostat.machine.leg import RIGID, Joint, Spring
+
+NEGLIGIBLE = 1e-14
+"""Share of the largest eigenvalue below which a matrix of compliance does not yield: the rounding of zero."""
+
+
+@dataclass(frozen=True)
+class Rigidity:
+    """How a prismatic bar resists, from its section and material; infinity where it does not yield.
+
+    Attributes:
+        axial: E A, N.
+        torsion: G J, N·m².
+        bending_y, bending_z: E I about the section's y and z axes, N·m².
+        shear_y, shear_z: kappa G A along them, N: finite for a Timoshenko beam, infinite for an Euler-Bernoulli one.
+    """
+
+    axial: Scalar = RIGID
+    torsion: Scalar = RIGID
+    bending_y: Scalar = RIGID
+    bending_z: Scalar = RIGID
+    shear_y: Scalar = RIGID
+    shear_z: Scalar = RIGID
+
+
+def link_axes(start: Vector, end: Vector, up: Vector) -> tuple[Rotation, Scalar]:
+    """The link's axes in the base frame and its length (m): x from start to end, z nearest to `up`, y = z x x."""
+    span = end - start
+    length = span.norm()
+    along = span * reciprocal(length)
+    side = up.cross(along)
+    side = side * reciprocal(side.norm())
+    return Rotation(along, side, along.cross(side)), length
+
+
+@dataclass(frozen=True)
+class Beam:
+    """A prismatic link built in at both ends, with its full 6x6 compliance: Euler-Bernoulli, or Timoshenko.
+
+    The compliance of one end against the other is diagonal at the middle of the link, so that six springs there are
+    exact (theory section 5).
+
+    Attributes:
+        name: of the link.
+        start, end: of its axis, base frame, m.
+        up: not along the link; the section's z axis lies in the plane of both.
+        rigidity: of its section.
+    """
+
+    name: str
+    start: Vector
+    end: Vector
+    up: Vector
+    rigidity: Rigidity
+
+    @property
+    def freedoms(self) -> tuple[Joint, ...]:
+        """None."""
+        return ()
+
+    @property
+    def springs(self) -> tuple[Spring, ...]:
+        """Six at the middle: torsion GJ/L, bending EI/L, tension EA/L, and shear 1/(L^3/12EI + L/kappa GA)."""
+        axes, length = link_axes(self.start, self.end, self.up)
+        middle, shrink, own = (self.start + self.end) * 0.5, reciprocal(length), self.rigidity
+        cubed = length * length * length * (1.0 / 12.0)
+        shear = [
+            reciprocal(plus(cubed * reciprocal(bending), length * reciprocal(sliding)))
+            for bending, sliding in ((own.bending_z, own.shear_y), (own.bending_y, own.shear_z))
+        ]
+        turning = zip(("torsion", "bending y", "bending z"), (axes.x, axes.y, axes.z), strict=True)
+        sliding_along = zip(("tension", "shear y", "shear z"), (axes.x, axes.y, axes.z), strict=True)
+        return (
+            *_springs(
+                self.name,
+                [(what, Joint(axis, middle)) for what, axis in turning],
+                [k * shrink for k in (own.torsion, own.bending_y, own.bending_z)],
+            ),
+            *_springs(self.name, [(what, Joint(a)) for what, a in sliding_along], [own.axial * shrink, *shear]),
+        )
+
+    @property
+    def path(self) -> tuple[Vector, ...]:
+        """Its ends, base frame, m."""
+        return self.start, self.end
+
+    def displaced(self, motion: Displacement) -> "Beam":
+        """The link after a rigid displacement of the whole machine."""
+        ends = motion.apply(self.start), motion.apply(self.end)
+        return Beam(self.name, *ends, motion.rotation.apply(self.up), self.rigidity)
+
+
+def lumped_springs(name: str, start: Vector, end: Vector, up: Vector, rigidity: Rigidity) -> tuple[Spring, ...]:
+    """A flexible link as virtual joints where it is built in (`start`): torsion, two bendings 3EI/L, and EA/L.
+
+    Those about an axis that a passive joint there leaves free do nothing, which gives the paper's Tables I and II:
+    an actuated revolute keeps the actuator and three torsional springs, a passive one two, Hooke and spherical joints
+    of a two-force link none, and a planar revolute one or none (theory section 5).
+    """
+    axes, length = link_axes(start, end, up)
+    shrink = reciprocal(length)
+    joints = [
+        ("torsion", Joint(axes.x, start)),
+        ("bending y", Joint(axes.y, start)),
+        ("bending z", Joint(axes.z, start)),
+        ("tension", Joint(axes.x)),
+    ]
+    bending = (rigidity.bending_y * 3.0 * shrink, rigidity.bending_z * 3.0 * shrink)
+    return _springs(name, joints, (rigidity.torsion * shrink, *bending, rigidity.axial * shrink))
+
+
+def _springs(name: str, joints: Sequence[tuple[str, Joint]], stiffness: Sequence[Scalar]) -> tuple[Spring, ...]:
+    pairs = zip(joints, stiffness, strict=True)
+    return tuple(Spring(f"{name} {what}", joint, k, part=name) for (what, joint), k in pairs)
+
+
+@dataclass(frozen=True)
+class Parallelogram:
+    """Two equal bars between two equal short sides: one freedom, a translation that turns nothing.
+
+    Attributes:
+        name: of the joint.
+        near, far: middles of the short sides nearer to the base and to the platform, base frame, m.
+        side: unit vector along the short sides.
+        width: of the short sides, m.
+        bar: axial stiffness of each bar, N/m.
+    """
+
+    name: str
+    near: Vector
+    far: Vector
+    side: Vector
+    width: Scalar
+    bar: Scalar = RIGID
+
+    @property
+    def along(self) -> Vector:
+        """Unit vector of the bars."""
+        span = self.far - self.near
+        return span * reciprocal(span.norm())
+
+    @property
+    def normal(self) -> Vector:
+        """Unit normal of its plane."""
+        across = self.side.cross(self.along)
+        return across * reciprocal(across.norm())
+
+    @property
+    def bars(self) -> tuple[tuple[Vector, Vector], ...]:
+        """Near and far end of each bar, base frame, m."""
+        half = self.side * (0.5 * self.width)
+        return (self.near + half, self.far + half), (self.near - half, self.far - half)
+
+    @property
+    def freedoms(self) -> tuple[Joint, ...]:
+        """The translation in its plane, across the bars."""
+        return (Joint(self.normal.cross(self.along), None, self.name),)
+
+    @property
+    def springs(self) -> tuple[Spring, ...]:
+        """Both bars together: along them 2 k, and about the normal k (width sin)^2 / 2."""
+        along, normal = self.along, self.normal
+        arm = self.width * normal.cross(self.side).dot(along)
+        joints = [("tension", Joint(along)), ("turning", Joint(normal, (self.near + self.far) * 0.5))]
+        return _springs(self.name, joints, (2.0 * self.bar, 0.5 * self.bar * arm * arm))
+
+    @property
+    def path(self) -> tuple[Vector, ...]:
+        """The middles of its short sides, base frame, m."""
+        return self.near, self.far
+
+    def displaced(self, motion: Displacement) -> "Parallelogram":
+        """The parallelogram after a rigid displacement of the whole machine."""
+        ends = motion.apply(self.near), motion.apply(self.far)
+        return Parallelogram(self.name, *ends, motion.rotation.apply(self.side), self.width, self.bar)
+
+
+def matrix_springs(name: str, compliance: npt.ArrayLike, point: Vector) -> tuple[Spring, ...]:
+    """Springs that together yield as a 6x6 compliance does: screws, from its eigenvectors.
+
+    Args:
+        name: of the link or joint.
+        compliance: symmetric, >= 0, rows rx ry rz x y z, of one end against the other at `point`, SI [6 x 6].
+        point: base frame, m.
+    """
+    matrix = np.asarray(compliance, dtype=float)
+    scale = np.sqrt(np.repeat([np.trace(matrix[:3, :3]) or 1.0, np.trace(matrix[3:, 3:]) or 1.0], 3))
+    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    found = []
+    for n, (value, mode) in enumerate(zip(values[::-1], (vectors.T * scale)[::-1], strict=True), 1):
+        if value > NEGLIGIBLE * values[-1]:
+            joint, size = _screw(mode, point)
+            found.append(Spring(f"{name} mode {n}", joint, 1.0 / (float(value) * size * size), part=name))
+    return tuple(found)
+
+
+def _screw(twist: npt.NDArray[np.float64], point: Vector) -> tuple[Joint, float]:
+    """The screw of a twist [6] given at `point`, and how many units of it the twist is."""
+    turning, sliding = twist[:3], twist[3:]
+    size = float(np.linalg.norm(turning))
+    if size == 0.0:
+        length = float(np.linalg.norm(sliding))
+        return Joint(Vector(*(sliding / length).tolist())), length
+    axis, moved = turning / size, sliding / size
+    arm = Vector(*np.cross(axis, moved).tolist())
+    return Joint(Vector(*axis.tolist()), point + arm, pitch=float(axis @ moved)), size
