@@ -1,6 +1,6 @@
-"""Plane triangles: the one closed form that two-link legs need. Knows no machine."""
+"""Where two links meet, or a link and a rail: closed forms for legs with elbows and slides. Knows no machine."""
 
-from kinetostat.algebra.scalar import Scalar, reciprocal, sqrt
+from kinetostat.algebra.scalar import Scalar, minus, plus, reciprocal, sqrt, times
 from kinetostat.algebra.vector import Vector
 
 
@@ -23,3 +23,57 @@ def apex(start: Vector, end: Vector, first: Scalar, second: Scalar) -> tuple[Vec
     across = sqrt(first * first * shrink - along * along)
     point = start + span * along + Vector(span.z, 0.0, -span.x) * across
     return point, across * square * reciprocal(first * second)
+
+
+def crank_end(start: Vector, end: Vector, axis: Vector, crank: Scalar, rod: Scalar) -> Vector:
+    """Where a crank that turns about an axis through `start` meets a rod that ends at `end`: a circle and a sphere.
+
+    Of the two points the one that lies, seen along the axis, at +90 deg from the way from start to end. With `axis`
+    along y and start and end in one plane y = constant, it is the `apex`.
+
+    Args:
+        start, end: centre of the crank's circle, and far end of the rod, m.
+        axis: unit vector.
+        crank, rod: lengths, m.
+
+    Returns:
+        The common end of both, m; NaN where they do not meet.
+    """
+    span = end - start
+    off = span.dot(axis)
+    flat = span - axis * off
+    shrink = reciprocal(flat.dot(flat))
+    flat_rod = minus(times(rod, rod), times(off, off))
+    along = 0.5 * (1.0 + (crank * crank - flat_rod) * shrink)
+    across = sqrt(crank * crank * shrink - along * along)
+    return start + flat * along + axis.cross(flat) * across
+
+
+def crank_range(start: Vector, end: Vector, axis: Vector, crank: Scalar) -> tuple[Scalar, Scalar]:
+    """Least and greatest distance (m) of `end` from the circle of the crank's end: rods between them fit."""
+    span = end - start
+    off = span.dot(axis)
+    size = (span - axis * off).norm()
+    near, far = minus(size, crank), plus(size, crank)
+    return sqrt(plus(near * near, times(off, off))), sqrt(plus(far * far, times(off, off)))
+
+
+def slide_travel(start: Vector, end: Vector, direction: Vector, rod: Scalar) -> tuple[Scalar, Scalar]:
+    """How far a slide must go from `start` to meet a rod that ends at `end`: a line and a sphere.
+
+    Of the two positions the one behind `end`, from where the rod points forward.
+
+    Args:
+        start: a point of the rail, m.
+        end: far end of the rod, m.
+        direction: unit vector of the rail.
+        rod: length, m.
+
+    Returns:
+        The travel along `direction`, m, NaN where the rod is too short; and the distance of `end` from the rail, m.
+    """
+    span = end - start
+    ahead = span.dot(direction)
+    aside = span - direction * ahead
+    square = aside.dot(aside)
+    return minus(ahead, sqrt(minus(times(rod, rod), square))), sqrt(square)

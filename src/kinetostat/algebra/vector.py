@@ -96,6 +96,13 @@ def rotation_z(c: Scalar, s: Scalar) -> Rotation:
     return Rotation(Vector(c, s, 0.0), Vector(-s, c, 0.0), Z_AXIS)
 
 
+def rotation_along(axis: Vector, c: Scalar, s: Scalar) -> Rotation:
+    """Rotation about the unit vector `axis` by the angle whose cosine is c and sine s (Rodrigues)."""
+    rest = minus(1.0, c)
+    columns = [unit * c + axis * times(rest, axis.dot(unit)) + axis.cross(unit) * s for unit in AXES]
+    return Rotation(*columns)
+
+
 def polar(radius: Scalar, angle: Scalar) -> Vector:
     """The point of the x-y plane at `radius` (m) from the origin and `angle` (rad) from x."""
     return Vector(times(radius, cos(angle)), times(radius, sin(angle)), 0.0)

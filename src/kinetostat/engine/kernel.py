@@ -16,6 +16,7 @@ from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.engine.native import Array, Body, Codes, Program
 from kinetostat.engine.trace import Graph, Operand
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
+from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import respond
@@ -37,12 +38,14 @@ class Kernel:
         fixed: values of its fixed inputs, SI.
         varying: leaf paths of its columns, in order.
         angles: leaf paths of all angles.
+        machine: whose joints are found slab by slab, where its family has no closed form for them.
     """
 
     program: Program
     fixed: Array
     varying: tuple[str, ...]
     angles: frozenset[str]
+    machine: Machine
 
     def run(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab of points; other threads run meanwhile.
@@ -55,6 +58,10 @@ class Kernel:
         """
         served = [np.ascontiguousarray(columns[path], dtype=float) for path in self.varying]
         reduced = [_reduced(c) if p in self.angles else c for p, c in zip(self.varying, served, strict=True)]
+        if self.machine.family.chains is not None:
+            joints = solve_joints(with_values(self.machine, columns))
+            found = (*joints.coordinates, joints.status)
+            reduced += [np.ascontiguousarray(np.broadcast_to(c, status.shape), dtype=float) for c in found]
         self.program.run(self.fixed, reduced, results, status)
 
 
@@ -73,7 +80,7 @@ def slab_kernel(machine: Machine, varying: Sequence[str], quantities: Sequence[s
     inputs = {path: value for path, value in fixed.items() if path not in dict(constant)}
     ordinary = frozenset(path for path, value in inputs.items() if ORDINARY[0] < abs(value) < ORDINARY[1])
     form = _Form(constant, tuple(inputs), ordinary, tuple(varying), tuple(quantities))
-    return Kernel(_program(_Kind(machine), form), np.array([*inputs.values()], dtype=float), form.varying, angles)
+    return Kernel(_program(_Kind(machine), form), np.array([*inputs.values()], dtype=float), form.varying, angles, machine)
 
 
 def _reduced(angle: Array) -> Array:
@@ -113,11 +120,19 @@ def _program(kind: _Kind, form: _Form) -> Program:
     graph = Graph()
     fixed = {path: graph.input(fixed=True, ordinary=path in form.ordinary) for path in form.inputs}
     columns = {path: graph.input() for path in form.varying}
-    response = respond(with_values(kind.machine, {**dict(form.constant), **fixed, **columns}))
+    machine = with_values(kind.machine, {**dict(form.constant), **fixed, **columns})
+    joints = [graph.input() for _ in range(_coordinates(kind.machine))]
+    response = respond(machine, Joints(tuple(joints[:-1]), joints[-1]) if joints else None)
     accepted = response.status < Status.OK + 0.5
     results = [where(accepted, QUANTITIES[name].value(response), math.nan) for name in form.quantities]
     numbers = [_number(result) for result in results]
-    return Program(Body([*fixed.values()], [*columns.values()], numbers, _number(response.status)))
+    return Program(Body([*fixed.values()], [*columns.values(), *joints], numbers, _number(response.status)))
+
+
+def _coordinates(machine: Machine) -> int:
+    """How many columns the joints take: their coordinates and a status, or none where there is a closed form."""
+    chains = machine.family.chains
+    return chains(**machine.own_sections).size + 1 if chains else 0
 
 
 def _number(value: Scalar) -> Operand:

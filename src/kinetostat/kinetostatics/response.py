@@ -10,6 +10,7 @@ from kinetostat.algebra.scalar import Scalar, smaller, where
 from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import Vector
+from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.reach import within_reach
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_statics, stiffness_matrix
@@ -46,9 +47,16 @@ class Response:
     status: Scalar
 
 
-def respond(machine: Machine) -> Response:
-    """K, C and status of a machine at its pose."""
-    configuration = machine.configure()
+def respond(machine: Machine, joints: Joints | None = None) -> Response:
+    """K, C and status of a machine at its pose.
+
+    Args:
+        machine: with its pose.
+        joints: where its joints are, if known; otherwise they are found where the family has no closed form.
+    """
+    if joints is None:
+        joints = solve_joints(machine) if machine.family.chains else CLOSED_FORM
+    configuration = machine.configure(joints.coordinates)
     reference, length = machine.tool_point(configuration.platform), configuration.length
     absent, guide = _out_of_plane(configuration, reference)
     legs = tuple(leg.screws(reference, length, absent) for leg in configuration.legs)
@@ -65,8 +73,12 @@ def respond(machine: Machine) -> Response:
         stiffness_matrix(statics),
         compliance_matrix(statics),
         regularity,
-        pose_status(within_reach(configuration), regularity),
+        pose_status(joints.status, within_reach(configuration), regularity),
     )
+
+
+CLOSED_FORM = Joints((), int(Status.OK))
+"""The joints of a machine whose family places them itself."""
 
 
 def _out_of_plane(configuration: Configuration, reference: Vector) -> tuple[tuple[Joint, ...], tuple[Wrench, ...]]:
@@ -78,7 +90,7 @@ def _out_of_plane(configuration: Configuration, reference: Vector) -> tuple[tupl
     return configuration.plane.absent, wrenches
 
 
-def pose_status(reached: Scalar, regularity: Scalar) -> Scalar:
+def pose_status(placed: Scalar, reached: Scalar, regularity: Scalar) -> Scalar:
     """Status code of a pose, the most fundamental obstacle first; a regularity of NaN counts as singular."""
     solvable = where(regularity > SINGULAR, int(Status.OK), int(Status.SINGULAR))
-    return where(reached, solvable, int(Status.OUT_OF_REACH))
+    return where(placed > Status.OK + 0.5, placed, where(reached, solvable, int(Status.OUT_OF_REACH)))

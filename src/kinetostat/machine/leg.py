@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from kinetostat.algebra.scalar import Scalar, is_zero, plus, reciprocal
+from kinetostat.algebra.scalar import Scalar, cos, is_zero, plus, reciprocal, sin, times
 from kinetostat.algebra.screw import Twist, Wrench, force_along, rotation_about, translation_along
 from kinetostat.algebra.solve import complement
-from kinetostat.algebra.vector import AXES, Displacement, Vector
+from kinetostat.algebra.vector import AXES, IDENTITY, Displacement, Vector, rotation_along
 
 RIGID = float("inf")
 """Stiffness of what does not yield: exact, not large."""
@@ -44,6 +44,11 @@ class Joint:
         return ()
 
     @property
+    def mover(self) -> "Joint":
+        """The freedom in which it moves: its own."""
+        return self
+
+    @property
     def path(self) -> tuple[Vector, ...]:
         """Its point, if it has one."""
         return () if self.point is None else (self.point,)
@@ -59,6 +64,14 @@ class Joint:
         """The joint after a rigid displacement of the whole machine."""
         point = None if self.point is None else motion.apply(self.point)
         return replace(self, axis=motion.rotation.apply(self.axis), point=point)
+
+    def moved(self, amount: Scalar) -> tuple["Joint", Displacement]:
+        """The joint once it has moved by `amount` (rad, or m of a slide), and how it displaces what follows it."""
+        if self.point is None:
+            return self, Displacement(IDENTITY, self.axis * amount)
+        turn = rotation_along(self.axis, cos(amount), sin(amount))
+        shift = self.point - turn.apply(self.point) + self.axis * times(self.pitch, amount)
+        return self, Displacement(turn, shift)
 
 
 def revolutes(point: Vector, axes: Sequence[Vector], name: str = "") -> tuple[Joint, ...]:
@@ -95,6 +108,11 @@ class Spring:
         return (self,)
 
     @property
+    def mover(self) -> Joint:
+        """The freedom in which it moves when driven."""
+        return self.joint
+
+    @property
     def path(self) -> tuple[Vector, ...]:
         """Nothing that a drawing shows."""
         return ()
@@ -102,6 +120,10 @@ class Spring:
     def displaced(self, motion: Displacement) -> "Spring":
         """The spring after a rigid displacement of the whole machine."""
         return replace(self, joint=self.joint.displaced(motion))
+
+    def moved(self, amount: Scalar) -> tuple["Spring", Displacement]:
+        """The spring once its joint has moved by `amount` (rad or m), and how that displaces what follows it."""
+        return self, self.joint.moved(amount)[1]
 
 
 class Element(Protocol):
@@ -166,13 +188,16 @@ class Leg:
 
     Attributes:
         name: unique within the machine.
-        chain: its elements in order; their passive freedoms are independent unless `lines` are given.
+        chain: its elements in order.
         lines: where it is known in closed form that the leg carries forces along these lines and nothing else.
+        idle: which of its passive freedoms, counted from the base, depend on the others: the spin of a strut between
+            two spherical joints, for instance. Irrelevant where `lines` are given.
     """
 
     name: str
     chain: tuple[Element, ...]
     lines: tuple[Line, ...] = ()
+    idle: tuple[int, ...] = ()
 
     @property
     def passive(self) -> tuple[Joint, ...]:
@@ -198,7 +223,7 @@ class Leg:
     def displaced(self, motion: Displacement) -> "Leg":
         """The leg after a rigid displacement of the whole machine."""
         chain = tuple(element.displaced(motion) for element in self.chain)
-        return Leg(self.name, chain, tuple(line.displaced(motion) for line in self.lines))
+        return replace(self, chain=chain, lines=tuple(line.displaced(motion) for line in self.lines))
 
     def screws(self, reference: Vector, length: Scalar, absent: Sequence[Joint] = ()) -> LegScrews:
         """Its screws at a point; the wrenches are the space reciprocal to the passive twists (theory section 2).
@@ -212,7 +237,8 @@ class Leg:
         if self.lines:
             wrenches, regularity = tuple(line.wrench(reference) for line in self.lines), 1.0
         else:
-            wrenches, regularity = reciprocal_wrenches(passive, length)
+            needed = [twist for i, twist in enumerate(passive) if i not in self.idle]
+            wrenches, regularity = reciprocal_wrenches(needed, length)
         elastic = tuple(spring.joint.twist(reference) for spring in self.springs)
         return LegScrews(
             passive=passive,
@@ -273,7 +299,7 @@ def reciprocal_wrenches(passive: Sequence[Twist], length: Scalar) -> tuple[tuple
     """Wrenches that do no work on any of `passive`: a basis of the reciprocal space (J_p^T W = 0).
 
     Args:
-        passive: a independent unit twists, a < 6, at P in base axes.
+        passive: a independent unit twists, at P in base axes.
         length: m; translations are compared with rotations through it, the space does not depend on it.
 
     Returns:

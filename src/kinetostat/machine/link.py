@@ -4,13 +4,13 @@ What a section and a material make of a link is `section`'s; where links lie is 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.scalar import Scalar, plus, reciprocal
-from kinetostat.algebra.vector import Displacement, Rotation, Vector
+from kinetostat.algebra.scalar import Scalar, cos, plus, reciprocal, sin
+from kinetostat.algebra.vector import IDENTITY, Displacement, Rotation, Vector, rotation_along
 from kinetostat.machine.leg import RIGID, Joint, Spring
 
 NEGLIGIBLE = 1e-14
@@ -170,6 +170,11 @@ class Parallelogram:
         return (Joint(self.normal.cross(self.along), None, self.name),)
 
     @property
+    def mover(self) -> Joint:
+        """The freedom in which it moves."""
+        return self.freedoms[0]
+
+    @property
     def springs(self) -> tuple[Spring, ...]:
         """Both bars together: along them 2 k, and about the normal k (width sin)^2 / 2."""
         along, normal = self.along, self.normal
@@ -186,6 +191,13 @@ class Parallelogram:
         """The parallelogram after a rigid displacement of the whole machine."""
         ends = motion.apply(self.near), motion.apply(self.far)
         return Parallelogram(self.name, *ends, motion.rotation.apply(self.side), self.width, self.bar)
+
+    def moved(self, amount: Scalar) -> tuple["Parallelogram", Displacement]:
+        """The parallelogram once its far side has run by `amount` (m of arc), and how that displaces what follows."""
+        angle = amount * reciprocal((self.far - self.near).norm())
+        turn = rotation_along(self.normal, cos(angle), sin(angle))
+        far = self.near + turn.apply(self.far - self.near)
+        return replace(self, far=far), Displacement(IDENTITY, far - self.far)
 
 
 def matrix_springs(name: str, compliance: npt.ArrayLike, point: Vector) -> tuple[Spring, ...]:

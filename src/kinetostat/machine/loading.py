@@ -3,7 +3,9 @@
 import difflib
 import json
 import operator
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cache, reduce
 from importlib import resources
 from pathlib import Path
@@ -13,6 +15,9 @@ from pydantic import TypeAdapter
 
 from kinetostat.machine.catalogue import families
 from kinetostat.machine.machine import COMMON, Family, Machine
+from kinetostat.machine.written import family as written
+from kinetostat.machine.written.checking import check_numbers, with_idle_freedoms
+from kinetostat.machine.written.document import by_name, separate
 from kinetostat.spec import document as documents
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
@@ -66,10 +71,26 @@ def build(document: Document, origin: str, settings: Sequence[str] = ()) -> Mach
     Raises:
         InputError: a mistake in the document or an override.
     """
+    if document.get("family") == written.NAME:
+        return _build_written(document, origin, settings)
     family = _family(document.get("family"), origin)
+    changed = documents.override(document, settings, _counts(family))
+    return _validated(family, changed, origin)
+
+
+def _build_written(document: Document, origin: str, settings: Sequence[str]) -> Machine:
+    """A machine written leg by leg."""
+    changed = documents.override(by_name(document, origin), settings, {})
+    plan, numbers = separate(by_name(changed, origin), origin)
+    machine = _validated(written.family_of(plan), numbers, origin)
+    check_numbers(plan, machine.sections, origin)
+    complete = with_idle_freedoms(plan, machine.own_sections)
+    return replace(machine, family=written.family_of(complete))
+
+
+def _validated(family: Family, document: Document, origin: str) -> Machine:
     sections = family.every_section
-    written = documents.override(document, settings, _counts(family))
-    data: Any = validate(written, origin, file_model(family.name, sections), sections)
+    data: Any = validate(document, origin, file_model(family.name, sections), sections)
     return Machine(data.name, family, sections_in(data, sections))
 
 
@@ -83,9 +104,10 @@ def _counts(family: Family) -> dict[str, int]:
 
 
 def _family(name: object, origin: str) -> Family:
-    known = families()
-    if isinstance(name, str) and name in known:
-        return known[name]
+    found = families()
+    if isinstance(name, str) and name in found:
+        return found[name]
+    known = [*found, written.NAME]
     if name is None:
         raise InputError(f'"{origin}": family is missing; add family = "..." with one of: {", ".join(known)}.')
     near = difflib.get_close_matches(str(name), known, 1)
@@ -100,16 +122,28 @@ def as_toml(machine: Machine) -> str:
         f"name   = {json.dumps(machine.name, ensure_ascii=False)}",
         f'family = "{machine.family.name}"',
     ]
-    for name, section in machine.sections.items():
+    literals = machine.family.literals
+    lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get("", {}).items()]
+    for name in [*machine.sections, *(literals.keys() - machine.sections.keys() - {""})]:
+        section = machine.sections.get(name)
         if name in COMMON and section == COMMON[name]():
             continue
-        lines += ["", f"[{name}]"]
-        for field, quantity in quantities(type(section)).items():
-            held = getattr(section, field)
-            texts = [f'"{show(value, quantity.kind)}"' for value in (held if quantity.count else (held,))]
-            written = f"[{', '.join(texts)}]" if quantity.count else texts[0]
-            lines.append(f"{field} = {written}")
+        lines += ["", f"[{'.'.join(_key(part) for part in name.split('.'))}]"]
+        lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get(name, {}).items()]
+        lines += _quantity_lines(section) if section is not None else []
     return "\n".join(lines) + "\n"
+
+
+def _quantity_lines(section: Any) -> Iterator[str]:
+    for field, quantity in quantities(type(section)).items():
+        held = getattr(section, field)
+        texts = [json.dumps(show(value, quantity.kind)) for value in (held if quantity.count else (held,))]
+        yield f"{field} = {'[' + ', '.join(texts) + ']' if quantity.count else texts[0]}"
+
+
+def _key(name: str) -> str:
+    """A name as TOML takes it in a table's header."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
 
 
 def template(family: str) -> str:
@@ -118,8 +152,8 @@ def template(family: str) -> str:
     Raises:
         InputError: no such family.
     """
-    wanted = _family(family, "kinetostat new")
-    return next(text for text in bundled().values() if documents.parse(text, "")["family"] == wanted.name)
+    wanted = family if family == written.NAME else _family(family, "kinetostat new").name
+    return next(text for text in bundled().values() if documents.parse(text, "")["family"] == wanted)
 
 
 def machine_schema() -> dict[str, Any]:

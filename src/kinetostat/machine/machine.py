@@ -3,8 +3,8 @@
 Parameters may be floats or traced scalars; nothing here validates (that is `spec`) and nothing here solves.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from kinetostat.algebra.scalar import Scalar
@@ -97,6 +97,36 @@ COMMON = {"tool": Tool, "load": Load}
 """Sections that every machine file may have."""
 
 
+@dataclass(frozen=True)
+class Step:
+    """An element of a chain at the home pose, and whether a joint coordinate moves it."""
+
+    element: Any
+    moves: bool
+
+
+@dataclass(frozen=True)
+class Chains:
+    """The legs of a machine at its home pose.
+
+    Attributes:
+        legs: their elements in order.
+        home: placement of the platform.
+        pose: values of the coordinates that the pose gives, by name: x, y, z (m, base frame), roll, pitch, yaw (rad).
+        length: a characteristic length, m.
+    """
+
+    legs: tuple[tuple[Step, ...], ...]
+    home: Displacement
+    pose: Mapping[str, Scalar]
+    length: Scalar
+
+    @property
+    def size(self) -> int:
+        """How many joint coordinates there are."""
+        return sum(step.moves for steps in self.legs for step in steps)
+
+
 @dataclass(frozen=True, eq=False)
 class Family:
     """A kind of machine: what people must write about one, and its kinematics.
@@ -107,6 +137,9 @@ class Family:
         sections: the tables of a machine file by name (dots for tables in tables): dataclasses of annotated fields.
         configure: from one instance per section, by keyword, to the machine at its pose.
         planar: whether its platform moves in the x-y plane only.
+        chains: where there is no closed form, from the sections to the legs at the home pose, so that joint coordinates
+            can be found that close them (`kinematics.closure`); `configure` then takes these as `joints`.
+        literals: what its machine files say beside numbers, by section.
     """
 
     name: str
@@ -114,6 +147,8 @@ class Family:
     sections: Mapping[str, type]
     configure: Callable[..., Configuration]
     planar: bool = False
+    chains: Callable[..., "Chains"] | None = None
+    literals: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
 
     @property
     def every_section(self) -> dict[str, type]:
@@ -135,9 +170,15 @@ class Machine:
     family: Family
     sections: Mapping[str, Any]
 
-    def configure(self) -> Configuration:
-        """The machine at its pose."""
-        return self.family.configure(**{name: self.sections[name] for name in self.family.sections})
+    def configure(self, joints: Sequence[Scalar] = ()) -> Configuration:
+        """The machine at its pose; `joints` are its coordinates where the family has no closed form for them."""
+        placed = {"joints": joints} if self.family.chains else {}
+        return self.family.configure(**self.own_sections, **placed)
+
+    @property
+    def own_sections(self) -> dict[str, Any]:
+        """The sections that its family asks for, by name."""
+        return {name: self.sections[name] for name in self.family.sections}
 
     def tool_point(self, platform: Displacement) -> Vector:
         """The tool point T in the base frame, m: P itself unless the file has a table [tool]."""

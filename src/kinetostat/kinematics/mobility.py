@@ -1,0 +1,188 @@
+"""Mobility and singularities from the screws: what can move, what is constrained twice, what is lost or gained here.
+
+Freedoms of the platform are those that all legs leave it with rigid links and free actuators.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from kinetostat.algebra.screw import Screw
+from kinetostat.algebra.vector import Vector
+from kinetostat.kinematics.singularity import Array, columns
+from kinetostat.machine.leg import Leg
+from kinetostat.machine.machine import Configuration
+
+DEPENDENT = 1e-7
+"""Singular value of unit screws below which they are dependent: half of the digits of float64."""
+
+SPATIAL = 6
+
+
+class Kind(StrEnum):
+    """What a pose is to the freedoms of the machine."""
+
+    REGULAR = "regular"
+    LEG = "leg singularity"
+    CONSTRAINT = "constraint singularity"
+    ACTUATION = "actuation singularity"
+
+
+@dataclass(frozen=True)
+class Freedoms:
+    """Ranks at one pose.
+
+    Attributes:
+        platform: freedoms of the platform, actuators free.
+        legs: freedoms that each leg alone allows its platform end.
+        idle: freedoms within legs that move no platform, such as the spin of a strut.
+        redundant: constraints that legs impose twice.
+        locked: freedoms of the platform that remain when the actuators are held; 0 unless singular.
+    """
+
+    platform: int
+    legs: tuple[int, ...]
+    idle: int
+    redundant: int
+    locked: int
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """What can move at a pose, and in general.
+
+    Attributes:
+        here: ranks at the pose.
+        full_cycle: freedoms of the platform at poses nearby, in general: those the machine has while it moves.
+        actuators: how many there are; more than `full_cycle` is redundant actuation.
+        kind: of the pose.
+        lost: names of legs that lose a freedom here.
+        twists: what the platform gains, each [omega; v] at the reference point, base axes; of 1 rad, or 1 m.
+        leg_distance, platform_distance: smallest singular value of the unit joint screws of any leg, and of the unit
+            wrenches that hold the platform with actuators locked, lengths in units of the machine's: 0 at a singularity.
+    """
+
+    here: Freedoms
+    full_cycle: int
+    actuators: int
+    kind: Kind
+    lost: tuple[str, ...]
+    twists: tuple[tuple[float, ...], ...]
+    leg_distance: float
+    platform_distance: float
+
+
+def mobility(here: Configuration, nearby: Sequence[Configuration], reference: Vector) -> Mobility:
+    """Mobility of a machine and kind of a pose.
+
+    Args:
+        here: the machine at the pose.
+        nearby: at some poses around it, to tell what holds in general from what is special here.
+        reference: point of reference of twists, base frame, m.
+    """
+    found = freedoms(here, reference)
+    general = [freedoms(one, one.platform.translation) for one in nearby] or [found]
+    full_cycle = min(one.platform for one in general)
+    usual = [max(one.legs[i] for one in general) for i in range(len(here.legs))]
+    lost = tuple(
+        leg.name for leg, has, may in zip(here.legs, found.legs, usual, strict=True) if has < may
+    )
+    constraints, holding = _platform_wrenches(here, reference)
+    kind, twists = Kind.REGULAR, ()
+    if found.platform > full_cycle:
+        kind, twists = Kind.CONSTRAINT, _free_twists(constraints, found.platform, float(here.length))
+    elif found.locked:
+        kind, twists = Kind.ACTUATION, _free_twists(holding, found.locked, float(here.length))
+    elif lost:
+        kind = Kind.LEG
+    nearest_leg = min((_least(_leg_screws(here, leg, reference), may) for leg, may in zip(here.legs, _all(here, usual), strict=True)), default=1.0)
+    actuators = sum(spring.actuated for leg in here.legs for spring in leg.springs)
+    return Mobility(found, full_cycle, actuators, kind, lost, twists, nearest_leg, _least(holding, SPATIAL))
+
+
+def _all(here: Configuration, usual: Sequence[int]) -> list[int]:
+    """Ranks of the legs' screws with those that a plane takes away counted in."""
+    return [rank + (0 if here.plane is None else len(here.plane.absent)) for rank in usual]
+
+
+def freedoms(configuration: Configuration, reference: Vector) -> Freedoms:
+    """Ranks of a configuration; `reference` in the base frame, m."""
+    away = 0 if configuration.plane is None else len(configuration.plane.absent)
+    legs = [_rank(_leg_screws(configuration, leg, reference)) - away for leg in configuration.legs]
+    constraints, holding = _platform_wrenches(configuration, reference)
+    rank = _rank(constraints)
+    imposed = sum(SPATIAL - away - leg for leg in legs)
+    spins = sum(
+        len(_drives(leg)) + len(leg.passive) - has
+        for leg, has in zip(configuration.legs, legs, strict=True)
+        if not leg.lines
+    )
+    return Freedoms(SPATIAL - rank, tuple(legs), spins, imposed - (rank - away), SPATIAL - _rank(holding))
+
+
+def _drives(leg: Leg) -> list[Screw | None]:
+    return [None for spring in leg.springs if spring.actuated]
+
+
+def _leg_screws(configuration: Configuration, leg: Leg, reference: Vector) -> Array:
+    """Unit screws of all joints of a leg, actuated ones too, and of what a plane takes away [6 x n]."""
+    absent = configuration.plane.absent if configuration.plane else ()
+    drives = [spring.joint for spring in leg.springs if spring.actuated]
+    return _unit_screws([joint.twist(reference) for joint in (*leg.passive, *drives, *absent)], configuration)
+
+
+def _unit_screws(screws: Sequence[Screw], configuration: Configuration) -> Array:
+    if not screws:
+        return np.zeros((SPATIAL, 0))
+    matrix = columns(screws, 1.0, 1.0 / float(configuration.length))
+    return matrix / np.linalg.norm(matrix, axis=0)
+
+
+def _platform_wrenches(configuration: Configuration, reference: Vector) -> tuple[Array, Array]:
+    """What holds the platform, rows scaled to compare [6 x n]: with actuators free, and with actuators held."""
+    length = float(configuration.length)
+    absent = configuration.plane.absent if configuration.plane else ()
+    guide = []
+    if configuration.plane:
+        held = _unit_screws([joint.twist(reference) for joint in configuration.plane.freedoms], configuration)
+        guide = [_reciprocal(held)]
+    constraints, holding = list(guide), list(guide)
+    for leg in configuration.legs:
+        constraints.append(_reciprocal(_leg_screws(configuration, leg, reference)))
+        if leg.lines:
+            wrenches = columns([line.wrench(reference) for line in leg.lines], 1.0 / length, 1.0)
+            holding.append(wrenches / np.linalg.norm(wrenches, axis=0))
+        else:
+            passive = [joint.twist(reference) for joint in (*leg.passive, *absent)]
+            holding.append(_reciprocal(_unit_screws(passive, configuration)))
+    return np.hstack(constraints), np.hstack(holding)
+
+
+def _reciprocal(twists: Array) -> Array:
+    """Orthonormal wrenches that do no work on scaled twists [6 x n]: [moment / length; force] columns."""
+    left, sizes, _ = np.linalg.svd(twists)
+    return np.asarray(left[:, int((sizes > DEPENDENT).sum()) :])
+
+
+def _rank(matrix: Array) -> int:
+    return int((np.linalg.svd(matrix, compute_uv=False) > DEPENDENT).sum()) if matrix.size else 0
+
+
+def _least(matrix: Array, rank: int) -> float:
+    """The singular value of number `rank`, the least that a regular pose has."""
+    sizes = np.linalg.svd(matrix, compute_uv=False)
+    return float(sizes[rank - 1]) if 0 < rank <= len(sizes) else 0.0
+
+
+def _free_twists(wrenches: Array, count: int, length: float) -> tuple[tuple[float, ...], ...]:
+    """The twists that no wrench resists, each of 1 rad, or of 1 m where it does not turn."""
+    left, _, _ = np.linalg.svd(wrenches)
+    twists = left[:, SPATIAL - count :] * np.repeat([1.0, length], 3)[:, None]
+    found = []
+    for twist in twists.T:
+        turning, sliding = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])
+        size = turning if turning * length > DEPENDENT * sliding else sliding
+        found.append(tuple(float(c) for c in np.where(np.abs(twist) < DEPENDENT * size, 0.0, twist) / size))
+    return tuple(found)

@@ -1,0 +1,86 @@
+"""Internal loads: wrenches that legs exert on each other through the platform without any load on it. One pose.
+
+Elasticity decides them where something on their way yields; where all is rigid, statics leaves them undecided, and no
+motion of the platform depends on them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.algebra.screw import Wrench
+from kinetostat.kinetostatics.leg import leg_compliance, relaxed
+from kinetostat.machine.leg import LegScrews
+
+Array = npt.NDArray[np.float64]
+
+DEPENDENT = 1e-9
+"""Relative size of a singular value below which wrenches are dependent."""
+RIGID = 1e-12
+"""Share of the largest flexibility below which an internal load meets nothing that yields."""
+
+
+@dataclass(frozen=True)
+class InternalLoads:
+    """Statically indeterminate loads of a machine.
+
+    Attributes:
+        degree: how many independent internal loads the legs can carry: 0 for an isostatic machine.
+        undecided: how many of them meet only rigid parts.
+        legs: names of the legs that take part.
+        undecided_legs: names of the legs that take part in undecided ones.
+    """
+
+    degree: int
+    undecided: int
+    legs: tuple[str, ...]
+    undecided_legs: tuple[str, ...]
+
+
+def internal_loads(
+    names: Sequence[str], legs: Sequence[LegScrews], length: float, guide: Sequence[Wrench] = ()
+) -> InternalLoads:
+    """The internal loads of a machine at a regular pose.
+
+    Args:
+        names: of the legs.
+        legs: their screws at one reference point, base axes.
+        length: characteristic length, m; moments compare with forces through it.
+        guide: of a planar machine, the wrenches against twists that do not exist there.
+    """
+    balanced = [relaxed(leg) for leg in legs]
+    owners = np.repeat(np.arange(len(legs)), [len(leg.wrenches) for leg in balanced])
+    columns = [wrench.components() for leg in balanced for wrench in leg.wrenches]
+    columns += [wrench.components() for wrench in guide]
+    matrix = np.array(columns, dtype=float).T / np.repeat([length, 1.0], 3)[:, None]
+    sizes = np.linalg.norm(matrix, axis=0)
+    _, values, rows = np.linalg.svd(matrix / sizes)
+    internal = (rows[int((values > DEPENDENT * values[0]).sum()) :] / sizes).T[: len(owners)]
+    flexibility = _block_diagonal([np.array(leg_compliance(leg), dtype=float) for leg in balanced])
+    energy = internal.T @ flexibility @ internal
+    amounts, modes = np.linalg.eigh(energy) if internal.shape[1] else (np.zeros(0), np.zeros((0, 0)))
+    stiff = amounts <= RIGID * max(np.abs(flexibility).max(initial=0.0), 1e-300)
+    undecided = internal @ modes[:, stiff]
+    return InternalLoads(
+        internal.shape[1], int(stiff.sum()), _involved(names, owners, internal), _involved(names, owners, undecided)
+    )
+
+
+def _block_diagonal(blocks: Sequence[Array]) -> Array:
+    size = sum(len(block) for block in blocks)
+    whole = np.zeros((size, size))
+    at = 0
+    for block in blocks:
+        whole[at : at + len(block), at : at + len(block)] = block
+        at += len(block)
+    return whole
+
+
+def _involved(names: Sequence[str], owners: npt.NDArray[np.int64], loads: Array) -> tuple[str, ...]:
+    """Names of the legs that carry a share of any of these loads."""
+    if not loads.size:
+        return ()
+    carried = np.abs(loads).max(axis=1) > DEPENDENT * np.abs(loads).max()
+    return tuple(name for i, name in enumerate(names) if carried[owners == i].any())

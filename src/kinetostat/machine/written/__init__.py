@@ -1,0 +1,1 @@
+"""Machines written leg by leg: their file, their sections and how joint coordinates place them."""

@@ -1,0 +1,122 @@
+"""What the numbers of a machine written leg by leg must fulfil, and which freedoms of its legs are idle."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import qr
+
+from kinetostat.algebra.vector import Vector
+from kinetostat.machine.leg import Joint
+from kinetostat.machine.machine import Plane
+from kinetostat.machine.written.family import chains, place
+from kinetostat.machine.written.plan import JointPlan, LegPlan, LinkPlan, Plan
+from kinetostat.spec.errors import InputError
+
+LEAST_AXIS = 1e-9
+"""Length below which an axis has no direction."""
+PARALLEL = 1e-6
+"""Sine of the angle between the axes of a universal joint below which they are one."""
+INDEPENDENT = 1e-9
+"""Relative pivot below which a passive twist depends on the others."""
+ELASTIC = ("lumped", "beam", "timoshenko")
+
+
+def check_numbers(plan: Plan, sections: Mapping[str, Any], origin: str) -> None:
+    """Refuse axes without direction, links without length and sections without substance.
+
+    Raises:
+        InputError: names leg and joint, or the section.
+    """
+    for name, shape in plan.shapes.items():
+        data = sections[f"sections.{name}"]
+        if shape == "tube" and not 0.0 <= data.inner_diameter < data.outer_diameter:
+            raise InputError(
+                f'"{origin}": section "{name}": inner_diameter is {data.inner_diameter:g} m; it must be at least 0 and '
+                f"less than outer_diameter, {data.outer_diameter:g} m."
+            )
+    for leg in plan.legs:
+        for i, joint in enumerate(leg.joints):
+            where = f'"{origin}": leg "{leg.name}", joint "{joint.name}"'
+            data = sections[f"legs.{leg.name}.{joint.name}"]
+            _check_axes(data, where)
+            if plan.planar:
+                _check_plane(joint, data, where)
+            link = leg.links.get(joint.joins[1])
+            if link is not None and link.model in ELASTIC:
+                after = leg.joints[i + 1]
+                _check_link(leg, joint, after, link, sections, plan.shapes[link.section], origin)
+
+
+def _check_axes(data: Any, where: str) -> None:
+    axes = {name: getattr(data, name) for name in ("axis", "first_axis", "second_axis") if hasattr(data, name)}
+    for name, axis in axes.items():
+        if math.hypot(*axis) < LEAST_AXIS:
+            raise InputError(f"{where}: {name} has no length; give a direction, e.g. {name} = [0, 0, 1].")
+    if len(axes) == 2:
+        first, second = (np.array(axis) / math.hypot(*axis) for axis in axes.values())
+        if np.linalg.norm(np.cross(first, second)) < PARALLEL:
+            raise InputError(f"{where}: first_axis and second_axis are parallel; turn one of them.")
+    if hasattr(data, "far") and math.dist(data.point, data.far) < LEAST_AXIS:
+        raise InputError(f"{where}: point and far are the same; give the middles of both short sides.")
+
+
+def _check_plane(joint: JointPlan, data: Any, where: str) -> None:
+    axis = getattr(data, "axis", (0.0, 0.0, 1.0))
+    turning = joint.kind == "revolute" and math.hypot(axis[0], axis[1]) < PARALLEL * math.hypot(*axis)
+    sliding = joint.kind == "prismatic" and abs(axis[2]) < PARALLEL * math.hypot(*axis)
+    if not (turning or sliding or joint.kind == "fixed"):
+        raise InputError(
+            f"{where}: in a planar machine joints are revolute about z, prismatic in the x-y plane, or fixed; "
+            'mend its axis, or write space = "spatial".'
+        )
+
+
+def _check_link(
+    leg: LegPlan, near: JointPlan, far: JointPlan, link: LinkPlan, sections: Mapping[str, Any], shape: str, origin: str
+) -> None:
+    where = f'"{origin}": leg "{leg.name}", link "{link.name}"'
+    ends = [np.array(sections[f"legs.{leg.name}.{joint.name}"].point) for joint in (near, far)]
+    span = ends[1] - ends[0]
+    if np.linalg.norm(span) < LEAST_AXIS:
+        raise InputError(
+            f'{where} has no length: joints "{near.name}" and "{far.name}" share a point; move one, or make it rigid.'
+        )
+    if link.up is None and shape in ("rectangle", "own"):
+        raise InputError(f"{where}: its section has two axes; say where z points, e.g. up = [0, 0, 1].")
+    if link.up is not None and np.linalg.norm(np.cross(span, link.up)) < PARALLEL * np.linalg.norm(span):
+        raise InputError(f"{where}: up points along the link; give another direction.")
+
+
+def with_idle_freedoms(plan: Plan, sections: Mapping[str, Any]) -> Plan:
+    """The plan with the passive freedoms of each leg that depend on the others, found away from the home pose.
+
+    The home pose may be special, so that joints are displaced at random; legs need not close for that.
+    """
+    home = chains(plan, **sections)
+    amounts = np.random.default_rng(1).uniform(-0.4, 0.4, home.size).tolist()
+    remaining = iter(amounts)
+    legs = []
+    for leg, steps in zip(plan.legs, home.legs, strict=True):
+        placed, _ = place(steps, remaining)
+        freedoms = [joint for element in placed for joint in element.freedoms]
+        legs.append(replace(leg, idle=_dependent(freedoms, plan.planar, home.home.translation, float(home.length))))
+    return replace(plan, legs=tuple(legs))
+
+
+def _dependent(freedoms: Sequence[Joint], planar: bool, reference: Vector, length: float) -> tuple[int, ...]:
+    """Which freedoms depend on those before and beside them (twists out of a plane count as given)."""
+    absent = Plane().absent if planar else ()
+    twists = [joint.twist(reference).components() for joint in (*absent, *freedoms)]
+    if not freedoms:
+        return ()
+    matrix = np.array(twists, dtype=float).T / np.repeat([1.0, length or 1.0], 3)[:, None]
+    matrix /= np.linalg.norm(matrix, axis=0)
+    given, rest = matrix[:, : len(absent)], matrix[:, len(absent) :]
+    rest = rest - given @ np.linalg.lstsq(given, rest, rcond=None)[0] if absent else rest
+    _, triangle, order = qr(rest, mode="economic", pivoting=True)
+    pivots = np.abs(np.diag(triangle))
+    rank = int((pivots > INDEPENDENT * max(pivots[0], INDEPENDENT)).sum())
+    return tuple(sorted(int(i) for i in order[rank:]))

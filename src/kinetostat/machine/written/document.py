@@ -1,0 +1,238 @@
+"""The file of a machine written leg by leg: lists by name, and a plan apart from the numbers, with messages.
+
+Every message names the leg and the joint. Numbers are checked by `spec`, as in every machine file.
+"""
+
+import copy
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from kinetostat.machine.section import MATERIALS
+from kinetostat.machine.written.plan import (
+    BASE,
+    JOINT_TYPES,
+    LINK_MODELS,
+    ONE_FREEDOM,
+    PLANAR_POSE,
+    PLATFORM,
+    SHAPES,
+    SPATIAL_POSE,
+    JointPlan,
+    LegPlan,
+    LinkPlan,
+    Matrix,
+    Plan,
+)
+from kinetostat.spec.document import Document
+from kinetostat.spec.errors import InputError, shorten
+
+MOST_LEGS, MOST_JOINTS = 24, 24
+"""Legs of a machine and joints of a leg: more is a mistake, and the equations would take minutes."""
+
+SYMMETRIC = 1e-9
+"""Relative difference up to which a compliance matrix counts as symmetric and as free of negative eigenvalues."""
+
+
+def by_name(document: Document, origin: str) -> Document:
+    """The document with its lists of legs and joints as tables by name, so that paths can lead into them.
+
+    Raises:
+        InputError: no legs, no name, or one name twice.
+    """
+    result = copy.deepcopy(document)
+    legs = result.get("legs")
+    if isinstance(legs, list):
+        result["legs"] = legs = _named(legs, origin, "leg")
+    if not isinstance(legs, dict) or not 1 <= len(legs) <= MOST_LEGS:
+        raise InputError(f'"{origin}": it needs 1 to {MOST_LEGS} legs, each written as [[legs]] with name and joints.')
+    for name, leg in legs.items():
+        where = f'"{origin}": leg "{name}"'
+        if not isinstance(leg, dict):
+            raise InputError(f"{where} is {shorten(leg)}; it must be a table with name, joints and links.")
+        if "joints" in leg:
+            legs[name] = _merged(leg, where)
+    return result
+
+
+def _merged(leg: dict[str, Any], where: str) -> dict[str, Any]:
+    """Joints and links of a leg in one table by name."""
+    joints, links = leg.pop("joints"), leg.pop("links", {})
+    if isinstance(joints, list):
+        joints = _named(joints, where, "joint")
+    if isinstance(links, list):
+        links = _named(links, where, "link")
+    if not isinstance(joints, dict) or not isinstance(links, dict):
+        raise InputError(f"{where}: joints must be a list of tables with a name each, links a table of tables.")
+    for name in links:
+        if name in joints:
+            raise InputError(f'{where}: joint "{name}" and link "{name}" share a name; rename one of them.')
+    leg.pop("name", None)
+    return {**leg, **joints, **links}
+
+
+def _named(entries: list[Any], where: str, what: str) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for i, entry in enumerate(entries, 1):
+        name = entry.get("name") if isinstance(entry, dict) else None
+        if not isinstance(name, str) or not name.strip() or "." in name or len(name) > 40 or not name.isprintable():
+            raise InputError(
+                f'{where}: the name of {what} {i} is {shorten(name)}; give each a short name without dots, '
+                f'e.g. name = "{what} {i}".'
+            )
+        if name in found:
+            raise InputError(f'{where}: two {what}s are called "{name}"; give each a name of its own.')
+        found[name] = {key: value for key, value in entry.items() if key != "name"}
+    return found
+
+
+def separate(document: Document, origin: str) -> tuple[Plan, Document]:
+    """Plan and numbers of a document in which everything has a name.
+
+    Returns:
+        The plan, and what is left of the document: tables of numbers for `spec` to validate.
+
+    Raises:
+        InputError: with leg and joint, and how to mend it.
+    """
+    rest = copy.deepcopy(document)
+    space = rest.pop("space", "spatial")
+    if space not in ("spatial", "planar"):
+        raise InputError(f'"{origin}": space is {shorten(space)}; it must be "spatial" or "planar" (the x-y plane).')
+    shapes, materials = _sections(rest, origin)
+    legs = tuple(_leg(name, leg, f'"{origin}": leg "{name}"', shapes) for name, leg in rest["legs"].items())
+    coordinates = PLANAR_POSE if space == "planar" else SPATIAL_POSE
+    pose = rest.get("pose", {})
+    given = tuple(name for name in coordinates if isinstance(pose, dict) and name in pose)
+    if not given:
+        raise InputError(f'"{origin}": [pose] must give the task coordinates, some of {", ".join(coordinates)}.')
+    return Plan(legs, shapes, materials, given, space == "planar"), rest
+
+
+def _sections(rest: Document, origin: str) -> tuple[dict[str, str], dict[str, str]]:
+    shapes, materials = {}, {}
+    tables = rest.get("sections", {})
+    for name, table in tables.items() if isinstance(tables, dict) else ():
+        where = f'"{origin}": section "{name}"'
+        if not isinstance(table, dict):
+            raise InputError(f"{where} is {shorten(table)}; it must be a table with shape, sizes and material.")
+        shapes[name] = _choice(table.pop("shape", None), SHAPES, f"{where}: shape")
+        materials[name] = ""
+        if "material" in table or "youngs_modulus" not in table:
+            materials[name] = _choice(table.pop("material", None), MATERIALS, f"{where}: material")
+    return shapes, materials
+
+
+def _leg(name: str, leg: dict[str, Any], where: str, shapes: Mapping[str, str]) -> LegPlan:
+    joints = {key: part for key, part in leg.items() if isinstance(part, dict) and "model" not in part}
+    links = {key: part for key, part in leg.items() if isinstance(part, dict) and "model" in part}
+    for key in leg.keys() - joints.keys() - links.keys():
+        raise InputError(f"{where}: {key} is {shorten(leg[key])}; a leg holds joints and links, each a table.")
+    if not 1 <= len(joints) <= MOST_JOINTS:
+        raise InputError(f"{where} has {len(joints)} joints; it needs 1 to {MOST_JOINTS}, from base to platform.")
+    plans = tuple(_joint(key, part, f'{where}, joint "{key}"') for key, part in joints.items())
+    _check_chain(plans, where)
+    bodies = {plan.joins[1] for plan in plans[:-1]}
+    for key in links:
+        _choice(key, bodies, f"{where}: links name")
+    found = {key: _link(key, leg.pop(key), f'{where}, link "{key}"', shapes) for key in links}
+    return LegPlan(name, plans, found)
+
+
+def _joint(name: str, part: dict[str, Any], where: str) -> JointPlan:
+    kind = _choice(part.pop("type", None), JOINT_TYPES, f"{where}: type")
+    joins = part.pop("joins", None)
+    if not isinstance(joins, list) or len(joins) != 2 or not all(isinstance(body, str) and body for body in joins):
+        raise InputError(f'{where}: joins is {shorten(joins)}; give the two bodies it joins, e.g. ["base", "arm"].')
+    actuated = part.pop("actuated", False)
+    if not isinstance(actuated, bool):
+        raise InputError(f"{where}: actuated is {shorten(actuated)}; it must be true or false.")
+    sprung = "stiffness" in part
+    if (actuated or sprung) and kind not in ONE_FREEDOM:
+        raise InputError(
+            f"{where} is {kind}; only {', '.join(ONE_FREEDOM)} joints may be actuated or have a stiffness."
+        )
+    if actuated and not sprung:
+        example = "20 N/um" if kind == "prismatic" else "1e5 N*m/rad"
+        raise InputError(
+            f'{where} is actuated but has no stiffness; add stiffness = "{example}", or "rigid" if its servo is ideal.'
+        )
+    return JointPlan(name, kind, (joins[0], joins[1]), actuated, sprung, _matrix(part.pop("compliance", []), where))
+
+
+def _check_chain(joints: tuple[JointPlan, ...], where: str) -> None:
+    """The joints must lead from the base to the platform, body by body."""
+    at, seen = BASE, {BASE}
+    for i, joint in enumerate(joints):
+        near, far = joint.joins
+        if near != at:
+            before = f'joint "{joints[i - 1].name}" ends at "{at}"' if i else 'a leg starts at "base"'
+            raise InputError(
+                f'{where}, joint "{joint.name}" starts at "{near}", but {before}: the chain is disconnected; '
+                f'write joins = ["{at}", "{far}"].'
+            )
+        if far in seen or (far == PLATFORM and i < len(joints) - 1):
+            raise InputError(
+                f'{where}, joint "{joint.name}" leads to "{far}" too early; a leg passes each body once and the '
+                "platform last."
+            )
+        at, seen = far, {*seen, far}
+    if at != PLATFORM:
+        raise InputError(
+            f'{where} does not reach the platform: its last joint "{joints[-1].name}" ends at "{at}"; '
+            f'write joins = ["{joints[-1].joins[0]}", "platform"], or add the joints that are missing.'
+        )
+
+
+def _link(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str]) -> LinkPlan:
+    model = _choice(part.pop("model", None), LINK_MODELS, f"{where}: model")
+    section = part.pop("section", "")
+    if model in ("lumped", "beam", "timoshenko"):
+        section = _choice(section or None, shapes, f"{where}: section")
+    up = part.pop("up", None)
+    if up is not None and not _numbers(up, 3):
+        raise InputError(f"{where}: up is {shorten(up)}; give a direction as three numbers, e.g. [0, 0, 1].")
+    compliance = _matrix(part.pop("compliance", []), where)
+    if (model == "matrix") != bool(compliance):
+        raise InputError(f'{where}: a compliance matrix belongs to model = "matrix", and to it alone.')
+    for key in part:
+        raise InputError(f"{where}: {key} is not known; a link has model, section, up and compliance.")
+    return LinkPlan(name, model, section, tuple(map(float, up)) if up else None, compliance)
+
+
+def _matrix(value: object, where: str) -> Matrix:
+    """A 6x6 from what was written: nothing, six numbers for its diagonal, or six rows."""
+    if value == []:
+        return ()
+    if _numbers(value, 6):
+        value = np.diag(np.array(value, dtype=float)).tolist()
+    if not isinstance(value, list) or len(value) != 6 or not all(_numbers(row, 6) for row in value):
+        raise InputError(
+            f"{where}: compliance is {shorten(value)}; give six numbers (rx, ry, rz in rad/(N·m), x, y, z in m/N) or "
+            "six rows of six."
+        )
+    matrix = np.array(value, dtype=float)
+    size = np.sqrt(np.abs(np.outer(np.diag(matrix), np.diag(matrix))))
+    scaled = matrix / np.where(size > 0.0, size, 1.0)
+    if np.abs(scaled - scaled.T).max() > SYMMETRIC or np.linalg.eigvalsh(scaled)[0] < -SYMMETRIC:
+        raise InputError(f"{where}: compliance must be symmetric and have no negative eigenvalue (no negative energy).")
+    return tuple(tuple(row) for row in matrix.tolist())
+
+
+def _numbers(value: object, count: int) -> bool:
+    return (
+        isinstance(value, list)
+        and len(value) == count
+        and all(isinstance(c, int | float) and not isinstance(c, bool) and abs(c) < 1e100 for c in value)
+    )
+
+
+def _choice(value: object, known: Iterable[str], what: str) -> str:
+    names = list(known)
+    if isinstance(value, str) and value in names:
+        return value
+    near = difflib.get_close_matches(value, names, 1) if isinstance(value, str) else []
+    hint = f'did you mean "{near[0]}"?' if near else f"choose from {', '.join(names) or 'none: nothing is defined'}."
+    raise InputError(f"{what} is {'missing' if value is None else shorten(value)}; {hint}")

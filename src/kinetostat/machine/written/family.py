@@ -1,0 +1,145 @@
+"""A machine written leg by leg as a family: its chains at the home pose, and where joint coordinates take them.
+
+Which coordinates close the chains at a pose is found in `kinematics.closure`.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from kinetostat.algebra.scalar import Scalar, plus, reciprocal, sqrt, times, total, where
+from kinetostat.algebra.vector import AXES, IDENTITY, X_AXIS, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector
+from kinetostat.machine.leg import Element, Joint, Leg, Spring, revolutes
+from kinetostat.machine.link import Beam, Parallelogram, lumped_springs, matrix_springs
+from kinetostat.machine.machine import Chains, Configuration, Family, Plane, Step
+from kinetostat.machine.written.plan import JointPlan, LegPlan, LinkPlan, Plan, literals
+from kinetostat.machine.written.sections import rigidity_of, sections_of
+
+NAME = "legs"
+"""As machine files name this kind."""
+
+SUMMARY = "any machine, written leg by leg: joints by point and axis at the home pose, and the links between them"
+
+
+def family_of(plan: Plan) -> Family:
+    """The family of all machines with this plan."""
+    return Family(
+        NAME, SUMMARY, sections_of(plan), partial(configure, plan), plan.planar, partial(chains, plan), literals(plan)
+    )
+
+
+def configure(plan: Plan, joints: Sequence[Scalar], **sections: Any) -> Configuration:
+    """The machine with its joints at given coordinates; the platform is where the first leg takes it.
+
+    Args:
+        plan: what the machine consists of.
+        joints: coordinates of all joints leg by leg, rad or m from the home pose.
+        sections: its numbers, SI.
+    """
+    home = chains(plan, **sections)
+    remaining = iter(joints)
+    placed = [place(steps, remaining) for steps in home.legs]
+    legs = tuple(Leg(leg.name, tuple(chain), (), leg.idle) for leg, (chain, _) in zip(plan.legs, placed, strict=True))
+    return Configuration(placed[0][1] @ home.home, legs, (), home.length, Plane() if plan.planar else None)
+
+
+def chains(plan: Plan, **sections: Any) -> Chains:
+    """All legs at the home pose."""
+    legs = tuple(tuple(chain_at_home(plan, leg, sections)) for leg in plan.legs)
+    home = Displacement(IDENTITY, Vector(*sections["platform"].point))
+    pose = {name: getattr(sections["pose"], name) for name in plan.pose}
+    return Chains(legs, home, pose, _length(plan, sections))
+
+
+def place(steps: Sequence[Step], coordinates: Iterator[Scalar]) -> tuple[list[Element], Displacement]:
+    """A chain at given coordinates, and the displacement of its platform end from the home pose."""
+    motion = Displacement(IDENTITY, ZERO)
+    chain: list[Element] = []
+    for step in steps:
+        placed = step.element.displaced(motion)
+        if step.moves:
+            placed, moved = placed.moved(next(coordinates))
+            motion = moved @ motion
+        chain.append(placed)
+    return chain, motion
+
+
+def chain_at_home(plan: Plan, leg: LegPlan, sections: Mapping[str, Any]) -> list[Step]:
+    """The elements of a leg at the home pose, from base to platform."""
+    data = [sections[f"legs.{leg.name}.{joint.name}"] for joint in leg.joints]
+    steps: list[Step] = []
+    for i, joint in enumerate(leg.joints):
+        title = f"{leg.name} {joint.name}"
+        own = matrix_springs(f"{title} play", joint.compliance, Vector(*data[i].point)) if joint.compliance else ()
+        steps += [Step(spring, False) for spring in own]
+        steps += [Step(element, True) for element in _elements(title, joint, data[i])]
+        link = leg.links.get(joint.joins[1])
+        if link is not None:
+            ends = Vector(*data[i].point), Vector(*data[i + 1].point)
+            steps += [Step(element, False) for element in _yielding(f"{leg.name} {link.name}", link, ends, plan, sections)]
+    return steps
+
+
+def _elements(title: str, joint: JointPlan, data: Any) -> list[Element]:
+    """The movable elements of a joint, in order."""
+    point = Vector(*data.point)
+    if joint.kind == "fixed":
+        return []
+    if joint.kind == "spherical":
+        return list(revolutes(point, AXES, title))
+    if joint.kind == "universal":
+        return list(revolutes(point, [unit(data.first_axis), unit(data.second_axis)], title))
+    axis = unit(data.axis)
+    if joint.kind == "parallelogram":
+        return [Parallelogram(title, point, Vector(*data.far), axis, data.width, data.bar_stiffness)]
+    if joint.kind == "cylindrical":
+        return [Joint(axis, point, title), Joint(axis, None, title)]
+    where_ = None if joint.kind == "prismatic" else point
+    freedom = Joint(axis, where_, title, data.pitch if joint.kind == "helical" else 0.0)
+    if not joint.sprung:
+        return [freedom]
+    name = f"{title} actuator" if joint.actuated else f"{title} hinge"
+    return [Spring(name, freedom, data.stiffness, title, joint.actuated)]
+
+
+def _yielding(
+    title: str, link: LinkPlan, ends: tuple[Vector, Vector], plan: Plan, sections: Mapping[str, Any]
+) -> Sequence[Element]:
+    """What stands for a link that yields."""
+    if link.model == "rigid":
+        return ()
+    if link.model == "matrix":
+        return matrix_springs(title, link.compliance, ends[1])
+    up = Vector(*link.up) if link.up else _any_up(ends)
+    shape, data = plan.shapes[link.section], sections[f"sections.{link.section}"]
+    own = rigidity_of(shape, data, link.model == "timoshenko")
+    if link.model == "lumped":
+        return lumped_springs(title, *ends, up, own)
+    return (Beam(title, *ends, up, own),)
+
+
+def _any_up(ends: tuple[Vector, Vector]) -> Vector:
+    """The base axis that is furthest from a link's direction: for sections that look alike from all sides."""
+    sizes = [times(c, c) for c in (ends[1] - ends[0]).components()]
+    best, least = X_AXIS, sizes[0]
+    for axis, size in ((Y_AXIS, sizes[1]), (Z_AXIS, sizes[2])):
+        nearer = size < least
+        chosen = [where(nearer, a, b) for a, b in zip(axis.components(), best.components(), strict=True)]
+        best, least = Vector(*chosen), where(nearer, size, least)
+    return best
+
+
+def unit(axis: Sequence[Scalar]) -> Vector:
+    """The unit vector along an axis as written."""
+    vector = Vector(*axis)
+    return vector * reciprocal(vector.norm())
+
+
+def _length(plan: Plan, sections: Mapping[str, Any]) -> Scalar:
+    """Root mean square distance of the joints from P at the home pose, m."""
+    centre = Vector(*sections["platform"].point)
+    arms = [
+        Vector(*sections[f"legs.{leg.name}.{joint.name}"].point) - centre for leg in plan.legs for joint in leg.joints
+    ]
+    squares = total([arm.dot(arm) for arm in arms])
+    return sqrt(plus(squares, 0.0) * (1.0 / len(arms)))

@@ -1,0 +1,151 @@
+"""What a machine written leg by leg consists of, apart from its numbers: legs, joints, links and their models."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+BASE, PLATFORM = "base", "platform"
+"""Names of the two bodies that every leg joins."""
+
+JOINT_TYPES = {
+    "revolute": "turns about `axis` through `point`",
+    "prismatic": "slides along `axis`",
+    "cylindrical": "turns about and slides along `axis` through `point`",
+    "universal": "turns about `first_axis`, then about `second_axis`, both through `point` (Hooke joint)",
+    "spherical": "turns about `point`",
+    "helical": "turns about `axis` through `point` and advances by `pitch` per radian",
+    "parallelogram": "two bars from the short side at `point` to the one at `far`, short sides along `axis`",
+    "fixed": "joins two bodies at `point` and does not move",
+}
+"""Types of joints, and what their numbers mean at the home pose in the base frame."""
+
+ONE_FREEDOM = ("revolute", "prismatic", "helical")
+"""Types that may have an actuator or a spring of their own."""
+
+LINK_MODELS = {
+    "rigid": "does not yield",
+    "lumped": "torsional and linear springs where the link is built in, at its first joint",
+    "beam": "Euler-Bernoulli beam between its two joints",
+    "timoshenko": "beam that yields in shear as well",
+    "matrix": "a 6x6 compliance of its own, of its end against its beginning, at the end",
+}
+"""How a link may yield."""
+
+SHAPES = {
+    "round": ("diameter",),
+    "tube": ("outer_diameter", "inner_diameter"),
+    "rectangle": ("width", "height"),
+    "own": ("area", "second_moment_y", "second_moment_z", "torsion_constant"),
+}
+"""Cross-sections and the numbers that give them."""
+
+SPATIAL_POSE = ("x", "y", "z", "roll", "pitch", "yaw")
+PLANAR_POSE = ("x", "y", "yaw")
+"""Coordinates of the platform: P in the base frame, and Q = Rz(yaw) Ry(pitch) Rx(roll) against the home pose."""
+
+Matrix = tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class JointPlan:
+    """A joint of a leg.
+
+    Attributes:
+        name: unique within the leg.
+        kind: a key of `JOINT_TYPES`.
+        joins: names of the bodies on its base side and on its platform side.
+        actuated: whether a servo holds it.
+        sprung: whether it has a stiffness, as an actuator or a flexure hinge.
+        compliance: of its own, rows rx ry rz x y z at its point, base axes at the home pose, SI; empty if it is stiff.
+    """
+
+    name: str
+    kind: str
+    joins: tuple[str, str]
+    actuated: bool
+    sprung: bool
+    compliance: Matrix
+
+
+@dataclass(frozen=True)
+class LinkPlan:
+    """A link between two consecutive joints of a leg.
+
+    Attributes:
+        name: of the body.
+        model: a key of `LINK_MODELS`.
+        section: name of its cross-section, or empty.
+        up: direction in which the section's z axis points, base axes at the home pose; None to leave the choice.
+        compliance: of model "matrix", as for a joint, at the link's end.
+    """
+
+    name: str
+    model: str
+    section: str
+    up: tuple[float, float, float] | None
+    compliance: Matrix
+
+
+@dataclass(frozen=True)
+class LegPlan:
+    """A leg: its joints from base to platform, those of its links that yield by name, and its idle freedoms.
+
+    For `idle` see `leg.Leg`.
+    """
+
+    name: str
+    joints: tuple[JointPlan, ...]
+    links: Mapping[str, LinkPlan]
+    idle: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A machine written leg by leg.
+
+    Attributes:
+        legs: in the order of the file.
+        shapes: of the cross-sections, by name: keys of `SHAPES`.
+        materials: of the cross-sections, by name: keys of `section.MATERIALS`, or empty where E and G are given.
+        pose: coordinates that the pose gives; the others follow from the legs.
+        planar: whether the platform moves in the x-y plane only.
+    """
+
+    legs: tuple[LegPlan, ...]
+    shapes: Mapping[str, str]
+    materials: Mapping[str, str]
+    pose: tuple[str, ...]
+    planar: bool
+
+
+def literals(plan: Plan) -> dict[str, dict[str, object]]:
+    """What machine files with this plan say beside numbers, by table: they then have it back."""
+    found: dict[str, dict[str, object]] = {"": {"space": "planar" if plan.planar else "spatial"}}
+    for name, shape in plan.shapes.items():
+        material = plan.materials[name]
+        found[f"sections.{name}"] = {"shape": shape, **({"material": material} if material else {})}
+    for leg in plan.legs:
+        for joint in leg.joints:
+            found[f"legs.{leg.name}.{joint.name}"] = _joint_literals(joint)
+        for link in leg.links.values():
+            found[f"legs.{leg.name}.{link.name}"] = _link_literals(link)
+    return found
+
+
+def _joint_literals(joint: JointPlan) -> dict[str, object]:
+    said: dict[str, object] = {"type": joint.kind, "joins": list(joint.joins)}
+    if joint.actuated:
+        said["actuated"] = True
+    if joint.compliance:
+        said["compliance"] = [list(row) for row in joint.compliance]
+    return said
+
+
+def _link_literals(link: LinkPlan) -> dict[str, object]:
+    said: dict[str, object] = {"model": link.model}
+    if link.section:
+        said["section"] = link.section
+    if link.up:
+        said["up"] = list(link.up)
+    if link.compliance:
+        said["compliance"] = [list(row) for row in link.compliance]
+    return said

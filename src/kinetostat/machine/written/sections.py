@@ -1,0 +1,121 @@
+"""The numbers of a machine written leg by leg: one section for each of its parts, as the plan has them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from kinetostat.machine.leg import RIGID
+from kinetostat.machine.section import MATERIALS, Section, rectangular_section, rigidity, tube_section
+from kinetostat.machine.link import Rigidity
+from kinetostat.machine.written.plan import SHAPES, JointPlan, Plan
+from kinetostat.spec.fields import Quantity, section
+
+AXIS = Quantity("direction", "direction of the joint, of any length, base axes at the home pose", count=3)
+POINT = Quantity("length", "a point of the joint, base frame, at the home pose", count=3)
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of a section: what it holds, and its default if it may be left out."""
+
+    quantity: Quantity
+    default: Any = None
+
+
+JOINT_FIELDS: Mapping[str, Mapping[str, Field]] = {
+    "revolute": {"point": Field(POINT), "axis": Field(AXIS)},
+    "prismatic": {"point": Field(POINT), "axis": Field(AXIS)},
+    "cylindrical": {"point": Field(POINT), "axis": Field(AXIS)},
+    "universal": {"point": Field(POINT), "first_axis": Field(AXIS), "second_axis": Field(AXIS)},
+    "spherical": {"point": Field(POINT)},
+    "helical": {"point": Field(POINT), "axis": Field(AXIS), "pitch": Field(Quantity("length", "advance per radian"))},
+    "parallelogram": {
+        "point": Field(POINT),
+        "far": Field(Quantity("length", "middle of the far short side, base frame, at the home pose", count=3)),
+        "axis": Field(AXIS),
+        "width": Field(Quantity("length", "of the short sides", positive=True)),
+        "bar_stiffness": Field(Quantity("linear stiffness", "axial stiffness of each bar"), RIGID),
+    },
+    "fixed": {"point": Field(POINT)},
+}
+
+SHAPE_KINDS = {
+    "diameter": "length",
+    "outer_diameter": "length",
+    "inner_diameter": "length",
+    "width": "length",
+    "height": "length",
+    "area": "area",
+    "second_moment_y": "second moment of area",
+    "second_moment_z": "second moment of area",
+    "torsion_constant": "second moment of area",
+}
+
+POSE_KINDS = {"x": "length", "y": "length", "z": "length", "roll": "angle", "pitch": "angle", "yaw": "angle"}
+
+
+def sections_of(plan: Plan) -> dict[str, type]:
+    """The sections of the plan's machine files, by dotted name."""
+    point = Quantity("length", "platform point P at the home pose, base frame", count=3)
+    found = {"platform": _section("Platform", {"point": Field(point)})}
+    for name, shape in plan.shapes.items():
+        found[f"sections.{name}"] = _section("CrossSection", _shape_fields(shape, plan.materials[name]))
+    for leg in plan.legs:
+        for joint in leg.joints:
+            found[f"legs.{leg.name}.{joint.name}"] = _section("JointSection", _joint_fields(joint))
+    pose = {name: Field(Quantity(POSE_KINDS[name], f"{name} of the platform")) for name in plan.pose}
+    return {**found, "pose": _section("Pose", pose)}
+
+
+def _joint_fields(joint: JointPlan) -> dict[str, Field]:
+    fields = dict(JOINT_FIELDS[joint.kind])
+    if joint.sprung:
+        kind = "linear stiffness" if joint.kind == "prismatic" else "torsional stiffness"
+        what = "its actuator, held by its servo" if joint.actuated else "the joint's own, as of a flexure hinge"
+        fields["stiffness"] = Field(Quantity(kind, what))
+    return fields
+
+
+def _shape_fields(shape: str, material: str) -> dict[str, Field]:
+    fields = {
+        name: Field(Quantity(SHAPE_KINDS[name], name.replace("_", " "), positive=name != "inner_diameter"))
+        for name in SHAPES[shape]
+    }
+    known = MATERIALS.get(material)
+    modulus = Quantity("elastic modulus", "Young's modulus E", positive=True)
+    shear = Quantity("elastic modulus", "shear modulus G", positive=True)
+    density = Quantity("density", "of the material")
+    fields["youngs_modulus"] = Field(modulus, known.youngs_modulus if known else None)
+    fields["shear_modulus"] = Field(shear, known.shear_modulus if known else None)
+    fields["density"] = Field(density, known.density if known else 0.0)
+    return fields
+
+
+def _section(name: str, fields: Mapping[str, Field]) -> type:
+    """A section class from its fields, those that may be left out last."""
+    ordered = dict(sorted(fields.items(), key=lambda item: item[1].default is not None))
+    kinds = {key: float if one.quantity.count is None else tuple[float, ...] for key, one in ordered.items()}
+    hints = {key: Annotated[kinds[key], one.quantity] for key, one in ordered.items()}
+    defaults = {key: one.default for key, one in ordered.items() if one.default is not None}
+    return section(type(name, (), {"__annotations__": hints, "__module__": __name__, **defaults}))
+
+
+def rigidity_of(shape: str, data: Any, shear: bool) -> Rigidity:
+    """The rigidity of a bar with a cross-section of the file.
+
+    Args:
+        shape: a key of `SHAPES`.
+        data: an instance of its section.
+        shear: whether it yields in shear (Timoshenko).
+    """
+    young, slide = data.youngs_modulus, data.shear_modulus
+    poisson = 0.5 * young / slide - 1.0
+    if shape == "round":
+        profile = tube_section(data.diameter, 0.0, poisson)
+    elif shape == "tube":
+        profile = tube_section(data.outer_diameter, data.inner_diameter, poisson)
+    elif shape == "rectangle":
+        profile = rectangular_section(data.width, data.height)
+    else:
+        profile = Section(data.area, data.second_moment_y, data.second_moment_z, data.torsion_constant, 5.0 / 6.0)
+    return rigidity(young, slide, profile, shear)
