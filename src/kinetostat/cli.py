@@ -88,6 +88,10 @@ def _parser() -> Parser:
         'kinetostat analyze mine.toml --set pose.x="5 mm" --json',
     )  # fmt: skip
     _machine(analyze)
+    analyze.add_argument(
+        "--axes", choices=["base", "platform"], default="base", help="in which everything is given (default: base)"
+    )
+    analyze.add_argument("--full", action="store_true", help="eigenscrews and every single spring as well")
     _json(analyze)
     _add_grid_commands(commands)
     reproduce = _add(
@@ -205,17 +209,19 @@ def _check(options: argparse.Namespace) -> int:
 
 def _analyze(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
-    from kinetostat.studies.analysis import analyze, as_json
+    from kinetostat.studies.analysis import analyze
+    from kinetostat.studies.analysis_data import as_json
 
-    found = analyze(_load(options))
+    found = analyze(_load(options), options.axes)
     if options.json:
         _print_json(as_json(found))
         return DONE if found.status is Status.OK else NO_ANSWER
     if found.status is not Status.OK:
         return _no_answer(found.message)
-    from kinetostat.views.tables import print_analysis, terminal
+    from kinetostat.views.analysis_tables import print_analysis
+    from kinetostat.views.tables import terminal
 
-    print_analysis(terminal(), found)
+    print_analysis(terminal(), found, options.full)
     return DONE
 
 

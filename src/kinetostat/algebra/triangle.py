@@ -37,7 +37,7 @@ def crank_end(start: Vector, end: Vector, axis: Vector, crank: Scalar, rod: Scal
         crank, rod: lengths, m.
 
     Returns:
-        The common end of both, m; NaN where they do not meet.
+        The common end of both, m; not a number where they do not meet.
     """
     span = end - start
     off = span.dot(axis)

@@ -80,7 +80,9 @@ def slab_kernel(machine: Machine, varying: Sequence[str], quantities: Sequence[s
     inputs = {path: value for path, value in fixed.items() if path not in dict(constant)}
     ordinary = frozenset(path for path, value in inputs.items() if ORDINARY[0] < abs(value) < ORDINARY[1])
     form = _Form(constant, tuple(inputs), ordinary, tuple(varying), tuple(quantities))
-    return Kernel(_program(_Kind(machine), form), np.array([*inputs.values()], dtype=float), form.varying, angles, machine)
+    return Kernel(
+        _program(_Kind(machine), form), np.array([*inputs.values()], dtype=float), form.varying, angles, machine
+    )
 
 
 def _reduced(angle: Array) -> Array:

@@ -24,10 +24,12 @@ MOST_STEPS, MOST_ITERATIONS, ON_THE_WAY = 200, 40, 2
 FURTHEST_SLIDE, FURTHEST_TURN = 0.15, 0.2
 """Between poses on the way from the home pose: in units of the machine's length, and in rad. Short enough to stay on
 the branch of the home pose."""
+DAMPING = 1e-15
+"""Of the trace of the squared rates: far below what a regular direction weighs, enough for an idle one."""
 NEGLIGIBLE = 1e-9
-"""Relative size of a singular value below which a direction of motion is not used (Moore-Penrose inverse)."""
-DETERMINED = 1e-7
-"""Size of a platform motion that neither legs nor pose coordinates determine, above which the pose is singular."""
+"""Relative size of a singular value below which angles have no rates (at pitch = +-90 deg)."""
+DETERMINED = 1e-4
+"""Share of undamped motion above which the platform's place is determined by nothing but damping."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,7 @@ class Gaps:
 
 def solve_joints(machine: Machine) -> Joints:
     """The joint coordinates of a machine at its pose, reached from the home pose without leaving its branch."""
-    assert machine.family.chains is not None
-    chains = machine.family.chains(**machine.own_sections)
+    chains = machine.chains()
     goal = np.stack(np.broadcast_arrays(*map(np.asarray, chains.pose.values())), axis=-1).astype(float)
     single = goal.ndim == 1
     goal = np.atleast_2d(goal)
@@ -126,13 +127,21 @@ def _newton(chains: Chains, found: Array, goal: Array, most: int) -> Array:
 
 
 def _least_norm(rates: Array, left: Array) -> Array:
-    """Solutions of rates x = left of least norm, pose by pose."""
+    """Least-squares solutions of rates x = left, all but least in norm, pose by pose; zero where nothing is finite."""
     sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(left).all(axis=1)
     steps = np.zeros((len(rates), rates.shape[2]))
     if sound.any():
-        inverse = np.linalg.pinv(rates[sound], rcond=NEGLIGIBLE)
-        steps[sound] = (inverse @ left[sound][:, :, None])[:, :, 0]
+        kept = rates[sound]
+        work = np.swapaxes(kept, 1, 2) @ left[sound][:, :, None]
+        steps[sound] = np.linalg.solve(_damped_square(kept), work)[:, :, 0]
     return steps
+
+
+def _damped_square(rates: Array) -> Array:
+    """rates^T rates, made regular by a trace of damping that only directions without effect feel."""
+    square = np.swapaxes(rates, 1, 2) @ rates
+    trace = np.trace(square, axis1=1, axis2=2)[:, None, None]
+    return np.asarray(square + DAMPING * (trace + 1e-300) * np.eye(rates.shape[2]))
 
 
 def _scale(chains: Chains) -> Array:
@@ -144,18 +153,21 @@ def _status(chains: Chains, found: Array, goal: Array) -> npt.NDArray[np.int64]:
     left = np.max(np.abs(np.hstack([gaps.closure, gaps.pose])), axis=1, initial=0.0)
     closed = left <= CLOSED * _scale(chains)
     status = np.where(np.isfinite(left), int(Status.OUT_OF_REACH), int(Status.NOT_CONVERGED))
-    rates = np.concatenate([gaps.closure_rates, gaps.pose_rates], axis=1)
-    for n in np.flatnonzero(closed):
-        status[n] = Status.SINGULAR if _undetermined(rates[n], gaps.platform_rates[n]) else Status.OK
+    rates = np.concatenate([gaps.closure_rates, gaps.pose_rates], axis=1)[closed]
+    free = _undetermined(rates, gaps.platform_rates[closed])
+    status[closed] = np.where(free, int(Status.SINGULAR), int(Status.OK))
     return status
 
 
-def _undetermined(rates: Array, platform_rates: Array) -> bool:
-    """Whether the platform can move without opening a leg or changing a pose coordinate."""
-    _, sizes, rows = np.linalg.svd(rates)
-    rank = int((sizes > NEGLIGIBLE * sizes[0]).sum())
-    idle = rows[rank:]
-    return bool(idle.size and np.abs(platform_rates @ idle.T).max() > DETERMINED)
+def _undetermined(rates: Array, platform_rates: Array) -> npt.NDArray[np.bool_]:
+    """Whether the platform can move without opening a leg or changing a pose coordinate.
+
+    The damped inverse of what determines it is then as large as the damping is small.
+    """
+    square = _damped_square(rates)
+    damping = DAMPING * np.trace(square, axis1=1, axis2=2)
+    freedom = platform_rates @ np.linalg.solve(square, np.swapaxes(platform_rates, 1, 2))
+    return np.asarray(np.trace(freedom, axis1=1, axis2=2) * damping > DETERMINED)
 
 
 def gaps_at(chains: Chains, found: Array, goal: Array) -> Gaps:
@@ -217,7 +229,9 @@ def _difference(one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
 def _pose_gap(
     end: tuple[Array, Array], rates: Array, given: Mapping[str, Scalar], goal: Array, length: Array
 ) -> tuple[Array, Array]:
-    reached, changes = pose_of(end), _angle_rates(end[0]) @ rates[:, :3]
+    reached = pose_of(end)
+    turning = any(name not in ("x", "y", "z") for name in given)
+    changes = _angle_rates(end[0]) @ rates[:, :3] if turning else rates[:, :3]
     gaps, rows = [], []
     for i, name in enumerate(given):
         left = goal[:, i] - reached[name]

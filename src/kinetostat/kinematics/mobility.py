@@ -12,7 +12,7 @@ import numpy as np
 from kinetostat.algebra.screw import Screw
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.singularity import Array, columns
-from kinetostat.machine.leg import Leg
+from kinetostat.machine.leg import Joint, Leg
 from kinetostat.machine.machine import Configuration
 
 DEPENDENT = 1e-7
@@ -61,7 +61,7 @@ class Mobility:
         lost: names of legs that lose a freedom here.
         twists: what the platform gains, each [omega; v] at the reference point, base axes; of 1 rad, or 1 m.
         leg_distance, platform_distance: smallest singular value of the unit joint screws of any leg, and of the unit
-            wrenches that hold the platform with actuators locked, lengths in units of the machine's: 0 at a singularity.
+            wrenches that hold the platform with actuators locked, lengths in units of the machine's; 0 if singular.
     """
 
     here: Freedoms
@@ -86,51 +86,57 @@ def mobility(here: Configuration, nearby: Sequence[Configuration], reference: Ve
     general = [freedoms(one, one.platform.translation) for one in nearby] or [found]
     full_cycle = min(one.platform for one in general)
     usual = [max(one.legs[i] for one in general) for i in range(len(here.legs))]
-    lost = tuple(
-        leg.name for leg, has, may in zip(here.legs, found.legs, usual, strict=True) if has < may
-    )
+    lost = tuple(leg.name for leg, has, may in zip(here.legs, found.legs, usual, strict=True) if has < may)
     constraints, holding = _platform_wrenches(here, reference)
-    kind, twists = Kind.REGULAR, ()
+    kind = Kind.REGULAR
+    twists: tuple[tuple[float, ...], ...] = ()
     if found.platform > full_cycle:
         kind, twists = Kind.CONSTRAINT, _free_twists(constraints, found.platform, float(here.length))
     elif found.locked:
         kind, twists = Kind.ACTUATION, _free_twists(holding, found.locked, float(here.length))
     elif lost:
         kind = Kind.LEG
-    nearest_leg = min((_least(_leg_screws(here, leg, reference), may) for leg, may in zip(here.legs, _all(here, usual), strict=True)), default=1.0)
-    actuators = sum(spring.actuated for leg in here.legs for spring in leg.springs)
-    return Mobility(found, full_cycle, actuators, kind, lost, twists, nearest_leg, _least(holding, SPATIAL))
+    away = _away(here)
+    legs = [_least(_leg_screws(here, leg, reference), rank + away) for leg, rank in zip(here.legs, usual, strict=True)]
+    actuators = sum(len(_drives(leg)) for leg in here.legs)
+    return Mobility(found, full_cycle, actuators, kind, lost, twists, min(legs, default=1.0), _least(holding, SPATIAL))
 
 
-def _all(here: Configuration, usual: Sequence[int]) -> list[int]:
-    """Ranks of the legs' screws with those that a plane takes away counted in."""
-    return [rank + (0 if here.plane is None else len(here.plane.absent)) for rank in usual]
+def _away(configuration: Configuration) -> int:
+    """How many twists a plane takes away."""
+    return 0 if configuration.plane is None else len(configuration.plane.absent)
 
 
 def freedoms(configuration: Configuration, reference: Vector) -> Freedoms:
     """Ranks of a configuration; `reference` in the base frame, m."""
-    away = 0 if configuration.plane is None else len(configuration.plane.absent)
+    away = _away(configuration)
     legs = [_rank(_leg_screws(configuration, leg, reference)) - away for leg in configuration.legs]
     constraints, holding = _platform_wrenches(configuration, reference)
     rank = _rank(constraints)
     imposed = sum(SPATIAL - away - leg for leg in legs)
     spins = sum(
-        len(_drives(leg)) + len(leg.passive) - has
+        len(_drives(leg)) + len(_free(leg)) - has
         for leg, has in zip(configuration.legs, legs, strict=True)
         if not leg.lines
     )
     return Freedoms(SPATIAL - rank, tuple(legs), spins, imposed - (rank - away), SPATIAL - _rank(holding))
 
 
-def _drives(leg: Leg) -> list[Screw | None]:
-    return [None for spring in leg.springs if spring.actuated]
+def _drives(leg: Leg) -> list[Joint]:
+    """The joints that actuators hold; one without stiffness holds nothing."""
+    return [spring.joint for spring in leg.springs if spring.actuated and float(spring.stiffness) > 0.0]
+
+
+def _free(leg: Leg) -> list[Joint]:
+    """All joints that nothing holds."""
+    return [*leg.passive, *(spring.joint for spring in leg.springs if float(spring.stiffness) == 0.0)]
 
 
 def _leg_screws(configuration: Configuration, leg: Leg, reference: Vector) -> Array:
     """Unit screws of all joints of a leg, actuated ones too, and of what a plane takes away [6 x n]."""
     absent = configuration.plane.absent if configuration.plane else ()
-    drives = [spring.joint for spring in leg.springs if spring.actuated]
-    return _unit_screws([joint.twist(reference) for joint in (*leg.passive, *drives, *absent)], configuration)
+    joints = (*_free(leg), *_drives(leg), *absent)
+    return _unit_screws([joint.twist(reference) for joint in joints], configuration)
 
 
 def _unit_screws(screws: Sequence[Screw], configuration: Configuration) -> Array:
@@ -151,11 +157,11 @@ def _platform_wrenches(configuration: Configuration, reference: Vector) -> tuple
     constraints, holding = list(guide), list(guide)
     for leg in configuration.legs:
         constraints.append(_reciprocal(_leg_screws(configuration, leg, reference)))
-        if leg.lines:
+        if leg.lines and len(_free(leg)) == len(leg.passive):
             wrenches = columns([line.wrench(reference) for line in leg.lines], 1.0 / length, 1.0)
             holding.append(wrenches / np.linalg.norm(wrenches, axis=0))
         else:
-            passive = [joint.twist(reference) for joint in (*leg.passive, *absent)]
+            passive = [joint.twist(reference) for joint in (*_free(leg), *absent)]
             holding.append(_reciprocal(_unit_screws(passive, configuration)))
     return np.hstack(constraints), np.hstack(holding)
 

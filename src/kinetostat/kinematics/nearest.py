@@ -1,8 +1,9 @@
 """The admissible pose nearest to one that the legs cannot take: what a refusal offers instead. One pose."""
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import least_squares
 
 from kinetostat.kinematics.closure import Gaps, gaps_at, pose_of, solve_joints
 from kinetostat.machine.machine import Machine
@@ -11,6 +12,8 @@ Array = npt.NDArray[np.float64]
 
 CLOSING = 1e4
 """How much more a gap in a leg counts than one in the pose, so that the legs close to a ten-thousandth of the rest."""
+MOST_DESCENTS = 400
+SMALLEST_DAMPING, LARGEST_DAMPING = 1e-15, 1e6
 SHOWN = 1e-9
 """Coordinates below this, in m or rad, are shown as zero."""
 
@@ -21,8 +24,7 @@ def nearest_pose(machine: Machine) -> dict[str, float]:
     Distance is that of the pose coordinates given, angles times the machine's characteristic length. It is found by
     descent from where the joints came to, on the branch of the home pose.
     """
-    assert machine.family.chains is not None
-    chains = machine.family.chains(**machine.own_sections)
+    chains = machine.chains()
     goal = np.array([list(chains.pose.values())], dtype=float)
 
     def gaps(joints: Array) -> Gaps:
@@ -36,10 +38,32 @@ def nearest_pose(machine: Machine) -> dict[str, float]:
         found = gaps(joints)
         return -np.concatenate([CLOSING * found.closure_rates[0], found.pose_rates[0]])
 
-    start = np.array(solve_joints(machine).coordinates, dtype=float)
-    best = least_squares(left, start, slopes, xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=2000)
-    coordinates = pose_of(gaps(best.x).platform)
+    best = _descend(left, slopes, np.array(solve_joints(machine).coordinates, dtype=float))
+    coordinates = pose_of(gaps(best).platform)
     return {name: _without_rounding(float(value[0])) for name, value in coordinates.items()}
+
+
+def _descend(left: Callable[[Array], Array], slopes: Callable[[Array], Array], at: Array) -> Array:
+    """A least-squares minimum by the method of Levenberg and Marquardt.
+
+    Args:
+        left: what is to become small, from the unknowns [rows].
+        slopes: its derivatives [rows x unknowns].
+        at: where to start [unknowns].
+    """
+    damping, error = 1e-3, left(at)
+    for _ in range(MOST_DESCENTS):
+        matrix = slopes(at)
+        square, work = matrix.T @ matrix, matrix.T @ error
+        step = -np.linalg.solve(square + damping * np.trace(square) / len(at) * np.eye(len(at)), work)
+        tried = left(at + step)
+        if not tried @ tried < error @ error:
+            damping *= 4.0
+            if damping > LARGEST_DAMPING:
+                break
+            continue
+        at, error, damping = at + step, tried, max(damping / 10.0, SMALLEST_DAMPING)
+    return at
 
 
 def _without_rounding(value: float) -> float:

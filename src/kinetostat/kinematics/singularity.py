@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.screw import COMPONENTS, Screw
+from kinetostat.algebra.screw import COMPONENTS, Screw, Wrench
 from kinetostat.machine.leg import LegScrews
 
 PURE = 1e-9
@@ -21,9 +21,15 @@ def columns(screws: Sequence[Screw], rotational_scale: float, translational_scal
     return np.array(rows, dtype=float).T * scale[:, None]
 
 
-def conditioning(legs: Sequence[LegScrews], length: float) -> Array:
-    """Singular values of W with moments divided by `length` (m), decreasing: their ratio is dimensionless."""
-    wrenches = [wrench for leg in legs for wrench in leg.wrenches]
+def conditioning(legs: Sequence[LegScrews], length: float, guide: Sequence[Wrench] = ()) -> Array:
+    """Singular values of W with moments divided by `length` (m), decreasing: their ratio is dimensionless.
+
+    Args:
+        legs: at one reference point, base axes.
+        length: characteristic length, m.
+        guide: of a planar machine, the wrenches against twists that do not exist there.
+    """
+    wrenches = [*(wrench for leg in legs for wrench in leg.wrenches), *guide]
     return np.asarray(np.linalg.svd(columns(wrenches, 1.0 / length, 1.0), compute_uv=False), dtype=float)
 
 

@@ -18,6 +18,9 @@ ROUNDING = 1e-26
 """Square of 1e-13: below this share of the largest, what a rigid or free spring does to a component is rounding."""
 
 
+NO_MOTION = Twist(ZERO, ZERO)
+
+
 @dataclass(frozen=True)
 class Statics:
     """How the springs of a machine share any load, and resist any motion.
@@ -65,7 +68,7 @@ def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
     for leg in balanced:
         taken = sum(len(own) for own in sharing)
         sharing.append(tuple(twists[taken : taken + len(leg.wrenches)]))
-        flexibility += [combine(sharing[-1], row) for row in leg.loads]
+        flexibility += [combine(sharing[-1], row) if row else NO_MOTION for row in leg.loads]
     parts = [leg_resistance(leg) for leg in legs]
     actions = [action for shares, _ in parts for action in shares] + [action for _, held in parts for action in held]
     compliance = tuple(s for leg in legs for s in leg.compliance)
@@ -133,7 +136,7 @@ def least_energy_twists(
     shrink = reciprocal(length)
     columns = [Wrench(wrench.rotational * shrink, wrench.translational).components() for wrench in wrenches]
     if len(wrenches) < SIZE:
-        return [Twist(ZERO, ZERO)] * len(wrenches), 0.0
+        return [NO_MOTION] * len(wrenches), 0.0
     balance, internal, regularity = right_inverse([list(row) for row in zip(*columns, strict=True)])
     yielding = [_yield(legs, mode) for mode in internal]
     energy = [[_product(mode, other) for other in yielding] for mode in internal]

@@ -1,40 +1,225 @@
-"""Indices: one number (or one direction) at one pose. Rotation and translation are never mixed (theory section 1)."""
+"""Indices: stiffness by direction at one pose, read off K or C; rotation and translation are never mixed.
 
+No machine, no legs and no characteristic length here (see `conditioning`). Of K and C either may be missing or not
+finite, as where a spring is rigid or free: all is then taken from the other by Schur complement. A planar machine has
+the `components` rz x y and matrices 3 x 3.
+
+"Free": the other block carries no load and follows (a machine alone, loaded at its tool). "Guided": the other block is
+held, as by a second guide. Free is never stiffer than guided.
+"""
+
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
+from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.symmetric import Symmetric6
 
-BLOCKS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
-"""The two diagonal blocks of a 6x6, each of one unit."""
+Array: TypeAlias = npt.NDArray[np.float64]
+Matrix: TypeAlias = Symmetric6 | npt.ArrayLike
+Block: TypeAlias = Literal["rotation", "translation"]
+
+SPATIAL = (0, 1, 2, 3, 4, 5)
+"""Components of a machine that moves in space: rx ry rz x y z."""
+PLANAR = (2, 3, 4)
+"""Components of a machine that moves in the x-y plane: rz x y."""
+ROUNDING = 1e-14
+"""Share of the largest eigenvalue below which one is the rounding of zero: some dozen rounding units."""
+CANCELLED = 1e-12
+"""Likewise after the subtraction in a Schur complement."""
+ALIGNED = 1e-9
+"""Sine of an angle that is none: a direction so near to one without stiffness or compliance has no share in others."""
 
 
 @dataclass(frozen=True)
 class Principal:
-    """Principal compliances of one block, in increasing order.
+    """Principal compliances of one block, the other free, in increasing order.
 
     Attributes:
-        compliances: rad/(N·m) for rotation, m/N for translation [3].
-        directions: unit vectors, base axes, one row each [3 x 3].
+        compliances: rad/(N·m) for rotation, m/N for translation [n]; n = 3 in space.
+        directions: unit vectors, base axes, one row each [n x 3].
     """
 
     compliances: list[float]
     directions: list[list[float]]
 
 
-def principal_compliances(compliance: Symmetric6) -> dict[str, Principal]:
+@dataclass(frozen=True)
+class PrincipalStiffness:
+    """Principal stiffnesses of one block, in increasing order: the semi-axes of its stiffness ellipsoid.
+
+    Attributes:
+        stiffnesses: N·m/rad for rotation, N/m for translation [n]; 0 where free, infinity where rigid.
+        directions: unit vectors, base axes, one row each [n x 3].
+    """
+
+    stiffnesses: list[float]
+    directions: list[list[float]]
+
+
+def finite(matrix: Matrix | None, components: Sequence[int] = SPATIAL) -> Array | None:
+    """K or C as an array [n x n], n = len(components); None where it is missing or not all of it is finite.
+
+    Raises:
+        ValueError: if its shape is another.
+    """
+    if matrix is None:
+        return None
+    array = np.asarray(matrix.rows() if isinstance(matrix, Symmetric6) else matrix, dtype=float)
+    if array.shape != (len(components), len(components)):
+        raise ValueError(f"a matrix of {len(components)} components is square of that size, not {array.shape}")
+    return array if bool(np.isfinite(array).all()) else None
+
+
+def principal_compliances(compliance: Matrix, components: Sequence[int] = SPATIAL) -> dict[str, Principal]:
     """How soft the platform is in its softest and stiffest directions, for rotation and for translation.
 
     Under a pure moment (force) along a direction, the rotation (translation) it causes along itself; the extremes of
-    that are the eigenvalues of the block.
+    that are the eigenvalues of the diagonal block C_rr (C_tt).
 
     Args:
-        compliance: C at P, base axes, all entries finite.
+        compliance: C at P, base axes, all entries finite [n x n].
+        components: its rows, increasing, of rx ry rz x y z = 0 ... 5.
+
+    Returns:
+        "rotation" and "translation", as far as there are such components.
+
+    Raises:
+        ValueError: if C is not of that shape, or not finite.
     """
-    matrix = np.array(compliance.rows(), dtype=float)
-    result = {}
-    for name, block in BLOCKS.items():
-        values, vectors = np.linalg.eigh(matrix[block, block])
-        result[name] = Principal(np.maximum(values, 0.0).tolist(), vectors.T.tolist())
+    matrix = finite(compliance, components)
+    if matrix is None:
+        raise ValueError("principal compliances need a finite C: where a spring is free there is none")
+    result: dict[str, Principal] = {}
+    for name, own, _, axes in _blocks(components):
+        values, vectors = np.linalg.eigh(matrix[np.ix_(own, own)])
+        result[name] = Principal(np.maximum(values, 0.0).tolist(), (vectors.T @ axes).tolist())
     return result
+
+
+def free_stiffnesses(
+    stiffness: Matrix | None, compliance: Matrix | None, components: Sequence[int] = SPATIAL
+) -> dict[str, PrincipalStiffness] | None:
+    """Principal stiffnesses against a pure force (moment) while the rotations (translations) follow: 1 / eig(C_bb).
+
+    What a tool feels at P of a machine held by its legs alone. From K it is eig(K_bb - K_bo K_oo^+ K_ob).
+
+    Args:
+        stiffness, compliance: K and C at P, base axes [n x n]; C is used where it is finite.
+        components: their rows, increasing, of rx ry rz x y z = 0 ... 5.
+
+    Returns:
+        "rotation" and "translation", as far as there are such components; None where neither matrix is finite.
+
+    Raises:
+        ValueError: if a matrix has another shape.
+    """
+    soft, stiff = finite(compliance, components), finite(stiffness, components)
+    return _ellipsoids(soft, stiff, components, inverse=soft is not None)
+
+
+def guided_stiffnesses(
+    stiffness: Matrix | None, compliance: Matrix | None, components: Sequence[int] = SPATIAL
+) -> dict[str, PrincipalStiffness] | None:
+    """Principal stiffnesses against a displacement (rotation) while the other block is held at zero: eig(K_bb).
+
+    What remains if something else, a second guide or a clamped workpiece, takes the rotations; an upper bound of
+    `free_stiffnesses`. From C it is 1 / eig(C_bb - C_bo C_oo^+ C_ob). Arguments, results and errors as there; K is
+    used where it is finite.
+    """
+    soft, stiff = finite(compliance, components), finite(stiffness, components)
+    return _ellipsoids(stiff, soft, components, inverse=stiff is None)
+
+
+def free_stiffness_along(
+    direction: Sequence[float],
+    block: Block,
+    stiffness: Matrix | None,
+    compliance: Matrix | None,
+    components: Sequence[int] = SPATIAL,
+) -> float | None:
+    """Force along n over the displacement along n it causes, all else free to follow: 1 / (n^T C_bb n).
+
+    Args:
+        direction: along n, base axes, of any length [3]; along an axis that has no component it must be zero.
+        block: "translation" for a force (N/m), "rotation" for a moment (N·m/rad).
+        stiffness, compliance, components: as for `free_stiffnesses`.
+
+    Returns:
+        From 0 (free) to infinity (rigid); None where neither matrix is finite.
+
+    Raises:
+        ValueError: if the direction is zero or leaves the space of the components, or a matrix has another shape.
+    """
+    found = free_stiffnesses(stiffness, compliance, components)
+    shares = _shares(direction, block, components, found)
+    if found is None:
+        return None
+    return reciprocal(math.fsum(s * reciprocal(k) for s, k in zip(shares, found[block].stiffnesses, strict=True) if s))
+
+
+def guided_stiffness_along(
+    direction: Sequence[float],
+    block: Block,
+    stiffness: Matrix | None,
+    compliance: Matrix | None,
+    components: Sequence[int] = SPATIAL,
+) -> float | None:
+    """Force along n over a displacement along n, all else held at zero: n^T K_bb n. Arguments as for the free one."""
+    found = guided_stiffnesses(stiffness, compliance, components)
+    shares = _shares(direction, block, components, found)
+    if found is None:
+        return None
+    return math.fsum(s * k for s, k in zip(shares, found[block].stiffnesses, strict=True) if s)
+
+
+def _blocks(components: Sequence[int]) -> list[tuple[Block, list[int], list[int], Array]]:
+    """Of each block that exists: name, own rows, the other's rows, and base axes of its rows [n x 3]."""
+    turns = [i for i, c in enumerate(components) if c < 3]
+    moves = [i for i, c in enumerate(components) if c >= 3]
+    axes = np.eye(3)[[c % 3 for c in components]]
+    parts: list[tuple[Block, list[int], list[int]]] = [("rotation", turns, moves), ("translation", moves, turns)]
+    return [(name, own, other, axes[own]) for name, own, other in parts if own]
+
+
+def _ellipsoids(
+    direct: Array | None, dual: Array | None, components: Sequence[int], inverse: bool
+) -> dict[str, PrincipalStiffness] | None:
+    """From the blocks of `direct`, or else Schur complements of `dual`; `inverse` says that C is what is used."""
+    matrix = dual if direct is None else direct
+    if matrix is None:
+        return None
+    result: dict[str, PrincipalStiffness] = {}
+    for name, own, other, axes in _blocks(components):
+        block = matrix[np.ix_(own, own)]
+        size, share = float(np.linalg.norm(block, 2)), ROUNDING
+        if direct is None and other:
+            coupling, share = matrix[np.ix_(own, other)], CANCELLED
+            block = (
+                block - coupling @ np.linalg.pinv(matrix[np.ix_(other, other)], CANCELLED, hermitian=True) @ coupling.T
+            )
+        values, vectors = np.linalg.eigh(block)
+        stiffnesses = [0.0 if value <= share * size else float(value) for value in values]
+        order = range(len(own))
+        if inverse:
+            stiffnesses, order = [reciprocal(value) for value in stiffnesses], range(len(own) - 1, -1, -1)
+        rows = (vectors.T @ axes).tolist()
+        result[name] = PrincipalStiffness([stiffnesses[i] for i in order], [rows[i] for i in order])
+    return result
+
+
+def _shares(
+    direction: Sequence[float], block: Block, components: Sequence[int], found: dict[str, PrincipalStiffness] | None
+) -> list[float]:
+    """Squares of the cosines between a direction and the principal ones; exactly zero where it is at right angles."""
+    axes = {name: rows for name, _, _, rows in _blocks(components)}.get(block)
+    vector = np.asarray(direction, dtype=float)
+    size = float(np.linalg.norm(vector))
+    if axes is None or not size > 0.0 or float(np.linalg.norm(vector - axes.T @ (axes @ vector))) > ALIGNED * size:
+        raise ValueError(f"direction {list(direction)} is zero or has no {block} component in this machine's space")
+    cosines = np.array(found[block].directions) @ (vector / size) if found else np.zeros(0)
+    return [float(c) ** 2 if abs(c) > ALIGNED else 0.0 for c in cosines]

@@ -48,7 +48,9 @@ def relaxed(leg: LegScrews) -> LegScrews:
         regularity = smaller(regularity, apart)
     weights = [0.0 if type(s) is float and s == INFINITE else s for s in leg.compliance]
     rows = [
-        tuple(0.0 if row in free else total([times(c, b) for c, b in zip(row, column, strict=True)]) for column in basis)
+        tuple(
+            0.0 if row in free else total([times(c, b) for c, b in zip(row, column, strict=True)]) for column in basis
+        )
         for row in leg.loads
     ]
     wrenches = tuple(combine(leg.wrenches, column) for column in basis)

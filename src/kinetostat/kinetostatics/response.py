@@ -30,6 +30,7 @@ class Response:
         configuration: where everything is.
         reference: the tool point T (P itself unless the machine has a tool), base frame, m.
         legs: screws of every leg at T, base axes.
+        guide: of a planar machine, the wrenches against twists that do not exist there; likewise.
         statics: how the springs share loads.
         stiffness, compliance: K (N·m/rad, N/rad, N/m) and C (rad/(N·m), rad/N, m/N) at T, base axes; of a planar
             machine only rz, x, y have a meaning, and the other entries are 0.
@@ -40,6 +41,7 @@ class Response:
     configuration: Configuration
     reference: Vector
     legs: tuple[LegScrews, ...]
+    guide: tuple[Wrench, ...]
     statics: Statics
     stiffness: Symmetric6
     compliance: Symmetric6
@@ -69,6 +71,7 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
         configuration,
         reference,
         legs,
+        guide,
         statics,
         stiffness_matrix(statics),
         compliance_matrix(statics),

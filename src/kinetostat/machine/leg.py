@@ -222,7 +222,7 @@ class Leg:
 
     def displaced(self, motion: Displacement) -> "Leg":
         """The leg after a rigid displacement of the whole machine."""
-        chain = tuple(element.displaced(motion) for element in self.chain)
+        chain: tuple[Element, ...] = tuple(element.displaced(motion) for element in self.chain)
         return replace(self, chain=chain, lines=tuple(line.displaced(motion) for line in self.lines))
 
     def screws(self, reference: Vector, length: Scalar, absent: Sequence[Joint] = ()) -> LegScrews:

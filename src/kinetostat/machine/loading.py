@@ -17,7 +17,7 @@ from kinetostat.machine.catalogue import families
 from kinetostat.machine.machine import COMMON, Family, Machine
 from kinetostat.machine.written import family as written
 from kinetostat.machine.written.checking import check_numbers, with_idle_freedoms
-from kinetostat.machine.written.document import by_name, separate
+from kinetostat.machine.written.document import by_name, check_paths, separate
 from kinetostat.spec import document as documents
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
@@ -80,8 +80,9 @@ def build(document: Document, origin: str, settings: Sequence[str] = ()) -> Mach
 
 def _build_written(document: Document, origin: str, settings: Sequence[str]) -> Machine:
     """A machine written leg by leg."""
-    changed = documents.override(by_name(document, origin), settings, {})
-    plan, numbers = separate(by_name(changed, origin), origin)
+    named = by_name(document, origin)
+    check_paths(named, settings)
+    plan, numbers = separate(documents.override(named, settings, {}), origin)
     machine = _validated(written.family_of(plan), numbers, origin)
     check_numbers(plan, machine.sections, origin)
     complete = with_idle_freedoms(plan, machine.own_sections)
@@ -113,6 +114,11 @@ def _family(name: object, origin: str) -> Family:
     near = difflib.get_close_matches(str(name), known, 1)
     hint = f'did you mean "{near[0]}"?' if near else f"known families: {', '.join(known)}."
     raise InputError(f'"{origin}": family is {shorten(name)}, which is not known; {hint}')
+
+
+def kinds_of_machine() -> dict[str, str]:
+    """Every kind of machine that a file may name, with one line about each."""
+    return {**{family.name: family.summary for family in families().values()}, written.NAME: written.SUMMARY}
 
 
 def as_toml(machine: Machine) -> str:

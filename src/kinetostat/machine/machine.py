@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from kinetostat.algebra.scalar import Scalar
+from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.leg import Joint, Leg, Spring
 from kinetostat.spec.fields import Quantity, section
@@ -29,6 +30,9 @@ class Closure:
     longest: Scalar
 
 
+BASE_FRAME = Displacement(IDENTITY, ZERO)
+
+
 @dataclass(frozen=True)
 class Plane:
     """The plane of a planar machine: twists out of it are absent, neither rigid nor free.
@@ -37,7 +41,7 @@ class Plane:
         frame: its origin (m) and axes in the base frame; z is its normal.
     """
 
-    frame: Displacement = Displacement(IDENTITY, ZERO)
+    frame: Displacement = BASE_FRAME
 
     @property
     def freedoms(self) -> tuple[Joint, ...]:
@@ -151,6 +155,16 @@ class Family:
     literals: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
 
     @property
+    def components(self) -> tuple[int, ...]:
+        """Which of rx ry rz x y z exist."""
+        return (2, 3, 4) if self.planar else (0, 1, 2, 3, 4, 5)
+
+    @property
+    def component_names(self) -> tuple[str, ...]:
+        """Their names: rx ry rz x y z, or rz x y."""
+        return tuple(COMPONENTS[i] for i in self.components)
+
+    @property
     def every_section(self) -> dict[str, type]:
         """Its own sections and the common ones."""
         return {**self.sections, **COMMON}
@@ -174,6 +188,12 @@ class Machine:
         """The machine at its pose; `joints` are its coordinates where the family has no closed form for them."""
         placed = {"joints": joints} if self.family.chains else {}
         return self.family.configure(**self.own_sections, **placed)
+
+    def chains(self) -> Chains:
+        """Its legs at the home pose, where the family has no closed form."""
+        if self.family.chains is None:
+            raise ValueError(f"family {self.family.name} places its joints in closed form")
+        return self.family.chains(**self.own_sections)
 
     @property
     def own_sections(self) -> dict[str, Any]:

@@ -88,7 +88,13 @@ def rectangular_section(width: Scalar, height: Scalar) -> Section:
     short = smaller(width, height)
     long = width + height - short
     slender = short / long
-    torsion = long * short * short * short * (1.0 / 3.0 - 0.21 * slender * (1.0 - slender * slender * slender * slender / 12.0))
+    torsion = (
+        long
+        * short
+        * short
+        * short
+        * (1.0 / 3.0 - 0.21 * slender * (1.0 - slender * slender * slender * slender / 12.0))
+    )
     second = width * height * (1.0 / 12.0)
     return Section(width * height, second * height * height, second * width * width, torsion, 5.0 / 6.0)
 

@@ -88,7 +88,9 @@ class Quantity:
         kind = KINDS[self.kind]
         example = f'e.g. "{kind.example}"'
         if self.stiff and number < 0:
-            raise UnitError(f'a {self.kind.split()[-1]} cannot be negative; write 0 for a free element, {example}, or "{RIGID}"')
+            raise UnitError(
+                f'a {self.kind.split()[-1]} cannot be negative; write 0 for a free element, {example}, or "{RIGID}"'
+            )
         if self.positive and number <= 0:
             raise UnitError(f"it must be greater than 0, {example}")
         largest = LARGEST.get(self.kind, LARGEST_OTHER)

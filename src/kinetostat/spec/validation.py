@@ -36,7 +36,7 @@ def _table_model(title: str, sections: Mapping[str, type], content: dict[str, An
         inner = {path.partition(".")[2]: kind for path, kind in sections.items() if path.partition(".")[0] == name}
         model = inner[""] if "" in inner else _table_model(name, inner, {})
         may_miss = "" in inner and set(quantities(model)) == optional(model)
-        default = {"default_factory": model} if may_miss else {}
+        default: Any = {"default_factory": model} if may_miss else {}
         about: Any = Field(alias=name, description=f"the machine's {name}", **default)
         content[f"section_{i}"] = (model, about)
     return create_model(title, __config__=ConfigDict(extra="forbid"), **content)

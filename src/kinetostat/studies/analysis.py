@@ -1,23 +1,30 @@
-"""The first question: how stiff is this machine at this pose, and why. One pose; nothing is compiled."""
+"""The first question: how stiff is this machine at this pose, and why. One pose; nothing is compiled.
+
+What is printed or written of it is elsewhere (`analysis_data`, `views.tables`).
+"""
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
-from kinetostat.algebra.screw import COMPONENTS
+import numpy as np
+
+from kinetostat.algebra.screw import COMPONENTS, Screw
 from kinetostat.algebra.symmetric import Symmetric6
-from kinetostat.algebra.vector import Vector
-from kinetostat.kinematics.reach import why_out_of_reach
-from kinetostat.kinematics.singularity import conditioning, describe, independent, why_singular
+from kinetostat.algebra.vector import IDENTITY, Rotation, Vector
+from kinetostat.kinematics.mobility import Mobility, mobility
+from kinetostat.kinematics.singularity import conditioning, describe, independent
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, stiffness_matrix
 from kinetostat.kinetostatics.attribution import compliance_shares, stiffness_shares
-from kinetostat.kinetostatics.indices import Principal, principal_compliances
+from kinetostat.kinetostatics.internal import InternalLoads, internal_loads
 from kinetostat.kinetostatics.leg import AnyScrew
-from kinetostat.kinetostatics.response import SINGULAR, Response, respond
+from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.leg import Spring
-from kinetostat.machine.machine import Machine, springs
-from kinetostat.machine.parameters import values
+from kinetostat.machine.machine import Configuration, Machine, springs
+from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.studies.indices import Indices, indices_of
+from kinetostat.studies.loads import LoadCase, load_case
+from kinetostat.studies.refusal import why_not
 
 Rows = list[list[float]]
 
@@ -25,6 +32,8 @@ NEGLIGIBLE = 1e-13
 """Share of a screw's size below which one of its components is rounding."""
 INDEPENDENT = 1e-9
 """Relative size of a singular value below which the motions of springs are dependent."""
+NEARBY = 0.03
+"""How far poses for the general mobility lie from the pose: in units of the machine's length, and in rad."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +42,14 @@ class SpringShare:
 
     Attributes:
         name: of the spring.
+        part: the joint or link that it stands for.
         stiffness: N/m or N·m/rad; infinity if rigid.
-        compliance: its share of the six diagonal entries of C, 0 to 1, or None where there is nothing to share.
+        compliance: its share of the diagonal entries of C, 0 to 1, or None where there is nothing to share.
         stiffness_share: likewise of K.
     """
 
     name: str
+    part: str
     stiffness: float
     compliance: tuple[float | None, ...]
     stiffness_share: tuple[float | None, ...]
@@ -46,19 +57,25 @@ class SpringShare:
 
 @dataclass(frozen=True)
 class Analysis:
-    """The answer at one pose; matrices at P in base axes, order rx ry rz x y z, SI.
+    """The answer at one pose; matrices at the tool point T (P itself unless there is a tool), SI.
 
     Attributes:
         machine: what was analysed.
         status: of the pose; all that follows is None or empty unless it is OK.
         message: one readable paragraph.
-        stiffness: K [6 x 6], None where a direction is rigid (K has no finite value there).
-        compliance: C [6 x 6], None where a direction is free.
-        stiffness_diagonal, compliance_diagonal: the six entries, infinity where rigid or free.
+        components: names of the rows and columns of K and C: rx ry rz x y z, or rz x y of a planar machine.
+        axes: "base" or "platform", in which everything is given.
+        platform: position of P (m) and rotation (rows) in the base frame.
+        stiffness: K [n x n], None where a direction is rigid (K has no finite value there).
+        compliance: C [n x n], None where a direction is free.
+        stiffness_diagonal, compliance_diagonal: their diagonals, infinity where rigid or free.
         rank: of C, or of K where a direction is free.
         rigid, free: names of the springs with infinite and with zero stiffness.
         shares: attribution, spring by spring.
-        principal: principal compliances by block, None where a direction is free.
+        indices: numbers and directions read off K and C.
+        mobility: what can move, and the kind of pose.
+        internal: statically indeterminate loads.
+        load: what the machine's [load] does, None without one.
         condition: ratio of the extreme singular values of W, moments divided by the characteristic length.
         length: that length, m.
     """
@@ -66,6 +83,9 @@ class Analysis:
     machine: Machine
     status: Status
     message: str
+    components: tuple[str, ...] = COMPONENTS
+    axes: str = "base"
+    platform: tuple[tuple[float, ...], Rows] | None = None
     stiffness: Rows | None = None
     compliance: Rows | None = None
     stiffness_diagonal: tuple[float, ...] = ()
@@ -74,47 +94,102 @@ class Analysis:
     rigid: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
     shares: tuple[SpringShare, ...] = ()
-    principal: dict[str, Principal] | None = None
+    indices: Indices | None = None
+    mobility: Mobility | None = None
+    internal: InternalLoads | None = None
+    load: LoadCase | None = None
     condition: float | None = None
     length: float | None = None
 
 
-def analyze(machine: Machine) -> Analysis:
-    """K, C, attribution, indices and singularity of a machine at its pose.
+def analyze(machine: Machine, axes: str = "base") -> Analysis:
+    """K, C, attribution, indices, mobility and loads of a machine at its pose.
 
     A pose that cannot be reached or is singular is an answer too: see `status` and `message`.
+
+    Args:
+        machine: with its pose, tool and load.
+        axes: "base", or "platform" for results in platform axes.
     """
     response = respond(machine)
-    status = Status(response.status)
+    status = Status(int(response.status))
+    configuration = response.configuration
     if status is not Status.OK:
-        return Analysis(machine, status, _why(status, response))
-    held = springs(response.configuration)
+        return Analysis(machine, status, why_not(machine, response, _around(machine)), machine.family.component_names)
+    turn = IDENTITY if axes == "base" else configuration.platform.rotation.inverse()
+    statics = _without_rounding(_turned(response.statics, turn))
+    stiffness, compliance = stiffness_matrix(statics), compliance_matrix(statics)
+    kept = machine.family.components
+    soft, stiff = _rows(compliance, kept), _rows(stiffness, kept)
+    held, length = springs(configuration), float(configuration.length)
     rigid = tuple(spring.name for spring in held if math.isinf(spring.stiffness))
     free = tuple(spring.name for spring in held if spring.stiffness == 0.0)
-    statics = without_rounding(response.statics)
-    stiffness, compliance = stiffness_matrix(statics), compliance_matrix(statics)
-    yielding = all(math.isfinite(entry) for entry in stiffness.diagonal())
-    length = float(response.configuration.length)
-    extremes = conditioning(response.legs, length)
+    extremes = conditioning(response.legs, length, response.guide)
     return Analysis(
         machine,
         status,
-        _message(response, rigid, free, yielding),
-        stiffness=stiffness.rows() if yielding else None,
-        compliance=None if free else compliance.rows(),
-        stiffness_diagonal=stiffness.diagonal(),
-        compliance_diagonal=compliance.diagonal(),
-        rank=_rank(statics, bool(free)),
+        _message(response, rigid, free, stiff is not None),
+        components=machine.family.component_names,
+        axes=axes,
+        platform=_placement(configuration),
+        stiffness=stiff,
+        compliance=soft,
+        stiffness_diagonal=tuple(stiffness.entry(i, i) for i in kept),
+        compliance_diagonal=tuple(compliance.entry(i, i) for i in kept),
+        rank=_rank(statics, soft is None),
         rigid=rigid,
         free=free,
-        shares=_shares(held, statics, stiffness, compliance),
-        principal=None if free else principal_compliances(compliance),
+        shares=_shares(held, statics, stiffness, compliance, kept),
+        indices=indices_of(stiff, soft, length, kept),
+        mobility=mobility(configuration, _around(machine), response.reference),
+        internal=internal_loads([leg.name for leg in configuration.legs], response.legs, length, response.guide),
+        load=load_case(machine, replace(response, compliance=compliance), turn),
         condition=float(extremes[0] / extremes[-1]),
         length=length,
     )
 
 
-def without_rounding(statics: Statics) -> Statics:
+def _rows(matrix: Symmetric6, kept: tuple[int, ...]) -> Rows | None:
+    """The rows and columns that exist, or None where an entry is infinite."""
+    rows = [[float(matrix.entry(i, j)) for j in kept] for i in kept]
+    return rows if all(math.isfinite(entry) for row in rows for entry in row) else None
+
+
+def _placement(configuration: Configuration) -> tuple[tuple[float, ...], Rows]:
+    turn = configuration.platform.rotation
+    rows = zip(*([float(c) for c in axis.components()] for axis in (turn.x, turn.y, turn.z)), strict=True)
+    return tuple(float(c) for c in configuration.platform.translation.components()), [list(row) for row in rows]
+
+
+def _around(machine: Machine) -> list[Configuration]:
+    """The machine at three poses around its own, as far as it can reach them."""
+    pose = {p.path: p.quantity.kind for p in parameters(machine.family) if p.path.startswith("pose.")}
+    length, held = float(machine_length(machine)), values(machine)
+    found, rng = [], np.random.default_rng(0)
+    for _ in range(3):
+        reach = {path: NEARBY * (length if kind == "length" else 1.0) for path, kind in pose.items()}
+        response = respond(with_values(machine, {p: held[p] + r * float(rng.uniform(-1, 1)) for p, r in reach.items()}))
+        if Status(int(response.status)) is Status.OK:
+            found.append(response.configuration)
+    return found
+
+
+def machine_length(machine: Machine) -> float:
+    """The characteristic length of a machine at its pose, m."""
+    return float(respond(machine).configuration.length)
+
+
+def _turned(statics: Statics, turn: Rotation) -> Statics:
+    """The same statics in axes turned back by `turn`."""
+    return replace(
+        statics,
+        sharing=tuple(tuple(twist.rotated(turn) for twist in own) for own in statics.sharing),
+        flexibility=tuple(twist.rotated(turn) for twist in statics.flexibility),
+        resistance=tuple(wrench.rotated(turn) for wrench in statics.resistance),
+    )
+
+
+def _without_rounding(statics: Statics) -> Statics:
     """The same statics with exact zeros where a screw's component is but rounding beside its others."""
     length = statics.length
     flexibility = tuple(_rounded(twist, 1.0 / length) for twist in statics.flexibility)
@@ -129,59 +204,10 @@ def _rounded(screw: AnyScrew, length: float) -> AnyScrew:
     return type(screw)(Vector(*kept[:3]), Vector(*kept[3:]))
 
 
-def as_json(analysis: Analysis) -> dict[str, Any]:
-    """The analysis as plain data for `--json`: infinite and missing numbers are null."""
-    machine = analysis.machine
-    pose = {path.removeprefix("pose."): value for path, value in values(machine).items() if path.startswith("pose.")}
-    return {
-        "name": machine.name,
-        "family": machine.family.name,
-        "order": list(COMPONENTS),
-        "pose": pose,
-        "status": analysis.status.word,
-        "message": analysis.message,
-        "stiffness": analysis.stiffness,
-        "compliance": analysis.compliance,
-        "stiffness_diagonal": [_finite(entry) for entry in analysis.stiffness_diagonal] or None,
-        "compliance_diagonal": [_finite(entry) for entry in analysis.compliance_diagonal] or None,
-        "rank": analysis.rank,
-        "rigid": list(analysis.rigid),
-        "free": list(analysis.free),
-        "condition": analysis.condition,
-        "characteristic_length": analysis.length,
-        "principal_compliances": {
-            block: {"values": found.compliances, "directions": found.directions}
-            for block, found in (analysis.principal or {}).items()
-        }
-        or None,
-        "attribution": [
-            {
-                "spring": share.name,
-                "stiffness": "rigid" if math.isinf(share.stiffness) else share.stiffness,
-                "compliance_share": list(share.compliance),
-                "stiffness_share": list(share.stiffness_share),
-            }
-            for share in analysis.shares
-        ],
-    }
-
-
-def _finite(number: float) -> float | None:
-    return number if math.isfinite(number) else None
-
-
-def _why(status: Status, response: Response) -> str:
-    configuration = response.configuration
-    if status is Status.OUT_OF_REACH:
-        return why_out_of_reach(configuration)
-    names = [leg.name for leg in configuration.legs]
-    return f"The pose is singular. {why_singular(names, response.legs, configuration.length, SINGULAR)}"
-
-
-def _rank(statics: Statics, free: bool) -> int:
-    """Rank of C, or of K where a spring is free; independent of how much the springs differ."""
-    if free:
-        held = [wrench for k, wrench in zip(statics.stiffness, statics.resistance, strict=True) if k > 0.0]
+def _rank(statics: Statics, endless: bool) -> int:
+    """Rank of C, or of K where C is not finite; independent of how much the springs differ."""
+    if endless:
+        held: list[Screw] = [wrench for k, wrench in zip(statics.stiffness, statics.resistance, strict=True) if k > 0.0]
         return independent(held, statics.length, INDEPENDENT)
     motions = [twist for s, twist in zip(statics.compliance, statics.flexibility, strict=True) if s > 0.0]
     return independent(motions, 1.0 / statics.length, INDEPENDENT)
@@ -198,20 +224,24 @@ def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...], 
         if spring.name in free:
             per = "m" if spring.joint.point is None else "rad"
             motion = describe([float(c) for c in twist.components()], (f"rad/{per}", f"m/{per}"))
-            sentences.append(f"Free: {spring.name} has no stiffness, so that the platform moves freely by {motion}.")
+            moves = f"so that the platform moves freely by {motion}" if motion else "and carries nothing"
+            sentences.append(f"Free: {spring.name} has no stiffness, {moves}.")
     return " ".join(sentences) or Status.OK.sentence
 
 
 def _shares(
-    held: list[Spring], statics: Statics, stiffness: Symmetric6, compliance: Symmetric6
+    held: list[Spring], statics: Statics, stiffness: Symmetric6, compliance: Symmetric6, kept: tuple[int, ...]
 ) -> tuple[SpringShare, ...]:
     parts = zip(compliance_shares(statics), stiffness_shares(statics), held, strict=True)
     return tuple(
-        SpringShare(spring.name, spring.stiffness, _ratio(soft, compliance), _ratio(stiff, stiffness))
+        SpringShare(
+            spring.name, spring.part or spring.name, spring.stiffness,
+            _ratio(soft, compliance, kept), _ratio(stiff, stiffness, kept),
+        )
         for soft, stiff, spring in parts
-    )
+    )  # fmt: skip
 
 
-def _ratio(part: Symmetric6, whole: Symmetric6) -> tuple[float | None, ...]:
-    pairs = zip(part.diagonal(), whole.diagonal(), strict=True)
+def _ratio(part: Symmetric6, whole: Symmetric6, kept: tuple[int, ...]) -> tuple[float | None, ...]:
+    pairs = [(part.entry(i, i), whole.entry(i, i)) for i in kept]
     return tuple(p / w if 0.0 < w < math.inf else None for p, w in pairs)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.kinematics.status import Status
@@ -56,7 +57,7 @@ def evaluate_grid(
         raise InputError(f"the grid has {count:,} points; at most {MOST_POINTS:,} are allowed: lower the counts.")
     pairs = list(zip(wanted, chosen, strict=True))
     grid = Grid([Axis(parameter.leaves, one.values(parameter.quantity)) for one, parameter in pairs])
-    names = resolve_quantities(quantities)
+    names = resolve_quantities(quantities, machine.family.component_names)
     found = evaluate(machine, grid, names, progress)
     dims = [parameter.path for parameter in chosen]
     content: dict[str, Any] = {name: (dims, found.values[name].reshape(grid.shape), _about(name)) for name in names}
@@ -70,19 +71,30 @@ def evaluate_grid(
     return xr.Dataset(content, coordinates, {**origin, "frame": "base axes at the platform point P"})
 
 
-def resolve_quantities(names: Sequence[str]) -> list[str]:
+def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONENTS) -> list[str]:
     """Names of quantities, with groups replaced by their members and repetitions dropped.
 
+    Args:
+        names: of quantities or groups.
+        components: that the machine has: rx ry rz x y z, or rz x y of a planar one.
+
     Raises:
-        InputError: an unknown name.
+        InputError: an unknown name, or one of a component that the machine does not have.
     """
+    groups = {group: [name for name in members if _exists(name, components)] for group, members in GROUPS.items()}
     found: list[str] = []
     for name in names:
-        if name not in GROUPS and name not in QUANTITIES:
-            known = ", ".join([*GROUPS, *(n for group in GROUPS.values() for n in group), "regularity"])
-            raise InputError(f'"{name}" is not a quantity; choose from {known}, or an entry such as compliance_rx_z.')
-        found += GROUPS.get(name, (name,))
+        if name not in GROUPS and not (name in QUANTITIES and _exists(name, components)):
+            known = ", ".join([*GROUPS, *(n for group in groups.values() for n in group), "regularity"])
+            example = f"compliance_{components[0]}_{components[-1]}"
+            raise InputError(f'"{name}" is not a quantity; choose from {known}, or an entry such as {example}.')
+        found += groups.get(name, [name])
     return list(dict.fromkeys(found))
+
+
+def _exists(name: str, components: Sequence[str]) -> bool:
+    """Whether all components that a quantity is about exist."""
+    return all(part in components for part in name.split("_")[1:])
 
 
 def failures(dataset: xr.Dataset) -> dict[Status, int]:

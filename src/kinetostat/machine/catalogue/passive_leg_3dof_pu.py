@@ -6,23 +6,20 @@ The paper names the class of 3-dof machines but no leg; this one is ours (theory
 from typing import Annotated
 
 from kinetostat.algebra.scalar import cos, sin
-from kinetostat.algebra.vector import AXES, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector, ring, rotation_x, rotation_y
-from kinetostat.machine.leg import Joint, Leg, Spring, revolutes, two_force_legs
+from kinetostat.algebra.vector import AXES, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector, rotation_x, rotation_y
+from kinetostat.machine.guide import Guide
+from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes, two_force_legs
 from kinetostat.machine.machine import Configuration, Family
+from kinetostat.machine.parts import in_series, servo
+from kinetostat.machine.rings import Three, ThreeLegs, ends
 from kinetostat.spec.fields import Quantity, section
 
 LEGS = 3
-Three = tuple[float, float, float]
 
 
 @section
-class Geometry:
+class Geometry(ThreeLegs):
     """Table [geometry]; the base frame has its origin at the base centre, the ram slides along its z axis."""
-
-    base_radius: Annotated[float, Quantity("length", "radius of the base joints, Rb", positive=True)]
-    base_angles: Annotated[Three, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS)]
-    platform_radius: Annotated[float, Quantity("length", "radius of the platform joints, Rp", positive=True)]
-    platform_angles: Annotated[Three, Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS)]
 
 
 @section
@@ -33,6 +30,14 @@ class Stiffness:
     ram: Annotated[
         Three, Quantity("torsional stiffness", "ram at its base end: bending about x and y, torsion about z", count=3)
     ]
+    leg_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of the legs, EA")] = RIGID
+    ram_bending: Annotated[float, Quantity("bending rigidity", "bending rigidity of the ram from base to P, EI")] = (
+        RIGID
+    )
+    ram_torsion: Annotated[float, Quantity("torsional rigidity", "torsional rigidity of the ram, GJ")] = RIGID
+    ram_actuator: Annotated[float, Quantity("linear stiffness", "actuator of the ram's slide; 0 leaves it passive")] = (
+        0.0
+    )
 
 
 @section
@@ -44,24 +49,30 @@ class Pose:
     theta2: Annotated[float, Quantity("angle", "angle of the Hooke joint's second axis, about the pitched x")]
 
 
+def guide(stiffness: Stiffness, pose: Pose) -> Guide:
+    """The platform and the ram, in closed form; every pose can be reached (SI, base frame)."""
+    pitch = rotation_y(cos(pose.theta1), sin(pose.theta1))
+    tip = Vector(0.0, 0.0, pose.z)
+    platform = Displacement(pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2)), tip)
+    rigidities = ((stiffness.ram_bending, 3.0), (stiffness.ram_bending, 3.0), (stiffness.ram_torsion, 1.0))
+    built_in = [in_series(k, own, abs(pose.z), n) for k, (own, n) in zip(stiffness.ram, rigidities, strict=True)]
+    springs = tuple(
+        Spring(f"ram {name}", Joint(axis, ZERO), k)
+        for name, axis, k in zip(("bending x", "bending y", "torsion"), AXES, built_in, strict=True)
+    )
+    slide = servo(Joint(Z_AXIS, None, "ram slide"), "ram actuator", stiffness.ram_actuator)
+    return Guide(platform, Leg("ram", (*springs, slide, *revolutes(tip, (Y_AXIS, pitch.x), "ram Hooke joint"))))
+
+
 def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
     """The machine at a pose, in closed form.
 
     Args:
         geometry, stiffness, pose: SI; base frame.
     """
-    pitch = rotation_y(cos(pose.theta1), sin(pose.theta1))
-    tip = Vector(0.0, 0.0, pose.z)
-    platform = Displacement(pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2)), tip)
-    springs = tuple(
-        Spring(f"ram {name}", Joint(axis, ZERO), k)
-        for name, axis, k in zip(("bending x", "bending y", "torsion"), AXES, stiffness.ram, strict=True)
-    )
-    ram = Leg("ram", (*springs, Joint(Z_AXIS, None, "ram slide"), *revolutes(tip, (Y_AXIS, pitch.x), "ram Hooke joint")))
-    base = ring(geometry.base_radius, geometry.base_angles)
-    top = [platform.apply(point) for point in ring(geometry.platform_radius, geometry.platform_angles)]
-    legs = two_force_legs(base, top, stiffness.actuator)
-    return Configuration(platform, (ram, *legs), (), 0.5 * (geometry.base_radius + geometry.platform_radius))
+    ram = guide(stiffness, pose)
+    base, top = ends(geometry, geometry.base_angles, geometry.platform_angles, ram.platform)
+    return ram.moved_by(two_force_legs(base, top, stiffness.actuator, stiffness.leg_axial), geometry.size)
 
 
 FAMILY = Family(

@@ -8,24 +8,27 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar, cos, sin
 from kinetostat.algebra.triangle import apex
-from kinetostat.algebra.vector import Y_AXIS, Displacement, Rotation, Vector, polar, rotation_x, rotation_y
-from kinetostat.machine.leg import Joint, Leg, Spring, revolutes, two_force_legs
+from kinetostat.algebra.vector import Y_AXIS, Displacement, Rotation, Vector, rotation_x, rotation_y
+from kinetostat.machine.guide import Guide
+from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes, two_force_legs
 from kinetostat.machine.machine import Closure, Configuration, Family
+from kinetostat.machine.parts import bent_links, servo
+from kinetostat.machine.rings import Rings, four_joints
 from kinetostat.spec.fields import Quantity, section
 
 LEGS = 4
+Four = tuple[float, float, float, float]
+Two = tuple[float, float]
 
 
 @section
-class Geometry:
+class Geometry(Rings):
     """Table [geometry]; the base frame has its origin O at the foot of the passive leg, z up."""
 
-    base_radius: Annotated[float, Quantity("length", "radius of the base joints, Rb", positive=True)]
-    platform_radius: Annotated[float, Quantity("length", "radius of the platform joints, Rp", positive=True)]
     base_angle: Annotated[float, Quantity("angle", "angle of the first base joint from x, Ta")]
     platform_angle: Annotated[float, Quantity("angle", "angle of the first platform joint from x, Tb")]
     passive_links: Annotated[
-        tuple[float, float],
+        Two,
         Quantity("length", "lengths of the passive leg's links l51 (base) and l52 (platform)", positive=True, count=2),
     ]
     passive_leg_offset: Annotated[
@@ -38,13 +41,19 @@ class Stiffness:
     """Table [stiffness]."""
 
     actuator: Annotated[
-        tuple[float, float, float, float],
-        Quantity("linear stiffness", "stiffness of the four actuators held by their servos, Ka", count=LEGS),
+        Four, Quantity("linear stiffness", "stiffness of the four actuators held by their servos, Ka", count=LEGS)
     ]
     passive_links: Annotated[
-        tuple[float, float],
+        Two,
         Quantity("torsional stiffness", "out-of-plane bending of the links at their lower ends, k52 and k54", count=2),
     ]
+    leg_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of the actuated legs, EA")] = RIGID
+    passive_link_bending: Annotated[
+        Two, Quantity("bending rigidity", "out-of-plane bending rigidity of the passive leg's links, EI", count=2)
+    ] = (RIGID, RIGID)
+    passive_actuator: Annotated[
+        float, Quantity("torsional stiffness", "actuator of the passive leg's first revolute; 0 leaves it passive")
+    ] = 0.0
 
 
 @section
@@ -57,17 +66,11 @@ class Pose:
     theta6: Annotated[float, Quantity("angle", "angle of the Hooke joint's second axis, about the pitched x")]
 
 
-def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
-    """The machine at a pose, in closed form.
+def guide(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Guide:
+    """The platform and the passive leg, in closed form; NaN where the passive leg cannot reach (SI, base frame).
 
     The elbow lies on the +x side of the line from O to P; el2, the elevation of link 2, fixes the pitch:
     pitch = 90 deg - el2 - theta5, and Q = Ry(pitch) Rx(theta6).
-
-    Args:
-        geometry, stiffness, pose: SI; base frame.
-
-    Returns:
-        The passive leg and the four actuated legs, placed; NaN where the passive leg cannot reach.
     """
     foot = Vector(0.0, geometry.passive_leg_offset, 0.0)
     tip = Vector(pose.x, geometry.passive_leg_offset, pose.z)
@@ -76,10 +79,18 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
     pitch = platform_pitch((tip - elbow) * (1.0 / second), pose.theta5)
     platform = Displacement(pitch @ rotation_x(cos(pose.theta6), sin(pose.theta6)), tip)
     closure = Closure("passive leg", (tip - foot).norm(), abs(first - second), first + second)
-    passive = _passive_leg(foot, elbow, tip, pitch.x, geometry, stiffness)
-    legs = _actuated_legs(platform, geometry, stiffness)
-    length = 0.5 * (geometry.base_radius + geometry.platform_radius)
-    return Configuration(platform, (passive, *legs), (closure,), length)
+    return Guide(platform, _passive_leg(foot, elbow, tip, pitch.x, geometry, stiffness), (closure,))
+
+
+def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
+    """The machine at a pose, in closed form: the passive leg and four U-P-S legs; NaN out of reach.
+
+    Args:
+        geometry, stiffness, pose: SI; base frame.
+    """
+    passive = guide(geometry, stiffness, pose)
+    base, top = joints(geometry, passive.platform)
+    return passive.moved_by(two_force_legs(base, top, stiffness.actuator, stiffness.leg_axial), geometry.size)
 
 
 def platform_pitch(link: Vector, theta5: Scalar) -> Rotation:
@@ -94,26 +105,21 @@ def _passive_leg(
     """Revolutes 51, 53, 55 along y and 56 along the pitched x; virtual joints 52 and 54 bend the links out of plane."""
     first, second = geometry.passive_links
     lower, upper = (elbow - foot) * (1.0 / first), (tip - elbow) * (1.0 / second)
+    bending = bent_links(geometry.passive_links, stiffness.passive_links, stiffness.passive_link_bending)
     chain = (
-        Joint(Y_AXIS, foot, "passive leg foot"),
-        Spring("passive link 1", Joint(Vector(-lower.z, 0.0, lower.x), foot), stiffness.passive_links[0]),
+        servo(Joint(Y_AXIS, foot, "passive leg foot"), "passive leg actuator", stiffness.passive_actuator),
+        Spring("passive link 1", Joint(Vector(-lower.z, 0.0, lower.x), foot), bending[0]),
         Joint(Y_AXIS, elbow, "passive leg elbow"),
-        Spring("passive link 2", Joint(Vector(-upper.z, 0.0, upper.x), elbow), stiffness.passive_links[1]),
+        Spring("passive link 2", Joint(Vector(-upper.z, 0.0, upper.x), elbow), bending[1]),
         *revolutes(tip, (Y_AXIS, last_axis), "passive leg Hooke joint"),
     )
     return Leg("passive leg", chain)
 
 
-def _actuated_legs(platform: Displacement, geometry: Geometry, stiffness: Stiffness) -> list[Leg]:
-    base = attachments(geometry.base_radius, geometry.base_angle)
-    top = attachments(geometry.platform_radius, geometry.platform_angle)
-    return two_force_legs(base, [platform.apply(point) for point in top], stiffness.actuator)
-
-
-def attachments(radius: Scalar, angle: Scalar) -> list[Vector]:
-    """Joint centres at `radius` (m) and the angles T, 90 deg + T, -(90 deg + T), -T for T = `angle` (rad)."""
-    p = polar(radius, angle)
-    return [p, Vector(-p.y, p.x, 0.0), Vector(-p.y, -p.x, 0.0), Vector(p.x, -p.y, 0.0)]
+def joints(geometry: Geometry, platform: Displacement) -> tuple[list[Vector], list[Vector]]:
+    """Base joints and platform joints of the actuated legs in order, base frame, m."""
+    top = four_joints(geometry.platform_radius, geometry.platform_angle)
+    return four_joints(geometry.base_radius, geometry.base_angle), [platform.apply(point) for point in top]
 
 
 FAMILY = Family(

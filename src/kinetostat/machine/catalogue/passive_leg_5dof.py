@@ -3,14 +3,18 @@
 The paper names the class of 5-dof machines but no leg; this one is ours (theory section 4).
 """
 
+from collections.abc import Sequence
 from typing import Annotated
 
-from kinetostat.algebra.scalar import cos, reciprocal, sin, sqrt
+from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin, sqrt
 from kinetostat.algebra.triangle import apex
-from kinetostat.algebra.vector import X_AXIS, Y_AXIS, ZERO, Displacement, Rotation, Vector, ring, rotation_x
-from kinetostat.machine.catalogue.passive_leg_4dof import platform_pitch
-from kinetostat.machine.leg import Joint, Leg, Spring, revolutes, two_force_legs
+from kinetostat.algebra.vector import X_AXIS, Y_AXIS, ZERO, Displacement, Rotation, Vector, rotation_x
+from kinetostat.machine.catalogue.passive_leg_4dof import Two, platform_pitch
+from kinetostat.machine.guide import Guide
+from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes, two_force_legs
 from kinetostat.machine.machine import Closure, Configuration, Family
+from kinetostat.machine.parts import bent_links, servo
+from kinetostat.machine.rings import Rings, ends
 from kinetostat.spec.fields import Quantity, section
 
 LEGS = 5
@@ -18,15 +22,13 @@ Five = tuple[float, float, float, float, float]
 
 
 @section
-class Geometry:
+class Geometry(Rings):
     """Table [geometry]; the base frame has its origin O at the foot of the passive leg, z up."""
 
-    base_radius: Annotated[float, Quantity("length", "radius of the base joints, Rb", positive=True)]
     base_angles: Annotated[Five, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS)]
-    platform_radius: Annotated[float, Quantity("length", "radius of the platform joints, Rp", positive=True)]
     platform_angles: Annotated[Five, Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS)]
     passive_links: Annotated[
-        tuple[float, float],
+        Two,
         Quantity("length", "lengths of the passive leg's links l51 (base) and l52 (platform)", positive=True, count=2),
     ]
 
@@ -37,9 +39,16 @@ class Stiffness:
 
     actuator: Annotated[Five, Quantity("linear stiffness", "stiffness of the five actuators, Ka", count=LEGS)]
     passive_links: Annotated[
-        tuple[float, float],
+        Two,
         Quantity("torsional stiffness", "out-of-plane bending of the links at their lower ends, k52 and k54", count=2),
     ]
+    leg_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of the actuated legs, EA")] = RIGID
+    passive_link_bending: Annotated[
+        Two, Quantity("bending rigidity", "out-of-plane bending rigidity of the passive leg's links, EI", count=2)
+    ] = (RIGID, RIGID)
+    passive_actuator: Annotated[
+        float, Quantity("torsional stiffness", "actuator of the passive leg's first foot axis; 0 leaves it passive")
+    ] = 0.0
 
 
 @section
@@ -53,44 +62,51 @@ class Pose:
     theta6: Annotated[float, Quantity("angle", "angle of the Hooke joint's second axis, about the pitched x")]
 
 
-def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
-    """The machine at a pose, in closed form: the 4-dof machine's leg in a plane tilted about x through O and P.
+def guide(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Guide:
+    """The platform and the passive leg: that of the 4-dof machine in a plane tilted about x through O and P.
 
-    Args:
-        geometry, stiffness, pose: SI; base frame.
-
-    Returns:
-        The passive leg and the five actuated legs, placed; NaN where the passive leg cannot reach.
+    In closed form; NaN where the passive leg cannot reach (SI, base frame).
     """
     height = sqrt(pose.y * pose.y + pose.z * pose.z)
     tilt = rotation_x(pose.z * reciprocal(height), -pose.y * reciprocal(height))
     first, second = geometry.passive_links
-    flat_tip = Vector(pose.x, 0.0, height)
-    elbow, _ = apex(ZERO, flat_tip, first, second)
-    lower, upper = elbow * (1.0 / first), (flat_tip - elbow) * (1.0 / second)
-    pitch = tilt @ platform_pitch(upper, pose.theta5)
-    platform = Displacement(pitch @ rotation_x(cos(pose.theta6), sin(pose.theta6)), tilt.apply(flat_tip))
-    passive = _passive_leg(tilt, elbow, flat_tip, (lower, upper), pitch.x, stiffness)
-    base = ring(geometry.base_radius, geometry.base_angles)
-    top = [platform.apply(point) for point in ring(geometry.platform_radius, geometry.platform_angles)]
-    legs = two_force_legs(base, top, stiffness.actuator)
-    closure = Closure("passive leg", flat_tip.norm(), abs(first - second), first + second)
-    length = 0.5 * (geometry.base_radius + geometry.platform_radius)
-    return Configuration(platform, (passive, *legs), (closure,), length)
+    tip = Vector(pose.x, 0.0, height)
+    elbow, _ = apex(ZERO, tip, first, second)
+    links = elbow * (1.0 / first), (tip - elbow) * (1.0 / second)
+    pitch = tilt @ platform_pitch(links[1], pose.theta5)
+    platform = Displacement(pitch @ rotation_x(cos(pose.theta6), sin(pose.theta6)), tilt.apply(tip))
+    bending = bent_links(geometry.passive_links, stiffness.passive_links, stiffness.passive_link_bending)
+    springs = tuple(
+        Spring(f"passive link {i}", Joint(tilt.apply(Vector(-link.z, 0.0, link.x)), tilt.apply(low)), k)
+        for i, (link, low, k) in enumerate(zip(links, (ZERO, elbow), bending, strict=True), 1)
+    )
+    leg = _passive_leg(tilt, elbow, tip, pitch.x, springs, stiffness.passive_actuator)
+    return Guide(platform, leg, (Closure("passive leg", tip.norm(), abs(first - second), first + second),))
+
+
+def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
+    """The machine at a pose, in closed form: the passive leg and five U-P-S legs; NaN out of reach.
+
+    Args:
+        geometry, stiffness, pose: SI; base frame.
+    """
+    passive = guide(geometry, stiffness, pose)
+    base, top = ends(geometry, geometry.base_angles, geometry.platform_angles, passive.platform)
+    return passive.moved_by(two_force_legs(base, top, stiffness.actuator, stiffness.leg_axial), geometry.size)
 
 
 def _passive_leg(
-    tilt: Rotation, elbow: Vector, tip: Vector, links: tuple[Vector, Vector], last_axis: Vector, stiffness: Stiffness
+    tilt: Rotation, elbow: Vector, tip: Vector, last_axis: Vector, springs: Sequence[Spring], actuator: Scalar
 ) -> Leg:
     """Base Hooke joint along x and the plane's normal, elbow and platform joints along the normal, last along x''."""
     normal = tilt.apply(Y_AXIS)
-    knee, end = tilt.apply(elbow), tilt.apply(tip)
-    bending = [tilt.apply(Vector(-link.z, 0.0, link.x)) for link in links]
+    end = tilt.apply(tip)
     chain = (
-        *revolutes(ZERO, (X_AXIS, normal), "passive leg foot"),
-        Spring("passive link 1", Joint(bending[0], ZERO), stiffness.passive_links[0]),
-        Joint(normal, knee, "passive leg elbow"),
-        Spring("passive link 2", Joint(bending[1], knee), stiffness.passive_links[1]),
+        servo(Joint(X_AXIS, ZERO, "passive leg foot"), "passive leg actuator", actuator),
+        Joint(normal, ZERO, "passive leg foot"),
+        springs[0],
+        Joint(normal, tilt.apply(elbow), "passive leg elbow"),
+        springs[1],
         *revolutes(end, (normal, last_axis), "passive leg Hooke joint"),
     )
     return Leg("passive leg", chain)

@@ -6,23 +6,20 @@ The paper names the class of 3-dof machines but no leg; this one is ours (theory
 from typing import Annotated
 
 from kinetostat.algebra.scalar import cos, sin
-from kinetostat.algebra.vector import Y_AXIS, ZERO, Displacement, ring, rotation_x, rotation_y
-from kinetostat.machine.leg import Joint, Leg, Spring, revolutes, two_force_legs
+from kinetostat.algebra.vector import Y_AXIS, ZERO, Displacement, rotation_x, rotation_y
+from kinetostat.machine.guide import Guide
+from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes, two_force_legs
 from kinetostat.machine.machine import Configuration, Family
+from kinetostat.machine.parts import in_series, servo
+from kinetostat.machine.rings import Three, ThreeLegs, ends
 from kinetostat.spec.fields import Quantity, section
 
 LEGS = 3
-Three = tuple[float, float, float]
 
 
 @section
-class Geometry:
+class Geometry(ThreeLegs):
     """Table [geometry]; the base frame has its origin at the Hooke joint of the tube."""
-
-    base_radius: Annotated[float, Quantity("length", "radius of the base joints, Rb", positive=True)]
-    base_angles: Annotated[Three, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS)]
-    platform_radius: Annotated[float, Quantity("length", "radius of the platform joints, Rp", positive=True)]
-    platform_angles: Annotated[Three, Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS)]
 
 
 @section
@@ -34,6 +31,12 @@ class Stiffness:
         Three,
         Quantity("torsional stiffness", "tube at its platform end: bending about its x and y, torsion", count=3),
     ]
+    leg_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of the legs, EA")] = RIGID
+    tube_bending: Annotated[float, Quantity("bending rigidity", "bending rigidity of the tube, EI")] = RIGID
+    tube_torsion: Annotated[float, Quantity("torsional rigidity", "torsional rigidity of the tube, GJ")] = RIGID
+    tube_actuator: Annotated[
+        float, Quantity("linear stiffness", "actuator of the tube's slide; 0 leaves it passive")
+    ] = 0.0
 
 
 @section
@@ -45,27 +48,30 @@ class Pose:
     length: Annotated[float, Quantity("length", "from the Hooke joint to the platform point P", positive=True)]
 
 
+def guide(stiffness: Stiffness, pose: Pose) -> Guide:
+    """The platform and the tube, in closed form; every pose can be reached (SI, base frame)."""
+    pitch = rotation_y(cos(pose.theta1), sin(pose.theta1))
+    turn = pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2))
+    platform = Displacement(turn, turn.z * pose.length)
+    rigidities = ((stiffness.tube_bending, 3.0), (stiffness.tube_bending, 3.0), (stiffness.tube_torsion, 1.0))
+    built_in = [in_series(k, own, pose.length, n) for k, (own, n) in zip(stiffness.tube, rigidities, strict=True)]
+    springs = tuple(
+        Spring(f"tube {name}", Joint(axis, platform.translation), k)
+        for name, axis, k in zip(("bending x", "bending y", "torsion"), (turn.x, turn.y, turn.z), built_in, strict=True)
+    )
+    slide = servo(Joint(turn.z, None, "tube slide"), "tube actuator", stiffness.tube_actuator)
+    return Guide(platform, Leg("tube", (*revolutes(ZERO, (Y_AXIS, pitch.x), "tube Hooke joint"), slide, *springs)))
+
+
 def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
     """The machine at a pose, in closed form.
 
     Args:
         geometry, stiffness, pose: SI; base frame.
     """
-    pitch = rotation_y(cos(pose.theta1), sin(pose.theta1))
-    turn = pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2))
-    platform = Displacement(turn, turn.z * pose.length)
-    springs = tuple(
-        Spring(f"tube {name}", Joint(axis, platform.translation), k)
-        for name, axis, k in zip(
-            ("bending x", "bending y", "torsion"), (turn.x, turn.y, turn.z), stiffness.tube, strict=True
-        )
-    )
-    joints = (*revolutes(ZERO, (Y_AXIS, pitch.x), "tube Hooke joint"), Joint(turn.z, None, "tube slide"))
-    tube = Leg("tube", (*joints, *springs))
-    base = ring(geometry.base_radius, geometry.base_angles)
-    top = [platform.apply(point) for point in ring(geometry.platform_radius, geometry.platform_angles)]
-    legs = two_force_legs(base, top, stiffness.actuator)
-    return Configuration(platform, (tube, *legs), (), 0.5 * (geometry.base_radius + geometry.platform_radius))
+    tube = guide(stiffness, pose)
+    base, top = ends(geometry, geometry.base_angles, geometry.platform_angles, tube.platform)
+    return tube.moved_by(two_force_legs(base, top, stiffness.actuator, stiffness.leg_axial), geometry.size)
 
 
 FAMILY = Family(

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import qr
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.machine.leg import Joint
@@ -20,7 +19,7 @@ LEAST_AXIS = 1e-9
 PARALLEL = 1e-6
 """Sine of the angle between the axes of a universal joint below which they are one."""
 INDEPENDENT = 1e-9
-"""Relative pivot below which a passive twist depends on the others."""
+"""Distance from the span of others below which a unit twist depends on them."""
 ELASTIC = ("lumped", "beam", "timoshenko")
 
 
@@ -116,7 +115,12 @@ def _dependent(freedoms: Sequence[Joint], planar: bool, reference: Vector, lengt
     matrix /= np.linalg.norm(matrix, axis=0)
     given, rest = matrix[:, : len(absent)], matrix[:, len(absent) :]
     rest = rest - given @ np.linalg.lstsq(given, rest, rcond=None)[0] if absent else rest
-    _, triangle, order = qr(rest, mode="economic", pivoting=True)
-    pivots = np.abs(np.diag(triangle))
-    rank = int((pivots > INDEPENDENT * max(pivots[0], INDEPENDENT)).sum())
-    return tuple(sorted(int(i) for i in order[rank:]))
+    kept: list[int] = []
+    for _ in range(rest.shape[1]):
+        sizes = np.linalg.norm(rest, axis=0)
+        if sizes.max() < INDEPENDENT:
+            break
+        kept.append(int(np.argmax(sizes)))
+        axis = rest[:, kept[-1]] / sizes[kept[-1]]
+        rest = rest - np.outer(axis, axis @ rest)
+    return tuple(i for i in range(rest.shape[1]) if i not in kept)

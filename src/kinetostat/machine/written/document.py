@@ -45,7 +45,7 @@ def by_name(document: Document, origin: str) -> Document:
     result = copy.deepcopy(document)
     legs = result.get("legs")
     if isinstance(legs, list):
-        result["legs"] = legs = _named(legs, origin, "leg")
+        result["legs"] = legs = _named(legs, f'"{origin}"', "leg")
     if not isinstance(legs, dict) or not 1 <= len(legs) <= MOST_LEGS:
         raise InputError(f'"{origin}": it needs 1 to {MOST_LEGS} legs, each written as [[legs]] with name and joints.')
     for name, leg in legs.items():
@@ -79,13 +79,29 @@ def _named(entries: list[Any], where: str, what: str) -> dict[str, Any]:
         name = entry.get("name") if isinstance(entry, dict) else None
         if not isinstance(name, str) or not name.strip() or "." in name or len(name) > 40 or not name.isprintable():
             raise InputError(
-                f'{where}: the name of {what} {i} is {shorten(name)}; give each a short name without dots, '
+                f"{where}: the name of {what} {i} is {shorten(name)}; give each a short name without dots, "
                 f'e.g. name = "{what} {i}".'
             )
         if name in found:
             raise InputError(f'{where}: two {what}s are called "{name}"; give each a name of its own.')
         found[name] = {key: value for key, value in entry.items() if key != "name"}
     return found
+
+
+def check_paths(document: Document, settings: Iterable[str]) -> None:
+    """Refuse overrides of legs, joints and links that the document, in which everything has a name, does not have.
+
+    Raises:
+        InputError: with what it has.
+    """
+    for setting in settings:
+        table, *names = setting.partition("=")[0].strip().split(".")
+        at: Any = document.get(table)
+        for name in names[:2] if table == "legs" else ():
+            if isinstance(at, dict) and name not in at:
+                _choice(name, at, f"--set {shorten(setting)}: the name after {table}")
+            at = at.get(name) if isinstance(at, dict) else None
+            table = f"{table}.{name}"
 
 
 def separate(document: Document, origin: str) -> tuple[Plan, Document]:
@@ -105,6 +121,8 @@ def separate(document: Document, origin: str) -> tuple[Plan, Document]:
     legs = tuple(_leg(name, leg, f'"{origin}": leg "{name}"', shapes) for name, leg in rest["legs"].items())
     coordinates = PLANAR_POSE if space == "planar" else SPATIAL_POSE
     pose = rest.get("pose", {})
+    for name in pose if isinstance(pose, dict) else ():
+        _choice(name, coordinates, f'"{origin}": a name in [pose]')
     given = tuple(name for name in coordinates if isinstance(pose, dict) and name in pose)
     if not given:
         raise InputError(f'"{origin}": [pose] must give the task coordinates, some of {", ".join(coordinates)}.')
@@ -199,7 +217,7 @@ def _link(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str]
         raise InputError(f'{where}: a compliance matrix belongs to model = "matrix", and to it alone.')
     for key in part:
         raise InputError(f"{where}: {key} is not known; a link has model, section, up and compliance.")
-    return LinkPlan(name, model, section, tuple(map(float, up)) if up else None, compliance)
+    return LinkPlan(name, model, section, (float(up[0]), float(up[1]), float(up[2])) if up else None, compliance)
 
 
 def _matrix(value: object, where: str) -> Matrix:

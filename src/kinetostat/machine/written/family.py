@@ -76,7 +76,9 @@ def chain_at_home(plan: Plan, leg: LegPlan, sections: Mapping[str, Any]) -> list
         link = leg.links.get(joint.joins[1])
         if link is not None:
             ends = Vector(*data[i].point), Vector(*data[i + 1].point)
-            steps += [Step(element, False) for element in _yielding(f"{leg.name} {link.name}", link, ends, plan, sections)]
+            steps += [
+                Step(element, False) for element in _yielding(f"{leg.name} {link.name}", link, ends, plan, sections)
+            ]
     return steps
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from kinetostat.machine.leg import RIGID
-from kinetostat.machine.section import MATERIALS, Section, rectangular_section, rigidity, tube_section
 from kinetostat.machine.link import Rigidity
+from kinetostat.machine.section import MATERIALS, Section, rectangular_section, rigidity, tube_section
 from kinetostat.machine.written.plan import SHAPES, JointPlan, Plan
 from kinetostat.spec.fields import Quantity, section
 

@@ -1,0 +1,112 @@
+"""Eigenscrews: the six screws on which a twist causes a wrench on the same screw, and what they make of K and C.
+
+They belong to the machine, not to the reference point. Full 6 x 6 only: in a plane all pitches are zero. Centres are in
+`centres`.
+
+Sources: T. Patterson and H. Lipkin, "Structure of robot compliance", ASME J. Mechanical Design 115(3), 1993; S. Huang
+and J. M. Schimmels, "The eigenscrew decomposition of spatial stiffness matrices", IEEE Trans. Robotics and Automation
+16(2), 2000.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinetostat.kinetostatics.indices import Array, Matrix, finite
+
+INDEFINITE = 1e-12
+"""Share of the largest eigenvalue, in units of the matrix' own length, below which one is the rounding of zero."""
+ROTATION, TRANSLATION = slice(0, 3), slice(3, 6)
+MOMENT, FORCE = ROTATION, TRANSLATION
+PURE = 1e-9
+"""Share of force in a wrench (rotation in a twist), in the same units, below which it is a couple (translation)."""
+
+
+@dataclass(frozen=True)
+class Eigenscrew:
+    """A screw on which a twist causes a wrench on the same screw.
+
+    Attributes:
+        eigenvalue: that wrench's force over that twist's rotation, N/rad: K t = eigenvalue * (t as a wrench). Zero from
+            a K, infinity from a C, that is singular.
+        pitch: m/rad, of the sign of the eigenvalue; infinity for a couple (translation).
+        direction: unit vector of the axis, base axes [3]; its largest component is positive.
+        point: foot of the perpendicular from P on the axis, base axes, m [3]; None at infinite pitch.
+        weight: k in K = sum k w w^T, of a spring on the unit wrench w = [h n + r x n; n] (N/m), or [n; 0] at infinite
+            pitch (N·m/rad); from C, s in C = sum s t t^T with t = [n; h n + r x n] (rad/(N·m)), or [0; n] (m/N).
+    """
+
+    eigenvalue: float
+    pitch: float
+    direction: list[float]
+    point: list[float] | None
+    weight: float
+
+
+def eigenscrews(stiffness: Matrix) -> list[Eigenscrew]:
+    """The eigenscrews of K, solutions of K t = lambda Delta t, where Delta exchanges the halves of a screw.
+
+    With K = F F^T they are the w = F y with F^T Delta F y = lambda y: a symmetric problem, hence real, and K =
+    sum k w w^T follows. Where K is regular three pitches are positive and three negative, and 2 h k = lambda.
+    Patterson and Lipkin (1993); the decomposition, Huang and Schimmels (2000).
+
+    Args:
+        stiffness: K at P, base axes [6 x 6], finite, positive semi-definite.
+
+    Returns:
+        As many as the rank of K, by increasing eigenvalue; of a repeated eigenvalue (zero, where K is singular) one of
+        many choices that all give the sum.
+
+    Raises:
+        ValueError: if K is not 6 x 6 and finite.
+    """
+    return [_eigenscrew(*term, term[0]) for term in _terms(_finite(stiffness), line=FORCE, moment=MOMENT)]
+
+
+def compliance_eigenscrews(compliance: Matrix) -> list[Eigenscrew]:
+    """The eigenscrews of C: the same screws as of K = C^-1, and those that yield where K is infinite.
+
+    With C = F F^T they are the t = F y with F^T Delta F y = y / lambda. Arguments and results as for `eigenscrews`.
+    """
+    terms = _terms(_finite(compliance), line=ROTATION, moment=TRANSLATION)
+    found = [_eigenscrew(*term, 1.0 / term[0] if term[0] else math.inf) for term in terms]
+    return sorted(found, key=lambda screw: screw.eigenvalue)
+
+
+def _finite(matrix: Matrix) -> Array:
+    array = finite(matrix)
+    if array is None:
+        raise ValueError("eigenscrews need a finite matrix: take C where K is infinite, K where C is")
+    return array
+
+
+def _terms(matrix: Array, line: slice, moment: slice) -> list[tuple[float, Array, Array]]:
+    """The matrix as a sum of squares of its eigenscrews: for each, twice line . moment, its line and its moment.
+
+    All in the balanced length, in which both diagonal blocks have one trace. A line that is rounding is zero.
+    """
+    sizes = float(np.trace(matrix[moment, moment])), float(np.trace(matrix[line, line]))
+    length = math.sqrt(sizes[0] / sizes[1]) if sizes[0] > 0.0 and sizes[1] > 0.0 else 1.0
+    scale = np.ones(6)
+    scale[moment] = 1.0 / length
+    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+    kept = values > INDEFINITE * values[-1]
+    factor = vectors[:, kept] * np.sqrt(values[kept])
+    products, mixed = np.linalg.eigh(factor.T @ np.roll(factor, 3, axis=0))
+    products[np.abs(products) <= INDEFINITE * values[-1]] = 0.0
+    screws = (factor @ mixed).T
+    pure = np.linalg.norm(screws[:, line], axis=1) <= PURE * np.linalg.norm(screws, axis=1)
+    screws[pure, line] = 0.0
+    return [(float(p) * length, w[line], w[moment] * length) for p, w in zip(products, screws, strict=True)]
+
+
+def _eigenscrew(product: float, line: Array, moment: Array, eigenvalue: float) -> Eigenscrew:
+    """From a term: its pitch is line . moment over line . line."""
+    pure = not line.any()
+    axis = moment if pure else line
+    size = float(np.linalg.norm(axis))
+    direction = axis * math.copysign(1.0 / size, axis[np.argmax(np.abs(axis))])
+    point = None if pure else [float(c) for c in np.cross(line, moment) / size**2]
+    pitch = math.inf if pure else 0.5 * product / size**2
+    return Eigenscrew(eigenvalue, pitch, direction.tolist(), point, size**2)

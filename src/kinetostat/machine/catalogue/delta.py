@@ -1,0 +1,89 @@
+"""Delta: three actuated cranks, each with a pair of bars that keeps the platform from turning; freedoms x, y, z.
+
+Source: R. Clavel, "Delta, a fast robot with parallel geometry" (1988), for the architecture; symbols are ours
+(theory section 4). The base plate is at z = 0, the platform below it.
+"""
+
+from typing import Annotated
+
+from kinetostat.algebra.scalar import Scalar
+from kinetostat.algebra.vector import IDENTITY, Z_AXIS, Displacement, Vector, polar, ring
+from kinetostat.machine.bars import BarPair
+from kinetostat.machine.crank import CrankLinks, place
+from kinetostat.machine.leg import RIGID, Joint, Leg, Spring
+from kinetostat.machine.machine import Closure, Configuration, Family
+from kinetostat.machine.parts import arm
+from kinetostat.machine.rings import Rings, Three
+from kinetostat.spec.fields import Quantity, section
+
+LEGS = 3
+
+
+@section
+class Geometry(Rings):
+    """Table [geometry]; the base frame has its origin at the base centre, the platform's axes stay parallel to it."""
+
+    leg_angles: Annotated[Three, Quantity("angle", "angles of the legs from x, in base and platform", count=LEGS)]
+    arm_length: Annotated[
+        float, Quantity("length", "from the actuated revolute to the middle of the elbow", positive=True)
+    ]
+    bar_length: Annotated[float, Quantity("length", "of the bars, from elbow to platform", positive=True)]
+    bar_spacing: Annotated[float, Quantity("length", "distance of the two bars of a leg", positive=True)]
+
+
+@section
+class Stiffness:
+    """Table [stiffness]."""
+
+    actuator: Annotated[Three, Quantity("torsional stiffness", "stiffness of the actuated revolutes", count=LEGS)]
+    bar_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of each bar, EA")] = RIGID
+    arm_bending: Annotated[float, Quantity("bending rigidity", "bending rigidity of the arms, EI")] = RIGID
+    arm_torsion: Annotated[float, Quantity("torsional rigidity", "torsional rigidity of the arms, GJ")] = RIGID
+
+
+@section
+class Pose:
+    """Table [pose]: the three task coordinates; the platform does not turn."""
+
+    x: Annotated[float, Quantity("length", "x of the platform point P")]
+    y: Annotated[float, Quantity("length", "y of the platform point P")]
+    z: Annotated[float, Quantity("length", "z of the platform point P, negative: below the base")]
+
+
+def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
+    """The machine at a pose, in closed form, elbows outward; NaN where the bars do not reach.
+
+    Args:
+        geometry, stiffness, pose: SI; base frame.
+    """
+    tip = Vector(pose.x, pose.y, pose.z)
+    base, top = ring(geometry.base_radius, geometry.leg_angles), ring(geometry.platform_radius, geometry.leg_angles)
+    radial = [polar(1.0, angle) for angle in geometry.leg_angles]
+    found = [
+        _leg(f"leg {i}", low, tip + high, outward.cross(Z_AXIS), k, geometry, stiffness)
+        for i, (low, high, outward, k) in enumerate(zip(base, top, radial, stiffness.actuator, strict=True), 1)
+    ]
+    limits = tuple(limit for _, own in found for limit in own)
+    return Configuration(Displacement(IDENTITY, tip), tuple(leg for leg, _ in found), limits, geometry.size)
+
+
+def _leg(
+    name: str, base: Vector, tip: Vector, axis: Vector, actuator: Scalar, geometry: Geometry, stiffness: Stiffness
+) -> tuple[Leg, tuple[Closure, ...]]:
+    """R - arm - pair of bars; `axis` of the revolute such that an elbow at +90 deg from a way down is outward."""
+    elbow, limits = place(name, base, tip, axis, CrankLinks(geometry.arm_length, geometry.bar_length))
+    bars = BarPair(name, elbow, tip, axis, geometry.bar_length, geometry.bar_spacing, stiffness.bar_axial)
+    chain = (
+        Spring(f"{name} actuator", Joint(axis, base), actuator, actuated=True),
+        arm(f"{name} arm", base, elbow, axis, stiffness.arm_bending, stiffness.arm_torsion),
+        *bars.chain,
+    )
+    return Leg(name, chain, bars.lines), limits
+
+
+FAMILY = Family(
+    name="delta",
+    summary="Delta: 3 actuated cranks with pairs of bars; freedoms x, y, z",
+    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
+    configure=configure,
+)

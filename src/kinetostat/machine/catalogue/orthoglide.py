@@ -1,0 +1,94 @@
+"""Orthoglide: three actuated slides along x, y and z, each with a pair of bars to the platform; freedoms x, y, z.
+
+Source: Chablat and Wenger, "Architecture optimization of a 3-DOF translational parallel mechanism for machining
+applications, the Orthoglide" (2003), for the architecture; bars on spherical joints and symbols are ours (theory
+section 4). At the origin all bars point along their slides: there the machine is isotropic.
+"""
+
+from typing import Annotated
+
+from kinetostat.algebra.scalar import Scalar
+from kinetostat.algebra.triangle import slide_travel
+from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector
+from kinetostat.machine.bars import BarPair
+from kinetostat.machine.leg import RIGID, Joint, Leg, Spring
+from kinetostat.machine.machine import Closure, Configuration, Family
+from kinetostat.machine.parts import arm
+from kinetostat.machine.rings import Three
+from kinetostat.spec.fields import Quantity, section
+
+LEGS = 3
+
+
+@section
+class Geometry:
+    """Table [geometry]; the origin of the base frame is the point P at the isotropic pose."""
+
+    bar_length: Annotated[float, Quantity("length", "of the bars, from slide to platform", positive=True)]
+    bar_spacing: Annotated[float, Quantity("length", "distance of the two bars of a leg", positive=True)]
+    platform_radius: Annotated[
+        float, Quantity("length", "from the platform joints, on the negative x, y, z axes of the platform, to P")
+    ]
+    foot_length: Annotated[
+        float, Quantity("length", "of the foot on each slide, square to the rail, that carries the bars", positive=True)
+    ]
+
+
+@section
+class Stiffness:
+    """Table [stiffness]."""
+
+    actuator: Annotated[Three, Quantity("linear stiffness", "stiffness of the slides along x, y, z", count=LEGS)]
+    bar_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of each bar, EA")] = RIGID
+    foot_bending: Annotated[float, Quantity("bending rigidity", "bending rigidity of the feet, EI")] = RIGID
+    foot_torsion: Annotated[float, Quantity("torsional rigidity", "torsional rigidity of the feet, GJ")] = RIGID
+
+
+@section
+class Pose:
+    """Table [pose]: the three task coordinates; the platform does not turn."""
+
+    x: Annotated[float, Quantity("length", "x of the platform point P")]
+    y: Annotated[float, Quantity("length", "y of the platform point P")]
+    z: Annotated[float, Quantity("length", "z of the platform point P")]
+
+
+def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
+    """The machine at a pose, in closed form, the slides behind the platform; NaN where the bars do not reach.
+
+    Args:
+        geometry, stiffness, pose: SI; base frame.
+    """
+    tip = Vector(pose.x, pose.y, pose.z)
+    found = [
+        _leg(f"leg {name}", tip, (AXES[i], AXES[(i + 1) % LEGS]), k, geometry, stiffness)
+        for i, (name, k) in enumerate(zip("xyz", stiffness.actuator, strict=True))
+    ]
+    legs, limits = tuple(leg for leg, _ in found), tuple(limit for _, limit in found)
+    return Configuration(Displacement(IDENTITY, tip), legs, limits, geometry.bar_length)
+
+
+def _leg(
+    name: str, tip: Vector, axes: tuple[Vector, Vector], actuator: Scalar, geometry: Geometry, stiffness: Stiffness
+) -> tuple[Leg, Closure]:
+    """P - foot - pair of bars; `axes` of the slide and from one bar to the other, the foot square to both."""
+    forward, side = axes
+    joint = tip - forward * geometry.platform_radius
+    travel, aside = slide_travel(ZERO, joint, forward, geometry.bar_length)
+    slide = forward * travel
+    bars = BarPair(name, slide, joint, side, geometry.bar_length, geometry.bar_spacing, stiffness.bar_axial)
+    rail = slide + side.cross(forward) * geometry.foot_length
+    chain = (
+        Spring(f"{name} actuator", Joint(forward), actuator, actuated=True),
+        arm(f"{name} foot", rail, slide, forward, stiffness.foot_bending, stiffness.foot_torsion),
+        *bars.chain,
+    )
+    return Leg(name, chain, bars.lines), Closure(f"pair of bars of {name}", aside, 0.0, geometry.bar_length)
+
+
+FAMILY = Family(
+    name="orthoglide",
+    summary="Orthoglide: 3 actuated slides along x, y, z with pairs of bars; freedoms x, y, z",
+    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
+    configure=configure,
+)

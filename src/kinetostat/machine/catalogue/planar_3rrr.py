@@ -1,0 +1,77 @@
+"""Planar 3-RRR: three legs R-R-R in the x-y plane, their base revolutes actuated; freedoms x, y and one angle.
+
+All elbows lie on the left of the way from base joint to platform joint, seen from +z (theory section 4).
+Source: Gosselin and Angeles, "The optimum kinematic design of a planar three-degree-of-freedom parallel manipulator"
+(1988), for the architecture; symbols are ours.
+"""
+
+from typing import Annotated
+
+from kinetostat.algebra.scalar import Scalar, reciprocal
+from kinetostat.algebra.vector import Z_AXIS, Vector
+from kinetostat.machine.catalogue.planar_3rpr import LEGS, Pose, placed
+from kinetostat.machine.crank import CrankLinks, place
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, Spring
+from kinetostat.machine.machine import Closure, Configuration, Family, Plane
+from kinetostat.machine.parts import RigidLink, if_elastic, per_length
+from kinetostat.machine.rings import Three, ThreeLegs
+from kinetostat.spec.fields import Quantity, section
+
+
+@section
+class Geometry(ThreeLegs):
+    """Table [geometry]; all joints lie in the x-y plane, the base ones about O, the platform ones about P."""
+
+    proximal_link: Annotated[float, Quantity("length", "from the actuated base revolute to the elbow", positive=True)]
+    distal_link: Annotated[float, Quantity("length", "from the elbow to the platform joint", positive=True)]
+
+
+@section
+class Stiffness:
+    """Table [stiffness]."""
+
+    actuator: Annotated[Three, Quantity("torsional stiffness", "stiffness of the actuated revolutes", count=LEGS)]
+    proximal_bending: Annotated[
+        float, Quantity("bending rigidity", "bending rigidity of the proximal links in the plane, EI")
+    ] = RIGID
+    distal_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of the distal links, EA")] = RIGID
+
+
+def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
+    """The machine at a pose, in closed form; NaN where a leg does not reach.
+
+    Args:
+        geometry, stiffness, pose: SI; base frame.
+    """
+    platform, joints = placed(geometry, pose)
+    links = CrankLinks(geometry.proximal_link, geometry.distal_link, stiffness.proximal_bending, stiffness.distal_axial)
+    found = [
+        _leg(f"leg {i}", base, tip, k, links)
+        for i, (base, tip, k) in enumerate(zip(*joints, stiffness.actuator, strict=True), 1)
+    ]
+    limits = tuple(limit for _, own in found for limit in own)
+    return Configuration(platform, tuple(leg for leg, _ in found), limits, geometry.size, Plane())
+
+
+def _leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, links: CrankLinks) -> tuple[Leg, tuple[Closure, ...]]:
+    """R-R-R: a force along the distal link; the base revolute is two springs, actuator and 3 EI / length (Table I)."""
+    elbow, limits = place(name, base, tip, Z_AXIS, links)
+    along, pivot = (tip - elbow) * reciprocal(links.rod), Joint(Z_AXIS, base)
+    chain: tuple[Element, ...] = (
+        Spring(f"{name} actuator", pivot, stiffness, actuated=True),
+        *if_elastic(Spring(f"{name} proximal link", pivot, per_length(links.bending, links.crank, 3.0))),
+        RigidLink(base, elbow),
+        Joint(Z_AXIS, elbow, f"{name} elbow"),
+        *if_elastic(Spring(f"{name} distal link", Joint(along), per_length(links.axial, links.rod))),
+        Joint(Z_AXIS, tip, f"{name} platform joint"),
+    )
+    return Leg(name, chain, (Line(tip, along),)), limits
+
+
+FAMILY = Family(
+    name="planar-3rrr",
+    summary="planar: 3 R-R-R legs with actuated base revolutes; freedoms x, y, angle",
+    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
+    configure=configure,
+    planar=True,
+)

@@ -1,0 +1,68 @@
+"""All indices of one pose together, read off K and C; their formulas are in `kinetostatics`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kinetostat.kinetostatics.centres import (
+    Point,
+    centre_of_compliance,
+    centre_of_elasticity,
+    centre_of_stiffness,
+)
+from kinetostat.kinetostatics.conditioning import stiffness_condition
+from kinetostat.kinetostatics.eigenscrews import Eigenscrew, compliance_eigenscrews, eigenscrews
+from kinetostat.kinetostatics.indices import (
+    SPATIAL,
+    Principal,
+    PrincipalStiffness,
+    free_stiffnesses,
+    guided_stiffnesses,
+    principal_compliances,
+)
+
+Rows = Sequence[Sequence[float]]
+
+
+@dataclass(frozen=True)
+class Indices:
+    """Indices of a pose, at T and in the axes of K and C.
+
+    Attributes:
+        principal: principal compliances by block, None where a direction is free.
+        free, guided: principal stiffnesses by block, the other block free or held (`kinetostatics.indices`).
+        condition: of K, rotations made comparable by the characteristic length; infinite where rigid or free.
+        centres: of stiffness, compliance and elasticity, from T, m; None where there is none.
+        eigenscrews: of K, or of C where K is not finite; empty for a planar machine.
+    """
+
+    principal: dict[str, Principal] | None
+    free: dict[str, PrincipalStiffness] | None
+    guided: dict[str, PrincipalStiffness] | None
+    condition: float
+    centres: dict[str, Point | None]
+    eigenscrews: tuple[Eigenscrew, ...]
+
+
+def indices_of(stiffness: Rows | None, compliance: Rows | None, length: float, components: tuple[int, ...]) -> Indices:
+    """Every index that K [n x n] and C [n x n] give, one of which may be missing.
+
+    Args:
+        stiffness, compliance: None where not finite.
+        length: characteristic length, m.
+        components: their rows, of rx ry rz x y z = 0 ... 5.
+    """
+    screws: list[Eigenscrew] = []
+    if components == SPATIAL:
+        screws = eigenscrews(stiffness) if stiffness else compliance_eigenscrews(compliance) if compliance else []
+    return Indices(
+        principal_compliances(compliance, components) if compliance else None,
+        free_stiffnesses(stiffness, compliance, components),
+        guided_stiffnesses(stiffness, compliance, components),
+        stiffness_condition(stiffness, compliance, length, components),
+        {
+            "stiffness": centre_of_stiffness(stiffness, components),
+            "compliance": centre_of_compliance(compliance, components),
+            "elasticity": centre_of_elasticity(stiffness, compliance, components),
+        },
+        tuple(screws),
+    )

@@ -1,0 +1,74 @@
+"""What an independent engine answers about a machine, and how two compliances compare. Knows no engine."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+ROTATIONS, TRANSLATIONS = slice(0, 3), slice(3, 6)
+VANISHING = 1e-10
+"""Share of the other diagonal block, in one unit, below which a block counts as zero: the machine is rigid there."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One of the answers from which an engine's final one follows.
+
+    Attributes:
+        scale: what was varied, see `Answer.varied`.
+        compliance: C at the reference point, base axes, rx ry rz x y z [6 x 6].
+    """
+
+    scale: float
+    compliance: Array
+
+
+@dataclass(frozen=True)
+class Answer:
+    """An engine's compliance of a machine.
+
+    Attributes:
+        compliance: C at the reference point, base axes, rx ry rz x y z [6 x 6]; rows that a planar machine does not
+            have are 0.
+        uncertainty: how far the engine's own answers differ, as a share of it (see `difference`).
+        varied: what the trials vary, for people.
+        trials: in the order of their scale.
+    """
+
+    compliance: Array
+    uncertainty: float
+    varied: str
+    trials: tuple[Trial, ...]
+
+
+def block_differences(actual: Array, expected: Array, length: float, vanishing: float = VANISHING) -> dict[str, float]:
+    """Relative difference of two compliances in their blocks: rotation, coupling, translation.
+
+    A block is measured by its Frobenius norm, the coupling by the geometric mean of the two diagonal blocks: for a
+    positive semi-definite matrix it is at most that, and no unit is mixed. Where the machine is rigid in one diagonal
+    block, so that nothing is there to compare with, the other one serves, through `length` (m):
+    that is, where it is below the share `vanishing` of the other.
+    """
+    turning, moving = (float(np.linalg.norm(expected[b, b])) for b in (ROTATIONS, TRANSLATIONS))
+    if turning * length**2 < vanishing * moving:
+        turning = moving / length**2
+    elif moving < vanishing * turning * length**2:
+        moving = turning * length**2
+    sizes = {
+        "rotation": (ROTATIONS, ROTATIONS, turning),
+        "coupling": (ROTATIONS, TRANSLATIONS, float(np.sqrt(turning * moving))),
+        "translation": (TRANSLATIONS, TRANSLATIONS, moving),
+    }
+    error = actual - expected
+    apart = {
+        name: max(float(np.linalg.norm(error[rows, columns])), float(np.linalg.norm(error[columns, rows])))
+        for name, (rows, columns, _) in sizes.items()
+    }
+    return {name: apart[name] / size if size > 0.0 else apart[name] for name, (_, _, size) in sizes.items()}
+
+
+def difference(actual: Array, expected: Array, length: float, vanishing: float = VANISHING) -> float:
+    """The largest of the relative differences of the blocks."""
+    return max(block_differences(actual, expected, length, vanishing).values())

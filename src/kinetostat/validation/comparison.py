@@ -1,0 +1,171 @@
+"""Our compliance beside that of an independent engine: which engines there are, and what they say of a machine."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.algebra.vector import Vector
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.validation.answer import Answer, block_differences, difference
+
+Array = npt.NDArray[np.float64]
+
+INSTALL = "Install it with: pip install 'kinetostat[validate]'"
+
+
+@dataclass(frozen=True)
+class Engine:
+    """An engine that is not ours.
+
+    Attributes:
+        name: by which it is asked for.
+        package: as installed.
+        needs: modules that must be there.
+        builder: our module whose `solve` rebuilds a machine in it.
+        summary: what it makes of a machine.
+    """
+
+    name: str
+    package: str
+    needs: tuple[str, ...]
+    builder: str
+    summary: str
+
+    @property
+    def version(self) -> str | None:
+        """Of the installed package; None if it is not installed."""
+        if any(find_spec(module) is None for module in self.needs):
+            return None
+        try:
+            return version(self.package)
+        except PackageNotFoundError:
+            return None
+
+    def solve(self, configuration: Configuration, reference: Vector) -> Answer:
+        """C of a placed machine at a point (base frame, m).
+
+        Raises:
+            InputError: if the engine is not installed, or has no part for one of the machine's.
+        """
+        if self.version is None:
+            raise InputError(f"The engine {self.name} is not installed. {INSTALL}")
+        solve: Callable[[Configuration, Vector], Answer] = import_module(self.builder).solve
+        return solve(configuration, reference)
+
+
+KNOWN = (
+    Engine(
+        "exudyn",
+        "exudyn",
+        ("exudyn", "scipy"),
+        "kinetostat.validation.exudyn_answer",
+        "multibody dynamics: rigid bodies, exact constraints and springs",
+    ),
+    Engine(
+        "pynite",
+        "PyNiteFEA",
+        ("Pynite", "scipy"),
+        "kinetostat.validation.pynite_machine",
+        "frame analysis: straight members, releases and stiff parts",
+    ),
+)
+"""Every engine that a machine can be rebuilt in, the one for any machine first."""
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Two answers to one question; matrices at T in base axes, order rx ry rz x y z, SI.
+
+    Attributes:
+        machine: what was asked about.
+        engine, version: who answered beside us.
+        ours, theirs: C [6 x 6]; rows that a planar machine does not have are 0.
+        differences: relative, by block: rotation, coupling, translation.
+        uncertainty: how far the engine's own answers differ, in the same measure.
+        varied: what the engine's trials vary, for people.
+        trials: scale and difference from ours of each.
+    """
+
+    machine: Machine
+    engine: str
+    version: str
+    ours: Array
+    theirs: Array
+    differences: dict[str, float]
+    uncertainty: float
+    varied: str
+    trials: tuple[tuple[float, float], ...]
+
+    @property
+    def difference(self) -> float:
+        """The largest of the blocks' relative differences."""
+        return max(self.differences.values())
+
+
+def engines() -> dict[str, str]:
+    """Name and version of every engine that is installed."""
+    return {engine.name: found for engine in KNOWN if (found := engine.version) is not None}
+
+
+def choose(name: str | None) -> Engine:
+    """The engine of that name, or the first that is installed.
+
+    Raises:
+        InputError: if there is none.
+    """
+    if name is None:
+        installed = [engine for engine in KNOWN if engine.version is not None]
+        if not installed:
+            names = " or ".join(engine.package for engine in KNOWN)
+            raise InputError(f"No independent engine is installed; {names} can be compared with. {INSTALL}")
+        return installed[0]
+    found = [engine for engine in KNOWN if engine.name == name]
+    if not found:
+        raise InputError(f"There is no engine {shorten(name)}; known are {', '.join(e.name for e in KNOWN)}.")
+    return found[0]
+
+
+def validate(machine: Machine, engine: str | None = None) -> Validation:
+    """Rebuild a machine in an engine that is not ours and compare the compliances at its tool point.
+
+    Args:
+        machine: at its pose, where it must be reachable, regular and without a free direction.
+        engine: name of the engine; the first that is installed if None.
+
+    Raises:
+        InputError: if there is no such engine, no compliance to compare, or a part that the engine cannot have.
+    """
+    chosen = choose(engine)
+    response = respond(machine)
+    ours = _our_compliance(response)
+    answer = chosen.solve(response.configuration, response.reference)
+    length = float(response.configuration.length)
+    return Validation(
+        machine,
+        chosen.name,
+        chosen.version or "",
+        ours,
+        answer.compliance,
+        block_differences(answer.compliance, ours, length),
+        answer.uncertainty,
+        answer.varied,
+        tuple((trial.scale, difference(trial.compliance, ours, length)) for trial in answer.trials),
+    )
+
+
+def _our_compliance(response: Response) -> Array:
+    status = Status(response.status)
+    if status is not Status.OK:
+        raise InputError(f"There is nothing to validate at this pose. {status.sentence}")
+    ours = np.array(response.compliance.rows(), dtype=float)
+    if not np.all(np.isfinite(ours)):
+        raise InputError("A spring without stiffness leaves the platform free: there is no compliance to compare.")
+    return ours

@@ -1,0 +1,166 @@
+"""A placed machine as a frame of straight members in PyNite, and its compliance as what is rigid grows ever stiffer.
+
+Built from points, axes and sections; the members themselves are `pynite_members`.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.algebra.vector import Vector
+from kinetostat.machine.leg import Joint, Leg, Spring
+from kinetostat.machine.link import Beam, Parallelogram
+from kinetostat.machine.machine import Configuration
+from kinetostat.spec.errors import InputError
+from kinetostat.validation.answer import Answer, Trial, difference
+from kinetostat.validation.cantilever import section_axes
+from kinetostat.validation.pieces import Piece, Strut, array, columns, joint_of, pieces
+from kinetostat.validation.pynite_members import Frame
+
+Array = npt.NDArray[np.float64]
+
+TRIALS = 10
+"""How many stiffnesses of rigid parts are tried."""
+STIFFER = 100.0
+"""The greatest of them, in units of the stiffest part; the least is the softest part's: what is rigid adds its own
+compliance, which extrapolation takes away again and exactly so where no leg is redundant."""
+SMALL = 1e-4
+"""Share of the other below which a block of C is on its way to zero, so that its relative error says nothing."""
+MOST = 6
+"""Trials that one extrapolation uses at most."""
+
+
+def solve(configuration: Configuration, reference: Vector) -> Answer:
+    """C with rigid parts of several stiffnesses k, extrapolated to 1/k = 0.
+
+    Args:
+        configuration: placed machine.
+        reference: where loads act and motions are read, base frame, m.
+
+    Raises:
+        InputError: if it has a part that no member stands for.
+    """
+    length = float(configuration.length)
+    softest, stiffest = _extremes(configuration)
+    stiffnesses = np.geomspace(softest, STIFFER * stiffest, TRIALS).tolist()
+    trials = [Trial(stiff, _compliance(configuration, reference, stiff)) for stiff in stiffnesses]
+    found, uncertainty = extrapolate([1.0 / t.scale for t in trials], [t.compliance for t in trials], length)
+    return Answer(found, uncertainty, "stiffness of what is rigid, N/m", tuple(trials))
+
+
+def extrapolate(steps: Sequence[float], values: Sequence[Array], length: float) -> tuple[Array, float]:
+    """Values [6 x 6] at ever smaller steps, taken to step 0 by polynomials through some that follow each other.
+
+    Returns:
+        Of all polynomials the value that differs least from those of one degree less, and by how much.
+    """
+    best, least = values[-1], math.inf
+    column = list(values)
+    for degree in range(1, MOST):
+        finer = [
+            (steps[i] * column[i + 1] - steps[i + degree] * column[i]) / (steps[i] - steps[i + degree])
+            for i in range(len(column) - 1)
+        ]
+        for new, *older in zip(finer, column, column[1:], strict=False):
+            apart = max(difference(old, new, length, SMALL) for old in older)
+            if degree > 1 and apart < least:
+                best, least = new, apart
+        column = finer
+    return best, least
+
+
+def _extremes(configuration: Configuration) -> tuple[float, float]:
+    """Least and greatest stiffness of its parts, N/m; those in N·m/rad through the machine's length."""
+    length = float(configuration.length)
+    found = []
+    for leg in configuration.legs:
+        for piece in pieces(leg, configuration.plane):
+            found += _stiffnesses(piece, length)
+    finite = [k for k in found if 0.0 < k < math.inf]
+    return (min(finite), max(finite)) if finite else (1.0, 1.0)
+
+
+def _stiffnesses(piece: Piece, length: float) -> list[float]:
+    if isinstance(piece, Spring):
+        return [float(piece.stiffness) / (1.0 if piece.joint.point is None else length**2)]
+    if isinstance(piece, Beam):
+        own, size = piece.rigidity, section_axes(piece)[1]
+        turning = [float(k) / (size * length**2) for k in (own.torsion, own.bending_y, own.bending_z)]
+        return [float(own.axial) / size, *turning]
+    if isinstance(piece, Joint):
+        return []
+    return [float(piece.stiffness if isinstance(piece, Strut) else piece.bar)]
+
+
+def _compliance(configuration: Configuration, reference: Vector, stiff: float) -> Array:
+    """C at the reference, base axes, with this stiffness (N/m) of what is rigid."""
+    plane = configuration.plane
+    axes = np.eye(3) if plane is None else columns(plane.frame.rotation)
+    frame = Frame(plane is not None, float(configuration.length), stiff)
+    platform = frame.node(axes.T @ array(reference))
+    for leg in configuration.legs:
+        chain = pieces(leg, plane)
+        _leg(frame, leg, chain, axes, platform)
+    turn = np.kron(np.eye(2), axes)
+    return np.asarray(turn @ frame.compliance(platform) @ turn.T)
+
+
+def _leg(frame: Frame, leg: Leg, chain: Sequence[Piece], axes: Array, platform: str) -> None:
+    """The members of one leg from a fixed node to the platform's."""
+    if not chain:
+        raise InputError(f"{leg.name} is rigid and welds the platform to the base, of which PyNite makes nothing.")
+    at = frame.fixed_node(frame.points[platform])
+    for piece in chain:
+        at = _piece(frame, piece, axes, at)
+    frame.rigid(at, platform)
+
+
+def _piece(frame: Frame, piece: Piece, axes: Array, at: str) -> str:
+    """The members of a piece that begins on the body of node `at`; a node of the body after it."""
+    if isinstance(piece, Joint | Spring):
+        return _joint(frame, piece, axes, at)
+    if isinstance(piece, Beam):
+        return _beam(frame, piece, axes, at)
+    if isinstance(piece, Strut):
+        near, far = frame.reach(at, axes.T @ array(piece.start)), frame.node(axes.T @ array(piece.end))
+        frame.bar(near, far, piece.stiffness)
+        return far
+    return _parallelogram(frame, piece, axes, at)
+
+
+def _joint(frame: Frame, piece: Joint | Spring, axes: Array, at: str) -> str:
+    joint = joint_of(piece)
+    if joint.pitch != 0.0:
+        raise InputError("PyNite's members have no release for a screw; use Exudyn for this machine.")
+    if joint.point is not None:
+        at = frame.reach(at, axes.T @ array(joint.point))
+    stiffness = float(piece.stiffness) if isinstance(piece, Spring) else None
+    return frame.stub(at, axes.T @ array(joint.axis), joint.point is None, stiffness)
+
+
+def _beam(frame: Frame, beam: Beam, axes: Array, at: str) -> str:
+    own = beam.rigidity
+    if math.isfinite(own.shear_y) or math.isfinite(own.shear_z):
+        raise InputError(f'"{beam.name}" yields to shear, PyNite\'s members do not; use Exudyn for this machine.')
+    near, far = frame.reach(at, axes.T @ array(beam.start)), frame.node(axes.T @ array(beam.end))
+    section = [float(k) for k in (own.axial, own.bending_y, own.bending_z, own.torsion)]
+    frame.member((near, far), section, axes.T @ section_axes(beam)[0])
+    return far
+
+
+def _parallelogram(frame: Frame, piece: Parallelogram, axes: Array, at: str) -> str:
+    """Two bars between bodies that stubs for the motions in the parallelogram's plane keep parallel to it."""
+    near, far, side = (axes.T @ array(v) for v in (piece.near, piece.far, piece.side))
+    along = (far - near) / np.linalg.norm(far - near)
+    normal = np.cross(side, along)
+    normal = normal / np.linalg.norm(normal)
+    at = before = frame.reach(at, near)
+    for axis, slide in ((along, True), (np.cross(normal, along), True), (normal, False)):
+        at = frame.stub(at, axis, slide)
+    after = frame.reach(at, far)
+    for start, end in piece.bars:
+        ends = frame.reach(before, axes.T @ array(start)), frame.reach(after, axes.T @ array(end))
+        frame.bar(*ends, float(piece.bar))
+    return after
