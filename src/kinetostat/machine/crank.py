@@ -9,7 +9,7 @@ from kinetostat.algebra.triangle import crank_end, crank_range
 from kinetostat.algebra.vector import AXES, Z_AXIS, Vector, rotation_z
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, Spring, revolutes
 from kinetostat.machine.machine import Closure
-from kinetostat.machine.parts import RigidLink, if_elastic, per_length
+from kinetostat.machine.parts import Arm, if_elastic, per_length
 from kinetostat.spec.fields import Quantity, section
 
 
@@ -87,7 +87,7 @@ def crank_leg(
             Spring(f"{part} in plane", Joint(axis, base), bending, part),
             Spring(f"{part} across", Joint(axis.cross(crank), base), bending, part),
         ),
-        RigidLink(base, elbow),
+        Arm(base, elbow),
         *revolutes(elbow, AXES, f"{name} elbow"),
         *if_elastic(Spring(f"{name} rod", Joint(along), per_length(links.axial, links.rod))),
         *revolutes(tip, AXES, f"{name} platform joint"),

@@ -222,7 +222,7 @@ class Leg:
 
     def displaced(self, motion: Displacement) -> "Leg":
         """The leg after a rigid displacement of the whole machine."""
-        chain: tuple[Element, ...] = tuple(element.displaced(motion) for element in self.chain)
+        chain = tuple(element.displaced(motion) for element in self.chain)
         return replace(self, chain=chain, lines=tuple(line.displaced(motion) for line in self.lines))
 
     def screws(self, reference: Vector, length: Scalar, absent: Sequence[Joint] = ()) -> LegScrews:
@@ -276,7 +276,7 @@ def two_force_leg(
     yielding = [Spring(f"{name} actuator", Joint(along), stiffness, actuated=True)]
     if not (type(axial) is float and axial == RIGID):
         yielding.append(Spring(f"{name} rod", Joint(along), axial * reciprocal(size)))
-    chain = (
+    chain: tuple[Element, ...] = (
         *revolutes(base_joint, AXES, f"{name} base joint"),
         *yielding,
         *revolutes(platform_joint, AXES, f"{name} platform joint"),

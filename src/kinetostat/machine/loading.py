@@ -2,6 +2,7 @@
 
 import difflib
 import json
+import math
 import operator
 import re
 from collections.abc import Iterator, Sequence
@@ -15,15 +16,17 @@ from pydantic import TypeAdapter
 
 from kinetostat.machine.catalogue import families
 from kinetostat.machine.machine import COMMON, Family, Machine
+from kinetostat.machine.rigidities import resolve
 from kinetostat.machine.written import family as written
 from kinetostat.machine.written.checking import check_numbers, with_idle_freedoms
 from kinetostat.machine.written.document import by_name, check_paths, separate
+from kinetostat.machine.written.schema import written_schema
 from kinetostat.spec import document as documents
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import quantities
 from kinetostat.spec.validation import SCHEMA_VERSION, file_model, sections_in, validate
-from kinetostat.units import show
+from kinetostat.units import RIGID, show
 
 SUFFIX = ".toml"
 
@@ -75,7 +78,7 @@ def build(document: Document, origin: str, settings: Sequence[str] = ()) -> Mach
         return _build_written(document, origin, settings)
     family = _family(document.get("family"), origin)
     changed = documents.override(document, settings, _counts(family))
-    return _validated(family, changed, origin)
+    return _validated(family, resolve(changed, family, origin), origin)
 
 
 def _build_written(document: Document, origin: str, settings: Sequence[str]) -> Machine:
@@ -167,4 +170,18 @@ def machine_schema() -> dict[str, Any]:
     models = [file_model(family.name, family.every_section) for family in families().values()]
     union: Any = reduce(operator.or_, models)
     schema = TypeAdapter(union).json_schema()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "kinetostat machine file", **schema}
+    schema["anyOf"].append(written_schema(SCHEMA_VERSION))
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "kinetostat machine file",
+        **_as_written(schema),
+    }
+
+
+def _as_written(schema: Any) -> Any:
+    """A schema whose defaults are as people write them: an infinite stiffness is "rigid"."""
+    if isinstance(schema, dict):
+        return {key: _as_written(value) for key, value in schema.items()}
+    if isinstance(schema, list | tuple):
+        return [_as_written(value) for value in schema]
+    return RIGID if schema == math.inf else schema

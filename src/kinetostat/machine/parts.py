@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
-from kinetostat.algebra.vector import Displacement, Vector
-from kinetostat.machine.leg import RIGID, Element, Joint, Spring, series
-from kinetostat.machine.link import Beam, Rigidity
+from kinetostat.algebra.vector import Z_AXIS, Displacement, Vector
+from kinetostat.machine.leg import RIGID, Joint, Spring, series
+from kinetostat.machine.link import link_axes
 
 
 def is_rigid(stiffness: Scalar) -> bool:
@@ -44,11 +44,22 @@ def servo(joint: Joint, name: str, stiffness: Scalar) -> Joint | Spring:
 
 
 @dataclass(frozen=True)
-class RigidLink:
-    """A link that does not yield: nothing but a line between two points (base frame, m) for those who draw."""
+class Arm:
+    """A link that resists tension, but bends and twists where it is not rigid by form: a beam (theory section 5).
+
+    Attributes:
+        start, end: of its axis, base frame, m.
+        name: of the link.
+        up: unit vector, not along the link.
+        bending, torsion: E I about both axes of its section, and G J, N·m².
+    """
 
     start: Vector
     end: Vector
+    name: str = ""
+    up: Vector = Z_AXIS
+    bending: Scalar = RIGID
+    torsion: Scalar = RIGID
 
     @property
     def freedoms(self) -> tuple[Joint, ...]:
@@ -57,28 +68,26 @@ class RigidLink:
 
     @property
     def springs(self) -> tuple[Spring, ...]:
-        """None."""
-        return ()
+        """Those of a `Beam` that are not rigid by form, at its middle: GJ/L, EI/L twice, and 12EI/L^3 twice."""
+        if is_rigid(self.bending) and is_rigid(self.torsion):
+            return ()
+        axes, length = link_axes(self.start, self.end, self.up)
+        middle = (self.start + self.end) * 0.5
+        bend, shear = per_length(self.bending, length), per_length(self.bending, length * length * length, 12.0)
+        return if_elastic(
+            Spring(f"{self.name} torsion", Joint(axes.x, middle), per_length(self.torsion, length), self.name),
+            Spring(f"{self.name} bending y", Joint(axes.y, middle), bend, self.name),
+            Spring(f"{self.name} bending z", Joint(axes.z, middle), bend, self.name),
+            Spring(f"{self.name} shear y", Joint(axes.y), shear, self.name),
+            Spring(f"{self.name} shear z", Joint(axes.z), shear, self.name),
+        )
 
     @property
     def path(self) -> tuple[Vector, ...]:
         """Its ends, base frame, m."""
         return self.start, self.end
 
-    def displaced(self, motion: Displacement) -> "RigidLink":
+    def displaced(self, motion: Displacement) -> "Arm":
         """The link after a rigid displacement of the whole machine."""
-        return RigidLink(motion.apply(self.start), motion.apply(self.end))
-
-
-def arm(name: str, start: Vector, end: Vector, up: Vector, bending: Scalar, torsion: Scalar) -> Element:
-    """A link between two points (base frame, m): a beam, or a rigid link where it is rigid by form.
-
-    Args:
-        name: of the link.
-        start, end: of its axis.
-        up: unit vector, not along the link.
-        bending, torsion: E I about both axes of its section, and G J, N·m².
-    """
-    if is_rigid(bending) and is_rigid(torsion):
-        return RigidLink(start, end)
-    return Beam(name, start, end, up, Rigidity(torsion=torsion, bending_y=bending, bending_z=bending))
+        ends = motion.apply(self.start), motion.apply(self.end)
+        return Arm(*ends, self.name, motion.rotation.apply(self.up), self.bending, self.torsion)

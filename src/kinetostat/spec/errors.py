@@ -1,5 +1,8 @@
 """What can be wrong with what people give us. Each message is one readable paragraph that says how to mend it."""
 
+import difflib
+from collections.abc import Iterable
+
 
 class InputError(ValueError):
     """Bad input: the message names the field, the value, what is allowed and the fix. Commands exit with 2.
@@ -18,3 +21,17 @@ def shorten(value: object, longest: int = 60) -> str:
     except ValueError:  # Python refuses to write integers of thousands of digits
         return "a number of thousands of digits"
     return text if len(text) <= longest else f"{text[: longest - 1]}…"
+
+
+def choice(value: object, known: Iterable[str], what: str) -> str:
+    """The value, if it is one of the known names.
+
+    Raises:
+        InputError: "what is ..." with the name that was probably meant, or all of them.
+    """
+    names = list(known)
+    if isinstance(value, str) and value in names:
+        return value
+    near = difflib.get_close_matches(value, names, 1) if isinstance(value, str) else []
+    hint = f'did you mean "{near[0]}"?' if near else f"choose from {', '.join(names) or 'none: nothing is defined'}."
+    raise InputError(f"{what} is {'missing' if value is None else shorten(value)}; {hint}")

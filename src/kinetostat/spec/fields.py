@@ -103,7 +103,8 @@ class Quantity:
 
     def __get_pydantic_json_schema__(self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler) -> Any:
         kind = KINDS[self.kind]
-        one = {"type": ["number", "string"], "examples": [kind.example]}
+        table = ["object"] if kind.name.endswith("rigidity") else []
+        one = {"type": ["number", "string", *table], "examples": [kind.example]}
         rule = f"{self.meaning}; a {kind.name} with its unit, or a bare number in {kind.unit}"
         rule += f', or "{RIGID}"' if self.stiff else ""
         if self.count is None:

@@ -53,12 +53,18 @@ class Engine:
         """C of a placed machine at a point (base frame, m).
 
         Raises:
-            InputError: if the engine is not installed, or has no part for one of the machine's.
+            InputError: if the engine is not installed, has no part for one of the machine's, or fails.
         """
         if self.version is None:
             raise InputError(f"The engine {self.name} is not installed. {INSTALL}")
         solve: Callable[[Configuration, Vector], Answer] = import_module(self.builder).solve
-        return solve(configuration, reference)
+        try:
+            return solve(configuration, reference)
+        except InputError:
+            raise
+        except Exception as trouble:  # engines raise what they like, down to bare exceptions
+            reason = str(trouble).partition("\n")[0]
+            raise InputError(f"The engine {self.name} could not answer for this machine: {reason}") from trouble
 
 
 KNOWN = (

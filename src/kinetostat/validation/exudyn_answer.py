@@ -41,6 +41,8 @@ def solve(configuration: Configuration, reference: Vector) -> Answer:
     greatest = float(np.max(np.abs(model.system.ComputeLinearizedSystem(_settings(model))[1]))) or 1.0
     model, platform = build(configuration, reference, unit=greatest)
     tangent = _tangent(model, platform)
+    if not np.any(tangent):
+        return Answer(tangent, 0.0, VARIED, ())
     trials = tuple(_finite_loads(model, platform, tangent, length))
     return Answer(tangent, _uncertainty(tangent, trials, length), VARIED, trials)
 
@@ -64,6 +66,8 @@ def _tangent(model: Multibody, platform: Body) -> Array:
     free = np.asarray(found[4]) if len(found) > 3 else np.eye(len(stiffness))
     rows = model.system.GetNodeODE2Index(platform.node) + np.array(TRANSLATION_FIRST)
     loads = free[:, rows] / model.unit
+    if not loads.size:
+        return np.zeros((6, 6))
     motion = np.linalg.lstsq(stiffness, loads, rcond=LOST)[0]
     if np.max(np.abs(stiffness @ motion - loads)) > UNBALANCED * np.max(np.abs(loads)):
         raise InputError("Exudyn finds a motion that nothing resists: there is no compliance to compare.")

@@ -137,10 +137,11 @@ def _print_summary(console: Console, analysis: Analysis) -> None:
     lines = []
     if analysis.mobility:
         found = analysis.mobility
+        legs, platform = number(found.leg_distance), number(found.platform_distance)
         extra = f", {found.here.redundant} constraints redundant" if found.here.redundant else ""
         lines.append(
             f"Mobility: {found.full_cycle} freedoms, {found.actuators} actuators{extra}; {found.kind} pose, "
-            f"distance from a singularity {number(found.leg_distance)} (legs), {number(found.platform_distance)} (platform) of 1."
+            f"distance from a singularity {legs} (legs), {platform} (platform) of 1."
         )
     if analysis.internal and analysis.internal.degree:
         legs = ", ".join(analysis.internal.legs)

@@ -33,7 +33,7 @@ def three_views(configuration: Configuration, title: str) -> Figure:
 
 def _draw_view(panel: Axes, configuration: Configuration, across: str, up: str) -> None:
     reference = configuration.platform.translation
-    actuated = [leg for leg in configuration.legs if len(leg.path) == 2]
+    actuated = [leg for leg in configuration.legs if leg.actuated]
     for plate in (_loop([leg.path[0] for leg in actuated]), _loop([leg.path[-1] for leg in actuated])):
         panel.fill(*_flat(plate, across, up), facecolor="#dddddd", edgecolor=PLATE, linewidth=0.8, alpha=0.8)
     for leg in configuration.legs:

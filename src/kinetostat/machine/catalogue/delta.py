@@ -12,7 +12,7 @@ from kinetostat.machine.bars import BarPair
 from kinetostat.machine.crank import CrankLinks, place
 from kinetostat.machine.leg import RIGID, Joint, Leg, Spring
 from kinetostat.machine.machine import Closure, Configuration, Family
-from kinetostat.machine.parts import arm
+from kinetostat.machine.parts import Arm
 from kinetostat.machine.rings import Rings, Three
 from kinetostat.spec.fields import Quantity, section
 
@@ -75,7 +75,7 @@ def _leg(
     bars = BarPair(name, elbow, tip, axis, geometry.bar_length, geometry.bar_spacing, stiffness.bar_axial)
     chain = (
         Spring(f"{name} actuator", Joint(axis, base), actuator, actuated=True),
-        arm(f"{name} arm", base, elbow, axis, stiffness.arm_bending, stiffness.arm_torsion),
+        Arm(base, elbow, f"{name} arm", axis, stiffness.arm_bending, stiffness.arm_torsion),
         *bars.chain,
     )
     return Leg(name, chain, bars.lines), limits

@@ -13,7 +13,7 @@ from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.bars import BarPair
 from kinetostat.machine.leg import RIGID, Joint, Leg, Spring
 from kinetostat.machine.machine import Closure, Configuration, Family
-from kinetostat.machine.parts import arm
+from kinetostat.machine.parts import Arm
 from kinetostat.machine.rings import Three
 from kinetostat.spec.fields import Quantity, section
 
@@ -80,7 +80,7 @@ def _leg(
     rail = slide + side.cross(forward) * geometry.foot_length
     chain = (
         Spring(f"{name} actuator", Joint(forward), actuator, actuated=True),
-        arm(f"{name} foot", rail, slide, forward, stiffness.foot_bending, stiffness.foot_torsion),
+        Arm(rail, slide, f"{name} foot", forward, stiffness.foot_bending, stiffness.foot_torsion),
         *bars.chain,
     )
     return Leg(name, chain, bars.lines), Closure(f"pair of bars of {name}", aside, 0.0, geometry.bar_length)

@@ -13,7 +13,7 @@ from kinetostat.machine.catalogue.planar_3rpr import LEGS, Pose, placed
 from kinetostat.machine.crank import CrankLinks, place
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, Spring
 from kinetostat.machine.machine import Closure, Configuration, Family, Plane
-from kinetostat.machine.parts import RigidLink, if_elastic, per_length
+from kinetostat.machine.parts import Arm, if_elastic, per_length
 from kinetostat.machine.rings import Three, ThreeLegs
 from kinetostat.spec.fields import Quantity, section
 
@@ -60,7 +60,7 @@ def _leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, links: CrankLi
     chain: tuple[Element, ...] = (
         Spring(f"{name} actuator", pivot, stiffness, actuated=True),
         *if_elastic(Spring(f"{name} proximal link", pivot, per_length(links.bending, links.crank, 3.0))),
-        RigidLink(base, elbow),
+        Arm(base, elbow),
         Joint(Z_AXIS, elbow, f"{name} elbow"),
         *if_elastic(Spring(f"{name} distal link", Joint(along), per_length(links.axial, links.rod))),
         Joint(Z_AXIS, tip, f"{name} platform joint"),

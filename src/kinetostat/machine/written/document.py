@@ -4,7 +4,6 @@ Every message names the leg and the joint. Numbers are checked by `spec`, as in 
 """
 
 import copy
-import difflib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -27,7 +26,7 @@ from kinetostat.machine.written.plan import (
     Plan,
 )
 from kinetostat.spec.document import Document
-from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.errors import InputError, choice, shorten
 
 MOST_LEGS, MOST_JOINTS = 24, 24
 """Legs of a machine and joints of a leg: more is a mistake, and the equations would take minutes."""
@@ -99,7 +98,7 @@ def check_paths(document: Document, settings: Iterable[str]) -> None:
         at: Any = document.get(table)
         for name in names[:2] if table == "legs" else ():
             if isinstance(at, dict) and name not in at:
-                _choice(name, at, f"--set {shorten(setting)}: the name after {table}")
+                choice(name, at, f"--set {shorten(setting)}: the name after {table}")
             at = at.get(name) if isinstance(at, dict) else None
             table = f"{table}.{name}"
 
@@ -122,7 +121,7 @@ def separate(document: Document, origin: str) -> tuple[Plan, Document]:
     coordinates = PLANAR_POSE if space == "planar" else SPATIAL_POSE
     pose = rest.get("pose", {})
     for name in pose if isinstance(pose, dict) else ():
-        _choice(name, coordinates, f'"{origin}": a name in [pose]')
+        choice(name, coordinates, f'"{origin}": a name in [pose]')
     given = tuple(name for name in coordinates if isinstance(pose, dict) and name in pose)
     if not given:
         raise InputError(f'"{origin}": [pose] must give the task coordinates, some of {", ".join(coordinates)}.')
@@ -136,10 +135,10 @@ def _sections(rest: Document, origin: str) -> tuple[dict[str, str], dict[str, st
         where = f'"{origin}": section "{name}"'
         if not isinstance(table, dict):
             raise InputError(f"{where} is {shorten(table)}; it must be a table with shape, sizes and material.")
-        shapes[name] = _choice(table.pop("shape", None), SHAPES, f"{where}: shape")
+        shapes[name] = choice(table.pop("shape", None), SHAPES, f"{where}: shape")
         materials[name] = ""
         if "material" in table or "youngs_modulus" not in table:
-            materials[name] = _choice(table.pop("material", None), MATERIALS, f"{where}: material")
+            materials[name] = choice(table.pop("material", None), MATERIALS, f"{where}: material")
     return shapes, materials
 
 
@@ -154,13 +153,13 @@ def _leg(name: str, leg: dict[str, Any], where: str, shapes: Mapping[str, str]) 
     _check_chain(plans, where)
     bodies = {plan.joins[1] for plan in plans[:-1]}
     for key in links:
-        _choice(key, bodies, f"{where}: links name")
+        choice(key, bodies, f"{where}: links name")
     found = {key: _link(key, leg.pop(key), f'{where}, link "{key}"', shapes) for key in links}
     return LegPlan(name, plans, found)
 
 
 def _joint(name: str, part: dict[str, Any], where: str) -> JointPlan:
-    kind = _choice(part.pop("type", None), JOINT_TYPES, f"{where}: type")
+    kind = choice(part.pop("type", None), JOINT_TYPES, f"{where}: type")
     joins = part.pop("joins", None)
     if not isinstance(joins, list) or len(joins) != 2 or not all(isinstance(body, str) and body for body in joins):
         raise InputError(f'{where}: joins is {shorten(joins)}; give the two bodies it joins, e.g. ["base", "arm"].')
@@ -205,10 +204,10 @@ def _check_chain(joints: tuple[JointPlan, ...], where: str) -> None:
 
 
 def _link(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str]) -> LinkPlan:
-    model = _choice(part.pop("model", None), LINK_MODELS, f"{where}: model")
+    model = choice(part.pop("model", None), LINK_MODELS, f"{where}: model")
     section = part.pop("section", "")
     if model in ("lumped", "beam", "timoshenko"):
-        section = _choice(section or None, shapes, f"{where}: section")
+        section = choice(section or None, shapes, f"{where}: section")
     up = part.pop("up", None)
     if up is not None and not _numbers(up, 3):
         raise InputError(f"{where}: up is {shorten(up)}; give a direction as three numbers, e.g. [0, 0, 1].")
@@ -245,12 +244,3 @@ def _numbers(value: object, count: int) -> bool:
         and len(value) == count
         and all(isinstance(c, int | float) and not isinstance(c, bool) and abs(c) < 1e100 for c in value)
     )
-
-
-def _choice(value: object, known: Iterable[str], what: str) -> str:
-    names = list(known)
-    if isinstance(value, str) and value in names:
-        return value
-    near = difflib.get_close_matches(value, names, 1) if isinstance(value, str) else []
-    hint = f'did you mean "{near[0]}"?' if near else f"choose from {', '.join(names) or 'none: nothing is defined'}."
-    raise InputError(f"{what} is {'missing' if value is None else shorten(value)}; {hint}")
