@@ -27,6 +27,7 @@ EXAMPLES = """examples:
   kinetostat analyze zhang-gosselin-4dof --set stiffness.passive_links=rigid --json
   kinetostat sweep   zhang-gosselin-4dof --vary "stiffness.passive_links=1e3:1e10:8:log"
   kinetostat map     zhang-gosselin-4dof --over "x=-2 cm:2 cm:41" --over "z=66 cm:70 cm:41" -o maps
+  kinetostat validate tripteron
   kinetostat reproduce
 """
 
@@ -93,6 +94,17 @@ def _parser() -> Parser:
     )
     analyze.add_argument("--full", action="store_true", help="eigenscrews and every single spring as well")
     _json(analyze)
+    validate = _add(
+        commands, "validate", _validate, "the same machine in an engine that is not ours, side by side",
+        'kinetostat validate tripteron --pose x="0.4 m" y="0.6 m" --pose z="0.3 m"',
+    )  # fmt: skip
+    _machine(validate)
+    validate.add_argument(
+        "--pose", metavar="NAME=VALUE", nargs="+", action="append", default=[], dest="poses",
+        help="coordinates of a pose that differ from the file's; repeat for several poses",
+    )  # fmt: skip
+    validate.add_argument("--engine", help="exudyn or pynite (default: the first that is installed)")
+    _json(validate)
     _add_grid_commands(commands)
     reproduce = _add(
         commands, "reproduce", _reproduce, "every table, equation and figure of the paper, printed beside computed",
@@ -223,6 +235,23 @@ def _analyze(options: argparse.Namespace) -> int:
 
     print_analysis(terminal(), found, options.full)
     return DONE
+
+
+def _validate(options: argparse.Namespace) -> int:
+    from kinetostat.machine.loading import load
+    from kinetostat.validation.comparison import AGREED, as_json, validate
+    from kinetostat.views.tables import terminal
+    from kinetostat.views.validation_tables import print_validation
+
+    poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]
+    machines = [load(options.machine, [*options.settings, *pose]) for pose in poses]
+    found = [validate(machine, options.engine) for machine in machines]
+    if options.json:
+        _print_json([as_json(validation) for validation in found])
+    else:
+        for validation in found:
+            print_validation(terminal(), validation, AGREED)
+    return DONE if all(validation.difference <= AGREED for validation in found) else NO_ANSWER
 
 
 def _no_answer(message: str) -> int:

@@ -18,7 +18,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import with_values
+from kinetostat.machine.parameters import parameters, with_values
 
 NATIVE_FROM = 50_000
 """Points from which loading LLVM and compiling (0.2 s) pays: NumPy does some 0.4 million poses/s."""
@@ -61,7 +61,7 @@ def evaluate(machine: Machine, points: Points, quantities: Sequence[str], progre
     """
     native = points.size >= NATIVE_FROM
     slab, threads = (NATIVE_SLAB, available_cores()) if native else (NUMPY_SLAB, 1)
-    fill = (_native_fill if native else _numpy_fill)(machine, points.paths, quantities)
+    fill = _by_free_springs(machine, points.paths, quantities, _native_fill if native else _numpy_fill)
     results = np.empty((len(quantities), points.size))
     status = np.empty(points.size, dtype=np.int8)
 
@@ -79,6 +79,34 @@ def evaluate(machine: Machine, points: Points, quantities: Sequence[str], progre
 
 Fill = Callable[[Mapping[str, Array], Array, Codes], None]
 """From the varying parameters of a slab [points] to its results [quantities x points] and status codes, in place."""
+
+Method = Callable[[Machine, Sequence[str], Sequence[str]], Fill]
+"""A way to evaluate slabs: from a machine, its varying paths and names of quantities."""
+
+
+def _by_free_springs(machine: Machine, paths: Sequence[str], quantities: Sequence[str], method: Method) -> Fill:
+    """Points at which a varying stiffness is exactly 0 apart from the others: there it is 0 by form, a free joint."""
+    stiff = {p.path for p in parameters(machine.family) if p.quantity.stiff}
+    watched = [path for path in paths if path in stiff]
+    ordinary = method(machine, paths, quantities)
+    if not watched:
+        return ordinary
+
+    def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        free = np.stack([columns[path] == 0.0 for path in watched])
+        if not free.any():
+            ordinary(columns, results, status)
+            return
+        for pattern in np.unique(free, axis=1).T:
+            chosen = (free == pattern[:, None]).all(axis=0)
+            fixed = {path: 0.0 for path, zero in zip(watched, pattern, strict=True) if zero}
+            kept = {path: values[chosen] for path, values in columns.items() if path not in fixed}
+            found, codes = np.empty((len(results), int(chosen.sum()))), np.empty(int(chosen.sum()), dtype=status.dtype)
+            part = method(with_values(machine, fixed), [*kept], quantities) if fixed else ordinary
+            part(kept, found, codes)
+            results[:, chosen], status[chosen] = found, codes
+
+    return fill
 
 
 def _numpy_fill(machine: Machine, _paths: Sequence[str], quantities: Sequence[str]) -> Fill:

@@ -162,7 +162,8 @@ def template(family: str) -> str:
         InputError: no such family.
     """
     wanted = family if family == written.NAME else _family(family, "kinetostat new").name
-    return next(text for text in bundled().values() if documents.parse(text, "")["family"] == wanted)
+    simplest = sorted(bundled().items(), key=lambda item: len(item[0]))
+    return next(text for _, text in simplest if documents.parse(text, "")["family"] == wanted)
 
 
 def machine_schema() -> dict[str, Any]:

@@ -5,19 +5,24 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.validation.answer import Answer, block_differences, difference
 
 Array = npt.NDArray[np.float64]
 
+AGREED = 1e-6
+"""Relative difference up to which two compliances count as one."""
 INSTALL = "Install it with: pip install 'kinetostat[validate]'"
 
 
@@ -114,6 +119,27 @@ class Validation:
     def difference(self) -> float:
         """The largest of the blocks' relative differences."""
         return max(self.differences.values())
+
+
+def as_json(validation: Validation) -> dict[str, Any]:
+    """The validation as plain data for `--json`, SI."""
+    machine = validation.machine
+    pose = {path.removeprefix("pose."): value for path, value in values(machine).items() if path.startswith("pose.")}
+    return {
+        "name": machine.name,
+        "pose": pose,
+        "order": list(COMPONENTS),
+        "engine": validation.engine,
+        "version": validation.version,
+        "ours": validation.ours.tolist(),
+        "theirs": validation.theirs.tolist(),
+        "differences": validation.differences,
+        "difference": validation.difference,
+        "allowed": AGREED,
+        "uncertainty": validation.uncertainty,
+        "varied": validation.varied,
+        "trials": [{"scale": scale, "difference": apart} for scale, apart in validation.trials],
+    }
 
 
 def engines() -> dict[str, str]:

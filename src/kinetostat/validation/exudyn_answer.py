@@ -20,7 +20,7 @@ SHARES = (1e-3, 1e-4, 1e-5)
 VARIED = "how far loads move the platform, rad or share of the machine's length"
 UNBALANCED = 1e-6
 """Share of a load that may be left over where the equations of equilibrium are solved as well as they can be."""
-LOST = 1e-13
+LOST = 1e-15
 """Relative size of a stiffness below which a motion counts as idle."""
 EPS = float(np.finfo(float).eps)
 

@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from kinetostat.algebra.vector import Rotation, Vector
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring
-from kinetostat.machine.link import Beam, Parallelogram
+from kinetostat.machine.link import Beam, Parallelogram, Rigidity
 from kinetostat.machine.machine import Plane
+from kinetostat.machine.parts import Arm
 from kinetostat.spec.errors import InputError
 
 Array = npt.NDArray[np.float64]
@@ -77,6 +78,9 @@ def _plain(leg: Leg, element: Element) -> list[Piece]:
         return [] if math.isinf(element.stiffness) else [element]
     if isinstance(element, Joint | Beam | Parallelogram):
         return [element]
+    if isinstance(element, Arm) and element.springs:
+        own = Rigidity(torsion=element.torsion, bending_y=element.bending, bending_z=element.bending)
+        return [Beam(element.name, element.start, element.end, element.up, own)]
     if not element.freedoms and not element.springs:
         return []
     raise InputError(f"{leg.name} holds a {type(element).__name__}, which validation cannot rebuild in another engine.")

@@ -66,7 +66,7 @@ def number(value: Number, endless: str = "∞") -> str:
 
 def text_table(title: str, *columns: str) -> Table:
     """A table without rules between its rows."""
-    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    table = _titled(title)
     for i, column in enumerate(columns):
         table.add_column(column, justify="left" if i == 0 else "default")
     return table
@@ -74,8 +74,15 @@ def text_table(title: str, *columns: str) -> Table:
 
 def numeric_table(title: str, first: str, columns: Sequence[str]) -> Table:
     """A table whose columns after the first hold numbers."""
-    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    table = _titled(title)
     table.add_column(first, no_wrap=True)
     for column in columns:
         table.add_column(column, justify="right", no_wrap=True)
     return table
+
+
+def _titled(title: str) -> Table:
+    """An empty table, wide enough for its title on one line."""
+    return Table(
+        title=title, min_width=len(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False
+    )

@@ -10,7 +10,7 @@ from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import IDENTITY, Z_AXIS, Displacement, Vector, polar, ring
 from kinetostat.machine.bars import BarPair
 from kinetostat.machine.crank import CrankLinks, place
-from kinetostat.machine.leg import RIGID, Joint, Leg, Spring
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm
 from kinetostat.machine.rings import Rings, Three
@@ -73,7 +73,7 @@ def _leg(
     """R - arm - pair of bars; `axis` of the revolute such that an elbow at +90 deg from a way down is outward."""
     elbow, limits = place(name, base, tip, axis, CrankLinks(geometry.arm_length, geometry.bar_length))
     bars = BarPair(name, elbow, tip, axis, geometry.bar_length, geometry.bar_spacing, stiffness.bar_axial)
-    chain = (
+    chain: tuple[Element, ...] = (
         Spring(f"{name} actuator", Joint(axis, base), actuator, actuated=True),
         Arm(base, elbow, f"{name} arm", axis, stiffness.arm_bending, stiffness.arm_torsion),
         *bars.chain,

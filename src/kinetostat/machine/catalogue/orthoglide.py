@@ -11,7 +11,7 @@ from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.triangle import slide_travel
 from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.bars import BarPair
-from kinetostat.machine.leg import RIGID, Joint, Leg, Spring
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm
 from kinetostat.machine.rings import Three
@@ -78,7 +78,7 @@ def _leg(
     slide = forward * travel
     bars = BarPair(name, slide, joint, side, geometry.bar_length, geometry.bar_spacing, stiffness.bar_axial)
     rail = slide + side.cross(forward) * geometry.foot_length
-    chain = (
+    chain: tuple[Element, ...] = (
         Spring(f"{name} actuator", Joint(forward), actuator, actuated=True),
         Arm(rail, slide, f"{name} foot", forward, stiffness.foot_bending, stiffness.foot_torsion),
         *bars.chain,
