@@ -92,6 +92,10 @@ def _parser() -> Parser:
     analyze.add_argument(
         "--axes", choices=["base", "platform"], default="base", help="in which everything is given (default: base)"
     )
+    analyze.add_argument(
+        "--along", metavar="X,Y,Z", action="append", default=[], type=_direction,
+        help="stiffness along (force) and about (moment) a direction; repeatable",
+    )  # fmt: skip
     analyze.add_argument("--full", action="store_true", help="eigenscrews and every single spring as well")
     _json(analyze)
     validate = _add(
@@ -161,6 +165,14 @@ def _machine(command: Parser) -> None:
     )  # fmt: skip
 
 
+def _direction(text: str) -> tuple[float, ...]:
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text} is no direction; give three numbers, e.g. 0,0,1") from None
+    return x, y, z
+
+
 def _json(command: Parser) -> None:
     command.add_argument("--json", action="store_true", help="machine-readable output on stdout and nothing else")
 
@@ -225,15 +237,17 @@ def _analyze(options: argparse.Namespace) -> int:
     from kinetostat.studies.analysis_data import as_json
 
     found = analyze(_load(options), options.axes)
+    answered = found.status is Status.OK
+    along = [found.along(direction) for direction in options.along] if answered else []
     if options.json:
-        _print_json(as_json(found))
+        _print_json(as_json(found, along))
         return DONE if found.status is Status.OK else NO_ANSWER
     if found.status is not Status.OK:
         return _no_answer(found.message)
     from kinetostat.views.analysis_tables import print_analysis
     from kinetostat.views.tables import terminal
 
-    print_analysis(terminal(), found, options.full)
+    print_analysis(terminal(), found, along, options.full)
     return DONE
 
 

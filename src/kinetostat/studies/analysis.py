@@ -4,6 +4,7 @@ What is printed or written of it is elsewhere (`analysis_data`, `views.tables`).
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,18 +12,20 @@ import numpy as np
 from kinetostat.algebra.screw import COMPONENTS, Screw
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import IDENTITY, Rotation, Vector
+from kinetostat.kinematics.jacobian import actuator_jacobian
 from kinetostat.kinematics.mobility import Mobility, mobility
 from kinetostat.kinematics.singularity import conditioning, describe, independent
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, stiffness_matrix
 from kinetostat.kinetostatics.attribution import compliance_shares, stiffness_shares
+from kinetostat.kinetostatics.conditioning import twist_condition
 from kinetostat.kinetostatics.internal import InternalLoads, internal_loads
 from kinetostat.kinetostatics.leg import AnyScrew
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Configuration, Machine, springs
 from kinetostat.machine.parameters import parameters, values, with_values
-from kinetostat.studies.indices import Indices, indices_of
+from kinetostat.studies.indices import Along, Indices, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
 from kinetostat.studies.refusal import why_not
 
@@ -77,6 +80,8 @@ class Analysis:
         internal: statically indeterminate loads.
         load: what the machine's [load] does, None without one.
         condition: ratio of the extreme singular values of W, moments divided by the characteristic length.
+        jacobian_condition: of the actuators' Jacobian, angles multiplied by that length; None where actuators are of
+            two kinds, or there is none.
         length: that length, m.
     """
 
@@ -99,7 +104,16 @@ class Analysis:
     internal: InternalLoads | None = None
     load: LoadCase | None = None
     condition: float | None = None
+    jacobian_condition: float | None = None
     length: float | None = None
+
+    def along(self, direction: Sequence[float]) -> Along:
+        """Stiffness along and about a direction, in the axes of K and C.
+
+        Raises:
+            InputError: if the machine has no such direction.
+        """
+        return stiffness_along(direction, self.stiffness, self.compliance, self.machine.family.components)
 
 
 def analyze(machine: Machine, axes: str = "base") -> Analysis:
@@ -145,8 +159,18 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
         internal=internal_loads([leg.name for leg in configuration.legs], response.legs, length, response.guide),
         load=load_case(machine, replace(response, compliance=compliance), turn),
         condition=float(extremes[0] / extremes[-1]),
+        jacobian_condition=_jacobian_condition(response, length),
         length=length,
     )
+
+
+def _jacobian_condition(response: Response, length: float) -> float | None:
+    """Of the actuators' Jacobian in the components that they move."""
+    groups = [leg.springs for leg in response.configuration.legs]
+    kinds = {s.joint.point is None for group in groups for s in group if s.actuated and float(s.stiffness) > 0.0}
+    if len(kinds) != 1:
+        return None
+    return twist_condition(actuator_jacobian(response.legs, groups, length, response.guide), length)
 
 
 def _rows(matrix: Symmetric6, kept: tuple[int, ...]) -> Rows | None:

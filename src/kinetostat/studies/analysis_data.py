@@ -1,17 +1,18 @@
 """An analysis as plain data for `--json`: numbers in SI, infinite and missing ones null. Nothing is computed here."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 from kinetostat.machine.parameters import values
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.indices import Indices
+from kinetostat.studies.indices import Along, Indices
 from kinetostat.studies.loads import LoadCase
 
 
-def as_json(analysis: Analysis) -> dict[str, Any]:
-    """The analysis as nested dictionaries and lists."""
+def as_json(analysis: Analysis, along: Sequence[Along] = ()) -> dict[str, Any]:
+    """The analysis, and stiffnesses along directions, as nested dictionaries and lists."""
     machine = analysis.machine
     pose = {path.removeprefix("pose."): value for path, value in values(machine).items() if path.startswith("pose.")}
     position, rotation = analysis.platform or (None, None)
@@ -33,8 +34,10 @@ def as_json(analysis: Analysis) -> dict[str, Any]:
         "rigid": list(analysis.rigid),
         "free": list(analysis.free),
         "condition": analysis.condition,
+        "jacobian_condition": analysis.jacobian_condition and _finite(analysis.jacobian_condition),
         "characteristic_length": analysis.length,
         **_indices(analysis.indices),
+        "along": [{key: _known(value) for key, value in asdict(one).items()} for one in along],
         "mobility": _mobility(analysis),
         "internal_loads": analysis.internal and asdict(analysis.internal),
         "load": analysis.load and _load(analysis.load),
@@ -68,10 +71,7 @@ def _indices(indices: Indices | None) -> dict[str, Any]:
         },
         "stiffness_condition": _finite(indices.condition),
         "centres": indices.centres,
-        "eigenscrews": [
-            {key: _finite(value) if isinstance(value, float) else value for key, value in asdict(screw).items()}
-            for screw in indices.eigenscrews
-        ],
+        "eigenscrews": [{key: _known(value) for key, value in asdict(screw).items()} for screw in indices.eigenscrews],
     }
 
 
@@ -109,6 +109,10 @@ def _load(load: LoadCase) -> dict[str, Any]:
             for reaction in load.reactions
         ],
     }
+
+
+def _known(value: Any) -> Any:
+    return _finite(value) if isinstance(value, float) else value
 
 
 def _finite(number: float) -> float | None:

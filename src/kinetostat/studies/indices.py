@@ -13,12 +13,16 @@ from kinetostat.kinetostatics.conditioning import stiffness_condition
 from kinetostat.kinetostatics.eigenscrews import Eigenscrew, compliance_eigenscrews, eigenscrews
 from kinetostat.kinetostatics.indices import (
     SPATIAL,
+    Block,
     Principal,
     PrincipalStiffness,
+    free_stiffness_along,
     free_stiffnesses,
+    guided_stiffness_along,
     guided_stiffnesses,
     principal_compliances,
 )
+from kinetostat.spec.errors import InputError
 
 Rows = Sequence[Sequence[float]]
 
@@ -41,6 +45,50 @@ class Indices:
     condition: float
     centres: dict[str, Point | None]
     eigenscrews: tuple[Eigenscrew, ...]
+
+
+@dataclass(frozen=True)
+class Along:
+    """Stiffness along one direction, in the axes of K and C.
+
+    Attributes:
+        direction: as asked for [3].
+        force, force_held: N/m, rotations free to follow, and held; None where there is no such direction or number.
+        moment, moment_held: N·m/rad, about it, the point free to follow, and held.
+    """
+
+    direction: tuple[float, ...]
+    force: float | None
+    force_held: float | None
+    moment: float | None
+    moment_held: float | None
+
+
+def stiffness_along(
+    direction: Sequence[float], stiffness: Rows | None, compliance: Rows | None, components: tuple[int, ...]
+) -> Along:
+    """Stiffness of the tool point along and about a direction.
+
+    Args:
+        direction: of any length, in the axes of K and C [3].
+        stiffness, compliance: None where not finite.
+        components: their rows, of rx ry rz x y z = 0 ... 5.
+
+    Raises:
+        InputError: if the direction has no length, or none in the plane of a planar machine.
+    """
+    found: dict[str, float | None] = {}
+    blocks: tuple[tuple[Block, str], ...] = (("translation", "force"), ("rotation", "moment"))
+    for block, name in blocks:
+        for kind, function in (("", free_stiffness_along), ("_held", guided_stiffness_along)):
+            try:
+                found[name + kind] = function(direction, block, stiffness, compliance, components)
+            except ValueError:
+                found[name + kind] = None
+    if all(value is None for value in found.values()):
+        shown = ", ".join(f"{c:g}" for c in direction)
+        raise InputError(f"--along {shown} is no direction of this machine; give three numbers, e.g. --along 0,0,1.")
+    return Along(tuple(direction), **found)
 
 
 def indices_of(stiffness: Rows | None, compliance: Rows | None, length: float, components: tuple[int, ...]) -> Indices:

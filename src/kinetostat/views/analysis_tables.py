@@ -8,6 +8,7 @@ from rich.console import Console
 from kinetostat.kinetostatics.eigenscrews import Eigenscrew
 from kinetostat.kinetostatics.indices import PrincipalStiffness
 from kinetostat.studies.analysis import Analysis, Rows, SpringShare
+from kinetostat.studies.indices import Along
 from kinetostat.studies.loads import LoadCase
 from kinetostat.views.tables import number, numeric_table
 
@@ -17,7 +18,7 @@ ROUNDING = 1e-12
 """Share of the geometric mean of its diagonal entries below which an entry is shown as zero."""
 
 
-def print_analysis(console: Console, analysis: Analysis, full: bool = False) -> None:
+def print_analysis(console: Console, analysis: Analysis, along: Sequence[Along] = (), full: bool = False) -> None:
     """K, C, attribution, indices, mobility and loads at one pose; all springs and eigenscrews if `full`."""
     machine, names = analysis.machine, analysis.components
     console.print(f"[bold]{machine.name}[/bold]  {analysis.status.word}")
@@ -33,6 +34,7 @@ def print_analysis(console: Console, analysis: Analysis, full: bool = False) -> 
     )
     _print_shares(console, analysis, full)
     _print_directions(console, analysis)
+    _print_along(console, along)
     if full and analysis.indices:
         _print_eigenscrews(console, analysis.indices.eigenscrews)
     if analysis.load:
@@ -87,6 +89,17 @@ def _print_directions(console: Console, analysis: Analysis) -> None:
             table.add_row(what, *_ellipsoid(blocks[block]))
     if table.row_count:
         console.print(table)
+
+
+def _print_along(console: Console, along: Sequence[Along]) -> None:
+    if not along:
+        return
+    columns = ["force", "rotations held", "moment", "point held"]
+    table = numeric_table("Stiffness along and about directions (N/m, N·m/rad)", "direction", columns)
+    for one in along:
+        values = (one.force, one.force_held, one.moment, one.moment_held)
+        table.add_row(_direction(one.direction), *(number(value, "rigid") for value in values))
+    console.print(table)
 
 
 def _ellipsoid(found: PrincipalStiffness) -> list[str]:
@@ -156,7 +169,9 @@ def _print_summary(console: Console, analysis: Analysis) -> None:
             lines.append(f"Centre of stiffness: {shown} mm from the point above.")
         lines.append(
             f"Condition of K: {number(analysis.indices.condition, 'infinite')}, of the leg wrenches: "
-            f"{number(analysis.condition)}; rotations compared through {number(analysis.length)} m."
+            f"{number(analysis.condition)}, of the actuators' Jacobian: "
+            f"{number(analysis.jacobian_condition, 'infinite')}; "
+            f"rotations compared through {number(analysis.length)} m."
         )
     for line in lines:
         console.print(line, highlight=False)
