@@ -14,8 +14,9 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.engine.native import Array, Body, Codes, Program
-from kinetostat.engine.trace import Graph, Operand
+from kinetostat.engine.trace import Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
+from kinetostat.kinematics.closed_form import closed_joints
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -38,7 +39,9 @@ class Kernel:
         fixed: values of its fixed inputs, SI.
         varying: leaf paths of its columns, in order.
         angles: leaf paths of all angles.
-        machine: whose joints are found slab by slab, where its family has no closed form for them.
+        machine: of which this is the program.
+        quantities: names of its results.
+        iterated: whether joint coordinates are found slab by slab, by Newton's method, and are columns of the program.
     """
 
     program: Program
@@ -46,6 +49,8 @@ class Kernel:
     varying: tuple[str, ...]
     angles: frozenset[str]
     machine: Machine
+    quantities: tuple[str, ...]
+    iterated: bool
 
     def run(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab of points; other threads run meanwhile.
@@ -58,31 +63,54 @@ class Kernel:
         """
         served = [np.ascontiguousarray(columns[path], dtype=float) for path in self.varying]
         reduced = [_reduced(c) if p in self.angles else c for p, c in zip(self.varying, served, strict=True)]
-        if self.machine.family.chains is not None:
+        if self.iterated:
             joints = solve_joints(with_values(self.machine, columns))
             found = (*joints.coordinates, joints.status)
             reduced += [np.ascontiguousarray(np.broadcast_to(c, status.shape), dtype=float) for c in found]
         self.program.run(self.fixed, reduced, results, status)
+        if not self.iterated and self.machine.family.chains is not None:
+            self._iterate(columns, results, status)
+
+    def _iterate(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        """Find by Newton's method the joints at those points where closed forms do not close the legs."""
+        left = np.flatnonzero(status == Status.NOT_CONVERGED)
+        if left.size:
+            found, codes = np.empty((len(results), left.size)), np.empty(left.size, dtype=status.dtype)
+            kernel = slab_kernel(self.machine, self.varying, self.quantities, iterated=True)
+            kernel.run({path: column[left] for path, column in columns.items()}, found, codes)
+            results[:, left], status[left] = found, codes
 
 
-def slab_kernel(machine: Machine, varying: Sequence[str], quantities: Sequence[str]) -> Kernel:
+def slab_kernel(
+    machine: Machine, varying: Sequence[str], quantities: Sequence[str], iterated: bool | None = None
+) -> Kernel:
     """The program for slabs of points of a machine; about 0.1 s unless one of the same form has been compiled.
 
     Args:
         machine: its family, and all parameters that do not vary.
         varying: leaf paths of the parameters that vary.
         quantities: names from `QUANTITIES`.
+        iterated: see `Kernel`; None to decide.
     """
+    if iterated is None:
+        iterated = needs_iteration(machine)
     angles = frozenset(p.path for p in parameters(machine.family) if p.quantity.kind == "angle")
     fixed = {path: float(value) for path, value in values(machine).items() if path not in varying}
     fixed |= {path: float(_reduced(np.array(fixed[path]))) for path in angles & fixed.keys()}
     constant = tuple((path, value) for path, value in fixed.items() if value == 0.0 or math.isinf(value))
     inputs = {path: value for path, value in fixed.items() if path not in dict(constant)}
     ordinary = frozenset(path for path, value in inputs.items() if ORDINARY[0] < abs(value) < ORDINARY[1])
-    form = _Form(constant, tuple(inputs), ordinary, tuple(varying), tuple(quantities))
-    return Kernel(
-        _program(_Kind(machine), form), np.array([*inputs.values()], dtype=float), form.varying, angles, machine
-    )
+    form = _Form(constant, tuple(inputs), ordinary, tuple(varying), tuple(quantities), iterated)
+    numbers = np.array([*inputs.values()], dtype=float)
+    return Kernel(_program(_Kind(machine), form), numbers, form.varying, angles, machine, form.quantities, iterated)
+
+
+def needs_iteration(machine: Machine) -> bool:
+    """Whether Newton's method has to find the joints of a machine, judged at its pose."""
+    if machine.family.chains is None:
+        return False
+    closed = closed_joints(machine.chains())
+    return closed is None or closed[1] == Status.NOT_CONVERGED or solve_joints(machine).status == Status.SINGULAR
 
 
 def _reduced(angle: Array) -> Array:
@@ -95,13 +123,14 @@ def _reduced(angle: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Form:
-    """All that a program depends on beside the family: what is constant, fixed, ordinary and varying, and wanted."""
+    """All that a program depends on beside the family: what is constant, fixed, ordinary, varying, wanted, iterated."""
 
     constant: tuple[tuple[str, float], ...]
     inputs: tuple[str, ...]
     ordinary: frozenset[str]
     varying: tuple[str, ...]
     quantities: tuple[str, ...]
+    iterated: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,18 +152,20 @@ def _program(kind: _Kind, form: _Form) -> Program:
     fixed = {path: graph.input(fixed=True, ordinary=path in form.ordinary) for path in form.inputs}
     columns = {path: graph.input() for path in form.varying}
     machine = with_values(kind.machine, {**dict(form.constant), **fixed, **columns})
-    joints = [graph.input() for _ in range(_coordinates(kind.machine))]
-    response = respond(machine, Joints(tuple(joints[:-1]), joints[-1]) if joints else None)
+    joints = [graph.input() for _ in range(kind.machine.chains().size + 1)] if form.iterated else []
+    response = respond(machine, _joints(machine, joints))
     accepted = response.status < Status.OK + 0.5
     results = [where(accepted, QUANTITIES[name].value(response), math.nan) for name in form.quantities]
     numbers = [_number(result) for result in results]
     return Program(Body([*fixed.values()], [*columns.values(), *joints], numbers, _number(response.status)))
 
 
-def _coordinates(machine: Machine) -> int:
-    """How many columns the joints take: their coordinates and a status, or none where there is a closed form."""
-    chains = machine.family.chains
-    return chains(**machine.own_sections).size + 1 if chains else 0
+def _joints(machine: Machine, columns: Sequence[Traced]) -> Joints | None:
+    """Joint coordinates and status: columns if they are found elsewhere, else in closed form."""
+    if columns:
+        return Joints(tuple(columns[:-1]), columns[-1])
+    closed = closed_joints(machine.chains()) if machine.family.chains else None
+    return Joints(tuple(closed[0]), closed[1]) if closed else None
 
 
 def _number(value: Scalar) -> Operand:

@@ -1,6 +1,7 @@
-"""Joint coordinates that close the legs of a machine at a pose, by Newton's method: for one pose or for many at once.
+"""Joint coordinates that close the legs of a machine at a pose, for one pose or for many at once.
 
-Used where a family has no closed form. Nothing here knows stiffness.
+In closed form where every leg has one, otherwise by Newton's method. For families whose `configure` does not place the
+joints itself. Nothing here knows stiffness.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,13 +12,14 @@ import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Displacement
+from kinetostat.kinematics.closed_form import CLOSED, closed_joints
 from kinetostat.kinematics.status import Status
+from kinetostat.machine.leg import Turn
 from kinetostat.machine.machine import Chains, Machine, Step
 
 Array = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.int64]
 
-CLOSED = 1e-10
-"""Largest gap of a closed leg and largest error of a pose coordinate: rad, or in units of the machine's length."""
 SETTLED = 1e-14
 """Gap at which nothing is left but rounding."""
 MOST_STEPS, MOST_ITERATIONS, ON_THE_WAY = 200, 40, 2
@@ -65,24 +67,51 @@ class Gaps:
 
 
 def solve_joints(machine: Machine) -> Joints:
-    """The joint coordinates of a machine at its pose, reached from the home pose without leaving its branch."""
+    """The joint coordinates of a machine at its pose, reached from the home pose without leaving its branch.
+
+    In closed form where every leg has one, otherwise by Newton's method along the way from the home pose.
+    """
     chains = machine.chains()
-    goal = np.stack(np.broadcast_arrays(*map(np.asarray, chains.pose.values())), axis=-1).astype(float)
-    single = goal.ndim == 1
-    goal = np.atleast_2d(goal)
-    count = max(len(goal), _batch(machine, chains))
-    goal = np.broadcast_to(goal, (count, goal.shape[1]))
-    start = np.stack(np.broadcast_arrays(*_home_pose(chains), np.zeros(count))[:-1], axis=-1)
-    found = np.zeros((count, chains.size))
+    goal, single = _goal(machine, chains)
     with np.errstate(all="ignore"):
-        steps = _steps(goal - start, chains)
-        for step in range(1, steps):
-            found = _newton(chains, found, start + (goal - start) * (step / steps), ON_THE_WAY)
-        found = _newton(chains, found, goal, MOST_ITERATIONS)
-        status = _status(chains, found, goal)
-    if single and count == 1:
+        found, status = _in_closed_form(chains, goal) or _by_newton(chains, goal)
+    if single:
         return Joints(tuple(float(q) for q in found[0]), int(status[0]))
     return Joints(tuple(found.T), status)
+
+
+def _goal(machine: Machine, chains: Chains) -> tuple[Array, bool]:
+    """Pose coordinates [n x given], and whether the machine is at one pose only."""
+    given = np.stack(np.broadcast_arrays(*map(np.asarray, chains.pose.values())), axis=-1).astype(float)
+    goal = np.atleast_2d(given)
+    count = max(len(goal), _batch(machine, chains))
+    return np.broadcast_to(goal, (count, goal.shape[1])), given.ndim == 1 and count == 1
+
+
+def _in_closed_form(chains: Chains, goal: Array) -> tuple[Array, Codes] | None:
+    """Coordinates [n x coordinates] and status; None where some pose needs Newton's method."""
+    closed = closed_joints(chains)
+    if closed is None:
+        return None
+    amounts, codes = closed
+    angles = [np.arctan2(a.sine, a.cosine) if isinstance(a, Turn) else a for a in amounts]
+    status = np.broadcast_to(np.asarray(codes), (len(goal),)).copy()
+    found = _stack(angles, len(goal))
+    if (status == Status.NOT_CONVERGED).any():
+        return None
+    reached = np.where(np.isnan(found), 0.0, found)
+    return found, np.where(status == Status.OK, _status(chains, reached, goal), status)
+
+
+def _by_newton(chains: Chains, goal: Array) -> tuple[Array, Codes]:
+    """Coordinates [n x coordinates] and status, reached in steps from the home pose."""
+    start = np.stack(np.broadcast_arrays(*_home_pose(chains), np.zeros(len(goal)))[:-1], axis=-1)
+    found = np.zeros((len(goal), chains.size))
+    steps = _steps(goal - start, chains)
+    for step in range(1, steps):
+        found = _newton(chains, found, start + (goal - start) * (step / steps), ON_THE_WAY)
+    found = _newton(chains, found, goal, MOST_ITERATIONS)
+    return found, _status(chains, found, goal)
 
 
 def _batch(machine: Machine, chains: Chains) -> int:
@@ -148,7 +177,7 @@ def _scale(chains: Chains) -> Array:
     return np.maximum(np.asarray(chains.length, dtype=float), 1e-30)
 
 
-def _status(chains: Chains, found: Array, goal: Array) -> npt.NDArray[np.int64]:
+def _status(chains: Chains, found: Array, goal: Array) -> Codes:
     gaps = gaps_at(chains, found, goal)
     left = np.max(np.abs(np.hstack([gaps.closure, gaps.pose])), axis=1, initial=0.0)
     closed = left <= CLOSED * _scale(chains)

@@ -18,6 +18,14 @@ RIGID = float("inf")
 
 
 @dataclass(frozen=True)
+class Turn:
+    """An angle by its cosine and sine: what closed forms find, and all that placing a revolute needs."""
+
+    cosine: Scalar
+    sine: Scalar
+
+
+@dataclass(frozen=True)
 class Joint:
     """One freedom: a revolute about the line through `point` (m) along the unit vector `axis`, or a slide along it.
 
@@ -65,12 +73,15 @@ class Joint:
         point = None if self.point is None else motion.apply(self.point)
         return replace(self, axis=motion.rotation.apply(self.axis), point=point)
 
-    def moved(self, amount: Scalar) -> tuple["Joint", Displacement]:
+    def moved(self, amount: "Scalar | Turn") -> tuple["Joint", Displacement]:
         """The joint once it has moved by `amount` (rad, or m of a slide), and how it displaces what follows it."""
         if self.point is None:
             return self, Displacement(IDENTITY, self.axis * amount)
-        turn = rotation_along(self.axis, cos(amount), sin(amount))
-        shift = self.point - turn.apply(self.point) + self.axis * times(self.pitch, amount)
+        angle = amount if isinstance(amount, Turn) else Turn(cos(amount), sin(amount))
+        turn = rotation_along(self.axis, angle.cosine, angle.sine)
+        shift = self.point - turn.apply(self.point)
+        if not is_zero(self.pitch):
+            shift = shift + self.axis * times(self.pitch, amount)
         return self, Displacement(turn, shift)
 
 
@@ -121,7 +132,7 @@ class Spring:
         """The spring after a rigid displacement of the whole machine."""
         return replace(self, joint=self.joint.displaced(motion))
 
-    def moved(self, amount: Scalar) -> tuple["Spring", Displacement]:
+    def moved(self, amount: Scalar | Turn) -> tuple["Spring", Displacement]:
         """The spring once its joint has moved by `amount` (rad or m), and how that displaces what follows it."""
         return self, self.joint.moved(amount)[1]
 

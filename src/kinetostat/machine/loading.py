@@ -18,7 +18,7 @@ from kinetostat.machine.catalogue import families
 from kinetostat.machine.machine import COMMON, Family, Machine
 from kinetostat.machine.rigidities import resolve
 from kinetostat.machine.written import family as written
-from kinetostat.machine.written.checking import check_numbers, with_idle_freedoms
+from kinetostat.machine.written.checking import check_numbers, completed
 from kinetostat.machine.written.document import by_name, check_paths, separate
 from kinetostat.machine.written.schema import written_schema
 from kinetostat.spec import document as documents
@@ -88,8 +88,7 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     plan, numbers = separate(documents.override(named, settings, {}), origin)
     machine = _validated(written.family_of(plan), numbers, origin)
     check_numbers(plan, machine.sections, origin)
-    complete = with_idle_freedoms(plan, machine.own_sections)
-    return replace(machine, family=written.family_of(complete))
+    return replace(machine, family=written.family_of(completed(plan, machine.own_sections)))
 
 
 def _validated(family: Family, document: Document, origin: str) -> Machine:

@@ -5,12 +5,12 @@ Parameters may be floats or traced scalars; nothing here validates (that is `spe
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
-from kinetostat.machine.leg import Joint, Leg, Spring
+from kinetostat.machine.leg import Joint, Leg, Spring, Turn
 from kinetostat.spec.fields import Quantity, section
 
 
@@ -109,6 +109,13 @@ class Step:
     moves: bool
 
 
+class Inverse(Protocol):
+    """The closed form of a leg's joint coordinates."""
+
+    def amounts(self, steps: Sequence[Step], motion: Displacement) -> tuple[list[Scalar | Turn], Closure]:
+        """Coordinates that displace the platform end by `motion`, and the condition for the leg to reach."""
+
+
 @dataclass(frozen=True)
 class Chains:
     """The legs of a machine at its home pose.
@@ -118,12 +125,14 @@ class Chains:
         home: placement of the platform.
         pose: values of the coordinates that the pose gives, by name: x, y, z (m, base frame), roll, pitch, yaw (rad).
         length: a characteristic length, m.
+        inverses: closed form of each leg's joint coordinates, None where it has none.
     """
 
     legs: tuple[tuple[Step, ...], ...]
     home: Displacement
     pose: Mapping[str, Scalar]
     length: Scalar
+    inverses: tuple["Inverse | None", ...] = ()
 
     @property
     def size(self) -> int:

@@ -32,26 +32,29 @@ class Answer:
     Attributes:
         compliance: C at the reference point, base axes, rx ry rz x y z [6 x 6]; rows that a planar machine does not
             have are 0.
-        uncertainty: how far the engine's own answers differ, as a share of it (see `difference`).
+        rival: the same by the engine's next best way, if it found one: how far it may be trusted.
         varied: what the trials vary, for people.
         trials: in the order of their scale.
     """
 
     compliance: Array
-    uncertainty: float
+    rival: Array | None
     varied: str
     trials: tuple[Trial, ...]
 
 
-def block_differences(actual: Array, expected: Array, length: float, vanishing: float = VANISHING) -> dict[str, float]:
+def block_differences(
+    actual: Array, expected: Array, length: float, vanishing: float = VANISHING, scale: Array | None = None
+) -> dict[str, float]:
     """Relative difference of two compliances in their blocks: rotation, coupling, translation.
 
-    A block is measured by its Frobenius norm, the coupling by the geometric mean of the two diagonal blocks: for a
-    positive semi-definite matrix it is at most that, and no unit is mixed. Where the machine is rigid in one diagonal
-    block, so that nothing is there to compare with, the other one serves, through `length` (m):
-    that is, where it is below the share `vanishing` of the other.
+    A block of `expected`, or of `scale` if given, is measured by its Frobenius norm, the coupling by the geometric mean
+    of the two diagonal blocks: for a positive semi-definite matrix it is at most that, and no unit is mixed. Where the
+    machine is rigid in one diagonal block, so that nothing is there to compare with, the other one serves, through
+    `length` (m): that is, where it is below the share `vanishing` of the other.
     """
-    turning, moving = (float(np.linalg.norm(expected[b, b])) for b in (ROTATIONS, TRANSLATIONS))
+    measure = expected if scale is None else scale
+    turning, moving = (float(np.linalg.norm(measure[b, b])) for b in (ROTATIONS, TRANSLATIONS))
     if turning * length**2 < vanishing * moving:
         turning = moving / length**2
     elif moving < vanishing * turning * length**2:

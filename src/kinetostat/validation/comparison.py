@@ -1,5 +1,6 @@
 """Our compliance beside that of an independent engine: which engines there are, and what they say of a machine."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
@@ -100,7 +101,7 @@ class Validation:
         engine, version: who answered beside us.
         ours, theirs: C [6 x 6]; rows that a planar machine does not have are 0.
         differences: relative, by block: rotation, coupling, translation.
-        uncertainty: how far the engine's own answers differ, in the same measure.
+        uncertainty: how far the engine's two best answers differ, in the same measure; infinite if it has but one.
         varied: what the engine's trials vary, for people.
         trials: scale and difference from ours of each.
     """
@@ -187,10 +188,16 @@ def validate(machine: Machine, engine: str | None = None) -> Validation:
         ours,
         answer.compliance,
         block_differences(answer.compliance, ours, length),
-        answer.uncertainty,
+        _uncertainty(answer, ours, length),
         answer.varied,
         tuple((trial.scale, difference(trial.compliance, ours, length)) for trial in answer.trials),
     )
+
+
+def _uncertainty(answer: Answer, ours: Array, length: float) -> float:
+    if answer.rival is None:
+        return math.inf
+    return max(block_differences(answer.rival, answer.compliance, length, scale=ours).values())
 
 
 def _our_compliance(response: Response) -> Array:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from kinetostat.algebra.vector import Vector
 from kinetostat.machine.machine import Configuration
 from kinetostat.spec.errors import InputError
-from kinetostat.validation.answer import Answer, Trial, difference
+from kinetostat.validation.answer import Answer, Trial
 from kinetostat.validation.exudyn_bodies import TRANSLATION_FIRST, Body, Multibody
 from kinetostat.validation.exudyn_machine import build
 
@@ -42,18 +42,18 @@ def solve(configuration: Configuration, reference: Vector) -> Answer:
     model, platform = build(configuration, reference, unit=greatest)
     tangent = _tangent(model, platform)
     if not np.any(tangent):
-        return Answer(tangent, 0.0, VARIED, ())
+        return Answer(tangent, tangent, VARIED, ())
     trials = tuple(_finite_loads(model, platform, tangent, length))
-    return Answer(tangent, _uncertainty(tangent, trials, length), VARIED, trials)
+    return Answer(tangent, _without_load(trials), VARIED, trials)
 
 
-def _uncertainty(tangent: Array, trials: tuple[Trial, ...], length: float) -> float:
-    """Distance from the answers under two finite loads, whose errors go with the load squared, taken to no load."""
+def _without_load(trials: tuple[Trial, ...]) -> Array | None:
+    """C under the two smallest loads taken to none: central differences err by the load squared."""
     if len(trials) < 2:
-        return float("inf")
-    (small, c_small), (large, c_large) = ((trial.scale, trial.compliance) for trial in trials[:2])
-    ratio = (large / small) ** 2
-    return difference((ratio * c_small - c_large) / (ratio - 1.0), tangent, length)
+        return None
+    small, large = trials[:2]
+    ratio = (large.scale / small.scale) ** 2
+    return (ratio * small.compliance - large.compliance) / (ratio - 1.0)
 
 
 def _tangent(model: Multibody, platform: Body) -> Array:
@@ -70,7 +70,10 @@ def _tangent(model: Multibody, platform: Body) -> Array:
         return np.zeros((6, 6))
     motion = np.linalg.lstsq(stiffness, loads, rcond=LOST)[0]
     if np.max(np.abs(stiffness @ motion - loads)) > UNBALANCED * np.max(np.abs(loads)):
-        raise InputError("Exudyn finds a motion that nothing resists: there is no compliance to compare.")
+        raise InputError(
+            "Exudyn finds a motion that nothing resists beside the machine's stiffest parts: it is free, or "
+            "stiffnesses differ by more than some nine decades."
+        )
     return np.asarray((free.T @ motion)[rows])
 
 

@@ -46,29 +46,30 @@ def solve(configuration: Configuration, reference: Vector) -> Answer:
     softest, stiffest = _extremes(configuration)
     stiffnesses = np.geomspace(softest, STIFFER * stiffest, TRIALS).tolist()
     trials = [Trial(stiff, _compliance(configuration, reference, stiff)) for stiff in stiffnesses]
-    found, uncertainty = extrapolate([1.0 / t.scale for t in trials], [t.compliance for t in trials], length)
-    return Answer(found, uncertainty, "stiffness of what is rigid, N/m", tuple(trials))
+    found, rival = extrapolate([1.0 / t.scale for t in trials], [t.compliance for t in trials], length)
+    return Answer(found, rival, "stiffness of what is rigid, N/m", tuple(trials))
 
 
-def extrapolate(steps: Sequence[float], values: Sequence[Array], length: float) -> tuple[Array, float]:
+def extrapolate(steps: Sequence[float], values: Sequence[Array], length: float) -> tuple[Array, Array]:
     """Values [6 x 6] at ever smaller steps, taken to step 0 by polynomials through some that follow each other.
 
     Returns:
-        Of all polynomials the value that differs least from those of one degree less, and by how much.
+        Of all polynomials the value that differs least from those of one degree less, and that of these which differs
+        from it more.
     """
-    best, least = values[-1], math.inf
+    least, best, rival = math.inf, values[-1], values[-2]
     column = list(values)
-    for degree in range(1, MOST):
+    for degree in range(1, min(MOST, len(steps))):
         finer = [
             (steps[i] * column[i + 1] - steps[i + degree] * column[i]) / (steps[i] - steps[i + degree])
             for i in range(len(column) - 1)
         ]
         for new, *older in zip(finer, column, column[1:], strict=False):
-            apart = max(difference(old, new, length, SMALL) for old in older)
-            if degree > 1 and apart < least:
-                best, least = new, apart
+            apart = [difference(old, new, length, SMALL) for old in older]
+            if degree > 1 and max(apart) < least:
+                least, best, rival = max(apart), new, older[apart.index(max(apart))]
         column = finer
-    return best, least
+    return best, rival
 
 
 def _extremes(configuration: Configuration) -> tuple[float, float]:

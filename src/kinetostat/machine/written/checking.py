@@ -10,6 +10,7 @@ import numpy as np
 from kinetostat.algebra.vector import Vector
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.machine import Plane
+from kinetostat.machine.written.closed_form import closed_form
 from kinetostat.machine.written.family import chains, place
 from kinetostat.machine.written.plan import JointPlan, LegPlan, LinkPlan, Plan
 from kinetostat.spec.errors import InputError
@@ -89,10 +90,11 @@ def _check_link(
         raise InputError(f"{where}: up points along the link; give another direction.")
 
 
-def with_idle_freedoms(plan: Plan, sections: Mapping[str, Any]) -> Plan:
-    """The plan with the passive freedoms of each leg that depend on the others, found away from the home pose.
+def completed(plan: Plan, sections: Mapping[str, Any]) -> Plan:
+    """The plan with what its numbers tell of each leg: a closed form if there is one, and its idle freedoms.
 
-    The home pose may be special, so that joints are displaced at random; legs need not close for that.
+    Freedoms are idle that depend on others. The home pose may be special, so that joints are displaced at random to
+    find them; legs need not close for that.
     """
     home = chains(plan, **sections)
     amounts = np.random.default_rng(1).uniform(-0.4, 0.4, home.size).tolist()
@@ -101,7 +103,8 @@ def with_idle_freedoms(plan: Plan, sections: Mapping[str, Any]) -> Plan:
     for leg, steps in zip(plan.legs, home.legs, strict=True):
         placed, _ = place(steps, remaining)
         freedoms = [joint for element in placed for joint in element.freedoms]
-        legs.append(replace(leg, idle=_dependent(freedoms, plan.planar, home.home.translation, float(home.length))))
+        idle = _dependent(freedoms, plan.planar, home.home.translation, float(home.length))
+        legs.append(replace(leg, idle=idle, inverse=closed_form(leg.name, steps)))
     return replace(plan, legs=tuple(legs))
 
 

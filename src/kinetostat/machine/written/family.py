@@ -9,7 +9,7 @@ from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, plus, reciprocal, sqrt, times, total, where
 from kinetostat.algebra.vector import AXES, IDENTITY, X_AXIS, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector
-from kinetostat.machine.leg import Element, Joint, Leg, Spring, revolutes
+from kinetostat.machine.leg import Element, Joint, Leg, Spring, Turn, revolutes
 from kinetostat.machine.link import Beam, Parallelogram, lumped_springs, matrix_springs
 from kinetostat.machine.machine import Chains, Configuration, Family, Plane, Step
 from kinetostat.machine.written.plan import JointPlan, LegPlan, LinkPlan, Plan, literals
@@ -28,12 +28,12 @@ def family_of(plan: Plan) -> Family:
     )
 
 
-def configure(plan: Plan, joints: Sequence[Scalar], **sections: Any) -> Configuration:
+def configure(plan: Plan, joints: Sequence[Scalar | Turn], **sections: Any) -> Configuration:
     """The machine with its joints at given coordinates; the platform is where the first leg takes it.
 
     Args:
         plan: what the machine consists of.
-        joints: coordinates of all joints leg by leg, rad or m from the home pose.
+        joints: coordinates of all joints leg by leg, from the home pose: m, and rad or turns.
         sections: its numbers, SI.
     """
     home = chains(plan, **sections)
@@ -48,10 +48,10 @@ def chains(plan: Plan, **sections: Any) -> Chains:
     legs = tuple(tuple(chain_at_home(plan, leg, sections)) for leg in plan.legs)
     home = Displacement(IDENTITY, Vector(*sections["platform"].point))
     pose = {name: getattr(sections["pose"], name) for name in plan.pose}
-    return Chains(legs, home, pose, _length(plan, sections))
+    return Chains(legs, home, pose, _length(plan, sections), tuple(leg.inverse for leg in plan.legs))
 
 
-def place(steps: Sequence[Step], coordinates: Iterator[Scalar]) -> tuple[list[Element], Displacement]:
+def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[list[Element], Displacement]:
     """A chain at given coordinates, and the displacement of its platform end from the home pose."""
     motion = Displacement(IDENTITY, ZERO)
     chain: list[Element] = []

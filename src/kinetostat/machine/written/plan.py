@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from kinetostat.machine.machine import Inverse
+
 BASE, PLATFORM = "base", "platform"
 """Names of the two bodies that every leg joins."""
 
@@ -87,15 +89,20 @@ class LinkPlan:
 
 @dataclass(frozen=True)
 class LegPlan:
-    """A leg: its joints from base to platform, those of its links that yield by name, and its idle freedoms.
+    """A leg: its joints from base to platform, and those of its links that yield by name.
 
-    For `idle` see `leg.Leg`.
+    Attributes:
+        name: unique within the machine.
+        joints, links: of it.
+        idle: see `leg.Leg`.
+        inverse: closed form of its joint coordinates, if it has one.
     """
 
     name: str
     joints: tuple[JointPlan, ...]
     links: Mapping[str, LinkPlan]
     idle: tuple[int, ...] = ()
+    inverse: Inverse | None = None
 
 
 @dataclass(frozen=True)

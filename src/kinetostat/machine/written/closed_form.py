@@ -1,0 +1,123 @@
+"""Legs whose joint coordinates follow in closed form from where the platform is: three parallel revolutes, and a slide.
+
+Which legs these are is seen from their axes at the home pose. All other legs are closed by Newton's method
+(`kinematics.closure`), and so are these where the platform turns out of the leg's plane.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinetostat.algebra.scalar import Scalar, minus, plus, reciprocal, sqrt, times
+from kinetostat.algebra.vector import Displacement, Vector
+from kinetostat.machine.leg import Joint, Turn
+from kinetostat.machine.machine import Closure, Step
+
+PARALLEL = 1e-12
+"""Sine of an angle between axes up to which they are parallel as written."""
+LEAST_LINK = 1e-9
+"""Length of a link, m, below which it has no direction."""
+
+
+@dataclass(frozen=True)
+class ParallelAxes:
+    """A leg of three revolutes about parallel axes and at most one slide along them, in any order.
+
+    Attributes:
+        leg: its name.
+        revolutes: which of its movable elements turn, from base to platform.
+        slide: which of them slides, or None.
+        signs: of the axes against the first revolute's.
+        bend: side of the line from the first to the last revolute on which the middle one lies at the home pose.
+    """
+
+    leg: str
+    revolutes: tuple[int, int, int]
+    slide: int | None
+    signs: tuple[float, ...]
+    bend: float
+
+    def amounts(self, steps: Sequence[Step], motion: Displacement) -> tuple[list[Scalar | Turn], Closure]:
+        """Joint coordinates that displace the platform end by `motion` as far as the leg can, on the home branch.
+
+        Args:
+            steps: the leg at the home pose.
+            motion: of the platform from its home pose, base frame.
+
+        Returns:
+            One coordinate per movable element: m of a slide, the cosine and sine of a revolute; NaN where the links
+            cannot reach, as the condition that comes with them says.
+        """
+        movers = [step.element.mover for step in steps if step.moves]
+        axis = movers[self.revolutes[0]].axis
+        first, middle, last = (_point(movers[i]) for i in self.revolutes)
+        goal = motion.apply(last)
+        lower, upper, span = (_across(v, axis) for v in (middle - first, last - middle, goal - first))
+        bent, closure = self._triangle(axis, lower, upper, span)
+        one = _turn(axis, lower, bent)
+        both = _turn(axis, upper, span - bent)
+        whole = _turn(axis, lower, motion.rotation.apply(lower))
+        found: list[Scalar | Turn] = [0.0] * len(movers)
+        turns = (one, _between(one, both), _between(both, whole))
+        for i, turn in zip(self.revolutes, turns, strict=True):
+            found[i] = Turn(turn.cosine, times(self.signs[i], turn.sine))
+        if self.slide is not None:
+            found[self.slide] = times(self.signs[self.slide], axis.dot(goal - last))
+        return found, closure
+
+    def _triangle(self, axis: Vector, lower: Vector, upper: Vector, span: Vector) -> tuple[Vector, Closure]:
+        """Where the lower link points, and the condition for the two links to bridge the span."""
+        near, far, square = lower.dot(lower), upper.dot(upper), span.dot(span)
+        shrink = reciprocal(square)
+        along = 0.5 * (1.0 + (near - far) * shrink)
+        across = sqrt(near * shrink - along * along)
+        sizes = sqrt(near), sqrt(far)
+        closure = Closure(self.leg, sqrt(square), abs(sizes[0] - sizes[1]), sizes[0] + sizes[1])
+        return span * along + axis.cross(span) * times(self.bend, across), closure
+
+
+def _point(joint: Joint) -> Vector:
+    if joint.point is None:
+        raise ValueError("a slide has no point")
+    return joint.point
+
+
+def _across(vector: Vector, axis: Vector) -> Vector:
+    """The part of a vector at right angles to an axis."""
+    return vector - axis * vector.dot(axis)
+
+
+def _turn(axis: Vector, old: Vector, new: Vector) -> Turn:
+    """The turn about an axis that takes one vector at right angles to it to another of the same length."""
+    size = reciprocal(old.dot(old))
+    return Turn(times(old.dot(new), size), times(axis.dot(old.cross(new)), size))
+
+
+def _between(first: Turn, whole: Turn) -> Turn:
+    """What is left of a turn after the first part of it."""
+    return Turn(
+        plus(times(whole.cosine, first.cosine), times(whole.sine, first.sine)),
+        minus(times(whole.sine, first.cosine), times(whole.cosine, first.sine)),
+    )
+
+
+def closed_form(name: str, steps: Sequence[Step]) -> ParallelAxes | None:
+    """The closed form of a leg at the home pose, if it has one; its numbers must be floats."""
+    movers = [step.element.mover for step in steps if step.moves and hasattr(step.element, "mover")]
+    turning = [i for i, joint in enumerate(movers) if joint.point is not None]
+    sliding = [i for i, joint in enumerate(movers) if joint.point is None]
+    if len(turning) != 3 or len(sliding) > 1 or any(joint.pitch for joint in movers):
+        return None
+    axes = np.array([joint.axis.components() for joint in movers], dtype=float)
+    axis = axes[turning[0]]
+    if np.linalg.norm(np.cross(axes, axis), axis=1).max() > PARALLEL:
+        return None
+    points = np.array([_point(movers[i]).components() for i in turning], dtype=float)
+    lower, upper = (link - axis * (link @ axis) for link in np.diff(points, axis=0))
+    bend = float(np.cross(upper, lower) @ axis)
+    if min(np.linalg.norm(lower), np.linalg.norm(upper)) < LEAST_LINK or bend == 0.0:
+        return None
+    signs = tuple(float(np.sign(one @ axis)) for one in axes)
+    first, middle, last = turning
+    return ParallelAxes(name, (first, middle, last), next(iter(sliding), None), signs, float(np.sign(bend)))
