@@ -1,0 +1,164 @@
+"""Files of machines written leg by leg: what is refused, and that each message names leg and joint and the way out."""
+
+import json
+
+import jsonschema
+import pytest
+
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.loading import build, bundled, load, machine_schema, template
+from kinetostat.spec import document
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.analysis import analyze
+
+GOOD = bundled()["tripteron"]
+
+MISTAKES = {
+    "a leg that does not reach the platform": (
+        'joins = ["distal", "platform"]',
+        'joins = ["distal", "hand"]',
+        ['leg "z" does not reach the platform', '"wrist"', '"hand"', 'joins = ["distal", "platform"]'],
+    ),
+    "a disconnected chain": (
+        'joins = ["carriage", "proximal"]',
+        'joins = ["trolley", "proximal"]',
+        ['leg "z", joint "shoulder" starts at "trolley"', "disconnected", 'joins = ["carriage", "proximal"]'],
+    ),
+    "a leg that does not start at the base": (
+        'joins = ["base", "carriage"]',
+        'joins = ["ground", "carriage"]',
+        ['leg "z", joint "slide" starts at "ground"', 'a leg starts at "base"'],
+    ),
+    "a body passed twice": (
+        'joins = ["proximal", "distal"]',
+        'joins = ["proximal", "carriage"]',
+        ['leg "z", joint "elbow" leads to "carriage" too early'],
+    ),
+    "an axis of zero length": (
+        "axis = [0, 0, 1], actuated",
+        "axis = [0, 0, 0], actuated",
+        ['leg "z", joint "slide": axis has no length', "axis = [0, 0, 1]"],
+    ),
+    "two legs with one name": ('name = "y"', 'name = "z"', ['two legs are called "z"', "name of its own"]),
+    "two joints with one name": ('name = "elbow"', 'name = "shoulder"', ['leg "z": two joints are called "shoulder"']),
+    "a leg without a name": ('name = "y"', "name = 5", ["the name of leg 2 is 5", 'name = "leg 2"']),
+    "an actuated joint without stiffness": (
+        ', stiffness = "1e6 N/m"',
+        "",
+        ['leg "z", joint "slide" is actuated but has no stiffness', 'stiffness = "20 N/um"', '"rigid"'],
+    ),
+    "a stiffness of another kind": (
+        'stiffness = "1e6 N/m"',
+        'stiffness = "1e6 N*m/rad"',
+        ["legs.z.slide.stiffness", '"N*m/rad" is no unit of linear stiffness'],
+    ),
+    "an unknown type": ('type = "revolute"', 'type = "revolve"', ['joint "shoulder"', 'did you mean "revolute"?']),
+    "an actuated ball joint": (
+        'type = "prismatic"',
+        'type = "spherical"',
+        ['joint "slide" is spherical; only revolute'],
+    ),
+    "an unknown section": ('section = "bar"', 'section = "rod"', ['link "proximal": section is "rod"', "bar"]),
+    "an unknown link": ("links = { proximal", "links = { upper", ['leg "z": links name is "upper"', "proximal"]),
+    "a link without length": (
+        "point = [0.7177071733467426, -0.2177071733467426, 0.5]",
+        "point = [0, 0, 0.5]",
+        ['leg "z", link "proximal" has no length', '"shoulder" and "elbow"'],
+    ),
+    "two coordinates for a point": (
+        "point = [0, 0, 0.5], axis = [0, 0, 1], actuated",
+        "point = [0, 0], axis = [0, 0, 1], actuated",
+        ["legs.z.slide.point is [0, 0]", "give 3"],
+    ),
+    "an unknown shape": ('"round"', '"hex"', ['section "bar": shape is "hex"', "rectangle"]),
+    "no material": ('youngs_modulus = "70 GPa"', "", ['section "bar": material is missing', "aluminium"]),
+    "an unknown coordinate": ("[pose]", "[pose]\nq = 1", ['a name in [pose] is "q"', "roll"]),
+    "no pose": ('x = "0.5 m"\ny = "0.5 m"\nz = "0.5 m"', "", ["[pose] must give the task coordinates"]),
+    "no legs": (GOOD[GOOD.index("[[legs]]") :], "", ["needs 1 to 24 legs"]),
+    "a leg without joints": (GOOD[GOOD.index("[[legs]]") :], '[[legs]]\nname = "a"\njoints = []', ["has 0 joints"]),
+    "a matrix where none belongs": (
+        'model = "beam", section',
+        'model = "matrix", section',
+        ['link "proximal"', 'belongs to model = "matrix"'],
+    ),
+    "a matrix with negative energy": (
+        'model = "beam", section = "bar"',
+        'model = "matrix", compliance = [1, 1, 1, 1, 1, -1]',
+        ["no negative eigenvalue"],
+    ),
+    "a coordinate out of the plane": ('family = "legs"', 'family = "legs"\nspace = "planar"', ['"z"', "x, y, yaw"]),
+}
+
+
+def refused(text, settings=()):
+    with pytest.raises(InputError) as caught:
+        build(document.parse(text, "mine.toml"), "mine.toml", settings)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(("old", "new", "words"), MISTAKES.values(), ids=MISTAKES)
+def test_a_mistake_is_refused_with_leg_and_joint(old, new, words):
+    assert old in GOOD
+    message = refused(GOOD.replace(old, new, 1))
+    assert message.startswith('"mine.toml": ')
+    for word in words:
+        assert word in message
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("legs.q.slide.stiffness=3", ['"q"', "z, y, x"]),
+        ("legs.z.slyde.stiffness=3", ['"slyde"', 'did you mean "slide"?']),
+        ('legs.z.slide.stiffness="-1 N/m"', ["legs.z.slide.stiffness", "negative"]),
+        ('sections.bar.diameter="0 mm"', ["sections.bar.diameter", "greater than 0"]),
+    ],
+)
+def test_a_mistaken_override_is_refused(setting, words):
+    message = refused(GOOD, [setting])
+    for word in words:
+        assert word in message
+
+
+def test_overrides_reach_every_number():
+    machine = load("tripteron", ['legs.z.slide.stiffness="rigid"', 'sections.bar.diameter="10 cm"', "pose.x=0.4"])
+    assert machine.sections["legs.z.slide"].stiffness == float("inf")
+    assert machine.sections["sections.bar"].diameter == 0.1
+
+
+def test_a_pose_off_the_constraint_is_refused_with_the_nearest_one():
+    found = analyze(load("tripteron", ['pose.yaw="3 deg"', "pose.x=0.4"]))
+    assert found.status is Status.OUT_OF_REACH
+    assert "nearest admissible pose is x 0.4 m, y 0.5 m, z 0.5 m, roll 0 rad, pitch 0 rad, yaw 0 rad" in found.message
+
+
+def test_a_pose_that_says_too_little_is_refused():
+    text = GOOD.replace('x = "0.5 m"\ny = "0.5 m"\nz = "0.5 m"', 'x = "0.5 m"')
+    found = analyze(build(document.parse(text, "mine.toml"), "mine.toml"))
+    assert found.status is Status.SINGULAR
+    assert "not determined" in found.message
+    assert "Give further coordinates in [pose]" in found.message
+
+
+def test_the_template_is_a_file_that_loads():
+    assert build(document.parse(template("legs"), "new"), "new").family.name == "legs"
+
+
+@pytest.mark.parametrize("name", bundled())
+def test_bundled_files_fulfil_the_schema(name):
+    schema = machine_schema()
+    assert json.loads(json.dumps(schema, allow_nan=False)) == schema
+    jsonschema.validate(document.parse(bundled()[name], name), schema)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('type = "revolute"', 'type = "revolve"'),
+        ('joins = ["base"', 'join = ["base"'),
+        ('family = "legs"', 'family = "leg"'),
+    ],
+)
+def test_the_schema_refuses_what_the_reader_refuses(old, new):
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(document.parse(GOOD.replace(old, new, 1), "mine"), machine_schema())
