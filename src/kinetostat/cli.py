@@ -252,13 +252,19 @@ def _analyze(options: argparse.Namespace) -> int:
 
 
 def _validate(options: argparse.Namespace) -> int:
+    from kinetostat.kinematics.status import Status
     from kinetostat.machine.loading import load
+    from kinetostat.studies.analysis import analyze
     from kinetostat.validation.comparison import AGREED, as_json, validate
     from kinetostat.views.tables import terminal
     from kinetostat.views.validation_tables import print_validation
 
     poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]
     machines = [load(options.machine, [*options.settings, *pose]) for pose in poses]
+    for machine in machines:
+        answer = analyze(machine)
+        if answer.status is not Status.OK:
+            return _no_answer(answer.message)
     found = [validate(machine, options.engine) for machine in machines]
     if options.json:
         _print_json([as_json(validation) for validation in found])

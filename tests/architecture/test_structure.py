@@ -8,7 +8,7 @@ from graphlib import TopologicalSorter
 import pytest
 from source import PACKAGE, ROOT, imports, modules
 
-LAYERS = ["units", "spec", "algebra", "machine", "kinematics", "kinetostatics", "engine", "studies", "views"]
+LAYERS = ["units", "spec", "algebra", "machine", "kinematics", "kinetostatics", "engine", "studies", "validation", "views"]
 """From the bottom up (DESIGN section 4): each may import itself and those before it."""
 EDGES = ["cli", "studio", "__main__"]
 """Thin edges above all layers; nobody below imports them."""

@@ -104,14 +104,22 @@ def _in_closed_form(chains: Chains, goal: Array) -> tuple[Array, Codes] | None:
 
 
 def _by_newton(chains: Chains, goal: Array) -> tuple[Array, Codes]:
-    """Coordinates [n x coordinates] and status, reached in steps from the home pose."""
+    """Coordinates [n x coordinates] and status, by Newton's method."""
+    found = joints_on_the_way(chains, goal)
+    return found, _status(chains, found, goal)
+
+
+def joints_on_the_way(chains: Chains, goal: Array) -> Array:
+    """Coordinates [n x coordinates] that come nearest to closing the legs at poses [n x given], from the home pose.
+
+    In steps short enough to stay on its branch.
+    """
     start = np.stack(np.broadcast_arrays(*_home_pose(chains), np.zeros(len(goal)))[:-1], axis=-1)
     found = np.zeros((len(goal), chains.size))
     steps = _steps(goal - start, chains)
     for step in range(1, steps):
         found = _newton(chains, found, start + (goal - start) * (step / steps), ON_THE_WAY)
-    found = _newton(chains, found, goal, MOST_ITERATIONS)
-    return found, _status(chains, found, goal)
+    return _newton(chains, found, goal, MOST_ITERATIONS)
 
 
 def _batch(machine: Machine, chains: Chains) -> int:

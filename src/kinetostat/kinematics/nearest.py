@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.kinematics.closure import Gaps, gaps_at, pose_of, solve_joints
+from kinetostat.kinematics.closure import Gaps, gaps_at, joints_on_the_way, pose_of
 from kinetostat.machine.machine import Machine
 
 Array = npt.NDArray[np.float64]
@@ -38,7 +38,7 @@ def nearest_pose(machine: Machine) -> dict[str, float]:
         found = gaps(joints)
         return -np.concatenate([CLOSING * found.closure_rates[0], found.pose_rates[0]])
 
-    best = _descend(left, slopes, np.array(solve_joints(machine).coordinates, dtype=float))
+    best = _descend(left, slopes, joints_on_the_way(chains, goal)[0])
     coordinates = pose_of(gaps(best).platform)
     return {name: _without_rounding(float(value[0])) for name, value in coordinates.items()}
 

@@ -26,6 +26,8 @@ TRIALS = 10
 STIFFER = 100.0
 """The greatest of them, in units of the stiffest part; the least is the softest part's: what is rigid adds its own
 compliance, which extrapolation takes away again and exactly so where no leg is redundant."""
+CONTRAST = 1e7
+"""Of stiffnesses in one machine, beyond which a redundant stiff part can stay hidden from every trial."""
 SMALL = 1e-4
 """Share of the other below which a block of C is on its way to zero, so that its relative error says nothing."""
 MOST = 6
@@ -40,10 +42,15 @@ def solve(configuration: Configuration, reference: Vector) -> Answer:
         reference: where loads act and motions are read, base frame, m.
 
     Raises:
-        InputError: if it has a part that no member stands for.
+        InputError: if it has a part that no member stands for, or stiffnesses too far apart.
     """
     length = float(configuration.length)
     softest, stiffest = _extremes(configuration)
+    if stiffest > CONTRAST * softest:
+        raise InputError(
+            "Stiffnesses of this machine differ by more than seven decades, too much for PyNite, where what is rigid "
+            "needs a finite stiffness beside them; use Exudyn."
+        )
     stiffnesses = np.geomspace(softest, STIFFER * stiffest, TRIALS).tolist()
     trials = [Trial(stiff, _compliance(configuration, reference, stiff)) for stiff in stiffnesses]
     found, rival = extrapolate([1.0 / t.scale for t in trials], [t.compliance for t in trials], length)
