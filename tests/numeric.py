@@ -1,6 +1,7 @@
 """Numbers for tests: our structures as NumPy arrays, and comparisons that never mix rotation with translation."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -8,15 +9,18 @@ from hypothesis import assume
 
 from kinetostat.algebra.screw import Screw, Twist, Wrench
 from kinetostat.algebra.symmetric import Symmetric6
-from kinetostat.algebra.vector import Displacement, Rotation, Vector
-from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_statics, stiffness_matrix
-from kinetostat.machine.machine import Configuration
+from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.limits import Limits
+from kinetostat.machine.machine import Configuration, Family, Load, Machine, Tool
 
 Array = npt.NDArray[np.float64]
 
 U = float(np.finfo(float).eps)
 """Rounding unit of float64, 2.2e-16."""
 BLOCKS = (slice(0, 3), slice(3, 6))
+DROWNED = 10
+"""Rounding units times the contrast of springs that may be lost where compliances are added up; see `lost`."""
 REACHED = 1e-9
 """Share of a screw, in one unit, above which a component is surely no rounding; see `reached`."""
 
@@ -62,19 +66,19 @@ def dimensionless(symmetric: Symmetric6, length: float, kind: type[Screw]) -> Ar
     return scale[:, None] * array(symmetric) * scale
 
 
-def trace_product(stiffness: Symmetric6, compliance: Symmetric6, length: float) -> float:
-    """tr K tr C in one unit: 36 at best; times the rounding unit, what K C can differ from 1."""
-    scaled = dimensionless(stiffness, length, Wrench), dimensionless(compliance, length, Twist)
-    return float(np.trace(scaled[0]) * np.trace(scaled[1]))
+def trace_product(response: Response) -> float:
+    """tr K tr C in one unit: 36 at best (9 in a plane); times the rounding unit, what K C can differ from 1."""
+    stiffness, compliance = reduced(response, response.stiffness, Wrench), reduced(response, response.compliance, Twist)
+    return float(np.trace(stiffness) * np.trace(compliance))
 
 
-def assert_blocks_close(actual: Array, expected: Array, relative: float) -> None:
-    """Compare two symmetric 6x6 block by block, in the Frobenius norm.
+def assert_blocks_close(actual: Array, expected: Array, relative: float, scale_of: Array | None = None) -> None:
+    """Compare two symmetric 6x6 block by block, in the Frobenius norm; of `expected`, or of another matrix `scale_of`.
 
     The scale of the coupling block is the geometric mean of the rotational and the translational block: for a
     positive semi-definite matrix it is at most that, and it has the same unit, so that no length has to be chosen.
     """
-    sizes = [np.linalg.norm(expected[block, block]) for block in BLOCKS]
+    sizes = [np.linalg.norm((expected if scale_of is None else scale_of)[block, block]) for block in BLOCKS]
     for i, rows in enumerate(BLOCKS):
         for j, columns in enumerate(BLOCKS):
             error = np.linalg.norm(actual[rows, columns] - expected[rows, columns])
@@ -82,30 +86,82 @@ def assert_blocks_close(actual: Array, expected: Array, relative: float) -> None
             assert error <= relative * scale, f"block {i},{j}: {error:.3g} of {scale:.3g}"
 
 
-def assert_psd(symmetric: Symmetric6, length: float, kind: type[Screw]) -> None:
-    """All entries finite and no eigenvalue below zero beyond rounding; symmetric by construction."""
-    scaled = dimensionless(symmetric, length, kind)
-    assert np.all(np.isfinite(scaled))
-    assert np.array_equal(scaled, scaled.T)
-    eigenvalues = np.linalg.eigvalsh(scaled)
-    assert eigenvalues[0] >= -20 * U * eigenvalues[-1]
+def lost(response: Response) -> float:
+    """What may be lost beside rounding, as a share of K or C: 0 where each leg is solved spring by spring.
+
+    In a leg with more or fewer springs than wrenches, and where legs constrain the platform twice, compliances are
+    added up before they are inverted: the softest drown the stiffest in rounding, by the contrast between them.
+    """
+    carried = sum(len(leg.wrenches) for leg in response.legs) + len(response.guide)
+    if carried == 6 and all(len(leg.loads) == len(leg.wrenches) for leg in response.legs):
+        return 0.0
+    length = float(response.configuration.length)
+    every = [s for leg in response.configuration.legs for s in leg.springs]
+    sizes = [float(s.stiffness) / (1.0 if s.joint.point is None else length**2) for s in every]
+    sizes = [size for size in sizes if 0.0 < size < np.inf] or [1.0]
+    return DROWNED * U * max(sizes) / min(sizes)
 
 
-def statics_at(configuration: Configuration, reference: Vector) -> Statics:
-    """Statics of a placed machine at any reference point (base frame, m)."""
-    length = configuration.length
-    return solve_statics([leg.screws(reference, length) for leg in configuration.legs], length)
+def assert_psd(symmetric: Array, size: float = 0.0) -> None:
+    """Of a matrix in one unit: all finite, and no eigenvalue below zero beyond rounding, of itself or of `size`."""
+    assert np.all(np.isfinite(symmetric))
+    assert np.allclose(symmetric, symmetric.T, rtol=0, atol=4 * U * np.max(abs(symmetric)))
+    eigenvalues = np.linalg.eigvalsh(symmetric)
+    assert eigenvalues[0] >= -20 * U * max(eigenvalues[-1], size)
+
+
+def placed(configuration: Configuration, reference: Vector | None = None) -> Machine:
+    """A machine that stands as it is placed, with its tool at `reference` (base frame, m): at P if not given."""
+    home = configuration.platform.inverse()
+    offset = ZERO if reference is None else home.apply(reference)
+    sections = {"tool": Tool(offset.components()), "load": Load(), "limits": Limits()}
+    return Machine("placed", Family("placed", "", {}, lambda: configuration), sections)
+
+
+def answer(configuration: Configuration, reference: Vector | None = None) -> Response:
+    """What a placed machine answers at any reference point (base frame, m), at P if none is given."""
+    return respond(placed(configuration, reference))
 
 
 def displaced(configuration: Configuration, motion: Displacement) -> Configuration:
-    """The whole placed machine moved as one."""
+    """The whole placed machine moved as one, and the plane of a planar one with it."""
     legs = tuple(leg.displaced(motion) for leg in configuration.legs)
-    return Configuration(motion @ configuration.platform, legs, configuration.closures, configuration.length)
+    plane = None if configuration.plane is None else configuration.plane.displaced(motion)
+    return replace(configuration, platform=motion @ configuration.platform, legs=legs, plane=plane)
 
 
-def matrices(statics: Statics) -> tuple[Array, Array]:
+def with_springs(configuration: Configuration, stiffness: Mapping[int, float]) -> Configuration:
+    """The placed machine with the stiffness of some springs replaced; springs count as in every per-spring result."""
+    legs, taken = [], 0
+    for leg in configuration.legs:
+        own = [replace(s, stiffness=stiffness.get(e, s.stiffness)) for e, s in enumerate(leg.springs, taken)]
+        legs.append(replace(leg, chain=(*leg.passive, *own)))
+        taken += len(own)
+    return replace(configuration, legs=tuple(legs))
+
+
+def respring(response: Response, stiffness: Mapping[int, float]) -> Response:
+    """What the same placed machine answers at the same point with other stiffnesses, by number of the spring."""
+    return answer(with_springs(response.configuration, stiffness), response.reference)
+
+
+def matrices(response: Response) -> tuple[Array, Array]:
     """K and C as arrays [6 x 6]."""
-    return array(stiffness_matrix(statics)), array(compliance_matrix(statics))
+    return array(response.stiffness), array(response.compliance)
+
+
+def motions(response: Response) -> Array:
+    """Orthonormal basis of the twists at the reference point that exist: all six, or rz, x, y of a plane [6 x n]."""
+    if response.configuration.plane is None:
+        return np.eye(6)
+    axes = response.configuration.plane.frame.rotation
+    return columns([Twist(axes.z, ZERO), Twist(ZERO, axes.x), Twist(ZERO, axes.y)])
+
+
+def reduced(response: Response, symmetric: Symmetric6, kind: type[Screw]) -> Array:
+    """K (kind Wrench) or C (kind Twist) over the motions that exist, in one unit (N/m or m/N) [n x n]."""
+    basis = motions(response)
+    return basis.T @ dimensionless(symmetric, float(response.configuration.length), kind) @ basis
 
 
 def columns(screws: Sequence[Screw]) -> Array:
@@ -121,7 +177,7 @@ def reached(screws: Sequence[Screw], indices: Sequence[int], length: float) -> n
     touched = np.zeros((6, 6), dtype=bool)
     for e in indices:
         parts = abs(screw(screws[e])) * np.repeat([length, 1.0], 3)
-        share = parts / np.linalg.norm(parts)
+        share = parts / (np.linalg.norm(parts) or 1.0)
         assume(not np.any((share > 100 * U) & (share < REACHED)))
         touched |= np.outer(share > REACHED, share > REACHED)
     return touched

@@ -5,7 +5,7 @@ import pytest
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinetostatics.assembly import compliance_matrix, solve_statics, stiffness_matrix
-from kinetostat.machine.leg import TwoForceLeg
+from kinetostat.machine.leg import two_force_leg
 from kinetostat.machine.loading import load
 
 EXTRA = (
@@ -18,7 +18,7 @@ LENGTH = 0.1
 def redundant(extra_stiffness, own_stiffness="20 N/um"):
     """The hexapod with two more legs."""
     configuration = load("hexapod", [f"stiffness.actuator={own_stiffness}"]).configure()
-    more = [TwoForceLeg(f"extra {i}", *ends, extra_stiffness) for i, ends in enumerate(EXTRA)]
+    more = [two_force_leg(f"extra {i}", *ends, extra_stiffness) for i, ends in enumerate(EXTRA)]
     reference = configuration.platform.translation
     return solve_statics([leg.screws(reference, LENGTH) for leg in (*configuration.legs, *more)], LENGTH)
 

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import with_values
-from kinetostat.studies.analysis import analyze, as_json
+from kinetostat.studies.analysis import analyze
+from kinetostat.studies.analysis_data import as_json
 from machines import CASES, CONTRASTING, every_machine, machines
 
 NAME = "zhang-gosselin-4dof"
@@ -155,7 +156,7 @@ def test_a_load_that_no_spring_feels_is_held_rigidly(beside):
 
 def limits(machine):
     """Shortest and longest span of the passive leg."""
-    first, second = machine.geometry.passive_links
+    first, second = machine.sections["geometry"].passive_links
     return abs(first - second), first + second
 
 

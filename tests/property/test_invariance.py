@@ -1,6 +1,7 @@
 """What may not matter: where the machine stands, how it is turned, the point of reference, order of legs and units."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,19 +10,18 @@ from hypothesis import strategies as st
 
 from geometry import displacements, vectors
 from kinetostat.algebra.vector import ZERO
-from kinetostat.kinetostatics.assembly import solve_statics
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.loading import load
-from kinetostat.machine.machine import Configuration
 from kinetostat.machine.parameters import parameters, values, with_values
-from machines import CONTRASTING, MODERATE, every_machine, regular, regular_machines, stiffness_paths
+from machines import CONTRASTING, MODERATE, every_machine, few, regular, regular_machines, stiffness_paths
 from numeric import (
+    answer,
     array,
     assert_blocks_close,
     displaced,
+    lost,
     matrices,
     matrix,
-    statics_at,
+    motions,
     twist_transport,
     vector,
     wrench_transport,
@@ -32,72 +32,113 @@ INVARIANT = 1e-12
 
 The trick of imitating free joints by huge compliances errs by percents here (DESIGN section 2).
 """
+REORDERED = 10.0
+"""Factor within which the regularity of a pose is known: it depends on the order in which vectors are taken, and that
+on which components are zero by form; whether 1e-17 is left of one or not is a matter of units as well."""
 every_contrast = pytest.mark.parametrize("stiffness", [MODERATE, CONTRASTING], ids=["moderate", "contrasting"])
 
 
-def transported(response, turn, offset):
-    """K and C of the machine turned, then referred to the point at `offset` from the turned P."""
-    forces, motions = wrench_transport(turn, offset), twist_transport(turn, offset)
-    return forces @ array(response.stiffness) @ forces.T, motions @ array(response.compliance) @ motions.T
+def assert_transported(found, response, turn, offset):
+    """`found` is the machine of `response` turned, and referred to the point at `offset` (m) from the turned one.
+
+    Compared over the motions that exist: a planar machine has no others, wherever its reference point lies.
+    """
+    forces, twists = wrench_transport(turn, offset), twist_transport(turn, offset)
+    stiffness, compliance = matrices(response)
+    exists = motions(found) @ motions(found).T
+    for actual, wanted in zip(
+        matrices(found), (forces @ stiffness @ forces.T, twists @ compliance @ twists.T), strict=True
+    ):
+        assert_blocks_close(exists @ actual @ exists, exists @ wanted @ exists, INVARIANT + lost(response))
 
 
-def assert_same(found, expected):
-    for actual, wanted in zip(found, expected, strict=True):
-        assert_blocks_close(actual, wanted, INVARIANT)
+def assert_same(found, response):
+    assert_transported(found, response, np.eye(3), np.zeros(3))
 
 
 @every_machine
 @every_contrast
+@few
 @given(data=st.data(), motion=displacements(2.0))
 def test_the_machine_moved_as_a_whole(case, stiffness, data, motion):
     response = data.draw(regular(case, stiffness))
-    moved = displaced(response.configuration, motion)
-    found = matrices(statics_at(moved, moved.platform.translation))
-    assert_same(found, transported(response, matrix(motion.rotation), np.zeros(3)))
+    found = answer(displaced(response.configuration, motion), motion.apply(response.reference))
+    assert_transported(found, response, matrix(motion.rotation), np.zeros(3))
 
 
 @every_machine
+@few
 @given(data=st.data(), offset=vectors(0.3))
 def test_another_reference_point(case, data, offset):
     """A tool point within some platform radii: twist and wrench are transported there, and K and C with them."""
     response = data.draw(regular(case))
-    found = matrices(statics_at(response.configuration, response.configuration.platform.translation + offset))
-    assert_same(found, transported(response, np.eye(3), vector(offset)))
+    found = answer(response.configuration, response.reference + offset)
+    assert_transported(found, response, np.eye(3), vector(offset))
 
 
 @every_machine
+@few
 @given(data=st.data(), motion=displacements(0.5))
 def test_moved_and_seen_from_the_origin(case, data, motion):
     response = data.draw(regular(case))
-    moved = displaced(response.configuration, motion)
-    found = matrices(statics_at(moved, ZERO))
-    assert_same(found, transported(response, matrix(motion.rotation), -vector(moved.platform.translation)))
+    found = answer(displaced(response.configuration, motion), ZERO)
+    assert_transported(found, response, matrix(motion.rotation), -vector(motion.apply(response.reference)))
 
 
 @every_machine
+@few
+@given(data=st.data())
+def test_the_tool_lies_on_the_platform(case, data):
+    """The tool point of a file is P moved by the offset in platform axes, and goes where the platform goes."""
+    machine = data.draw(regular_machines(case))
+    response = respond(machine)
+    platform = response.configuration.platform
+    offset = np.array(machine.sections["tool"].offset)
+    at_p = respond(with_values(machine, dict.fromkeys((f"tool.offset.{i}" for i in range(3)), 0.0)))
+    assert vector(at_p.reference) == pytest.approx(vector(platform.translation), abs=1e-15)
+    assert_transported(response, at_p, np.eye(3), matrix(platform.rotation) @ offset)
+
+
+@every_machine
+@few
 @given(data=st.data())
 def test_the_order_of_the_legs(case, data):
     response = data.draw(regular(case, CONTRASTING))
-    placed = response.configuration
-    legs = data.draw(st.permutations(placed.legs))
-    shuffled = Configuration(placed.platform, tuple(legs), placed.closures, placed.length)
-    expected = array(response.stiffness), array(response.compliance)
-    assert_same(matrices(statics_at(shuffled, placed.platform.translation)), expected)
+    legs = data.draw(st.permutations(response.configuration.legs))
+    assert_same(answer(replace(response.configuration, legs=tuple(legs)), response.reference), response)
 
 
 @every_machine
+@few
 @given(data=st.data(), factor=st.floats(0.1, 10.0))
 def test_the_length_that_scales_rows(case, data, factor):
     response = data.draw(regular(case))
-    length = factor * float(response.configuration.length)
-    point = response.configuration.platform.translation
-    statics = solve_statics([leg.screws(point, length) for leg in response.configuration.legs], length)
-    assert_same(matrices(statics), (array(response.stiffness), array(response.compliance)))
+    other = replace(response.configuration, length=factor * float(response.configuration.length))
+    assert_same(answer(other, response.reference), response)
+
+
+UNITS = {
+    "angle": (0, 0),
+    "direction": (0, 0),
+    "density": (0, 0),
+    "length": (1, 0),
+    "area": (2, 0),
+    "second moment of area": (4, 0),
+    "linear stiffness": (-1, 1),
+    "torsional stiffness": (1, 1),
+    "axial rigidity": (0, 1),
+    "torsional rigidity": (2, 1),
+    "bending rigidity": (2, 1),
+    "force": (0, 1),
+    "moment": (1, 1),
+    "elastic modulus": (-2, 1),
+}
+"""Powers of the units of length and of force in each kind of quantity."""
 
 
 def in_other_units(machine, metre, newton):
     """The same machine written in another unit of length and of force: `metre` and `newton` are their values."""
-    size = {"length": metre, "angle": 1.0, "linear stiffness": newton / metre, "torsional stiffness": newton * metre}
+    size = {kind: metre**length * newton**force for kind, (length, force) in UNITS.items()}
     now = values(machine)
     leaves = [p for p in parameters(machine.family) if p.leaves == (p.path,)]
     return with_values(machine, {p.path: now[p.path] * size[p.quantity.kind] for p in leaves})
@@ -110,16 +151,17 @@ def unit_of_stiffness(metre, newton):
 
 
 @every_machine
+@few
 @given(data=st.data(), metre=st.sampled_from([1e-9, 1e-3, 1e3, 1e6]), newton=st.sampled_from([1.0, 1e3]))
 def test_the_units_of_length_and_of_force(case, metre, newton, data):
     """Written in mm or km and mN, the machine has the same status, regularity, K and C."""
     machine = data.draw(regular_machines(case))
     here, there = respond(machine), respond(in_other_units(machine, metre, newton))
     assert there.status == here.status
-    assert there.regularity == pytest.approx(here.regularity, rel=1e-9)
+    assert 1.0 / REORDERED < there.regularity / here.regularity < REORDERED
     unit = unit_of_stiffness(metre, newton)
-    assert_blocks_close(array(there.stiffness) * unit, array(here.stiffness), INVARIANT)
-    assert_blocks_close(array(there.compliance) / unit, array(here.compliance), INVARIANT)
+    assert_blocks_close(array(there.stiffness) * unit, array(here.stiffness), INVARIANT + lost(here))
+    assert_blocks_close(array(there.compliance) / unit, array(here.compliance), INVARIANT + lost(here))
 
 
 @every_machine
@@ -127,8 +169,9 @@ def test_the_units_of_length_and_of_force(case, metre, newton, data):
 @pytest.mark.parametrize("end", [0.0, math.inf], ids=["free", "rigid"])
 def test_what_is_rigid_or_free_does_not_depend_on_units(case, end, metre):
     """At the reference design, spring by spring: no threshold compares metres with radians (DESIGN section 1)."""
-    for path in stiffness_paths(load(case.name)):
-        machine = with_values(load(case.name), {path: end})
+    for path in stiffness_paths(case.machine):
+        machine = with_values(case.machine, {path: end})
         here, there = respond(machine), respond(in_other_units(machine, metre, 1.0))
-        assert np.array_equal(np.isfinite(array(there.stiffness)), np.isfinite(array(here.stiffness))), path
-        assert np.array_equal(np.isfinite(array(there.compliance)), np.isfinite(array(here.compliance))), path
+        assert here.status == there.status, path
+        for ours, theirs in zip(matrices(here), matrices(there), strict=True):
+            assert np.array_equal(np.isfinite(ours), np.isfinite(theirs)), path

@@ -11,7 +11,8 @@ from hypothesis import assume, given
 
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.parameters import values, with_values
-from machines import CASES, REGULAR, machines
+from machines import CASES, REGULAR
+from machines import machines as any_machines
 from numeric import array, assert_blocks_close
 
 CASE = next(case for case in CASES if case.name == "zhang-gosselin-4dof")
@@ -19,6 +20,19 @@ WELL = 1e6
 """Bound on the condition of A J5 and J5', whose inverses the paper's formulas take; LAPACK loses its digits."""
 AGREEMENT = 1e-8
 """Two inversions with condition numbers below `WELL`, each in metres and radians without scaling."""
+
+
+SIMPLE = {
+    **{f"tool.offset.{i}": 0.0 for i in range(3)},
+    **{f"stiffness.passive_link_bending.{i}": math.inf for i in range(2)},
+    "stiffness.leg_axial": math.inf,
+    "stiffness.passive_actuator": 0.0,
+}
+"""What the paper's machine does not have: a tool, links beside its virtual joints, and a drive in the passive leg."""
+
+
+def machines(case):
+    return any_machines(case).map(lambda machine: with_values(machine, SIMPLE))
 
 
 def revolute(axis, point, tip):

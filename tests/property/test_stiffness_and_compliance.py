@@ -8,9 +8,21 @@ from hypothesis import strategies as st
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.kinetostatics.assembly import flexible_stiffness
 from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.machine import springs
 from kinetostat.machine.parameters import values, with_values
-from machines import CONTRASTING, MODERATE, every_machine, machines, regular, regular_machines, stiffness_paths
-from numeric import U, array, assert_blocks_close, assert_psd, dimensionless, trace_product
+from machines import CONTRASTING, MODERATE, elastic_paths, every_machine, few, machines, regular
+from numeric import (
+    U,
+    array,
+    assert_blocks_close,
+    assert_psd,
+    lost,
+    motions,
+    reduced,
+    respring,
+    screw,
+    trace_product,
+)
 
 INVERSE = 1e-9
 """What K C may differ from 1 at moderate contrast.
@@ -22,38 +34,52 @@ the traces is kept below `SPREAD`, so that this bound is 2e-10 c.
 """
 SPREAD = 1e6
 ROUNDINGS = 30
-"""Bound on c at any contrast: a margin of more than ten over what was seen."""
+"""Bound on c at any contrast: a margin of more than ten over what was seen, where legs are solved spring by spring."""
+UNDERFLOW = 1e-290
+"""Below it products have lost digits to the end of float64's range."""
+FELT = 1e-6
+"""Share of a spring in C from which the change it causes is surely not lost in rounding."""
 every_contrast = pytest.mark.parametrize("stiffness", [MODERATE, CONTRASTING], ids=["moderate", "contrasting"])
 
 
-def product_error(response, length):
-    """K C - 1 [6 x 6] in one unit."""
-    stiffness = dimensionless(response.stiffness, length, Wrench)
-    return stiffness @ dimensionless(response.compliance, length, Twist) - np.eye(6)
+def product_error(response):
+    """K C - 1 over the motions that exist, in one unit."""
+    stiffness, compliance = reduced(response, response.stiffness, Wrench), reduced(response, response.compliance, Twist)
+    return stiffness @ compliance - np.eye(len(stiffness))
+
+
+def outside(response, matrix):
+    """Largest entry of a matrix of twists or wrenches [6 x 6] outside the motions that exist, of its largest."""
+    inside = motions(response)
+    apart = matrix - inside @ inside.T @ matrix @ inside @ inside.T
+    return np.max(abs(apart)) / np.max(abs(matrix))
 
 
 @every_machine
 @every_contrast
+@few
 @given(data=st.data())
 def test_both_are_symmetric_and_positive(case, stiffness, data):
     response = data.draw(regular(case, stiffness))
-    length = float(response.configuration.length)
-    assert_psd(response.stiffness, length, Wrench)
-    assert_psd(response.compliance, length, Twist)
-    assert min(response.stiffness.diagonal()) > 0.0
-    assert min(response.compliance.diagonal()) > 0.0
+    matrices = (reduced(response, response.stiffness, Wrench), reduced(response, response.compliance, Twist))
+    for matrix in matrices:
+        assert_psd(matrix)
+        assert min(np.diag(matrix)) > 0.0
+    assert outside(response, array(response.compliance)) <= 100 * U
+    assert outside(response, array(response.stiffness)) <= 100 * U
 
 
 @every_machine
+@few
 @given(data=st.data())
 def test_they_are_inverse_at_moderate_contrast(case, data):
     response = data.draw(regular(case))
-    length = float(response.configuration.length)
-    assume(trace_product(response.stiffness, response.compliance, length) < SPREAD)
-    assert np.max(abs(product_error(response, length))) < INVERSE
+    assume(trace_product(response) < SPREAD)
+    assert np.max(abs(product_error(response))) < INVERSE
 
 
 @every_machine
+@few
 @given(data=st.data())
 def test_they_are_inverse_at_any_contrast_to_what_their_terms_allow(case, data):
     """Norm-wise to some rounding units of tr K tr C; entry by entry to 1e-9 of what the terms that cancel may be.
@@ -62,43 +88,49 @@ def test_they_are_inverse_at_any_contrast_to_what_their_terms_allow(case, data):
     entry that is small by symmetry still has the rounding of the large ones that made it.
     """
     response = data.draw(regular(case, CONTRASTING))
-    length = float(response.configuration.length)
-    assert np.max(abs(product_error(response, length))) <= ROUNDINGS * U * trace_product(
-        response.stiffness, response.compliance, length
-    )
-    stiffness, compliance = array(response.stiffness), array(response.compliance)
-    k, c = np.sqrt(np.diag(stiffness)), np.sqrt(np.diag(compliance))
-    assert np.all(abs(stiffness @ compliance - np.eye(6)) <= 1e-9 * np.outer(k, c) * (k @ c))
+    error = abs(product_error(response))
+    assert np.max(error) <= ROUNDINGS * U * trace_product(response) * (1.0 if lost(response) == 0.0 else 10.0)
+    matrices = (reduced(response, response.stiffness, Wrench), reduced(response, response.compliance, Twist))
+    k, c = (np.sqrt(np.diag(matrix)) for matrix in matrices)
+    assert np.all(error <= 1e-9 * np.outer(k, c) * (k @ c))
 
 
 @every_machine
 @every_contrast
+@few
 @given(data=st.data())
 def test_twice_the_stiffness_is_twice_k_and_half_c(case, stiffness, data):
-    """Exactly: doubling is exact in binary, and both are linear in it."""
+    """Exactly, but for numbers at the end of float64: doubling is exact in binary, and both are linear in it."""
     machine = data.draw(machines(case, stiffness))
     now = values(machine)
-    twice = respond(with_values(machine, {path: 2.0 * now[path] for path in stiffness_paths(machine)}))
+    twice = respond(with_values(machine, {path: 2.0 * now[path] for path in elastic_paths(machine)}))
     once = respond(machine)
-    assert np.array_equal(array(twice.stiffness), 2.0 * array(once.stiffness))
-    assert np.array_equal(array(twice.compliance), 0.5 * array(once.compliance))
+    for double, single in ((twice.stiffness, once.stiffness), (once.compliance, twice.compliance)):
+        np.testing.assert_allclose(array(double), 2.0 * array(single), rtol=0, atol=UNDERFLOW)
 
 
 @every_machine
+@few
 @given(data=st.data())
 def test_more_stiffness_anywhere_is_never_softer_in_any_direction(case, data):
     """Rayleigh: K(k + dk) - K(k) and C(k) - C(k + dk) are positive semi-definite, to the rounding of the larger."""
-    machine = data.draw(regular_machines(case))
-    path = data.draw(st.sampled_from(stiffness_paths(machine)))
-    once, more = respond(machine), respond(with_values(machine, {path: 3.0 * values(machine)[path]}))
+    once = data.draw(regular(case))
+    every = springs(once.configuration)
+    e = data.draw(st.integers(0, len(every) - 1))
+    more = respring(once, {e: 3.0 * every[e].stiffness})
     length = float(once.configuration.length)
+    scale = np.repeat([length, 1.0], 3)
+    motion = np.linalg.norm(screw(once.statics.flexibility[e]) * scale)
+    share = motion**2 / every[e].stiffness / np.trace(reduced(once, once.compliance, Twist))
     for kind, soft, stiff in ((Wrench, once.stiffness, more.stiffness), (Twist, more.compliance, once.compliance)):
-        low, high = dimensionless(soft, length, kind), dimensionless(stiff, length, kind)
+        low, high = reduced(once, soft, kind), reduced(once, stiff, kind)
         assert np.linalg.eigvalsh(high - low)[0] >= -20 * U * np.linalg.norm(high, 2)
-        assert np.trace(high) > np.trace(low)
+        if share > FELT:
+            assert np.trace(high) > np.trace(low)
 
 
 @every_machine
+@few
 @given(data=st.data())
 def test_the_sum_over_legs_is_the_same_stiffness(case, data):
     """Second route (DESIGN section 2, eq. 32): sum_i W_i G_i^-1 W_i^T knows neither W^-1 nor the springs' duals.
@@ -106,6 +138,5 @@ def test_the_sum_over_legs_is_the_same_stiffness(case, data):
     Its inverse of G, as its only solve, costs the contrast within a leg: 1e3 here, times some hundred for geometry.
     """
     response = data.draw(regular(case))
-    length = float(response.configuration.length)
-    assume(trace_product(response.stiffness, response.compliance, length) < SPREAD)
+    assume(trace_product(response) < SPREAD)
     assert_blocks_close(array(flexible_stiffness(response.legs)), array(response.stiffness), 1e-9)

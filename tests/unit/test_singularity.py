@@ -12,7 +12,7 @@ from kinetostat.algebra.screw import Twist, force_along
 from kinetostat.algebra.vector import X_AXIS, Y_AXIS, Z_AXIS, ZERO, Vector
 from kinetostat.kinematics.singularity import conditioning, describe, free_twist, why_singular
 from kinetostat.machine.leg import LegScrews
-from machines import every_machine, regular
+from machines import CASES, every_machine, few, regular
 from numeric import U, columns
 
 SIX = [
@@ -27,7 +27,7 @@ SIX = [
 
 
 def legs_of(wrenches, regularity=1.0):
-    return [LegScrews((), (), (), (wrench,), regularity) for wrench in wrenches]
+    return [LegScrews((), (), (), (wrench,), (), regularity) for wrench in wrenches]
 
 
 @pytest.mark.parametrize(
@@ -58,6 +58,21 @@ def _arms():
 
 
 @every_machine
+@few
+@given(data=st.data())
+def test_a_regular_pose_is_well_conditioned(case, data):
+    """Far from a singularity the wrenches of the legs, and of a plane, span all six dimensions."""
+    response = data.draw(regular(case))
+    sizes = conditioning(response.legs, float(response.configuration.length), response.guide)
+    assert len(sizes) == 6
+    assert sizes[-1] > 1e-3 * sizes[0]
+
+
+SPATIAL = [case for case in CASES if not case.machine.family.planar]
+
+
+@pytest.mark.parametrize("case", SPATIAL, ids=repr)
+@few
 @given(data=st.data())
 def test_a_regular_pose_resists_its_softest_twist(case, data):
     """The singular vectors of W, and the free twist among them, agree with the singular values."""
