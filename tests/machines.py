@@ -27,6 +27,8 @@ TURN = radians(6)
 """How far an angle varies about its value in the file."""
 TOOL = 0.1
 """How far the tool point lies from the platform point P along each axis, m: what holds, holds at a tool as well."""
+UNCHANGED = ("load.", "limits.")
+"""Sections on which neither K nor C depends."""
 TINY = 1e-12
 """Lengths (m) and angles (rad) below which a drawn one is 0."""
 SIZES = {"length", "area", "second moment of area", "elastic modulus"}
@@ -67,6 +69,8 @@ class Case:
             wanted: Range = 0.0
             if path.startswith("tool."):
                 wanted = TOOL
+            elif path.startswith(UNCHANGED):
+                wanted = 0.0
             elif kind == "angle":
                 wanted = TURN
             elif kind in SIZES:

@@ -32,6 +32,10 @@ KINDS = {
         Kind("angle", "rad", "30 deg"),
         Kind("linear stiffness", "N/m", "20 N/um"),
         Kind("torsional stiffness", "N·m/rad", "1e7 N*m/rad"),
+        Kind("coupling stiffness", "N/rad", "1e5 N/rad"),
+        Kind("linear compliance", "m/N", "1e-8 m/N"),
+        Kind("torsional compliance", "rad/(N·m)", "1e-6 rad/(N*m)"),
+        Kind("coupling compliance", "rad/N", "1e-7 rad/N"),
         Kind("axial rigidity", "N", "2e8 N"),
         Kind("torsional rigidity", "N·m**2", "4e4 N*m**2"),
         Kind("bending rigidity", "N·m**2", "5e4 N*m**2"),
@@ -50,7 +54,8 @@ RIGID = "rigid"
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _NAME = r"[A-Za-zµμ°]+(?:\s*(?:\*\*|\^)\s*[1-4])?"
-_UNIT = re.compile(rf"{_NAME}(?:\s*[*/·]\s*{_NAME})*")
+_UNDER = rf"/\s*\({_NAME}(?:\s*[*·]\s*{_NAME})*\)"
+_UNIT = re.compile(rf"{_NAME}(?:\s*[*/·]\s*{_NAME}|\s*{_UNDER})*")
 _LONGEST = 64
 
 

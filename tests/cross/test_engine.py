@@ -22,7 +22,7 @@ from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import values, with_values
+from kinetostat.machine.parameters import with_values
 from machines import CASES, Case, every_machine, one_of_each, stiffness_paths
 from numeric import lost
 
@@ -36,9 +36,9 @@ AGREEMENT = 5e-12
 condition of W at a regular pose."""
 ROUNDED_ZERO = 1e-24
 """The square of a rounding error, which one route leaves of C in a rigid direction where another has zero."""
-ORDER = 0.2
-"""Regularity depends on the order in which vectors are taken, and that on which components are zero by form: a float
-that happens to be zero counts as such, a traced value never does."""
+REORDERED = 10.0
+"""Factor within which the regularity of a pose is known: it depends on the order in which vectors are taken, and that
+on which components are zero by form: a float that happens to be zero counts as such, a traced value never does."""
 REGULAR = 0.05
 """Regularity from which numbers are compared so sharply; statuses are compared everywhere."""
 
@@ -104,8 +104,11 @@ def assert_same(actual: Found, expected: Found) -> None:
     compared = np.isfinite(expected.values) & (expected.values[NAMES.index("regularity")] > REGULAR)
     error = np.abs(np.subtract(actual.values, expected.values, where=compared, out=np.zeros(compared.shape)))
     allowed = (AGREEMENT + expected.lost) * scales(expected.values) + ROUNDED_ZERO
-    allowed[NAMES.index("regularity")] = ORDER * expected.values[NAMES.index("regularity")]
+    row = NAMES.index("regularity")
+    allowed[row] = math.inf
     assert np.all(error[compared] <= allowed[compared])
+    ratio = actual.values[row, compared[row]] / expected.values[row, compared[row]]
+    assert np.all((ratio > 1.0 / REORDERED) & (ratio < REORDERED))
 
 
 def drawn(case: Case, section: str, count: int, seed: int = 1) -> Columns:

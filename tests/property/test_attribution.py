@@ -143,7 +143,7 @@ def test_what_the_platform_would_gain_and_lose(case, data):
 def test_a_spring_moves_the_platform_as_its_flexibility_says(case, data):
     """xi_e xi_e^T is dC/ds_e, found without it: K^-1 by NumPy as one spring becomes softer, twice.
 
-    A change d of s_e adds xi_e xi_e^T / (1/d + h) to C, where the rest of the machine resists a deformation of e with the
+    A change d of s_e adds xi_e xi_e^T / (1/d + h) to C, where the rest of the machine resists a deformation of e by a
     stiffness h (0 without redundancy). The first change gives h, the second checks it. Stiffnesses of one decade keep
     the changes well above the rounding of the inverses.
     """

@@ -29,7 +29,8 @@ ZERO_PIVOT = 1e-12
 class _Triangular:
     """Q^T V = R for given vectors V: `vectors` holds R and `turned` Q^T, both by columns.
 
-    Vector `order[k]` ends in row `pivots[k]`; `free` are the rows without a pivot.
+    Vector `order[k]` ends in row `pivots[k]`; `free` are the rows without a pivot. Q is the
+    product of as many reflections.
     """
 
     vectors: list[Row]
@@ -38,6 +39,7 @@ class _Triangular:
     pivots: list[int]
     free: list[int]
     regularity: Scalar
+    reflections: int
 
 
 def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
@@ -100,6 +102,22 @@ def complement(vectors: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
     return [[column[row] for column in solved.turned] for row in solved.free], solved.regularity
 
 
+def handedness(vectors: Sequence[Sequence[Scalar]]) -> Scalar:
+    """The sign, +1 or -1, of the determinant of a independent vectors of n components and their complement.
+
+    The complement is the basis that `complement` returns for a < n, whose vectors need not move continuously with the
+    given ones; for a = n there is none.
+    """
+    solved = _triangularise(vectors)
+    columns = [*zip(solved.order, solved.pivots, strict=True), *enumerate(solved.free, len(vectors))]
+    rows = [row for _, row in sorted(columns)]
+    swaps = sum(rows[i] > rows[j] for j in range(len(rows)) for i in range(j))
+    sign: Scalar = -1.0 if (swaps + solved.reflections) % 2 else 1.0
+    for here, row in zip(solved.order, solved.pivots, strict=True):
+        sign = where(solved.vectors[here][row] < 0.0, -sign, sign)
+    return sign
+
+
 def _triangularise(vectors: Sequence[Sequence[Scalar]]) -> _Triangular:
     """Householder QR, backward stable without pivoting, so that it needs no data-dependent branch."""
     size = len(vectors[0])
@@ -109,16 +127,18 @@ def _triangularise(vectors: Sequence[Sequence[Scalar]]) -> _Triangular:
     order: list[int] = []
     pivots: list[int] = []
     regularity: Scalar = 1.0
+    reflections = 0
     while waiting:
         here = min(waiting, key=lambda j: sum(not is_zero(reduced[j][i]) for i in free))
         waiting.remove(here)
         filled = [i for i in free if not is_zero(reduced[here][i])] or free[:1]
         _reflect(reduced[here], [*(reduced[j] for j in waiting), *turned], filled)
+        reflections += len(filled) > 1
         order.append(here)
         pivots.append(filled[0])
         free.remove(filled[0])
         regularity = smaller(regularity, abs(reduced[here][filled[0]]))
-    return _Triangular(reduced, turned, order, pivots, free, regularity)
+    return _Triangular(reduced, turned, order, pivots, free, regularity, reflections)
 
 
 def _reflect(column: Row, others: list[Row], rows: list[int]) -> None:

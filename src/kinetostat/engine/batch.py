@@ -12,7 +12,7 @@ from itertools import islice
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.engine.points import Array, Points
+from kinetostat.engine.points import Array, Part, Points
 from kinetostat.engine.threads import available_cores
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -50,7 +50,15 @@ class Evaluation:
     status: Codes
 
 
-def evaluate(machine: Machine, points: Points, quantities: Sequence[str], progress: Progress = silent) -> Evaluation:
+def evaluate(
+    machine: Machine,
+    points: Points,
+    quantities: Sequence[str],
+    progress: Progress = silent,
+    *,
+    part: range | None = None,
+    threads: int | None = None,
+) -> Evaluation:
     """Quantities and status of a machine at many points.
 
     Args:
@@ -58,22 +66,15 @@ def evaluate(machine: Machine, points: Points, quantities: Sequence[str], progre
         points: where; leaf paths of the machine's family and their values, SI.
         quantities: names from `kinetostatics.quantities.QUANTITIES`.
         progress: told how far the work is.
+        part: only these points; where it starts at a multiple of `NATIVE_SLAB`, results are those of the whole batch
+            bit for bit, because the size of the whole decides the arithmetic, and slabs are the same.
+        threads: slabs under way at once; all processors unless given.
     """
     native = points.size >= NATIVE_FROM
-    slab, threads = (NATIVE_SLAB, available_cores()) if native else (NUMPY_SLAB, 1)
-    fill = _by_free_springs(machine, points.paths, quantities, _native_fill if native else _numpy_fill)
-    results = np.empty((len(quantities), points.size))
-    status = np.empty(points.size, dtype=np.int8)
-
-    def work(start: int) -> int:
-        stop = min(start + slab, points.size)
-        fill(points.columns(start, stop), results[:, start:stop], status[start:stop])
-        return stop - start
-
-    done = 0
-    for count in _in_threads(work, range(0, points.size, slab), threads):
-        done += count
-        progress(done, points.size)
+    slab, most = (NATIVE_SLAB, threads or available_cores()) if native else (NUMPY_SLAB, 1)
+    fill = by_free_springs(machine, points.paths, quantities, _native_fill if native else _numpy_fill)
+    served = points if part is None else Part(points, part.start, part.stop)
+    results, status = in_slabs(served, fill, len(quantities), slab, most, progress)
     return Evaluation(dict(zip(quantities, results, strict=True)), status)
 
 
@@ -84,7 +85,34 @@ Method = Callable[[Machine, Sequence[str], Sequence[str]], Fill]
 """A way to evaluate slabs: from a machine, its varying paths and names of quantities."""
 
 
-def _by_free_springs(machine: Machine, paths: Sequence[str], quantities: Sequence[str], method: Method) -> Fill:
+def in_slabs(
+    points: Points, fill: Fill, rows: int, slab: int, threads: int, progress: Progress = silent
+) -> tuple[Array, Codes]:
+    """Results [rows x points] and status codes, slab by slab.
+
+    Args:
+        points: where.
+        fill: evaluates a slab.
+        rows: of results.
+        slab: points of one.
+        threads: how many slabs are under way at once.
+        progress: told how far the work is.
+    """
+    results, status = np.empty((rows, points.size)), np.empty(points.size, dtype=np.int8)
+
+    def work(start: int) -> int:
+        stop = min(start + slab, points.size)
+        fill(points.columns(start, stop), results[:, start:stop], status[start:stop])
+        return stop - start
+
+    done = 0
+    for count in _in_threads(work, range(0, points.size, slab), threads):
+        done += count
+        progress(done, points.size)
+    return results, status
+
+
+def by_free_springs(machine: Machine, paths: Sequence[str], quantities: Sequence[str], method: Method) -> Fill:
     """Points at which a varying stiffness is exactly 0 apart from the others: there it is 0 by form, a free joint."""
     stiff = {p.path for p in parameters(machine.family) if p.quantity.stiff}
     watched = [path for path in paths if path in stiff]

@@ -13,19 +13,18 @@ from functools import lru_cache
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, where
-from kinetostat.engine.native import Array, Body, Codes, Program
-from kinetostat.engine.trace import Graph, Operand, Traced
-from kinetostat.engine.trigonometry import LARGEST_ANGLE
+from kinetostat.engine.body import Array, Body, Codes
+from kinetostat.engine.form import Form, Kind, angles, form_of, reduced, traced
+from kinetostat.engine.native import Program
+from kinetostat.engine.trace import Operand, Traced
 from kinetostat.kinematics.closed_form import closed_joints
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.machine.parameters import with_values
 
-ORDINARY = (1e-100, 1e100)
-"""Sizes between which a number and its reciprocal are by a wide margin neither zero nor infinite."""
 KEPT = 64
 """Programs kept in memory, of some 20 kB each."""
 
@@ -62,12 +61,12 @@ class Kernel:
             status: where the `Status` codes go [points].
         """
         served = [np.ascontiguousarray(columns[path], dtype=float) for path in self.varying]
-        reduced = [_reduced(c) if p in self.angles else c for p, c in zip(self.varying, served, strict=True)]
+        given = [reduced(c) if p in self.angles else c for p, c in zip(self.varying, served, strict=True)]
         if self.iterated:
             joints = solve_joints(with_values(self.machine, columns))
             found = (*joints.coordinates, joints.status)
-            reduced += [np.ascontiguousarray(np.broadcast_to(c, status.shape), dtype=float) for c in found]
-        self.program.run(self.fixed, reduced, results, status)
+            given += [np.ascontiguousarray(np.broadcast_to(c, status.shape), dtype=float) for c in found]
+        self.program.run(self.fixed, given, results, status)
         if not self.iterated and self.machine.family.chains is not None:
             self._iterate(columns, results, status)
 
@@ -94,15 +93,10 @@ def slab_kernel(
     """
     if iterated is None:
         iterated = needs_iteration(machine)
-    angles = frozenset(p.path for p in parameters(machine.family) if p.quantity.kind == "angle")
-    fixed = {path: float(value) for path, value in values(machine).items() if path not in varying}
-    fixed |= {path: float(_reduced(np.array(fixed[path]))) for path in angles & fixed.keys()}
-    constant = tuple((path, value) for path, value in fixed.items() if value == 0.0 or math.isinf(value))
-    inputs = {path: value for path, value in fixed.items() if path not in dict(constant)}
-    ordinary = frozenset(path for path, value in inputs.items() if ORDINARY[0] < abs(value) < ORDINARY[1])
-    form = _Form(constant, tuple(inputs), ordinary, tuple(varying), tuple(quantities), iterated)
-    numbers = np.array([*inputs.values()], dtype=float)
-    return Kernel(_program(_Kind(machine), form), numbers, form.varying, angles, machine, form.quantities, iterated)
+    form, numbers = form_of(machine, varying)
+    names = tuple(quantities)
+    program = _program(Kind(machine), form, names, iterated)
+    return Kernel(program, numbers, form.varying, angles(machine), machine, names, iterated)
 
 
 def needs_iteration(machine: Machine) -> bool:
@@ -113,51 +107,15 @@ def needs_iteration(machine: Machine) -> bool:
     return closed is None or closed[1] == Status.NOT_CONVERGED or solve_joints(machine).status == Status.SINGULAR
 
 
-def _reduced(angle: Array) -> Array:
-    """The angles (rad), turned back to between -pi and pi if any is beyond what traced cosines take."""
-    if angle.size == 0 or max(angle.max(), -angle.min()) <= LARGEST_ANGLE:
-        return angle
-    with np.errstate(invalid="ignore"):
-        return np.arctan2(np.sin(angle), np.cos(angle))
-
-
-@dataclass(frozen=True)
-class _Form:
-    """All that a program depends on beside the family: what is constant, fixed, ordinary, varying, wanted, iterated."""
-
-    constant: tuple[tuple[str, float], ...]
-    inputs: tuple[str, ...]
-    ordinary: frozenset[str]
-    varying: tuple[str, ...]
-    quantities: tuple[str, ...]
-    iterated: bool
-
-
-@dataclass(frozen=True, eq=False)
-class _Kind:
-    """A machine as a specimen of its family: equal to every other one of it."""
-
-    machine: Machine
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Kind) and self.machine.family == other.machine.family
-
-    def __hash__(self) -> int:
-        return hash(self.machine.family)
-
-
 @lru_cache(KEPT)
-def _program(kind: _Kind, form: _Form) -> Program:
-    graph = Graph()
-    fixed = {path: graph.input(fixed=True, ordinary=path in form.ordinary) for path in form.inputs}
-    columns = {path: graph.input() for path in form.varying}
-    machine = with_values(kind.machine, {**dict(form.constant), **fixed, **columns})
-    joints = [graph.input() for _ in range(kind.machine.chains().size + 1)] if form.iterated else []
-    response = respond(machine, _joints(machine, joints))
+def _program(kind: Kind, form: Form, quantities: tuple[str, ...], iterated: bool) -> Program:
+    given = traced(kind, form)
+    joints = [given.graph.input() for _ in range(kind.machine.chains().size + 1)] if iterated else []
+    response = respond(given.machine, _joints(given.machine, joints))
     accepted = response.status < Status.OK + 0.5
-    results = [where(accepted, QUANTITIES[name].value(response), math.nan) for name in form.quantities]
+    results = [where(accepted, QUANTITIES[name].value(response), math.nan) for name in quantities]
     numbers = [_number(result) for result in results]
-    return Program(Body([*fixed.values()], [*columns.values(), *joints], numbers, _number(response.status)))
+    return Program(Body([*given.fixed.values()], [*given.columns.values(), *joints], numbers, _number(response.status)))
 
 
 def _joints(machine: Machine, columns: Sequence[Traced]) -> Joints | None:

@@ -8,7 +8,6 @@ alone, which takes 50 ms. The order of tracing beats an order by depth: a tenth 
 import ctypes
 import struct
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -16,27 +15,8 @@ import llvmlite.binding as llvm  # type: ignore[import-untyped]
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.engine.body import Array, Body, Codes
 from kinetostat.engine.trace import Condition, Node, Operand, Traced, needed
-
-Array = npt.NDArray[np.float64]
-Codes = npt.NDArray[np.int8]
-
-
-@dataclass(frozen=True)
-class Body:
-    """What is computed at each point.
-
-    Attributes:
-        fixed: inputs that are the same at all points.
-        columns: inputs that vary.
-        results: nodes, or numbers where a result depends on nothing.
-        code: a small integer beside the results: a node or a number.
-    """
-
-    fixed: Sequence[Traced]
-    columns: Sequence[Traced]
-    results: Sequence[Operand]
-    code: Operand
 
 
 class Program:

@@ -57,12 +57,34 @@ class Grid:
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
         """Values of each varying parameter at points `start` to `stop` - 1, SI."""
-        indices = np.unravel_index(np.arange(start, stop), self.shape)
         served: dict[str, Array] = {}
-        for axis, index in zip(self.axes, indices, strict=True):
-            taken = axis.values[index]
-            served.update(dict.fromkeys(axis.paths, taken))
+        run = self.size
+        for axis in self.axes:
+            run //= len(axis.values)
+            served.update(dict.fromkeys(axis.paths, _in_runs(axis.values, run, start, stop)))
         return served
+
+
+def _in_runs(values: Array, run: int, start: int, stop: int) -> Array:
+    """Entries `start` to `stop` - 1 of the endless repetition of values, each of which stands `run` times in a row.
+
+    Eight times as fast as indices from `numpy.unravel_index`, which take longer than machine code does.
+    """
+    first, last = start // run, -(-stop // run)
+    met = _repeated(values, first % len(values), last - first)
+    if run <= stop - start:
+        return np.repeat(met, run)[start - first * run : stop - first * run]
+    lengths = np.full(last - first, run)
+    lengths[0] -= start - first * run
+    lengths[-1] -= last * run - stop
+    return np.repeat(met, lengths)
+
+
+def _repeated(values: Array, first: int, count: int) -> Array:
+    """Entries of the endless repetition of values."""
+    if count < len(values):
+        return values.take(np.arange(first, first + count), mode="wrap")
+    return np.tile(np.roll(values, -first), -(-count // len(values)))[:count]
 
 
 @dataclass(frozen=True)
@@ -84,3 +106,26 @@ class Table:
     def columns(self, start: int, stop: int) -> dict[str, Array]:
         """Values of each varying parameter at points `start` to `stop` - 1, SI."""
         return {path: column[start:stop] for path, column in self.values.items()}
+
+
+@dataclass(frozen=True)
+class Part:
+    """A run of consecutive points of others."""
+
+    whole: Points
+    start: int
+    stop: int
+
+    @property
+    def size(self) -> int:
+        """How many."""
+        return self.stop - self.start
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Leaf paths of the parameters that vary."""
+        return self.whole.paths
+
+    def columns(self, start: int, stop: int) -> dict[str, Array]:
+        """Values of each varying parameter at points `start` to `stop` - 1 of this part, SI."""
+        return self.whole.columns(self.start + start, self.start + stop)

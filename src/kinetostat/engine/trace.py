@@ -129,12 +129,20 @@ class Namespace:
     @staticmethod
     def cos(a: Traced) -> Operand:
         """Cosine of an angle in rad, see `cos_and_sin`."""
-        return cos_and_sin(a)[0]
+        return _turn(a)[0]
 
     @staticmethod
     def sin(a: Traced) -> Operand:
         """Sine of an angle in rad, see `cos_and_sin`."""
-        return cos_and_sin(a)[1]
+        return _turn(a)[1]
+
+
+def _turn(angle: Traced) -> tuple[Traced, Traced]:
+    """Cosine and sine of an angle, entered in the graph's table of them."""
+    cosine, sine = cos_and_sin(angle)
+    angle.graph.turns[cosine] = angle, -sine
+    angle.graph.turns[sine] = angle, cosine
+    return cosine, sine
 
 
 NAMESPACE = Namespace()
@@ -145,10 +153,13 @@ class Graph:
 
     Attributes:
         nodes: all values, operands before what uses them.
+        turns: of each node that is a cosine or sine, the angle and the derivative by it; the operations that compute it
+            say less.
     """
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
+        self.turns: dict[Node, tuple[Traced, Operand]] = {}
         self._known: dict[tuple[Any, ...], Any] = {}
 
     def input(self, fixed: bool = False, ordinary: bool = False) -> Traced:

@@ -89,7 +89,7 @@ def _goal(machine: Machine, chains: Chains) -> tuple[Array, bool]:
 
 
 def _in_closed_form(chains: Chains, goal: Array) -> tuple[Array, Codes] | None:
-    """Coordinates [n x coordinates] and status; None where some pose needs Newton's method."""
+    """Coordinates [n x coordinates] and status; None without a closed form. Newton closes the rest."""
     closed = closed_joints(chains)
     if closed is None:
         return None
@@ -97,10 +97,15 @@ def _in_closed_form(chains: Chains, goal: Array) -> tuple[Array, Codes] | None:
     angles = [np.arctan2(a.sine, a.cosine) if isinstance(a, Turn) else a for a in amounts]
     status = np.broadcast_to(np.asarray(codes), (len(goal),)).copy()
     found = _stack(angles, len(goal))
-    if (status == Status.NOT_CONVERGED).any():
+    left = status == Status.NOT_CONVERGED
+    if left.all():
         return None
     reached = np.where(np.isnan(found), 0.0, found)
-    return found, np.where(status == Status.OK, _status(chains, reached, goal), status)
+    status = np.where(status == Status.OK, _status(chains, reached, goal), status)
+    if not left.any():
+        return found, status
+    other, other_status = _by_newton(chains, goal)
+    return np.where(left[:, None], other, found), np.where(left, other_status, status)
 
 
 def _by_newton(chains: Chains, goal: Array) -> tuple[Array, Codes]:

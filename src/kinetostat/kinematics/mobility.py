@@ -15,8 +15,8 @@ from kinetostat.kinematics.singularity import Array, columns
 from kinetostat.machine.leg import Joint, Leg
 from kinetostat.machine.machine import Configuration
 
-DEPENDENT = 1e-7
-"""Singular value of unit screws below which they are dependent: half of the digits of float64."""
+DEPENDENT = 1e-6
+"""Singular value of unit screws below which they are dependent: what is exact loses half of its digits in a root."""
 
 SPATIAL = 6
 
@@ -115,7 +115,7 @@ def freedoms(configuration: Configuration, reference: Vector) -> Freedoms:
     rank = _rank(constraints)
     imposed = sum(SPATIAL - away - leg for leg in legs)
     spins = sum(
-        len(_drives(leg)) + len(_free(leg)) - has
+        len(_drives(leg)) + len(_free(leg)) + sum(spring.hinge for spring in leg.springs) - has
         for leg, has in zip(configuration.legs, legs, strict=True)
         if not leg.lines
     )
@@ -133,17 +133,20 @@ def _free(leg: Leg) -> list[Joint]:
 
 
 def _leg_screws(configuration: Configuration, leg: Leg, reference: Vector) -> Array:
-    """Unit screws of all joints of a leg, actuated ones too, and of what a plane takes away [6 x n]."""
+    """Unit screws of all joints of a leg, actuated ones and flexures too, and of what a plane takes away [6 x n]."""
     absent = configuration.plane.absent if configuration.plane else ()
-    joints = (*_free(leg), *_drives(leg), *absent)
+    hinges = [spring.joint for spring in leg.springs if spring.hinge and float(spring.stiffness) > 0.0]
+    joints = (*_free(leg), *hinges, *_drives(leg), *absent)
     return _unit_screws([joint.twist(reference) for joint in joints], configuration)
 
 
 def _unit_screws(screws: Sequence[Screw], configuration: Configuration) -> Array:
+    """Screws at unit size, without those that a degenerate placement leaves without direction [6 x n]."""
     if not screws:
         return np.zeros((SPATIAL, 0))
     matrix = columns(screws, 1.0, 1.0 / float(configuration.length))
-    return matrix / np.linalg.norm(matrix, axis=0)
+    sizes = np.linalg.norm(matrix, axis=0)
+    return matrix[:, sizes > 0.0] / sizes[sizes > 0.0]
 
 
 def _platform_wrenches(configuration: Configuration, reference: Vector) -> tuple[Array, Array]:

@@ -26,7 +26,7 @@ class Status(IntEnum):
 _SENTENCES = {
     Status.OK: "The pose can be reached and the machine resists every load.",
     Status.OUT_OF_REACH: "A leg is too short or too long to close.",
-    Status.JOINT_LIMIT: "A joint is beyond its limit.",
+    Status.JOINT_LIMIT: "A leg, a joint or an actuator is beyond its limit.",
     Status.SINGULAR: "The machine is singular: some load finds no unique answer in its legs.",
     Status.NOT_CONVERGED: "The position of the passive joints could not be computed.",
 }

@@ -54,6 +54,8 @@ def internal_loads(
     owners = np.repeat(np.arange(len(legs)), [len(leg.wrenches) for leg in balanced])
     columns = [wrench.components() for leg in balanced for wrench in leg.wrenches]
     columns += [wrench.components() for wrench in guide]
+    if not columns:
+        return InternalLoads(0, 0, (), ())
     matrix = np.array(columns, dtype=float).T / np.repeat([length, 1.0], 3)[:, None]
     sizes = np.linalg.norm(matrix, axis=0)
     _, values, rows = np.linalg.svd(matrix / sizes)

@@ -1,5 +1,6 @@
 """A leg as (W, G): how it yields when it carries a wrench. One leg at a time; the platform is `assembly`'s."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar
@@ -38,7 +39,7 @@ def relaxed(leg: LegScrews) -> LegScrews:
     Only springs that are free by form, of stiffness 0.0 itself, are meant; the others are kept.
     """
     free = [row for s, row in zip(leg.compliance, leg.loads, strict=True) if type(s) is float and s == INFINITE]
-    felt = [row for row in free if not all(isinstance(c, float) and abs(c) <= UNSEEN for c in row)]
+    felt = _independent(free)
     if not free:
         return leg
     basis: list[list[Scalar]] = []
@@ -55,6 +56,33 @@ def relaxed(leg: LegScrews) -> LegScrews:
     ]
     wrenches = tuple(combine(leg.wrenches, column) for column in basis)
     return replace(leg, compliance=tuple(weights), wrenches=wrenches, loads=tuple(rows), regularity=regularity)
+
+
+def _independent(rows: Sequence[Sequence[Scalar]]) -> list[Sequence[Scalar]]:
+    """The rows that are felt at all and do not repeat others, where they are numbers; all others."""
+    kept: list[Sequence[Scalar]] = []
+    for row in rows:
+        if all(isinstance(c, float) for one in (row, *kept) for c in one) and _rank([*kept, row]) == len(kept):
+            continue
+        kept.append(row)
+    return kept
+
+
+def _rank(rows: Sequence[Sequence[float]]) -> int:
+    """How many rows of numbers are independent, each taken at unit size."""
+    left = [list(row) for row in rows]
+    sizes = [math.hypot(*row) for row in left]
+    left = [[c / size for c in row] for row, size in zip(left, sizes, strict=True) if size > UNSEEN]
+    found = 0
+    while left:
+        axis = max(left, key=lambda row: math.hypot(*row))
+        size = math.hypot(*axis)
+        if size <= UNSEEN:
+            break
+        found += 1
+        parts = [sum(c * d for c, d in zip(row, axis, strict=True)) / size**2 for row in left]
+        left = [[c - part * d for c, d in zip(row, axis, strict=True)] for row, part in zip(left, parts, strict=True)]
+    return found
 
 
 def _unit(row: Sequence[Scalar]) -> list[Scalar]:

@@ -8,6 +8,7 @@ from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.symmetric import POSITIONS
 from kinetostat.kinetostatics.response import Response
+from kinetostat.kinetostatics.sides import side
 
 ROTATIONS = 3
 """How many of the six components are rotations; they come first."""
@@ -70,9 +71,10 @@ QUANTITIES = {
         *_entries("compliance", "C", _compliance_unit, _compliance),
         *_entries("stiffness", "K", _stiffness_unit, _stiffness),
         MapQuantity("regularity", "1", "regularity", _regularity),
+        MapQuantity("side", "1", "side of singularities", side),
     )
 }
-"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., regularity."""
+"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., regularity, side."""
 
 GROUPS = {
     "compliance": tuple(f"compliance_{name}" for name in COMPONENTS),

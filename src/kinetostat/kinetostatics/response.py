@@ -11,15 +11,17 @@ from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.limits import Check, geometric_checks, within
 from kinetostat.kinematics.reach import within_reach
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_statics, stiffness_matrix
+from kinetostat.kinetostatics.overload import actuator_checks
 from kinetostat.machine.leg import Joint, LegScrews, reciprocal_wrenches
 from kinetostat.machine.machine import Configuration, Machine
 
-SINGULAR = 1e-7
-"""Regularity below which a pose counts as singular: results have then lost half of their digits. A leg exactly at its
-limit comes out at the square root of rounding, 1e-8, not at zero."""
+SINGULAR = 1e-6
+"""Regularity below which a pose counts as singular: results have then lost six of their digits. A leg exactly at its
+limit comes out at the square root of a few rounding units, 1e-8 to 3e-7, not at zero."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,7 @@ class Response:
             machine only rz, x, y have a meaning, and the other entries are 0.
         regularity: distance from a singularity, 0 to 1 (dimensionless); the smaller of the legs' and the platform's.
         status: a `Status` code.
+        checks: the limits of the machine that are set, each with what it is compared with.
     """
 
     configuration: Configuration
@@ -47,6 +50,7 @@ class Response:
     compliance: Symmetric6
     regularity: Scalar
     status: Scalar
+    checks: tuple[Check, ...] = ()
 
 
 def respond(machine: Machine, joints: Joints | None = None) -> Response:
@@ -67,6 +71,9 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
     for leg in legs:
         regularity = smaller(regularity, leg.regularity)
     regularity = smaller(regularity, statics.regularity)
+    geometric = geometric_checks(machine, configuration, joints.coordinates)
+    loaded = actuator_checks(machine, configuration, statics)
+    reached = within_reach(configuration)
     return Response(
         configuration,
         reference,
@@ -76,7 +83,8 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
         stiffness_matrix(statics),
         compliance_matrix(statics),
         regularity,
-        pose_status(joints.status, within_reach(configuration), regularity),
+        pose_status(joints.status, reached, regularity, within(geometric), within(loaded)),
+        (*geometric, *loaded),
     )
 
 
@@ -93,7 +101,19 @@ def _out_of_plane(configuration: Configuration, reference: Vector) -> tuple[tupl
     return configuration.plane.absent, wrenches
 
 
-def pose_status(placed: Scalar, reached: Scalar, regularity: Scalar) -> Scalar:
-    """Status code of a pose, the most fundamental obstacle first; a regularity of NaN counts as singular."""
-    solvable = where(regularity > SINGULAR, int(Status.OK), int(Status.SINGULAR))
-    return where(placed > Status.OK + 0.5, placed, where(reached, solvable, int(Status.OUT_OF_REACH)))
+def pose_status(
+    placed: Scalar, reached: Scalar, regularity: Scalar, allowed: Scalar = True, borne: Scalar = True
+) -> Scalar:
+    """Status code of a pose, the most fundamental obstacle first; a regularity of NaN counts as singular.
+
+    Args:
+        placed: `Status` code of the joints.
+        reached: whether all legs close.
+        regularity: of the pose.
+        allowed: whether the limits of geometry are kept.
+        borne: whether the actuators bear the load, which means something where the pose is regular.
+    """
+    bearable = where(borne, int(Status.OK), int(Status.JOINT_LIMIT))
+    solvable = where(regularity > SINGULAR, bearable, int(Status.SINGULAR))
+    possible = where(allowed, solvable, int(Status.JOINT_LIMIT))
+    return where(placed > Status.OK + 0.5, placed, where(reached, possible, int(Status.OUT_OF_REACH)))

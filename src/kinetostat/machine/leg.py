@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from kinetostat.algebra.scalar import Scalar, cos, is_zero, plus, reciprocal, sin, times
-from kinetostat.algebra.screw import Twist, Wrench, force_along, rotation_about, translation_along
+from kinetostat.algebra.screw import Twist, Wrench, force_along, pure_moment, rotation_about, translation_along
 from kinetostat.algebra.solve import complement
-from kinetostat.algebra.vector import AXES, IDENTITY, Displacement, Vector, rotation_along
+from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector, rotation_along
 
 RIGID = float("inf")
 """Stiffness of what does not yield: exact, not large."""
@@ -100,6 +100,7 @@ class Spring:
         stiffness: N/m for a slide, N·m/rad for a revolute; 0 (free) and infinity (rigid) are exact.
         part: the joint or link that it stands for, together with others of the same part; its own name if empty.
         actuated: whether it is an actuator.
+        hinge: whether it is a flexure hinge: a joint that resists, where others are free.
     """
 
     name: str
@@ -107,6 +108,7 @@ class Spring:
     stiffness: Scalar
     part: str = ""
     actuated: bool = False
+    hinge: bool = False
 
     @property
     def freedoms(self) -> tuple[Joint, ...]:
@@ -317,13 +319,15 @@ def reciprocal_wrenches(passive: Sequence[Twist], length: Scalar) -> tuple[tuple
         W, 6 - a wrenches at P in base axes (orthonormal once moments are divided by `length`), and the regularity:
         0 where the twists are dependent.
     """
+    if not passive:
+        return (*(force_along(axis, ZERO) for axis in AXES), *(pure_moment(axis) * length for axis in AXES)), 1.0
     shrink = reciprocal(length)
-    basis, regularity = complement([_comparable(twist, shrink) for twist in passive])
+    basis, regularity = complement([comparable(twist, shrink) for twist in passive])
     return tuple(Wrench(Vector(*row[:3]) * length, Vector(*row[3:])) for row in basis), regularity
 
 
-def _comparable(twist: Twist, shrink: Scalar) -> tuple[Scalar, ...]:
-    """The components of a unit twist, translations shrunk to compare with rotations; a slide stays of unit size."""
+def comparable(twist: Twist, shrink: Scalar) -> tuple[Scalar, ...]:
+    """The components of a unit twist, translations times `shrink` (1/m); a slide stays of unit size."""
     if all(is_zero(c) for c in twist.rotational.components()):
         return twist.components()
     return Twist(twist.rotational, twist.translational * shrink).components()

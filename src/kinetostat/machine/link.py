@@ -14,7 +14,9 @@ from kinetostat.algebra.vector import IDENTITY, Displacement, Rotation, Vector, 
 from kinetostat.machine.leg import RIGID, Joint, Spring
 
 NEGLIGIBLE = 1e-14
-"""Share of the largest eigenvalue below which a matrix of compliance does not yield: the rounding of zero."""
+"""Share of its trace below which a block of a compliance does not yield: the rounding of zero."""
+FLAT = 1e-12
+"""Share of its motion below which the pitch of a screw is the rounding of zero."""
 
 
 @dataclass(frozen=True)
@@ -204,7 +206,10 @@ class Parallelogram:
 
 
 def matrix_springs(name: str, compliance: npt.ArrayLike, point: Vector) -> tuple[Spring, ...]:
-    """Springs that together yield as a 6x6 compliance does: screws, from its eigenvectors.
+    """Springs that together yield as a 6x6 compliance does: turns about its principal axes, then slides.
+
+    Where it turns under a pure moment gives up to three screws; what it moves beyond them, the Schur complement of that
+    block, up to three slides. Their dyads add up to the matrix.
 
     Args:
         name: of the link or joint.
@@ -212,23 +217,22 @@ def matrix_springs(name: str, compliance: npt.ArrayLike, point: Vector) -> tuple
         point: base frame, m.
     """
     matrix = np.asarray(compliance, dtype=float)
-    scale = np.sqrt(np.repeat([np.trace(matrix[:3, :3]) or 1.0, np.trace(matrix[3:, 3:]) or 1.0], 3))
-    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    found = []
-    for n, (value, mode) in enumerate(zip(values[::-1], (vectors.T * scale)[::-1], strict=True), 1):
-        if value > NEGLIGIBLE * values[-1]:
-            joint, size = _screw(mode, point)
-            found.append(Spring(f"{name} mode {n}", joint, 1.0 / (float(value) * size * size), part=name))
-    return tuple(found)
+    turning, coupling, moving = matrix[:3, :3], matrix[3:, :3], matrix[3:, 3:]
+    found: list[tuple[Joint, float]] = []
+    for value, axis in _principal(turning, float(np.trace(turning))):
+        moved = coupling @ axis / value
+        moving = moving - value * np.outer(moved, moved)
+        pitch = float(axis @ moved)
+        pitch = pitch if abs(pitch) > FLAT * np.linalg.norm(moved) else 0.0
+        foot = point + Vector(*np.cross(axis, moved).tolist())
+        found.append((Joint(Vector(*axis.tolist()), foot, pitch=pitch), 1.0 / value))
+    for value, axis in _principal(moving, float(np.trace(matrix[3:, 3:]))):
+        found.append((Joint(Vector(*axis.tolist())), 1.0 / value))
+    return tuple(Spring(f"{name} mode {n}", joint, k, part=name) for n, (joint, k) in enumerate(found, 1))
 
 
-def _screw(twist: npt.NDArray[np.float64], point: Vector) -> tuple[Joint, float]:
-    """The screw of a twist [6] given at `point`, and how many units of it the twist is."""
-    turning, sliding = twist[:3], twist[3:]
-    size = float(np.linalg.norm(turning))
-    if size == 0.0:
-        length = float(np.linalg.norm(sliding))
-        return Joint(Vector(*(sliding / length).tolist())), length
-    axis, moved = turning / size, sliding / size
-    arm = Vector(*np.cross(axis, moved).tolist())
-    return Joint(Vector(*axis.tolist()), point + arm, pitch=float(axis @ moved)), size
+def _principal(block: npt.NDArray[np.float64], size: float) -> list[tuple[float, npt.NDArray[np.float64]]]:
+    """Principal compliances of a block and their directions, the softest first, without those that are rounding."""
+    values, axes = np.linalg.eigh(block)
+    pairs = zip(values[::-1].tolist(), axes.T[::-1], strict=True)
+    return [(value, axis) for value, axis in pairs if value > NEGLIGIBLE * size]

@@ -15,6 +15,8 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from kinetostat.machine.catalogue import families
+from kinetostat.machine.leg import Leg
+from kinetostat.machine.limits import check_limits
 from kinetostat.machine.machine import COMMON, Family, Machine
 from kinetostat.machine.rigidities import resolve
 from kinetostat.machine.written import family as written
@@ -24,9 +26,9 @@ from kinetostat.machine.written.schema import written_schema
 from kinetostat.spec import document as documents
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.spec.fields import quantities
+from kinetostat.spec.fields import NO_LIMIT, quantities
 from kinetostat.spec.validation import SCHEMA_VERSION, file_model, sections_in, validate
-from kinetostat.units import RIGID, show
+from kinetostat.units import RIGID
 
 SUFFIX = ".toml"
 
@@ -78,7 +80,9 @@ def build(document: Document, origin: str, settings: Sequence[str] = ()) -> Mach
         return _build_written(document, origin, settings)
     family = _family(document.get("family"), origin)
     changed = documents.override(document, settings, _counts(family))
-    return _validated(family, resolve(changed, family, origin), origin)
+    machine = _validated(family, resolve(changed, family, origin), origin)
+    check_limits(machine.sections["limits"], machine.configure().legs, family.planar, False, origin)
+    return machine
 
 
 def _build_written(document: Document, origin: str, settings: Sequence[str]) -> Machine:
@@ -88,7 +92,13 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     plan, numbers = separate(documents.override(named, settings, {}), origin)
     machine = _validated(written.family_of(plan), numbers, origin)
     check_numbers(plan, machine.sections, origin)
-    return replace(machine, family=written.family_of(completed(plan, machine.own_sections)))
+    whole = replace(machine, family=written.family_of(completed(plan, machine.own_sections)))
+    legs = [
+        Leg(leg.name, tuple(s.element for s in steps))
+        for leg, steps in zip(plan.legs, whole.chains().legs, strict=True)
+    ]
+    check_limits(machine.sections["limits"], legs, plan.planar, True, origin)
+    return whole
 
 
 def _validated(family: Family, document: Document, origin: str) -> Machine:
@@ -145,7 +155,9 @@ def as_toml(machine: Machine) -> str:
 def _quantity_lines(section: Any) -> Iterator[str]:
     for field, quantity in quantities(type(section)).items():
         held = getattr(section, field)
-        texts = [json.dumps(show(value, quantity.kind)) for value in (held if quantity.count else (held,))]
+        if quantity.unset is not None and held == quantity.unset:
+            continue
+        texts = [json.dumps(quantity.show(value)) for value in (held if quantity.count else (held,))]
         yield f"{field} = {'[' + ', '.join(texts) + ']' if quantity.count else texts[0]}"
 
 
@@ -179,9 +191,10 @@ def machine_schema() -> dict[str, Any]:
 
 
 def _as_written(schema: Any) -> Any:
-    """A schema whose defaults are as people write them: an infinite stiffness is "rigid"."""
+    """A schema whose defaults are as people write them: an infinite stiffness is "rigid", no limit has no default."""
     if isinstance(schema, dict):
-        return {key: _as_written(value) for key, value in schema.items()}
+        unset = NO_LIMIT in str(schema.get("description")) and "default" in schema
+        return {key: _as_written(value) for key, value in schema.items() if not (unset and key == "default")}
     if isinstance(schema, list | tuple):
         return [_as_written(value) for value in schema]
     return RIGID if schema == math.inf else schema

@@ -11,6 +11,7 @@ from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.leg import Joint, Leg, Spring, Turn
+from kinetostat.machine.limits import Limits
 from kinetostat.spec.fields import Quantity, section
 
 
@@ -97,7 +98,7 @@ class Load:
     force: Annotated[tuple[float, float, float], Quantity("force", "force along x, y, z", count=3)] = (0.0, 0.0, 0.0)
 
 
-COMMON = {"tool": Tool, "load": Load}
+COMMON = {"tool": Tool, "load": Load, "limits": Limits}
 """Sections that every machine file may have."""
 
 

@@ -13,12 +13,15 @@ from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
 from kinetostat.spec.errors import shorten
-from kinetostat.units import KINDS, RIGID, UnitError, parse
+from kinetostat.units import KINDS, RIGID, UnitError, parse, show
 
 LARGEST = {"length": 1e6, "angle": 1e3}
 """Bounds on size, in SI: far beyond any machine, well inside float64."""
 LARGEST_OTHER = 1e20
 """The bound of every other kind."""
+
+NO_LIMIT = "none"
+"""How people write that a limit is not set."""
 
 Section = TypeVar("Section")
 
@@ -40,12 +43,16 @@ class Quantity:
         meaning: one phrase for people, also the comment in templates.
         positive: zero and negative values are refused; stiffness may be zero (free) but never negative.
         count: how many values; one value in the file stands for all of them.
+        most: the largest value that is allowed, SI.
+        unset: of a limit, the infinity that stands for "none"; None for what is no limit.
     """
 
     kind: str
     meaning: str
     positive: bool = False
     count: int | None = None
+    most: float = math.inf
+    unset: float | None = None
 
     @property
     def stiff(self) -> bool:
@@ -71,6 +78,8 @@ class Quantity:
         return tuple(self._read_one(entry, f"entry {i}: ") for i, entry in enumerate(value))
 
     def _read_one(self, value: object, where: str = "") -> float:
+        if self.unset is not None and isinstance(value, str) and value.strip().lower() == NO_LIMIT:
+            return self.unset
         try:
             number = parse(value, self.kind)
             self.check(number)
@@ -93,10 +102,17 @@ class Quantity:
             )
         if self.positive and number <= 0:
             raise UnitError(f"it must be greater than 0, {example}")
+        if number > self.most:
+            most = f"{math.degrees(self.most):g} deg" if self.kind == "angle" else f"{self.most:g} {kind.unit}"
+            raise UnitError(f"it must not exceed {most}, {example}")
         largest = LARGEST.get(self.kind, LARGEST_OTHER)
         if abs(number) > largest and not math.isinf(number):
             advice = f'; write "{RIGID}"' if self.stiff else ""
             raise UnitError(f"it must not exceed {largest:g} {kind.unit}{advice}")
+
+    def show(self, value: float) -> str:
+        """An SI value of it as text that a file may hold."""
+        return NO_LIMIT if value == self.unset else show(value, self.kind)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
@@ -107,6 +123,7 @@ class Quantity:
         one = {"type": ["number", "string", *table], "examples": [kind.example]}
         rule = f"{self.meaning}; a {kind.name} with its unit, or a bare number in {kind.unit}"
         rule += f', or "{RIGID}"' if self.stiff else ""
+        rule += f', or "{NO_LIMIT}"' if self.unset is not None else ""
         if self.count is None:
             return {**one, "description": rule}
         many = {"type": "array", "items": one, "minItems": self.count, "maxItems": self.count}

@@ -31,7 +31,7 @@ from kinetostat.studies.refusal import why_not
 
 Rows = list[list[float]]
 
-NEGLIGIBLE = 1e-13
+NEGLIGIBLE = 1e-12
 """Share of a screw's size below which one of its components is rounding."""
 INDEPENDENT = 1e-9
 """Relative size of a singular value below which the motions of springs are dependent."""

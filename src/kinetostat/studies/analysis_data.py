@@ -37,9 +37,9 @@ def as_json(analysis: Analysis, along: Sequence[Along] = ()) -> dict[str, Any]:
         "jacobian_condition": analysis.jacobian_condition and _finite(analysis.jacobian_condition),
         "characteristic_length": analysis.length,
         **_indices(analysis.indices),
-        "along": [{key: _known(value) for key, value in asdict(one).items()} for one in along],
+        "along": [_lists({key: _known(value) for key, value in asdict(one).items()}) for one in along],
         "mobility": _mobility(analysis),
-        "internal_loads": analysis.internal and asdict(analysis.internal),
+        "internal_loads": analysis.internal and _lists(asdict(analysis.internal)),
         "load": analysis.load and _load(analysis.load),
         "attribution": [
             {
@@ -109,6 +109,11 @@ def _load(load: LoadCase) -> dict[str, Any]:
             for reaction in load.reactions
         ],
     }
+
+
+def _lists(data: dict[str, Any]) -> dict[str, Any]:
+    """Lists for tuples, as JSON has them."""
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in data.items()}
 
 
 def _known(value: Any) -> Any:

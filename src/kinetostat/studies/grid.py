@@ -1,28 +1,88 @@
 """Sweeps and maps: quantities of a machine over a grid of any of its parameters, as a labelled dataset."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
-from math import prod
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.engine.batch import Progress, evaluate, silent
+from kinetostat.engine.batch import Evaluation, Progress, evaluate, silent
+from kinetostat.engine.chunks import Compute, here, in_chunks
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import find
+from kinetostat.machine.parameters import Parameter, find
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.ranges import parse_range
+from kinetostat.spec.ranges import Range, parse_range
 from kinetostat.units import KINDS
 
-MOST_POINTS = 5_000_000
-"""Points of one grid: a dozen quantities of them fit in half a gigabyte."""
+IN_MEMORY = 5_000_000
+"""Points of a grid that is answered in memory: a dozen quantities of them fit in half a gigabyte."""
+MOST_DIMENSIONS = 6
+
+
+@dataclass(frozen=True)
+class GridQuestion:
+    """Which quantities of which machine over which grid.
+
+    Attributes:
+        machine: gives all parameters that do not vary.
+        grid: where; one axis for each range.
+        dims: path of the field of each axis.
+        names: of quantities.
+        labels: coordinates and attributes of the answer, without any variable.
+    """
+
+    machine: Machine
+    grid: Grid
+    dims: tuple[str, ...]
+    names: tuple[str, ...]
+    labels: xr.Dataset
+
+    @property
+    def fits_memory(self) -> bool:
+        """Whether the answer is small enough to be computed and shown at once."""
+        return self.grid.size <= IN_MEMORY
+
+
+def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[str]) -> GridQuestion:
+    """A question about a grid, as people write it; see `evaluate_grid`.
+
+    Raises:
+        InputError: an unknown field or quantity, a bad range, a field twice, or more than six dimensions.
+    """
+    if len(ranges) > MOST_DIMENSIONS:
+        raise InputError(
+            f"the grid has {len(ranges)} dimensions; at most {MOST_DIMENSIONS} are allowed: "
+            "give the others one value each with --set."
+        )
+    wanted = [parse_range(text) for text in ranges]
+    chosen = [find(machine.family, one.field) for one in wanted]
+    taken = [leaf for parameter in chosen for leaf in parameter.leaves]
+    for leaf in taken:
+        if taken.count(leaf) > 1:
+            raise InputError(f"{leaf} is varied twice; give each field one range.")
+    pairs = list(zip(wanted, chosen, strict=True))
+    grid = Grid([Axis(parameter.leaves, one.values(parameter.quantity)) for one, parameter in pairs])
+    names = resolve_quantities(quantities, machine.family.component_names)
+    origin = {"machine": machine.name, "machine_file": as_toml(machine), "kinetostat": version("kinetostat")}
+    attributes = {**origin, "frame": "base axes at the platform point P"}
+    labels = xr.Dataset({}, _coordinates(grid, pairs), attributes)
+    return GridQuestion(machine, grid, tuple(parameter.path for parameter in chosen), tuple(names), labels)
+
+
+def _coordinates(grid: Grid, pairs: Sequence[tuple[Range, Parameter]]) -> dict[str, Any]:
+    found = {}
+    for axis, (one, parameter) in zip(grid.axes, pairs, strict=True):
+        kind = KINDS[parameter.quantity.kind]
+        about = {"units": kind.unit, "long_name": parameter.quantity.meaning, "kind": kind.name}
+        found[parameter.path] = (parameter.path, axis.values, {**about, "log": int(one.logarithmic)})
+    return found
 
 
 def evaluate_grid(
@@ -44,31 +104,46 @@ def evaluate_grid(
         Quantities are NaN where the status is not ok (0).
 
     Raises:
-        InputError: an unknown field or quantity, a bad range, a field twice, or too many points.
+        InputError: an unknown field or quantity, a bad range, a field twice, too many dimensions or points.
     """
-    wanted = [parse_range(text) for text in ranges]
-    chosen = [find(machine.family, one.field) for one in wanted]
-    taken = [leaf for parameter in chosen for leaf in parameter.leaves]
-    for leaf in taken:
-        if taken.count(leaf) > 1:
-            raise InputError(f"{leaf} is varied twice; give each field one range.")
-    count = prod(one.count for one in wanted)
-    if count > MOST_POINTS:
-        raise InputError(f"the grid has {count:,} points; at most {MOST_POINTS:,} are allowed: lower the counts.")
-    pairs = list(zip(wanted, chosen, strict=True))
-    grid = Grid([Axis(parameter.leaves, one.values(parameter.quantity)) for one, parameter in pairs])
-    names = resolve_quantities(quantities, machine.family.component_names)
-    found = evaluate(machine, grid, names, progress)
-    dims = [parameter.path for parameter in chosen]
-    content: dict[str, Any] = {name: (dims, found.values[name].reshape(grid.shape), _about(name)) for name in names}
-    content["status"] = (dims, found.status.reshape(grid.shape), _ABOUT_STATUS)
-    coordinates = {}
-    for axis, (one, parameter) in zip(grid.axes, pairs, strict=True):
-        kind = KINDS[parameter.quantity.kind]
-        about = {"units": kind.unit, "long_name": parameter.quantity.meaning, "kind": kind.name}
-        coordinates[parameter.path] = (parameter.path, axis.values, {**about, "log": int(one.logarithmic)})
-    origin = {"machine": machine.name, "machine_file": as_toml(machine), "kinetostat": version("kinetostat")}
-    return xr.Dataset(content, coordinates, {**origin, "frame": "base axes at the platform point P"})
+    return answer(grid_question(machine, ranges, quantities), progress)
+
+
+def answer(question: GridQuestion, progress: Progress = silent, compute: Compute = here) -> xr.Dataset:
+    """The answer to a question about a grid, in memory; see `evaluate_grid`.
+
+    Args:
+        question: of at most `IN_MEMORY` points.
+        progress: told how far the work is.
+        compute: who computes; bit for bit the same whoever does.
+
+    Raises:
+        InputError: too many points.
+    """
+    if not question.fits_memory:
+        raise InputError(
+            f"the grid has {question.grid.size:,} points, more than the {IN_MEMORY:,} that are kept in memory: "
+            "give -o FOLDER, into which results are written while they are computed, or lower the counts."
+        )
+    found = _evaluated(question, progress, compute)
+    shape = question.grid.shape
+    content = {name: (question.dims, found.values[name].reshape(shape), about(name)) for name in question.names}
+    return question.labels.assign(content).assign(status=(question.dims, found.status.reshape(shape), ABOUT_STATUS))
+
+
+def _evaluated(question: GridQuestion, progress: Progress, compute: Compute) -> Evaluation:
+    """All points in order."""
+    if compute is here:
+        return evaluate(question.machine, question.grid, question.names, progress)
+    work = in_chunks(question.machine, question.grid, question.names)
+    parts, done = {}, 0
+    for number, part in compute(work, range(work.count)):
+        parts[number] = part
+        done += len(part.status)
+        progress(done, question.grid.size)
+    ordered = [parts[number] for number in range(work.count)]
+    values = {name: np.concatenate([part.values[name] for part in ordered]) for name in question.names}
+    return Evaluation(values, np.concatenate([part.status for part in ordered]))
 
 
 def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONENTS) -> list[str]:
@@ -103,38 +178,13 @@ def failures(dataset: xr.Dataset) -> dict[Status, int]:
     return {Status(int(code)): int(n) for code, n in zip(codes, counts, strict=True) if code != Status.OK}
 
 
-def _about(name: str) -> dict[str, str]:
+def about(name: str) -> dict[str, str]:
+    """Attributes of the variable of a quantity."""
     quantity = QUANTITIES[name]
     return {"units": quantity.unit, "symbol": quantity.symbol}
 
 
-_ABOUT_STATUS = {
+ABOUT_STATUS = {
     "flag_values": [int(status) for status in Status],
     "flag_meanings": " ".join(status.word for status in Status),
 }
-
-
-def as_plain_data(dataset: xr.Dataset) -> dict[str, Any]:
-    """A dataset as plain data for `--json`: coordinates, nested lists; null where there is no finite value."""
-    coordinates = {
-        str(dim): {"units": dataset[dim].attrs["units"], "values": dataset[dim].values.tolist()}
-        for dim in dataset["status"].dims
-    }
-    variables = {
-        str(name): {"units": data.attrs["units"], "values": _finite_lists(data.values)}
-        for name, data in dataset.data_vars.items()
-        if name != "status"
-    }
-    words = np.array([status.word for status in Status])[dataset["status"].values]
-    return {
-        "name": dataset.attrs["machine"],
-        "coordinates": coordinates,
-        "variables": variables,
-        "status": words.tolist(),
-    }
-
-
-def _finite_lists(values: npt.NDArray[np.float64]) -> Any:
-    written: npt.NDArray[Any] = values.astype(object)
-    written[~np.isfinite(values)] = None
-    return written.tolist()

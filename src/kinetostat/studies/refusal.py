@@ -1,8 +1,10 @@
 """Why a pose has no answer, in a sentence that says what to change."""
 
+import math
 from collections.abc import Sequence
 
 from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinematics.limits import why_beyond
 from kinetostat.kinematics.mobility import Kind, mobility
 from kinetostat.kinematics.nearest import nearest_pose
 from kinetostat.kinematics.reach import why_out_of_reach
@@ -24,10 +26,20 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
             return _undetermined(machine) if placed is Status.SINGULAR else placed.sentence
     if status is Status.OUT_OF_REACH:
         return why_out_of_reach(configuration)
+    if status is Status.JOINT_LIMIT:
+        return why_beyond(response.checks)
     names = [leg.name for leg in configuration.legs]
-    found = mobility(configuration, nearby, response.reference)
-    kind = "" if found.kind is Kind.REGULAR else f" ({found.kind})"
-    return f"The pose is singular{kind}. {why_singular(names, response.legs, configuration.length, SINGULAR)}"
+    reason = why_singular(names, response.legs, configuration.length, SINGULAR)
+    return f"The pose is singular{_kind(response, nearby)}. {reason}"
+
+
+def _kind(response: Response, nearby: Sequence[Configuration]) -> str:
+    """What sort of singularity it is, in brackets; nothing where the joints have no place."""
+    screws = [screw for leg in response.legs for screw in (*leg.passive, *leg.elastic, *leg.wrenches)]
+    if not all(math.isfinite(c) for screw in screws for c in screw.components()):
+        return ""
+    found = mobility(response.configuration, nearby, response.reference)
+    return "" if found.kind is Kind.REGULAR else f" ({found.kind})"
 
 
 def _off_constraint(machine: Machine) -> str:

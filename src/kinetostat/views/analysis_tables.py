@@ -127,7 +127,8 @@ def _print_eigenscrews(console: Console, screws: Sequence[Eigenscrew]) -> None:
 def _print_load(console: Console, names: Sequence[str], load: LoadCase) -> None:
     kept = [("rx", "ry", "rz", "x", "y", "z").index(name) for name in names]
     table = numeric_table("Load at the tool point (N·m, N) and its deflection (rad, m)", "", names)
-    table.add_row("load", *(number(load.wrench[i]) for i in kept))
+    size = max(abs(c) for c in load.wrench)
+    table.add_row("load", *(number(load.wrench[i] if abs(load.wrench[i]) > ROUNDING * size else 0.0) for i in kept))
     table.add_row("deflection", *(number(load.deflection[i], "free") for i in kept))
     console.print(table)
     table = numeric_table("Actuators under it", "", ["load", "", "deformation", ""])

@@ -60,12 +60,12 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(2.75 * columns + 0.3, 2.45 * rows + 0.4), layout="constrained")
         panels = figure.subplots(rows, columns, squeeze=False).flat
-        x, x_label = _coordinate(dataset, str(across))
-        y, y_label = _coordinate(dataset, str(up))
+        x, x_label = axis_values(dataset, str(across))
+        y, y_label = axis_values(dataset, str(up))
         for panel, name in zip(panels, names, strict=False):
             _contour_panel(panel, x, y, dataset[name].transpose(up, across))
             panel.set(xlabel=x_label, ylabel=y_label)
-            _axis_scales(panel, dataset, str(across), str(up))
+            set_axis_scales(panel, dataset, str(across), str(up))
         for unused in list(figure.axes)[len(names) : rows * columns]:
             unused.remove()
         figure.suptitle(title, fontsize=10)
@@ -126,7 +126,8 @@ def _note_failures(figure: Figure, dataset: xr.Dataset) -> None:
         figure.supxlabel(text, fontsize=7, color="#555555")
 
 
-def _coordinate(dataset: xr.Dataset, name: str) -> tuple[Array, str]:
+def axis_values(dataset: xr.Dataset, name: str) -> tuple[Array, str]:
+    """Values of a coordinate as an axis shows them, and its label with the unit."""
     coordinate = dataset[name]
     scale = coordinate_scale(coordinate.attrs["kind"], coordinate.attrs["units"], coordinate.values)
     return coordinate.values * scale.factor, scale.label(_plain(name))
@@ -139,11 +140,13 @@ def _plain(path: str) -> str:
     return words if section == "pose" else f"{section}: {words}"
 
 
-def _axis_scales(panel: Axes, dataset: xr.Dataset, across: str, up: str) -> None:
+def set_axis_scales(panel: Axes, dataset: xr.Dataset, across: str, up: str) -> None:
+    """Equal scales for two lengths of similar range, logarithmic ones where the grid is."""
     lengths = [dataset[name].attrs["kind"] == "length" for name in (across, up)]
     spans = [np.ptp(dataset[name].values) for name in (across, up)]
     if all(lengths) and 0.5 < spans[0] / spans[1] < 2.0:
-        panel.set_aspect("equal")
+        per_metre = [coordinate_scale("length", "m", dataset[name].values).factor for name in (across, up)]
+        panel.set_aspect(per_metre[0] / per_metre[1])
     if dataset[across].attrs["log"]:
         panel.set_xscale("log")
     if dataset[up].attrs["log"]:
@@ -176,7 +179,7 @@ def _note(panel: Axes, text: str) -> None:
 
 
 def _curve_panel(panel: Axes, dataset: xr.Dataset, across: str, names: Sequence[str]) -> None:
-    x, x_label = _coordinate(dataset, across)
+    x, x_label = axis_values(dataset, across)
     logarithmic = bool(dataset[across].attrs["log"])
     values = np.concatenate([dataset[name].values for name in names])
     unit = dataset[names[0]].attrs["units"]

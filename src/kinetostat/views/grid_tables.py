@@ -1,12 +1,16 @@
 """Sweeps and maps as tables on a terminal, with units. Apart from `tables`, because datasets take long to import."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 
 import xarray as xr
 from rich.console import Console
 
+from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.studies.grid import failures
+from kinetostat.studies.stored_grid import StoredGrid
+from kinetostat.studies.tally import Extremes
 from kinetostat.views.tables import number, numeric_table
 
 LONGEST = 60
@@ -18,9 +22,33 @@ def print_dataset(console: Console, dataset: xr.Dataset, names: Sequence[str]) -
     if len(dataset["status"].dims) == 1 and dataset["status"].size <= LONGEST:
         _print_curve(console, dataset, names)
     else:
-        _print_extremes(console, dataset, names)
-    for status, count in failures(dataset).items():
-        console.print(f"{count:,} of {dataset['status'].size:,} points: {status.word}. {status.sentence}")
+        found = {name: _extremes(dataset[name]) for name in names}
+        _print_extremes(console, dataset.attrs["machine"], {str(d): n for d, n in dataset.sizes.items()}, found)
+    _print_failures(console, failures(dataset), dataset["status"].size)
+
+
+def print_stored(console: Console, stored: StoredGrid) -> None:
+    """A grid in a file: the extremes of each quantity, and what was there before."""
+    question = stored.question
+    sizes = dict(zip(question.dims, question.grid.shape, strict=True))
+    _print_extremes(console, question.machine.name, sizes, stored.tally.extremes)
+    failed: dict[Status, int] = {
+        status: count for status, count in stored.tally.statuses.items() if status != Status.OK
+    }
+    _print_failures(console, failed, question.grid.size)
+    if stored.computed < stored.chunks:
+        console.print(f"{stored.chunks - stored.computed:,} of {stored.chunks:,} chunks were there already.")
+
+
+def print_written(console: Console, paths: Iterable[Path]) -> None:
+    """Which files were written."""
+    for path in paths:
+        console.print(f"wrote {path}", highlight=False)
+
+
+def _print_failures(console: Console, counts: Mapping[Status, int], size: int) -> None:
+    for status, count in counts.items():
+        console.print(f"{count:,} of {size:,} points: {status.word}. {status.sentence}")
 
 
 def _print_curve(console: Console, dataset: xr.Dataset, names: Sequence[str]) -> None:
@@ -34,11 +62,14 @@ def _print_curve(console: Console, dataset: xr.Dataset, names: Sequence[str]) ->
     console.print(table)
 
 
-def _print_extremes(console: Console, dataset: xr.Dataset, names: Sequence[str]) -> None:
-    size = " x ".join(f"{dataset.sizes[dim]} {dim}" for dim in dataset["status"].dims)
-    table = numeric_table(f"{dataset.attrs['machine']}: {size}", "quantity", ["unit", "least", "mean", "largest"])
-    for name in names:
-        data = dataset[name]
-        statistics = (float(data.min()), float(data.mean()), float(data.max()))
-        table.add_row(name, data.attrs["units"], *(number(value) for value in statistics))
+def _extremes(data: xr.DataArray) -> Extremes:
+    return Extremes(float(data.min()), float(data.mean()), float(data.max()))
+
+
+def _print_extremes(console: Console, machine: str, sizes: Mapping[str, int], extremes: Mapping[str, Extremes]) -> None:
+    size = " x ".join(f"{count} {dim}" for dim, count in sizes.items())
+    table = numeric_table(f"{machine}: {size}", "quantity", ["unit", "least", "mean", "largest"])
+    for name, found in extremes.items():
+        statistics = (found.least, found.mean, found.largest)
+        table.add_row(name, QUANTITIES[name].unit, *(number(value) for value in statistics))
     console.print(table)

@@ -6,6 +6,9 @@ from contextlib import contextmanager
 
 from kinetostat.engine.batch import Progress, silent
 
+MEMORY = 600.0
+"""Seconds of progress from which the remaining time is estimated: several chunks, also where each takes minutes."""
+
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Progress]:
@@ -18,6 +21,6 @@ def progress_bar(what: str) -> Iterator[Progress]:
     from rich.progress import Progress as Bar
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Bar(*columns, console=Console(stderr=True), transient=True, speed_estimate_period=MEMORY) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)

@@ -11,7 +11,7 @@ from rich.table import Table
 from kinetostat.machine.loading import kinds_of_machine
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
-from kinetostat.units import show
+from kinetostat.spec.fields import Quantity
 
 Number = float | None
 
@@ -36,18 +36,18 @@ def print_machine(console: Console, machine: Machine) -> None:
     entries = {leaf for parameter in found if parameter.quantity.count for leaf in parameter.leaves}
     whole = [parameter for parameter in found if parameter.path not in entries]
     for parameter in whole:
-        texts = [_readable(held[leaf], parameter.quantity.kind) for leaf in parameter.leaves]
+        texts = [_readable(held[leaf], parameter.quantity) for leaf in parameter.leaves]
         alike = f"{len(texts)} x {texts[0]}" if len(texts) > 1 else texts[0]
         shown = alike if len(set(texts)) == 1 else ", ".join(texts)
         table.add_row(parameter.path, shown, parameter.quantity.meaning)
     console.print(table)
 
 
-def _readable(value: float, kind: str) -> str:
+def _readable(value: float, quantity: Quantity) -> str:
     """A value for a table: ten digits, angles in degrees."""
-    if kind == "angle":
+    if quantity.kind == "angle" and value != quantity.unset:
         return f"{math.degrees(value):.10g} deg"
-    return show(float(f"{value:.10g}"), kind)
+    return quantity.show(float(f"{value:.10g}"))
 
 
 def terminal() -> Console:

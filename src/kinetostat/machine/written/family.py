@@ -101,7 +101,7 @@ def _elements(title: str, joint: JointPlan, data: Any) -> list[Element]:
     if not joint.sprung:
         return [freedom]
     name = f"{title} actuator" if joint.actuated else f"{title} hinge"
-    return [Spring(name, freedom, data.stiffness, title, joint.actuated)]
+    return [Spring(name, freedom, data.stiffness, title, joint.actuated, not joint.actuated)]
 
 
 def _yielding(

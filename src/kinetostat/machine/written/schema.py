@@ -29,6 +29,7 @@ def written_schema(version: int) -> dict[str, Any]:
             "legs": {"type": "array", "minItems": 1, "items": _leg()},
             "tool": {"type": "object"},
             "load": {"type": "object"},
+            "limits": {"type": "object"},
         },
         ["name", "family", "platform", "pose", "legs"],
     )

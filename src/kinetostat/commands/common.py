@@ -1,0 +1,75 @@
+"""What commands share: exit codes, common options, how machines are read and answers printed. Knows no command."""
+
+import argparse
+import json
+import sys
+from typing import TYPE_CHECKING, NoReturn
+
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+    from kinetostat.machine.machine import Machine
+
+    Commands: TypeAlias = argparse._SubParsersAction["Parser"]
+
+DONE, NO_ANSWER, BAD_INPUT = 0, 1, 2
+"""Exit codes."""
+
+MACHINE = "a machine file, or the name of a bundled machine (see `kinetostat list`)"
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that reports mistakes in one readable paragraph."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and where help is, exit code 2."""
+        self.exit(BAD_INPUT, f"{self.prog}: {message}. Help: {self.prog} --help\n")
+
+
+def add_command(commands: "Commands", name: str, run: object, text: str, example: str) -> Parser:
+    """Add a command: its name, the function that runs it, one line about it, and an example."""
+    command = commands.add_parser(
+        name,
+        help=text,
+        description=f"{text[0].upper()}{text[1:]}.",
+        epilog=f"example:\n  {example}\n",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.set_defaults(run=run)
+    return command
+
+
+def takes_machine(command: Parser) -> None:
+    """Give a command the machine and `--set`."""
+    command.add_argument("machine", metavar="MACHINE", help=MACHINE)
+    command.add_argument(
+        "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",
+        help='override a field, e.g. --set geometry.base_radius="26 cm"; repeatable',
+    )  # fmt: skip
+
+
+def takes_json(command: Parser) -> None:
+    """Give a command `--json`."""
+    command.add_argument("--json", action="store_true", help="machine-readable output on stdout and nothing else")
+
+
+def load_machine(options: argparse.Namespace) -> "Machine":
+    """The machine that the options name, with their overrides.
+
+    Raises:
+        InputError: no such machine, or a mistake in the file or an override.
+    """
+    from kinetostat.machine.loading import load
+
+    return load(options.machine, options.settings)
+
+
+def print_json(data: object) -> None:
+    """Print plain data."""
+    print(json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1))
+
+
+def no_answer(message: str) -> int:
+    """Say why there is no answer; returns the exit code."""
+    print(f"kinetostat: {message}", file=sys.stderr)
+    return NO_ANSWER

@@ -1,0 +1,188 @@
+"""`sweep` and `map`: quantities over a grid, in memory or into a study folder. No formula lives here."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinetostat.commands.common import (
+    DONE,
+    NO_ANSWER,
+    add_command,
+    load_machine,
+    no_answer,
+    print_json,
+    takes_json,
+    takes_machine,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from kinetostat.commands.common import Commands
+    from kinetostat.engine.cluster import Crew
+    from kinetostat.studies.grid import GridQuestion
+
+VARY = "FIELD=from:to:count[:log]"
+MOST_WORKERS = 1024
+
+
+def add_grid_commands(commands: "Commands") -> None:
+    """Add `sweep` and `map`."""
+    sweep = add_command(
+        commands, "sweep", _sweep, "quantities along one parameter, as table, curves and NetCDF",
+        'kinetostat sweep zhang-gosselin-4dof --vary "stiffness.passive_links=1e3:1e10:8:log" --quantity compliance',
+    )  # fmt: skip
+    sweep.add_argument("--vary", metavar=VARY, required=True, action="append", dest="ranges", help="parameter to vary")
+    sweep.set_defaults(default_quantity="stiffness")
+    mapping = add_command(
+        commands, "map", _map, "quantities over two to six parameters, as contour maps and NetCDF",
+        'kinetostat map zhang-gosselin-4dof --over "x=-2 cm:2 cm:41" --over "z=66 cm:70 cm:41" -o maps',
+    )  # fmt: skip
+    mapping.add_argument(
+        "--over", metavar=VARY, required=True, action="append", dest="ranges", help="an axis of the map"
+    )
+    mapping.set_defaults(default_quantity="compliance")
+    for command in (sweep, mapping):
+        takes_machine(command)
+        command.add_argument(
+            "--quantity", metavar="NAME", action="append", dest="quantities",
+            help="compliance, stiffness (their six diagonal entries), compliance_rx, ..., compliance_rx_z, regularity",
+        )  # fmt: skip
+        command.add_argument("-o", "--output", type=Path, help="folder for NetCDF and figures (PNG, SVG, PDF)")
+        command.add_argument(
+            "--resume", action="store_true",
+            help="go on with what the folder holds, and refuse where it holds nothing; without this, the same command "
+            "goes on as well, or begins (grids of over 5 million points)",
+        )  # fmt: skip
+        who = command.add_mutually_exclusive_group()
+        who.add_argument("--workers", metavar="N", type=_workers, help="compute in N processes on this machine")
+        who.add_argument("--cluster", metavar="ADDRESS", help="compute on a Dask cluster, e.g. tcp://10.0.0.1:8786")
+        takes_json(command)
+
+
+def _workers(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text[:9]) <= MOST_WORKERS:
+        raise argparse.ArgumentTypeError(f"{text} is no number of processes; give 1 to {MOST_WORKERS}")
+    return int(text)
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    from kinetostat.spec.errors import InputError
+
+    if len(options.ranges) > 1:
+        raise InputError("sweep varies one parameter; for two or more use `kinetostat map --over ... --over ...`.")
+    return _grid(options, "sweep")
+
+
+def _map(options: argparse.Namespace) -> int:
+    from kinetostat.spec.errors import InputError
+
+    if len(options.ranges) < 2:
+        raise InputError("map needs two --over ranges or more; for one parameter use `kinetostat sweep --vary ...`.")
+    return _grid(options, "map")
+
+
+def _grid(options: argparse.Namespace, stem: str) -> int:
+    from kinetostat.studies.grid import grid_question
+
+    question = grid_question(load_machine(options), options.ranges, options.quantities or [options.default_quantity])
+    if options.output and not question.fits_memory:
+        return _stored(options, question, stem)
+    return _in_memory(options, question, stem)
+
+
+def _crew(options: argparse.Namespace) -> "Crew":
+    from kinetostat.engine.cluster import Crew
+
+    return Crew(options.workers, options.cluster)
+
+
+def _in_memory(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
+    from kinetostat.engine.cluster import hired
+    from kinetostat.studies.grid import answer
+    from kinetostat.views.progress import progress_bar
+
+    if options.output:
+        _check_folder(options.output, options.resume)
+    with hired(_crew(options)) as compute, progress_bar("computing") as progress:
+        dataset = answer(question, progress, compute)
+    written = _write(dataset, options.output, stem) if options.output else []
+    _show(dataset, options.json, written)
+    return DONE if bool((dataset["status"] == 0).any()) else NO_ANSWER
+
+
+def _check_folder(folder: Path, resume: bool) -> None:
+    """See that a small grid does not take the place of a long study."""
+    from kinetostat.spec.errors import InputError
+    from kinetostat.studies.study_folder import holds_study
+
+    if holds_study(folder):
+        raise InputError(f'"{folder}" holds the study of a larger grid; choose another folder with -o.')
+    if resume:
+        raise InputError("a grid that is kept in memory is computed at once and cannot be resumed; leave out --resume.")
+
+
+def _write(dataset: "xr.Dataset", folder: Path, stem: str) -> list[Path]:
+    from kinetostat.studies.storage import write_dataset
+
+    written = [folder / f"{stem}.nc"]
+    write_dataset(written[0], dataset)
+    return written + _draw(dataset, folder / stem, dataset.attrs["machine"])
+
+
+def _draw(dataset: "xr.Dataset", stem: Path, title: str) -> list[Path]:
+    """Figures of what has one dimension or two."""
+    dims = len(dataset["status"].dims)
+    if dims > 2:
+        return []
+    from kinetostat.views.figures import contour_maps, curves, save
+
+    draw = curves if dims == 1 else contour_maps
+    return save(draw(dataset, [str(name) for name in dataset.data_vars if name != "status"], title), stem)
+
+
+def _show(dataset: "xr.Dataset", as_json: bool, written: Sequence[Path]) -> None:
+    if as_json:
+        from kinetostat.studies.grid_data import as_plain_data
+
+        print_json(as_plain_data(dataset))
+        return
+    from kinetostat.views.grid_tables import print_dataset, print_written
+    from kinetostat.views.tables import terminal
+
+    console = terminal()
+    print_dataset(console, dataset, [str(name) for name in dataset.data_vars if name != "status"])
+    print_written(console, written)
+
+
+def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
+    from kinetostat.engine.cluster import hired
+    from kinetostat.studies.stored_grid import answer_into
+    from kinetostat.views.progress import progress_bar
+
+    try:
+        with hired(_crew(options)) as compute, progress_bar("computing") as progress:
+            found = answer_into(question, options.output, stem, progress, compute, options.resume)
+    except KeyboardInterrupt:
+        return no_answer(f"stopped; what was computed is in {options.output}: the same command goes on from there.")
+    if options.json:
+        from kinetostat.studies.grid_data import as_summary
+
+        print_json(as_summary(found))
+    else:
+        from kinetostat.views.grid_tables import print_stored, print_written
+        from kinetostat.views.tables import terminal
+
+        console = terminal()
+        print_stored(console, found)
+        print_written(console, [found.path, *(_draw_thinned(found.path) if len(question.dims) <= 2 else [])])
+    return DONE if found.tally.answered else NO_ANSWER
+
+
+def _draw_thinned(path: Path) -> list[Path]:
+    """Figures of a large grid of one dimension or two, of as many points as paper can show."""
+    from kinetostat.studies.result_file import thinned
+
+    dataset = thinned(path)
+    return _draw(dataset, path.with_suffix(""), f"{dataset.attrs['machine']} (thinned)")

@@ -1,0 +1,69 @@
+"""`sensitivity`: which parameters decide how stiff a machine is. No formula lives here."""
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinetostat.commands.common import (
+    DONE,
+    NO_ANSWER,
+    add_command,
+    load_machine,
+    no_answer,
+    print_json,
+    takes_json,
+    takes_machine,
+)
+
+if TYPE_CHECKING:
+    from kinetostat.commands.common import Commands
+    from kinetostat.studies.sensitivity import Sensitivity
+
+
+def add_sensitivity_command(commands: "Commands") -> None:
+    """Add `sensitivity`."""
+    command = add_command(
+        commands, "sensitivity", _sensitivity, "which parameters matter: derivatives of indices at a pose, ranked",
+        "kinetostat sensitivity zhang-gosselin-4dof --quantity compliance_z -o sensitivity",
+    )  # fmt: skip
+    takes_machine(command)
+    command.add_argument(
+        "--quantity", metavar="NAME", action="append", dest="quantities",
+        help="compliance (default), stiffness (their six diagonal entries), compliance_rx, ..., regularity; repeatable",
+    )  # fmt: skip
+    command.add_argument("-o", "--output", type=Path, help="folder for the figure (PNG, SVG, PDF) and JSON")
+    takes_json(command)
+
+
+def _sensitivity(options: argparse.Namespace) -> int:
+    from kinetostat.kinematics.status import Status
+    from kinetostat.studies.sensitivity import as_json, sensitivity
+
+    answer = sensitivity(load_machine(options), options.quantities or ["compliance"])
+    answered = answer.status is Status.OK
+    written = _write(answer, options.output) if options.output and answered else []
+    if options.json:
+        print_json(as_json(answer))
+        return DONE if answered else NO_ANSWER
+    if not answered:
+        return no_answer(answer.message)
+    from kinetostat.views.grid_tables import print_written
+    from kinetostat.views.sensitivity_tables import print_sensitivity
+    from kinetostat.views.tables import terminal
+
+    console = terminal()
+    print_sensitivity(console, answer)
+    print_written(console, written)
+    return DONE
+
+
+def _write(answer: "Sensitivity", folder: Path) -> list[Path]:
+    from kinetostat.studies.sensitivity import as_json
+    from kinetostat.studies.storage import write_text
+    from kinetostat.views.figures import save
+    from kinetostat.views.sensitivity_figure import sensitivity_figure
+
+    written = [folder / "sensitivity.json"]
+    write_text(written[0], json.dumps(as_json(answer), ensure_ascii=False, allow_nan=False, indent=1) + "\n")
+    return written + (save(sensitivity_figure(answer), folder / "sensitivity") if answer.influences else [])

@@ -1,0 +1,160 @@
+"""A NetCDF file larger than memory, filled run by run. Which runs are done is known elsewhere.
+
+Every variable is one contiguous block, reserved when the file is made; later only numbers are written into it. So there
+is no structure that an interruption could break, no second copy to assemble, and what runs were written, and in which
+order, leaves no trace.
+"""
+
+import os
+import shutil
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from math import prod
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import h5netcdf
+import h5py
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from kinetostat.spec.errors import InputError
+
+SPARE = 1 << 30
+"""Bytes that are left free on a disk."""
+STEP = 1 << 24
+"""Bytes written at a time."""
+SHOWN = 400
+"""Values of an axis that a figure can show."""
+STATUS = "status"
+UNKNOWN = -1
+"""Status of points that are not computed yet."""
+
+Array = npt.NDArray[Any]
+
+
+def check_space(folder: Path, points: int, quantities: int) -> None:
+    """See that a file of so many points and quantities fits the disk.
+
+    Raises:
+        InputError: it does not.
+    """
+    place = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
+    needed, free = points * (8 * quantities + 1), shutil.disk_usage(place).free
+    if needed + SPARE > free:
+        raise InputError(
+            f'"{folder}" has room for {free / 1e9:,.1f} GB, but {points:,} points of {quantities} quantities and a '
+            f"status take {needed / 1e9:,.1f} GB; lower the counts, name fewer quantities, or choose another disk."
+        )
+
+
+def create(path: Path, labels: xr.Dataset, dims: Sequence[str], variables: Mapping[str, Mapping[str, Any]]) -> None:
+    """Make a file in which no point is computed yet.
+
+    Args:
+        path: of the file; one that is there is replaced.
+        labels: coordinates and attributes.
+        dims: of all variables.
+        variables: attributes of each by name; `status` is one of them, int8, the others are float64.
+
+    Raises:
+        InputError: the folder cannot be written, or the disk is full.
+    """
+    with writing(path):
+        labels.to_netcdf(path, engine="h5netcdf")
+        with h5netcdf.File(path, "a") as file:
+            for name, attributes in variables.items():
+                kind = "i1" if name == STATUS else "f8"
+                variable = file.create_variable(name, tuple(dims), kind, dcpl=_reserved())
+                for key, value in attributes.items():
+                    variable.attrs[key] = value
+        with path.open("r+b") as stream:
+            if sys.platform == "linux":
+                os.posix_fallocate(stream.fileno(), 0, path.stat().st_size)
+            _fill_status(stream, _offsets(path)[STATUS], prod(labels.sizes[dim] for dim in dims))
+            _settle(stream)
+
+
+def _reserved() -> Any:
+    """Storage in one block that exists from the start, and that HDF5 itself leaves alone."""
+    wanted = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    wanted.set_layout(h5py.h5d.CONTIGUOUS)
+    wanted.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    wanted.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+    return wanted
+
+
+def _fill_status(stream: BinaryIO, offset: int, points: int) -> None:
+    stream.seek(offset)
+    stream.writelines(
+        np.full(min(STEP, points - start), UNKNOWN, dtype=np.int8).data for start in range(0, points, STEP)
+    )
+
+
+def _offsets(path: Path) -> dict[str, int]:
+    """Where the block of each variable starts, bytes."""
+    with h5py.File(path) as file:
+        found = {name: data.id.get_offset() for name, data in file.items()}
+    return {name: offset for name, offset in found.items() if offset is not None}
+
+
+class ResultFile:
+    """An open file, to be filled."""
+
+    def __init__(self, path: Path) -> None:
+        self._offsets = _offsets(path)
+        self._path = path
+        self._stream = path.open("r+b")
+
+    def write(self, start: int, values: Mapping[str, Array], status: Array) -> None:
+        """Write a run of points; when this returns it is on the disk.
+
+        The status comes last, so that a point that has one is complete.
+
+        Args:
+            start: number of its first point.
+            values: of each quantity [points].
+            status: codes [points].
+
+        Raises:
+            InputError: the disk is full or failing.
+        """
+        with writing(self._path):
+            for name, data in (*values.items(), (STATUS, status)):
+                self._stream.seek(self._offsets[name] + start * data.itemsize)
+                self._stream.write(np.ascontiguousarray(data).data)
+            _settle(self._stream)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._stream.close()
+
+
+def _settle(stream: BinaryIO) -> None:
+    stream.flush()
+    os.fsync(stream.fileno())
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Failures to write as messages for people.
+
+    Raises:
+        InputError: the disk is full or failing.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f'"{path}" cannot be written: {error.strerror or error}; what was written before is kept: mend this, then '
+            "give the same command again."
+        ) from None
+
+
+def thinned(path: Path) -> xr.Dataset:
+    """Of a file, as many values along each dimension as a figure can show."""
+    with xr.open_dataset(path, engine="h5netcdf") as dataset:
+        steps = {dim: slice(None, None, -(-size // SHOWN)) for dim, size in dataset.sizes.items()}
+        return dataset.isel(steps).load()

@@ -1,0 +1,168 @@
+"""Grids of any size: answered chunk by chunk into the folder of a study, so that nothing is lost when it is stopped."""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from kinetostat.engine.batch import Evaluation, Progress, silent
+from kinetostat.engine.chunks import Compute, Work, here, in_chunks
+from kinetostat.kinematics.status import Status
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.grid import ABOUT_STATUS, GridQuestion, about
+from kinetostat.studies.result_file import STATUS, UNKNOWN, ResultFile, check_space, create
+from kinetostat.studies.study_folder import Record, StudyFolder, holds_study, study_folder
+from kinetostat.studies.tally import Tally, combined, tally
+
+MOST_NUMBERS = 10_000_000_000
+"""Points times quantities of one grid: 80 GB."""
+STUDY_VERSION = 1
+
+
+@dataclass(frozen=True)
+class StoredGrid:
+    """The answer to a question about a grid, in a file.
+
+    Attributes:
+        question: that was asked.
+        path: of the NetCDF file.
+        tally: how many points have which status, and the extremes of each quantity.
+        chunks: in all.
+        computed: how many of them now; the others were there.
+    """
+
+    question: GridQuestion
+    path: Path
+    tally: Tally
+    chunks: int
+    computed: int
+
+
+def answer_into(
+    question: GridQuestion,
+    folder: Path,
+    stem: str,
+    progress: Progress = silent,
+    compute: Compute = here,
+    resume: bool = False,
+) -> StoredGrid:
+    """Answer a question about a grid into FOLDER/STEM.nc; go on with what the folder holds of the same answer.
+
+    The file is called STEM.partial.nc until it is whole; in it, status -1 marks what is not computed yet.
+
+    Args:
+        question: of any size that the disk holds.
+        folder: of this study alone.
+        stem: name of the file.
+        progress: told how far the work is.
+        compute: who computes; bit for bit the same whoever does.
+        resume: insist that the folder holds a part of the answer.
+
+    Raises:
+        InputError: too many points, no space, another study or another process in the folder, nothing to resume.
+    """
+    _check_size(question)
+    if resume and not holds_study(folder):
+        raise InputError(f'"{folder}" holds no study that could be resumed; check -o, or leave out --resume.')
+    final = folder / f"{stem}.nc"
+    if not holds_study(folder):
+        _check_room(question, final)
+    with study_folder(folder) as study:
+        work = _taken_up(question, study, final)
+        known = study.records()
+        missing = [number for number in range(work.count) if number not in known]
+        if missing:
+            _compute_missing(work, missing, _partial(final), study, progress, compute)
+        if _partial(final).exists():
+            _partial(final).replace(final)
+        records = study.records()
+        found = combined([records[number] for number in range(work.count)], question.names)
+        return StoredGrid(question, final, found, work.count, len(missing))
+
+
+def _check_size(question: GridQuestion) -> None:
+    numbers = question.grid.size * len(question.names)
+    if numbers > MOST_NUMBERS:
+        raise InputError(
+            f"the grid has {question.grid.size:,} points of {len(question.names)} quantities, {numbers:,} numbers; "
+            f"at most {MOST_NUMBERS:,} are allowed: lower the counts or name fewer quantities."
+        )
+
+
+def _check_room(question: GridQuestion, final: Path) -> None:
+    if final.exists():
+        raise InputError(f'"{final}" is there already; choose another folder with -o, or remove it.')
+    check_space(final.parent, question.grid.size, len(question.names))
+
+
+def _partial(final: Path) -> Path:
+    return final.with_suffix(f".partial{final.suffix}")
+
+
+def _taken_up(question: GridQuestion, study: StudyFolder, final: Path) -> Work:
+    """The work as the folder has it, or begun anew where the folder has none."""
+    work = in_chunks(question.machine, question.grid, question.names)
+    asked, held = _as_record(question, final.name), study.question()
+    if held is None:
+        attributes = {**{name: about(name) for name in question.names}, STATUS: _about_status()}
+        create(_partial(final), question.labels, question.dims, attributes)
+        study.begin({**asked, "chunk": work.chunk})
+        return work
+    different = [key for key in asked if asked[key] != held.get(key)]
+    if different:
+        raise InputError(
+            f'"{study.path}" holds another study (its {" and ".join(different)} differ); choose another folder with '
+            "-o, or remove that one."
+        )
+    if not final.exists() and not _partial(final).exists():
+        raise InputError(f'"{final}" was removed from its study; remove the folder "{study.path}" to begin again.')
+    return Work(work.machine, work.points, work.quantities, int(held["chunk"]))
+
+
+def _about_status() -> Mapping[str, Any]:
+    meanings = f"not_computed {ABOUT_STATUS['flag_meanings']}"
+    return {"flag_values": [UNKNOWN, *(int(status) for status in Status)], "flag_meanings": meanings}
+
+
+def _as_record(question: GridQuestion, file: str) -> Record:
+    """All that the numbers depend on."""
+    attributes = question.labels.attrs
+    axes = [
+        {"field": dim, "from": float(axis.values[0]), "to": float(axis.values[-1]), "count": len(axis.values)}
+        | {"log": question.labels[dim].attrs["log"]}
+        for dim, axis in zip(question.dims, question.grid.axes, strict=True)
+    ]
+    return {
+        "study": STUDY_VERSION,
+        "kinetostat": attributes["kinetostat"],
+        "file": file,
+        "machine": attributes["machine_file"],
+        "axes": axes,
+        "quantities": list(question.names),
+    }
+
+
+def _compute_missing(
+    work: Work, missing: Sequence[int], path: Path, study: StudyFolder, progress: Progress, compute: Compute
+) -> None:
+    """Compute chunks; while one is computed, the one before is written."""
+    total = work.points.size
+    done = total - sum(len(work.part(number)) for number in missing)
+    progress(done, total)
+    with closing(ResultFile(path)) as file, ThreadPoolExecutor(1) as writer:
+        pending: Future[None] | None = None
+        for number, found in compute(work, missing):
+            if pending:
+                pending.result()
+            pending = writer.submit(_keep, file, study, number, work.part(number).start, found)
+            done += len(found.status)
+            progress(done, total)
+        if pending:
+            pending.result()
+
+
+def _keep(file: ResultFile, study: StudyFolder, number: int, start: int, found: Evaluation) -> None:
+    file.write(start, found.values, found.status)
+    study.note({"chunk": number, **tally(found)})

@@ -1,0 +1,102 @@
+"""The folder of a long study: its question, which chunks of its answer are done, and who is at work. Computes nothing.
+
+`study.json` holds the question, `history.jsonl` one line for each chunk that is done, in the order of time. The lock on
+the history belongs to the process and ends with it, however it ends.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.storage import write_text
+
+QUESTION, HISTORY = "study.json", "history.jsonl"
+
+Record = dict[str, Any]
+"""What is noted about a chunk; "chunk" is its number."""
+
+
+def holds_study(folder: Path) -> bool:
+    """Whether a folder is that of a long study."""
+    return (folder / QUESTION).exists()
+
+
+class StudyFolder:
+    """A folder in which this process alone is at work."""
+
+    def __init__(self, path: Path, history: BinaryIO) -> None:
+        self.path = path
+        self._history = history
+
+    def question(self) -> Record | None:
+        """The question that is being answered here, or None where there is none yet.
+
+        Raises:
+            InputError: it cannot be read.
+        """
+        path = self.path / QUESTION
+        try:
+            return json.loads(path.read_text("utf-8")) if path.exists() else None
+        except (OSError, ValueError):
+            raise InputError(f'"{path}" cannot be read; choose another folder, or remove this one.') from None
+
+    def begin(self, question: Record) -> None:
+        """Note a new question, to which nothing is known yet."""
+        self._history.truncate(0)
+        write_text(self.path / QUESTION, json.dumps(question, ensure_ascii=False, indent=1) + "\n")
+
+    def records(self) -> dict[int, Record]:
+        """What was noted about the chunks that are done, by their number; a line cut short is dropped."""
+        self._history.seek(0)
+        text = self._history.read()
+        whole = text[: text.rfind(b"\n") + 1]
+        if len(whole) < len(text):
+            self._history.truncate(len(whole))
+        found = [json.loads(line) for line in whole.splitlines()]
+        return {record["chunk"]: record for record in found}
+
+    def note(self, record: Record) -> None:
+        """Add a chunk that is done; when this returns it is on the disk."""
+        self._history.write(json.dumps(record).encode() + b"\n")
+        self._history.flush()
+        os.fsync(self._history.fileno())
+
+
+@contextmanager
+def study_folder(path: Path) -> Iterator[StudyFolder]:
+    """A folder, made if need be, in which no other process may work meanwhile.
+
+    Raises:
+        InputError: another process is at work in it, or it cannot be written.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        stream = (path / HISTORY).open("a+b")
+    except OSError as error:
+        raise InputError(f'"{path}" cannot be written: {error.strerror}; choose another place with -o.') from None
+    with stream:
+        try:
+            _lock(stream)
+        except OSError:
+            raise InputError(
+                f'another kinetostat is at work in "{path}"; wait for it, or choose another folder with -o.'
+            ) from None
+        yield StudyFolder(path, stream)
+
+
+def _lock(stream: BinaryIO) -> None:
+    """Take the lock of a file, or fail at once; the system gives it back when the process ends."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        stream.seek(1 << 40)  # a byte far behind the text, because Windows refuses others to read what is locked
+        msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)

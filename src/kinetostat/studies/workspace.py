@@ -1,0 +1,177 @@
+"""Where a machine can work: what it reaches of pose space without a singularity, within limits and conditions.
+
+What is drawn or printed of it is elsewhere (`views.workspace_figures`, `views.workspace_tables`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import xarray as xr
+
+from kinetostat.engine.batch import Progress, evaluate, silent
+from kinetostat.engine.sampling import Cells
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import values
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.conditions import Condition, parse_condition
+from kinetostat.studies.connected import connected_to
+from kinetostat.studies.demands import Demand, demands
+from kinetostat.studies.grid import IN_MEMORY, MOST_DIMENSIONS, GridQuestion, answer, grid_question
+from kinetostat.studies.verdicts import INSIDE, Codes, Judge, Mask, Numbers, Poses
+from kinetostat.studies.volume import METHOD, Volume, estimate_volume
+
+MOST_DEMANDS = 200_000
+"""Inside nodes of which it is computed what they ask of the machine; of more, evenly chosen ones."""
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """Where a machine can work.
+
+    Attributes:
+        dataset: over the nodes of the grid: `status` (`Status` codes), `verdict` (place in `verdicts`), `connected`
+            (whether inside and joined to the file's pose), `regularity` and the quantities of the conditions.
+        verdicts: what may become of a node, "inside" first; then why not.
+        counts: how many nodes have each verdict.
+        volume: of the inside, whether joined to the file's pose or not.
+        joined: share of the inside nodes that hang together with the file's pose; None if that is not inside.
+        extents: least and greatest value of each coordinate over the inside nodes, SI; empty where there are none.
+        demands: what the workspace asks of legs, joints and actuators.
+        conditions: that were asked for.
+        divided: whether singularities divide pose space and the file's pose says on which side to work.
+    """
+
+    dataset: xr.Dataset
+    verdicts: tuple[str, ...]
+    counts: dict[str, int]
+    volume: Volume
+    joined: float | None
+    extents: dict[str, tuple[float, float]]
+    demands: tuple[Demand, ...]
+    conditions: tuple[Condition, ...]
+    divided: bool
+
+    @property
+    def found(self) -> bool:
+        """Whether there is any."""
+        return self.volume.value > 0.0 or self.counts[INSIDE] > 0
+
+
+def workspace(
+    machine: Machine, ranges: Sequence[str], conditions: Sequence[str] = (), progress: Progress = silent, seed: int = 0
+) -> Workspace:
+    """The region of pose space where a machine can work.
+
+    A pose is inside if it can be reached within the limits of the file, is not singular, lies on the same side of the
+    singularities as the file's pose, and meets the conditions.
+
+    Args:
+        machine: with its limits; its pose gives the coordinates that do not vary.
+        ranges: "FIELD=from:to:count", two to six coordinates of the pose.
+        conditions: "QUANTITY > VALUE".
+        progress: told how far the work is.
+        seed: of the random points for the volume.
+
+    Raises:
+        InputError: a field that is no coordinate of the pose, a bad range or condition, too many points.
+    """
+    judge = Judge(machine, tuple(parse_condition(text, machine.family.component_names) for text in conditions))
+    question = grid_question(machine, ranges, ["regularity", *judge.quantities])
+    _check(question)
+    total = question.grid.size + Cells(question.grid.axes).size
+    nodes = answer(question, lambda done, _: progress(done, total))
+    verdict = judge.verdicts(
+        nodes["status"].values, {name: nodes[name].values for name in judge.quantities}, partial(_poses, question)
+    )
+    inside = verdict == 0
+    volume = _volume(judge, question, seed, lambda done, _: progress(question.grid.size + done, total))
+    seat = _seat(question)
+    connected = connected_to(inside, seat) if seat is not None else np.zeros_like(inside)
+    return Workspace(
+        _labelled(nodes, verdict, connected, judge, volume),
+        judge.labels,
+        {label: int((verdict == i).sum()) for i, label in enumerate(judge.labels)},
+        volume,
+        float(connected.sum() / inside.sum()) if connected.any() else None,
+        _extents(question, inside),
+        demands(machine, _poses(question, np.flatnonzero(inside)[:: 1 + int(inside.sum()) // MOST_DEMANDS])),
+        judge.conditions,
+        judge.side != 0.0,
+    )
+
+
+def _check(question: GridQuestion) -> None:
+    """Only coordinates of the pose, evenly spaced, and few enough nodes."""
+    poses = [path for path in values(question.machine) if path.startswith("pose.")]
+    for dim in question.dims:
+        if dim not in poses:
+            raise InputError(
+                f"{dim} is no coordinate of the pose; a workspace extends over {', '.join(poses)}. For other fields "
+                "use `kinetostat map`."
+            )
+        if question.labels[dim].attrs["log"]:
+            raise InputError(f"{dim}: a workspace needs even spacing; leave out :log.")
+    if not 2 <= len(question.dims) <= MOST_DIMENSIONS:
+        raise InputError("a workspace needs two to six --over ranges, each of a coordinate of the pose.")
+    for dim, axis in zip(question.dims, question.grid.axes, strict=True):
+        if axis.values[0] >= axis.values[-1]:
+            raise InputError(f"{dim}: the range must run upwards; exchange its ends.")
+    if not question.fits_memory:
+        raise InputError(
+            f"the grid has {question.grid.size:,} nodes; a workspace is kept in memory, at most {IN_MEMORY:,}: lower "
+            "the counts."
+        )
+
+
+def _poses(question: GridQuestion, numbers: Numbers) -> Poses:
+    """Coordinates of some nodes by their number."""
+    places = np.unravel_index(numbers, question.grid.shape)
+    return {
+        path: axis.values[place] for axis, place in zip(question.grid.axes, places, strict=True) for path in axis.paths
+    }
+
+
+def _volume(judge: Judge, question: GridQuestion, seed: int, progress: Progress) -> Volume:
+    axes = question.grid.axes
+    found = evaluate(judge.machine, Cells(axes, seed), judge.quantities, progress)
+    sizes = [float(axis.values[-1] - axis.values[0]) for axis in axes]
+    units = [str(question.labels[dim].attrs["units"]) for dim in question.dims]
+    return estimate_volume(judge.inside(found.status, found.values), sizes, units)
+
+
+def _seat(question: GridQuestion) -> tuple[int, ...] | None:
+    """The node nearest to the file's pose; None where that is off the grid by more than half a step."""
+    held = values(question.machine)
+    found = []
+    for axis in question.grid.axes:
+        apart = np.abs(axis.values - float(held[axis.paths[0]]))
+        if apart.min() > 0.5001 * float(axis.values[1] - axis.values[0]):
+            return None
+        found.append(int(apart.argmin()))
+    return tuple(found)
+
+
+def _extents(question: GridQuestion, inside: Mask) -> dict[str, tuple[float, float]]:
+    found = {}
+    for number, (dim, axis) in enumerate(zip(question.dims, question.grid.axes, strict=True)):
+        others = tuple(i for i in range(inside.ndim) if i != number)
+        reached = axis.values[inside.any(axis=others)]
+        if reached.size:
+            found[dim] = float(reached[0]), float(reached[-1])
+    return found
+
+
+def _labelled(nodes: xr.Dataset, verdict: Codes, connected: Mask, judge: Judge, volume: Volume) -> xr.Dataset:
+    """The dataset of the nodes with verdicts and volume."""
+    dims = nodes["status"].dims
+    words = " ".join("_".join(label.split()) for label in judge.labels)
+    about = {"flag_values": list(range(len(judge.labels))), "flag_meanings": words}
+    told = {"long_name": "inside and joined to the file's pose", "flag_values": [0, 1], "flag_meanings": "no yes"}
+    figures = {"volume": volume.value, "volume_standard_error": volume.standard_error, "volume_units": volume.unit}
+    wanted = nodes.drop_vars("side").assign(
+        verdict=(dims, verdict, about), connected=(dims, connected.astype(np.int8), told)
+    )
+    pose = {path: float(value) for path, value in values(judge.machine).items() if path.startswith("pose.")}
+    return wanted.assign_attrs({**figures, "volume_method": METHOD, **pose})

@@ -1,0 +1,36 @@
+"""Sensitivities as a table on a terminal: parameters by rank against indices. Nothing is computed but rounding."""
+
+from rich.console import Console
+
+from kinetostat.studies.sensitivity import Sensitivity, notes
+from kinetostat.units import KINDS
+from kinetostat.views.tables import number, numeric_table
+
+MOST_ROWS = 40
+"""Parameters that are printed; `--json` has all."""
+LEAST = 0.0005
+"""Percent per percent below which a 0 is printed."""
+
+
+def print_sensitivity(console: Console, answer: Sensitivity) -> None:
+    """The parameters that matter most, and what the numbers mean."""
+    heads = [name.split("_", 1)[-1] for name in answer.quantities]
+    groups = ", ".join(dict.fromkeys(name.split("_", 1)[0] for name in answer.quantities))
+    title = f"{answer.machine.name}: {groups}, percent per percent"
+    table = numeric_table(title, "parameter", ["value", *heads])
+    for one in answer.influences[:MOST_ROWS]:
+        value = f"{number(one.value)} {KINDS[one.kind].unit}".rstrip()
+        table.add_row(one.path, value, *(_percent(percent) for percent in one.percents))
+    console.print(table)
+    hidden = len(answer.influences) - MOST_ROWS
+    if hidden > 0:
+        console.print(f"{hidden} more have less influence; --json has all.")
+    for note in notes(answer):
+        console.print(note, highlight=False)
+
+
+def _percent(value: float | None) -> str:
+    """Three digits after the point, a dash where there is none."""
+    if value is None:
+        return "–"
+    return "0" if abs(value) < LEAST else f"{value:.3f}"

@@ -1,0 +1,180 @@
+"""Pictures of a workspace: regions filled by verdict, cross-sections, and the solid. Every axis has its unit."""
+
+from collections.abc import Sequence
+
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from kinetostat.studies.conditions import Condition
+from kinetostat.studies.surface import surface
+from kinetostat.studies.verdicts import BEYOND, FAILS, INSIDE, LIMIT, PLAIN, phrase
+from kinetostat.views.display import coordinate_scale
+from kinetostat.views.figures import COLOURS, STYLE, Array, axis_values, fix_layout, set_axis_scales
+
+KNOWN = dict(zip([*PLAIN.values(), BEYOND], ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#e3bcd1"), strict=True))
+"""Colours of verdicts that need no limit and no condition."""
+LIMITED = ("#f2c77a", "#eea27a", "#f3ea9a", "#d8b98a", "#e7d3b5", "#c9a27e", "#f5dfa8", "#dcae92", "#cfc08a")
+UNMET = ("#a9d2ee", "#7fa8cf", "#c5cbe9", "#8fc4d4", "#b7c7d9", "#9db4e0")
+SECTIONS = 9
+"""Cross-sections of a picture at most."""
+SOLID = "#5fb39a"
+FINEST = 64
+"""Nodes along an axis that the picture of a solid shows at most."""
+LIGHT = np.array([-0.45, -0.7, 0.55])
+"""Where the light comes from."""
+
+
+def pictures(
+    dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[Condition], title: str
+) -> dict[str, Figure]:
+    """The pictures of a workspace by what is added to the file's name.
+
+    Over two coordinates the region; over three, cross-sections along the third and the solid. Over more, the others are
+    held where the file's pose has them.
+
+    Args:
+        dataset: of `studies.workspace.Workspace`.
+        labels: its verdicts.
+        conditions: whose contours are drawn.
+        title: over each picture.
+    """
+    dims = [str(dim) for dim in dataset["verdict"].dims]
+    held = {dim: float(dataset.attrs.get(dim, dataset[dim].values.mean())) for dim in dims[3:]}
+    if held:
+        dataset = dataset.sel(held, method="nearest")
+        shown = ", ".join(_at(dataset, dim) for dim in held)
+        title = f"{title}, {shown}"
+    if len(dims) == 2:
+        return {"": _sections([dataset], labels, conditions, title)}
+    cuts = [dataset.isel({dims[2]: int(i)}) for i in _shown(dataset, dims)]
+    return {"-sections": _sections(cuts, labels, conditions, title), "-solid": _solid(dataset, dims[:3], title)}
+
+
+def _shown(dataset: xr.Dataset, dims: Sequence[str]) -> Array:
+    """Which values of the third coordinate have a section: evenly chosen, no further than a step beyond the inside."""
+    reached = np.flatnonzero((dataset["verdict"] == 0).any(dims[:2]).values)
+    last = dataset.sizes[dims[2]] - 1
+    first, final = (max(0, reached[0] - 1), min(last, reached[-1] + 1)) if reached.size else (0, last)
+    return np.unique(np.linspace(first, final, min(SECTIONS, final - first + 1)).round().astype(int))
+
+
+def _at(dataset: xr.Dataset, dim: str) -> str:
+    """A coordinate and its value, for titles."""
+    coordinate = dataset[dim]
+    scale = coordinate_scale(coordinate.attrs["kind"], coordinate.attrs["units"], np.atleast_1d(coordinate.values))
+    return f"{dim.removeprefix('pose.')} = {float(coordinate) * scale.factor:.4g} {scale.unit}"
+
+
+def _colours(labels: Sequence[str]) -> list[str]:
+    limits, unmet = iter(LIMITED), iter(UNMET * 6)
+    return [KNOWN.get(label) or next(limits if label.startswith(LIMIT) else unmet) for label in labels]
+
+
+def _sections(cuts: Sequence[xr.Dataset], labels: Sequence[str], conditions: Sequence[Condition], title: str) -> Figure:
+    """One panel for each cut, filled by verdict, with the contours of the conditions."""
+    columns = min(3, len(cuts))
+    rows = -(-len(cuts) // columns)
+    wide = 4.6 if len(cuts) == 1 else 2.6
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(wide * columns + 0.3, 0.9 * wide * rows + 0.9), layout="constrained")
+        panels = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
+        for panel, cut in zip(panels, cuts, strict=False):
+            _fill(panel, cut, labels, conditions)
+            if len(cuts) > 1:
+                across = str(next(dim for dim in cut.coords if dim not in cut["verdict"].dims and cut[dim].attrs))
+                panel.set_title(_at(cut, _varied(cuts, across)))
+        for panel in panels[len(cuts) :]:
+            panel.remove()
+        figure.legend(handles=_legend(cuts, labels, conditions), loc="outside lower center", ncols=min(3, 1 + columns))
+        figure.suptitle(title, fontsize=10)
+        fix_layout(figure)
+    return figure
+
+
+def _varied(cuts: Sequence[xr.Dataset], fallback: str) -> str:
+    """The coordinate that differs between cuts."""
+    names = [str(n) for n in cuts[0].coords if n not in cuts[0]["verdict"].dims]
+    return next((n for n in names if len({float(cut[n]) for cut in cuts}) > 1), fallback)
+
+
+def _fill(panel: Axes, cut: xr.Dataset, labels: Sequence[str], conditions: Sequence[Condition]) -> None:
+    across, up = (str(dim) for dim in cut["verdict"].dims)
+    (x, x_label), (y, y_label) = axis_values(cut, across), axis_values(cut, up)
+    verdict = cut["verdict"].transpose(up, across).values
+    palette = ListedColormap(_colours(labels))
+    panel.grid(visible=False)
+    panel.pcolormesh(x, y, verdict, cmap=palette, vmin=-0.5, vmax=len(labels) - 0.5, shading="nearest", rasterized=True)
+    inside = (verdict == 0).astype(float)
+    if 0.0 < inside.mean() < 1.0:
+        panel.contour(x, y, inside, levels=[0.5], colors="#1d6b55", linewidths=0.9)
+    elsewhere = ~np.isin(verdict, [i for i, label in enumerate(labels) if label == INSIDE or label.startswith(FAILS)])
+    for condition, colour in zip(conditions, COLOURS, strict=False):
+        values = np.ma.masked_where(elsewhere, cut[condition.quantity].transpose(up, across).values)
+        if values.count() and values.min() < condition.value < values.max():
+            panel.contour(x, y, values, levels=[condition.value], colors=colour, linewidths=1.2, linestyles="--")
+    panel.set(xlabel=x_label, ylabel=y_label, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    set_axis_scales(panel, cut, across, up)
+    panel.label_outer()
+
+
+def _legend(cuts: Sequence[xr.Dataset], labels: Sequence[str], conditions: Sequence[Condition]) -> list[Patch | Line2D]:
+    """What the colours mean that occur, and the lines."""
+    present = {int(code) for cut in cuts for code in np.unique(cut["verdict"].values)}
+    patches: list[Patch | Line2D] = [
+        Patch(facecolor=colour, edgecolor="#888888", linewidth=0.4, label=phrase(label))
+        for code, (label, colour) in enumerate(zip(labels, _colours(labels), strict=True))
+        if code in present
+    ]
+    lines = [
+        Line2D([], [], color=colour, linestyle="--", linewidth=1.2, label=_edge(condition))
+        for condition, colour in zip(conditions, COLOURS, strict=False)
+    ]
+    return [*patches, *lines]
+
+
+def _edge(condition: Condition) -> str:
+    return condition.text.replace(condition.comparison, "=", 1)
+
+
+def _solid(dataset: xr.Dataset, dims: Sequence[str], title: str) -> Figure:
+    """The inside as a lit solid in a box with scales."""
+    thin = dataset.isel({dim: slice(None, None, -(-dataset.sizes[dim] // FINEST)) for dim in dims})
+    found = [axis_values(thin, dim) for dim in dims]
+    ends = [axis_values(dataset, dim)[0] for dim in dims]
+    triangles = surface(thin["verdict"].transpose(*dims).values == 0, [values for values, _ in found])
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(5.2, 4.8), layout="constrained")
+        panel = figure.add_subplot(projection="3d")
+        colours = _lit(triangles)
+        solid = Poly3DCollection(triangles, facecolors=colours, edgecolors=colours, linewidths=0.2, rasterized=True)
+        panel.add_collection3d(solid)
+        panel.set(xlabel=found[0][1], ylabel=found[1][1], zlabel=found[2][1])
+        panel.set(xlim=_ends(ends[0]), ylim=_ends(ends[1]), zlim=_ends(ends[2]))
+        lengths = all(dataset[dim].attrs["kind"] == "length" for dim in dims)
+        panel.set_box_aspect([float(np.ptp(dataset[dim].values)) for dim in dims] if lengths else None, zoom=0.9)
+        figure.suptitle(title, fontsize=10)
+        fix_layout(figure)
+    return figure
+
+
+def _ends(values: Array) -> tuple[float, float]:
+    return float(values[0]), float(values[-1])
+
+
+def _lit(triangles: Array) -> Array:
+    """A colour for each triangle by how it faces the light, scales made equal [n x 3]."""
+    if not len(triangles):
+        return np.zeros((0, 3))
+    spread = np.ptp(triangles.reshape(-1, 3), axis=0)
+    even = triangles / np.where(spread > 0.0, spread, 1.0)
+    normals = np.cross(even[:, 1] - even[:, 0], even[:, 2] - even[:, 0])
+    sizes = np.linalg.norm(normals, axis=1, keepdims=True)
+    facing = (normals / np.where(sizes > 0.0, sizes, 1.0)) @ (LIGHT / np.linalg.norm(LIGHT))
+    return np.outer(0.68 + 0.32 * facing, to_rgb(SOLID))

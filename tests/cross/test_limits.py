@@ -1,0 +1,120 @@
+"""Limits judged on floats, on NumPy arrays and by machine code: one status everywhere, and no code for none."""
+
+import numpy as np
+import pytest
+
+from kinetostat.engine.form import Kind, form_of, traced
+from kinetostat.engine.kernel import slab_kernel
+from kinetostat.engine.limits import first_passed, used
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.limits import is_set
+from kinetostat.machine.loading import load
+from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.studies.demands import EVERYTHING
+
+POSES = 300
+LOAD = ("load.force=[200, -100, 500]", "load.moment=[3, 5, -2]")
+PLANAR_LOAD = ("load.force=[200, -100, 0]",)
+BOTH_WAYS = ("shortest_leg", "longest_leg", "actuator_force", "leg_diameter")
+
+CASES = [
+    ("hexapod", LOAD, (*BOTH_WAYS, "base_joint_angle", "platform_joint_angle")),
+    ("zhang-gosselin-4dof", LOAD, (*BOTH_WAYS, "base_joint_angle", "platform_joint_angle")),
+    ("planar-3rpr", PLANAR_LOAD, BOTH_WAYS),
+    ("hexapod-rus", LOAD, ("actuator_moment", "platform_joint_angle", "leg_diameter")),
+    ("passive-leg-5dof-driven", LOAD, ("longest_leg", "actuator_force")),
+    ("tripteron", LOAD, ("travel_from", "travel_to", "actuator_force")),
+    ("delta", LOAD, ("actuator_moment",)),
+]
+
+
+def poses(machine):
+    """Poses around the file's, of all coordinates."""
+    rng, length = np.random.default_rng(8), float(respond(machine).configuration.length)
+    held = values(machine)
+    kinds = {p.path: p.quantity.kind for p in parameters(machine.family) if p.path.startswith("pose.")}
+    return {p: held[p] + (0.2 * length if k == "length" else 0.3) * rng.uniform(-1, 1, POSES) for p, k in kinds.items()}
+
+
+def limited(machine, columns, fields):
+    """The machine with limits that about one pose in five passes, each within the range that the poses use."""
+    wanted = {f"limits.{name}": EVERYTHING[name] for name in fields}
+    watched = with_values(machine, wanted)
+    found = {}
+    for name in fields:
+        measures = np.array([measure(watched, columns, i, name) for i in range(POSES)])
+        found[f"limits.{name}"] = float(np.nanquantile(measures, 0.2 if EVERYTHING[name] < 1e-6 else 0.8))
+    return with_values(machine, found)
+
+
+def measure(machine, columns, i, name):
+    """The extreme of what a limit is compared with, in its own unit."""
+    checks = [c for c in respond(at(machine, columns, i)).checks if c.field == name]
+    worst = (max if checks[0].at_most else min)(float(c.measure) for c in checks)
+    if name.endswith("angle"):
+        return np.arccos(np.sqrt(worst))
+    return np.sqrt(worst) if name == "leg_diameter" else worst
+
+
+def at(machine, columns, i):
+    return with_values(machine, {path: float(column[i]) for path, column in columns.items()})
+
+
+@pytest.mark.parametrize(("name", "load_settings", "fields"), CASES, ids=[case[0] for case in CASES])
+def test_floats_arrays_and_machine_code_give_one_status(name, load_settings, fields):
+    machine = load(name, load_settings)
+    columns = poses(machine)
+    machine = limited(machine, columns, fields)
+    single = [respond(at(machine, columns, i)) for i in range(POSES)]
+    expected = np.array([int(response.status) for response in single])
+    with np.errstate(all="ignore"):
+        arrays = np.broadcast_to(respond(with_values(machine, columns)).status, POSES)
+    results, codes = np.empty((1, POSES)), np.empty(POSES, dtype=np.int8)
+    slab_kernel(machine, [*columns], ["regularity"]).run(columns, results, codes)
+    assert {Status.OK, Status.JOINT_LIMIT} <= set(expected)
+    assert np.array_equal(arrays, expected)
+    assert np.array_equal(codes, expected)
+    passed = first_passed(machine, columns, fields)
+    for i, response in enumerate(single):
+        broken = [check.field for check in response.checks if not check.kept]
+        if expected[i] == Status.JOINT_LIMIT:
+            assert fields[passed[i]] == broken[0]
+
+
+@pytest.mark.parametrize(("name", "load_settings", "fields"), CASES, ids=[case[0] for case in CASES])
+def test_what_is_used_is_what_single_poses_measure(name, load_settings, fields):
+    machine = load(name, load_settings)
+    columns = {path: column[:20] for path, column in poses(machine).items()}
+    watched = with_values(machine, {f"limits.{field}": EVERYTHING[field] for field in fields})
+    found = used(watched, columns)
+    every = [check for i in range(20) for check in respond(at(watched, columns, i)).checks]
+    assert found.keys() == set(fields)
+    for field, ends in found.items():
+        measures = [float(check.measure) for check in every if check.field == field]
+        assert ends == pytest.approx((min(measures), max(measures)), rel=1e-9, abs=1e-12)
+
+
+def test_no_arithmetic_is_spent_on_limits_that_are_not_set(monkeypatch):
+    def nodes(machine):
+        form, _ = form_of(machine, ["pose.x", "pose.z"])
+        given = traced(Kind(machine), form)
+        respond(given.machine)
+        return len(given.graph.nodes)
+
+    free, limited_once = load("hexapod", LOAD), load("hexapod", (*LOAD, "limits.longest_leg=1"))
+    bare = nodes(free)
+    assert nodes(limited_once) > bare
+    monkeypatch.setattr("kinetostat.kinetostatics.response.geometric_checks", lambda *_: [])
+    monkeypatch.setattr("kinetostat.kinetostatics.response.actuator_checks", lambda *_: [])
+    assert nodes(free) == bare
+
+
+def test_a_limit_that_varies_is_a_column_like_any_other():
+    machine = load("hexapod")
+    length = np.linspace(0.08, 0.12, 200)
+    results, codes = np.empty((1, 200)), np.empty(200, dtype=np.int8)
+    slab_kernel(machine, ["limits.longest_leg"], ["regularity"]).run({"limits.longest_leg": length}, results, codes)
+    reach = used(with_values(machine, {"limits.longest_leg": 1.0}), {"pose.x": np.zeros(1)})["longest_leg"][1]
+    assert np.array_equal(codes == Status.OK, length >= reach)
+    assert is_set(length)

@@ -1,0 +1,108 @@
+"""`kinetostat sensitivity`: what it prints, writes and refuses, and what its percentages mean."""
+
+import json
+import math
+
+import pytest
+
+from kinetostat.cli import main
+from kinetostat.machine.loading import load
+from kinetostat.machine.parameters import values, with_values
+from kinetostat.studies.analysis import analyze
+from kinetostat.studies.sensitivity import as_json, notes, sensitivity
+
+MACHINE = "zhang-gosselin-4dof"
+
+
+def rows(machine=MACHINE, *settings):
+    return {row["path"]: row for row in as_json(sensitivity(load(machine, settings)))["parameters"]}
+
+
+def test_a_percent_more_changes_the_index_by_the_percentage():
+    machine, path = load(MACHINE), "geometry.base_radius"
+    told = rows()[path]["percent_per_percent"]["compliance_z"]
+    more, less = (
+        analyze(with_values(machine, {path: values(machine)[path] * factor})).compliance_diagonal[5]
+        for factor in (1.0001, 0.9999)
+    )
+    assert 100 * (more - less) / (more + less) == pytest.approx(0.01 * told, rel=1e-5)
+
+
+def test_what_is_zero_is_compared_with_a_measure():
+    found = rows(MACHINE, "geometry.base_angle=0 deg")
+    length = analyze(load(MACHINE)).length
+    assert found["pose.x"]["one_percent_of"] == {"measure": "length", "value": pytest.approx(length)}
+    assert found["geometry.base_angle"]["one_percent_of"] == {"measure": "radian", "value": 1.0}
+    assert found["geometry.platform_angle"]["one_percent_of"] == {"measure": "itself", "value": math.pi / 3}
+    one = found["pose.x"]
+    index = analyze(load(MACHINE, ["geometry.base_angle=0 deg"])).compliance_diagonal[5]
+    expected = one["derivatives"]["compliance_z"] * one["one_percent_of"]["value"] / index
+    assert one["percent_per_percent"]["compliance_z"] == pytest.approx(expected)
+
+
+def test_the_greatest_comes_first():
+    ranked = [max(abs(p) for p in row["percent_per_percent"].values()) for row in rows().values()]
+    assert ranked == sorted(ranked, reverse=True)
+
+
+def test_rigid_and_free_parts_are_left_out_with_a_note():
+    answer = sensitivity(load(MACHINE, ["stiffness.passive_links.0=rigid"]))
+    skipped = dict(answer.skipped)
+    assert "rigid" in skipped["stiffness.passive_links.0"]
+    assert "free" in skipped["stiffness.passive_actuator"]
+    assert any("stiffness.passive_links.0" in note for note in notes(answer))
+    assert not {path for path in rows() if path.startswith(("load.", "limits."))}
+
+
+def test_an_index_that_is_zero_has_derivatives_but_no_percentage():
+    rigid = load(MACHINE, ["stiffness.passive_links=rigid"])
+    for one in sensitivity(rigid, ["compliance_y", "compliance_z"]).influences:
+        assert one.percents[0] is None
+        assert one.derivatives[0] == 0.0
+        assert one.percents[1] is not None
+
+
+def test_what_the_legs_of_a_machine_forbid_has_no_derivative():
+    """Away from the home pose, three parallel axes close only if all three stay parallel."""
+    found = dict(sensitivity(load("tripteron", ["pose.x=0.4"])).skipped)
+    assert "close" in found["legs.z.elbow.axis.0"]
+    assert "legs.z.elbow.point.0" not in found
+
+
+def test_it_prints_a_table_with_notes(capsys):
+    assert main(["sensitivity", MACHINE, "--quantity", "compliance_z"]) == 0
+    printed = capsys.readouterr().out
+    assert "percent per percent" in printed
+    assert "geometry.base_radius" in printed
+    assert "Left out as rigid" in printed
+
+
+def test_json_is_all_of_stdout(capsys):
+    assert main(["sensitivity", MACHINE, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["status"] == "ok"
+    assert [*found["indices"]] == [f"compliance_{name}" for name in ("rx", "ry", "rz", "x", "y", "z")]
+    assert found["parameters"][0].keys() >= {"path", "value", "units", "derivatives", "percent_per_percent"}
+
+
+def test_a_folder_gets_figure_and_data(tmp_path, capsys):
+    folder = tmp_path / "new"
+    assert main(["sensitivity", "planar-3rpr", "-o", str(folder)]) == 0
+    names = sorted(path.name for path in folder.iterdir())
+    assert names == [f"sensitivity.{suffix}" for suffix in ("json", "pdf", "png", "svg")]
+    written = json.loads((folder / "sensitivity.json").read_text("utf-8"))
+    assert [*written["indices"]] == ["compliance_rz", "compliance_x", "compliance_y"]
+    assert "geometry.base_radius" in (folder / "sensitivity.svg").read_text("utf-8")
+    assert "sensitivity.png" in capsys.readouterr().out
+
+
+def test_out_of_reach_there_is_no_answer(capsys):
+    assert main(["sensitivity", MACHINE, "--set", "pose.z=5 m"]) == 1
+    assert "pose" in capsys.readouterr().err
+    assert main(["sensitivity", MACHINE, "--set", "pose.z=5 m", "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["parameters"] == []
+
+
+def test_an_unknown_quantity_is_refused(capsys):
+    assert main(["sensitivity", MACHINE, "--quantity", "weight"]) == 2
+    assert '"weight" is not a quantity' in capsys.readouterr().err

@@ -1,0 +1,169 @@
+"""Sweeps in other processes: the same bits as in one, also when a worker dies; what is missing or lost is said."""
+
+import os
+import signal
+import sys
+from operator import attrgetter
+
+import numpy as np
+import pytest
+
+from kinetostat.cli import BAD_INPUT, DONE, main
+from kinetostat.engine import chunks, cluster
+from kinetostat.engine.batch import NATIVE_SLAB
+from kinetostat.engine.chunks import in_chunks
+from kinetostat.engine.cluster import Crew, hired
+from kinetostat.engine.points import Axis, Grid
+from kinetostat.machine.loading import bundled, load
+from kinetostat.machine.parameters import values
+from kinetostat.spec.errors import InputError
+from kinetostat.studies import grid
+
+MACHINE = "zhang-gosselin-4dof"
+WORDS = ["map", MACHINE, "--over", "x=-40 cm:40 cm:400", "--over", "z=40 cm:140 cm:400", "--quantity", "compliance_x"]
+"""160 000 points."""
+
+
+@pytest.fixture(autouse=True)
+def small_chunks(monkeypatch):
+    monkeypatch.setattr(chunks, "CHUNK_NUMBERS", NATIVE_SLAB)
+
+
+@pytest.fixture(scope="module")
+def dask():
+    """A cluster of two processes, as one that exists already; its scheduler's address."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, memory_limit=0, dashboard_address="127.0.0.1:0", silence_logs="CRITICAL"
+    ) as running:
+        yield running.scheduler_address
+
+
+def work_of(name):
+    machine = load(name)
+    poses = [path for path in values(machine) if path.startswith("pose.")][:2]
+    axes = [Axis((path,), values(machine)[path] + np.linspace(-0.05, 0.06, 400)) for path in poses]
+    return in_chunks(machine, Grid(axes), ["compliance_x", "stiffness_y"])
+
+
+def assert_same(found, expected):
+    assert sorted(found) == sorted(expected)
+    for number, part in expected.items():
+        np.testing.assert_array_equal(found[number].status, part.status)
+        for name, column in part.values.items():
+            assert found[number].values[name].tobytes() == column.tobytes()
+
+
+@pytest.mark.parametrize("name", [MACHINE, "tripteron", "planar-3rrr"])
+def test_a_cluster_gives_the_same_bits(name, dask):
+    work = work_of(name)
+    with hired(Crew(address=dask)) as compute:
+        found = list(compute(work, range(work.count)))
+    assert len(found) == work.count > 2
+    assert_same(dict(found), dict(chunks.here(work, range(work.count))))
+
+
+@pytest.mark.parametrize("name", bundled())
+def test_a_worker_has_the_very_machine(name):
+    machine = load(name)
+    assert values(cluster._machine(cluster.as_toml(machine))) == values(machine)
+
+
+def test_commands_take_a_cluster_and_write_the_same_file(dask, tmp_path, monkeypatch, capsys):
+    assert main([*WORDS, "--json"]) == DONE
+    alone = capsys.readouterr().out
+    assert main([*WORDS, "--json", "--cluster", dask]) == DONE
+    assert capsys.readouterr().out == alone
+    monkeypatch.setattr(grid, "IN_MEMORY", 1000)
+    for folder, more in (("alone", []), ("together", ["--cluster", dask])):
+        assert main([*WORDS, "-o", str(tmp_path / folder), *more]) == DONE
+    assert (tmp_path / "alone" / "map.nc").read_bytes() == (tmp_path / "together" / "map.nc").read_bytes()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_a_worker_that_dies_is_survived():
+    distributed = pytest.importorskip("distributed")
+    work = work_of(MACHINE)
+    found = {}
+    with hired(Crew(workers=2)) as compute:
+        for number, part in compute(work, range(work.count)):
+            if not found:
+                os.kill(min(distributed.default_client().run(os.getpid).values()), signal.SIGKILL)
+            assert number not in found
+            found[number] = part
+    assert_same(found, dict(chunks.here(work, range(work.count))))
+
+
+def test_workers_started_here_leave_ctrl_c_to_the_one_that_gives_orders():
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        cluster.dask_setup(None)
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+class Failing:
+    """Stands for a client whose work ends in an error."""
+
+    def __init__(self, error):
+        self.error = error
+
+    def nthreads(self):
+        return {"worker": 1}
+
+    def submit(self, *_arguments, **_options):
+        raise self.error
+
+
+@pytest.mark.parametrize(
+    ("error", "arguments", "message"),
+    [
+        ("CancelledError", (), r"connection to the cluster was lost\. What was written is kept"),
+        ("comm.CommClosedError", (), "connection to the cluster was lost"),
+        ("KilledWorker", ("task", "worker", 3), "worker after worker died"),
+    ],
+)
+def test_a_cluster_that_fails_is_said(error, arguments, message):
+    distributed = pytest.importorskip("distributed")
+    client = Failing(attrgetter(error)(distributed)(*arguments))
+    with pytest.raises(InputError, match=message):
+        next(cluster._computed(distributed, client, work_of(MACHINE), [0]))
+
+
+def test_another_version_on_a_worker_is_refused():
+    class Client:
+        def run(self, _function):
+            return {"tcp://somewhere": "0.0.0"}
+
+    with pytest.raises(InputError, match=r"tcp://somewhere runs kinetostat 0\.0\.0, here is"):
+        cluster._check_versions(Client())
+
+
+@pytest.mark.parametrize("how", [["--workers", "2"], ["--cluster", "tcp://127.0.0.1:1"]])
+def test_without_dask_the_fix_is_named(how, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert main([*WORDS, *how]) == BAD_INPUT
+    assert "pip install 'kinetostat[cluster]'" in capsys.readouterr().err
+
+
+def test_no_scheduler_at_an_address_is_said(monkeypatch, capsys):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "PATIENCE", "100 ms")
+    assert main([*WORDS, "--cluster", "tcp://127.0.0.1:1"]) == BAD_INPUT
+    assert 'no Dask scheduler answers at "tcp://127.0.0.1:1"' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("how", "message"),
+    [
+        (["--workers", "0"], "1 to 1024"),
+        (["--workers", "two"], "1 to 1024"),
+        (["--workers", "2", "--cluster", "tcp://a:1"], "not allowed with"),
+    ],
+)
+def test_bad_crews_are_refused(how, message, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([*WORDS, *how])
+    assert stop.value.code == BAD_INPUT
+    assert message in capsys.readouterr().err

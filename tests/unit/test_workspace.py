@@ -1,0 +1,206 @@
+"""Workspaces of machines whose extent is known in closed form, and the verdict on single poses."""
+
+import math
+
+import numpy as np
+import pytest
+
+from kinetostat.engine.batch import NATIVE_FROM
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.loading import build, load
+from kinetostat.machine.parameters import with_values
+from kinetostat.spec import document
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.verdicts import BEYOND, INSIDE
+from kinetostat.studies.workspace import workspace
+
+ERRORS = 4
+"""Standard errors within which an estimate lies all but surely."""
+
+RIM = 1e-9
+"""Distance from the end of the reach, m, within which rounding decides."""
+
+ARM = """
+schema = 1
+name = "arm"
+family = "legs"
+space = "planar"
+[platform]
+point = ["0.5 m", "0.3 m", 0]
+[pose]
+x = "0.5 m"
+y = "0.3 m"
+yaw = 0
+[[legs]]
+name = "arm"
+joints = [
+  { name = "shoulder", type = "revolute", joins = ["base", "upper"], point = [0, 0, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
+  { name = "elbow", type = "revolute", joins = ["upper", "lower"], point = [0.5, 0, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
+  { name = "wrist", type = "revolute", joins = ["lower", "platform"], point = [0.5, 0.3, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
+]
+"""  # noqa: E501
+"""Two links, 0.5 m and 0.3 m long, and a wrist: it reaches a ring, whatever the yaw."""
+
+SQUARE = ["x=-1 m:1 m:81", "y=-1 m:1 m:81"]
+PLANE = ["x=-40 cm:40 cm:81", "y=-40 cm:40 cm:81"]
+CENTRES = math.sqrt(0.25**2 + 0.08**2 - 2 * 0.25 * 0.08 * math.cos(math.radians(30)))
+"""Planar 3-RPR: at a fixed angle P is a leg's length away from b - Q p, one of three points this far from O. The
+lines of the legs meet in one point where P lies on the circle through these."""
+SIDE = CENTRES * math.sqrt(3.0)
+"""Distance of two of the three points."""
+
+
+def near(found, value):
+    assert abs(found.volume.value - value) < ERRORS * found.volume.standard_error
+    assert found.volume.standard_error < 0.015 * value
+
+
+def test_two_links_reach_a_ring():
+    found = workspace(build(document.parse(ARM, "arm"), "arm"), SQUARE)
+    near(found, math.pi * (0.8**2 - 0.2**2))
+    assert found.joined == 1.0
+    assert found.counts["out of reach"] + found.counts[INSIDE] == 81 * 81
+    radius = np.hypot(*np.meshgrid(found.dataset["pose.x"], found.dataset["pose.y"], indexing="ij"))
+    inside = found.dataset["verdict"].values == 0
+    assert inside[(radius > 0.2 + RIM) & (radius < 0.8 - RIM)].all(), "also beside nodes at the very end of the reach"
+    assert not inside[(radius < 0.2 - RIM) | (radius > 0.8 + RIM)].any()
+
+
+def test_a_singular_circle_bounds_a_planar_machine():
+    found = workspace(load("planar-3rpr"), PLANE)
+    near(found, math.pi * CENTRES**2)
+    assert found.divided
+    assert found.counts[BEYOND] > 0
+
+
+def test_legs_of_equal_reach_leave_a_reuleaux_triangle():
+    """Three discs about the corners of an equilateral triangle, their radius its side; inside the singular circle."""
+    found = workspace(load("planar-3rpr", [f"limits.longest_leg={SIDE}"]), PLANE)
+    near(found, 0.5 * (math.pi - math.sqrt(3.0)) * SIDE**2)
+    assert found.joined == 1.0
+
+
+def test_short_legs_take_discs_out_of_it():
+    shortest = 0.2 * SIDE
+    found = workspace(load("planar-3rpr", [f"limits.longest_leg={SIDE}", f"limits.shortest_leg={shortest}"]), PLANE)
+    whole = 0.5 * (math.pi - math.sqrt(3.0)) * SIDE**2
+    near(found, whole - 3 * corner(shortest, SIDE))
+
+
+def corner(r, side):
+    """Area that a disc of radius r about a corner of a Reuleaux triangle has in common with it.
+
+    At the distance rho from the corner, two arcs leave an angle of 120 deg - 2 asin(rho / 2 side) between them.
+    """
+    rho = np.linspace(0.0, r, 20001)
+    return float(np.trapezoid(rho * (2 * math.pi / 3 - 2 * np.arcsin(rho / (2 * side))), rho))
+
+
+def test_slides_leave_a_box():
+    ranges = [f"{name}=0.25 m:0.75 m:15" for name in "xyz"]
+    found = workspace(load("tripteron", ["limits.travel_from=-0.12 m", "limits.travel_to=0.17 m"]), ranges)
+    near(found, 0.29**3)
+    assert not found.divided
+    demand = {d.name: d for d in found.demands}["travel_to"]
+    assert -0.12 <= demand.least < -0.08
+    assert 0.12 < demand.greatest <= 0.17
+
+
+class TestVerdicts:
+    SETTINGS = ("limits.longest_leg=18 cm", "limits.shortest_leg=8 cm", "limits.base_joint_angle=55 deg",
+                "limits.actuator_force=180 N", "load.force=[0, 0, 500]")  # fmt: skip
+    RANGES = ("x=-6 cm:6 cm:7", "y=-6 cm:6 cm:7", "z=6 cm:22 cm:9")
+    WHERE = ("stiffness_z > 50 N/um", "regularity > 0.1")
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def found(cls):
+        return workspace(load("hexapod", cls.SETTINGS), cls.RANGES, cls.WHERE)
+
+    def test_every_node_has_the_verdict_of_its_pose(self, found):
+        """Node by node on floats: the first of status, limit and condition that is against it."""
+        machine, labels = load("hexapod", self.SETTINGS), found.verdicts
+        for index in np.ndindex(found.dataset["verdict"].shape):
+            pose = {
+                dim: float(found.dataset[dim].values[i])
+                for dim, i in zip(found.dataset["verdict"].dims, index, strict=True)
+            }
+            response = respond(with_values(machine, pose))
+            expected = INSIDE
+            if response.status == Status.JOINT_LIMIT:
+                expected = "limits." + next(check.field for check in response.checks if not check.kept)
+            elif response.stiffness.entry(5, 5) <= 5e7:
+                expected = f"fails {self.WHERE[0]}"
+            elif response.regularity <= 0.1:
+                expected = f"fails {self.WHERE[1]}"
+            assert labels[int(found.dataset["verdict"].values[index])] == expected
+
+    def test_counts_are_those_of_the_nodes(self, found):
+        assert sum(found.counts.values()) == found.dataset["verdict"].size
+        assert found.counts[INSIDE] == int((found.dataset["verdict"] == 0).sum()) > 0
+        assert sum(count > 0 for count in found.counts.values()) >= 4
+
+    def test_demands_keep_within_the_limits(self, found):
+        told = {demand.name: demand for demand in found.demands}
+        assert 0.08 <= told["longest_leg"].least < told["longest_leg"].greatest <= 0.18
+        assert told["base_joint_angle"].greatest <= 55.0
+        assert 0.0 < told["actuator_force"].greatest <= 180.0
+
+    def test_a_seed_gives_the_same_volume_again(self, found):
+        again = workspace(load("hexapod", self.SETTINGS), self.RANGES, self.WHERE)
+        other = workspace(load("hexapod", self.SETTINGS), self.RANGES, self.WHERE, seed=1)
+        assert again.volume == found.volume
+        assert again.dataset.identical(found.dataset)
+        assert other.volume != found.volume
+        assert abs(other.volume.value - found.volume.value) < ERRORS * 1.5 * found.volume.standard_error
+
+
+def test_machine_code_and_arrays_agree_on_the_workspace():
+    """The same grid, once alone and once as a part of one that is large enough for machine code."""
+    settings = (*TestVerdicts.SETTINGS, "limits.leg_diameter=20 mm", "limits.platform_joint_angle=54 deg")
+    machine = load("hexapod", settings)
+    ranges = ["x=-6 cm:6 cm:41", "z=6 cm:22 cm:41"]
+    small = workspace(machine, ranges, TestVerdicts.WHERE)
+    large = workspace(machine, [*ranges, "y=0:1 mm:40"], TestVerdicts.WHERE)
+    assert large.dataset["verdict"].size > NATIVE_FROM > small.dataset["verdict"].size
+    assert np.array_equal(large.dataset["verdict"].values[:, :, 0], small.dataset["verdict"].values)
+    assert len(np.unique(small.dataset["verdict"])) >= 5
+
+
+def test_regions_apart_are_told():
+    """Beyond the singular circle another region of the same side does not exist; a ring of short legs cuts one off."""
+    machine = load("planar-3rpr", ["pose.x=0", "pose.y=0"])
+    found = workspace(machine, PLANE, [f"stiffness_x > {0.5 * respond(machine).stiffness.entry(3, 3)} N/m"])
+    assert found.joined == 1.0
+
+
+def test_a_pose_that_is_not_inside_joins_nothing():
+    found = workspace(load("planar-3rpr"), ["x=0.3 m:0.4 m:5", "y=0.3 m:0.4 m:5"])
+    assert found.joined is None
+    assert not found.found
+    assert found.demands == ()
+    assert found.extents == {}
+
+
+REFUSED = [
+    (["x=0:1:3"], (), ["two to six"]),
+    (
+        ["x=0:1:3", "geometry.base_radius=1:2:3"],
+        (),
+        ["geometry.base_radius is no coordinate", "pose.x", "kinetostat map"],
+    ),
+    (["x=0:1:3", "x=0:1:3"], (), ["varied twice"]),
+    (["x=1:0:3", "y=0:1:3"], (), ["pose.x", "upwards"]),
+    (["x=1:10:3:log", "y=0:1:3"], (), ["pose.x", "leave out :log"]),
+    (["x=0:1:3000", "y=0:1:3000"], (), ["9,000,000", "5,000,000", "lower the counts"]),
+    (["x=0:1:3", "y=0:1:3"], ["stiffness_z > 3 N/m"], ["not a quantity"]),
+]
+
+
+@pytest.mark.parametrize(("ranges", "conditions", "words"), REFUSED)
+def test_bad_questions_are_refused(ranges, conditions, words):
+    with pytest.raises(InputError) as refused:
+        workspace(load("planar-3rpr"), ranges, conditions)
+    for word in words:
+        assert word in str(refused.value)
