@@ -159,7 +159,7 @@ KINDS = ("zhang-gosselin-4dof", "passive-leg-5dof-driven", "delta", "planar-3rrr
 one_of_each = pytest.mark.parametrize("case", [case for case in CASES if case.name in KINDS], ids=repr)
 """For what takes long and is about arithmetic rather than about machines."""
 every_machine = pytest.mark.parametrize("case", CASES, ids=repr)
-few = settings(max_examples=max(8, settings.default.max_examples // 2))
+few = settings(max_examples=max(8, settings.default.max_examples * 2 // 5))
 """For a test over every machine: what one machine hides, another shows."""
 
 

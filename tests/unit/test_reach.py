@@ -56,14 +56,20 @@ def test_every_status_has_its_own_sentence(status):
 
 
 @pytest.mark.parametrize(
-    ("reached", "regularity", "status"),
+    ("placed", "reached", "regularity", "limits", "status"),
     [
-        (True, 1.0, Status.OK),
-        (True, SINGULAR / 2, Status.SINGULAR),
-        (True, float("nan"), Status.SINGULAR),
-        (False, 1.0, Status.OUT_OF_REACH),
-        (False, float("nan"), Status.OUT_OF_REACH),
+        (Status.OK, True, 1.0, (), Status.OK),
+        (Status.OK, True, SINGULAR / 2, (), Status.SINGULAR),
+        (Status.OK, True, float("nan"), (), Status.SINGULAR),
+        (Status.OK, False, 1.0, (), Status.OUT_OF_REACH),
+        (Status.OK, False, float("nan"), (False, False), Status.OUT_OF_REACH),
+        (Status.NOT_CONVERGED, True, 1.0, (), Status.NOT_CONVERGED),
+        (Status.SINGULAR, False, float("nan"), (), Status.SINGULAR),
+        (Status.OK, True, 1.0, (True, True), Status.OK),
+        (Status.OK, True, SINGULAR / 2, (False, True), Status.JOINT_LIMIT),
+        (Status.OK, True, SINGULAR / 2, (True, False), Status.SINGULAR),
+        (Status.OK, True, 1.0, (True, False), Status.JOINT_LIMIT),
     ],
 )
-def test_the_most_fundamental_obstacle_comes_first(reached, regularity, status):
-    assert pose_status(reached, regularity) == status
+def test_the_most_fundamental_obstacle_comes_first(placed, reached, regularity, limits, status):
+    assert pose_status(int(placed), reached, regularity, *limits) == status

@@ -49,13 +49,13 @@ class Joints:
 
 @dataclass(frozen=True)
 class Gaps:
-    """How far a machine is from closed and from its pose; rotations times the machine's length [n x rows].
+    """How far a machine is from closed and from its pose, in rad and in units of the machine's length [n x rows].
 
     Attributes:
         closure, pose: what is left to do.
-        closure_rates, pose_rates: how joint coordinates change them [n x rows x coordinates].
+        closure_rates, pose_rates: how joint coordinates, slides in those units, change them [n x rows x coordinates].
         platform: its rotation [n x 3 x 3] and P [n x 3], where the first leg takes it.
-        platform_rates: twist of the platform per unit of each joint coordinate [n x 6 x coordinates].
+        platform_rates: twist of the platform per unit of each joint coordinate, likewise [n x 6 x coordinates].
     """
 
     closure: Array
@@ -161,10 +161,10 @@ def _newton(chains: Chains, found: Array, goal: Array, most: int) -> Array:
         size = np.max(np.abs(left), axis=1, initial=0.0)
         better = size < least
         best, least = np.where(better[:, None], found, best), np.where(better, size, least)
-        if np.all((size <= SETTLED * _scale(chains)) | ~better):
+        if np.all((size <= SETTLED) | ~better):
             break
         rates = np.concatenate([gaps.closure_rates, gaps.pose_rates], axis=1)
-        found = found + _least_norm(rates, left)
+        found = found + _least_norm(rates, left) * units_of(chains, np.broadcast_to(chains.length, (len(found),)))
     return best
 
 
@@ -186,14 +186,10 @@ def _damped_square(rates: Array) -> Array:
     return np.asarray(square + DAMPING * (trace + 1e-300) * np.eye(rates.shape[2]))
 
 
-def _scale(chains: Chains) -> Array:
-    return np.maximum(np.asarray(chains.length, dtype=float), 1e-30)
-
-
 def _status(chains: Chains, found: Array, goal: Array) -> Codes:
     gaps = gaps_at(chains, found, goal)
     left = np.max(np.abs(np.hstack([gaps.closure, gaps.pose])), axis=1, initial=0.0)
-    closed = left <= CLOSED * _scale(chains)
+    closed = left <= CLOSED
     status = np.where(np.isfinite(left), int(Status.OUT_OF_REACH), int(Status.NOT_CONVERGED))
     rates = np.concatenate([gaps.closure_rates, gaps.pose_rates], axis=1)[closed]
     free = _undetermined(rates, gaps.platform_rates[closed])
@@ -221,14 +217,24 @@ def gaps_at(chains: Chains, found: Array, goal: Array) -> Gaps:
         end, twists = _leg_at(steps, [next(columns) for step in steps if step.moves], chains.home, count)
         ends.append(end)
         rates.append(twists)
-    weights = np.concatenate([np.repeat(length[:, None], 3, axis=1), np.ones((count, 3))], axis=1)
+    weights = np.concatenate([np.ones((count, 3)), np.repeat(1.0 / length[:, None], 3, axis=1)], axis=1)
     closure, closure_rates = [np.zeros((count, 0))], [np.zeros((count, 0, chains.size))]
     blocks = [_widened(twists, rates, i) for i, twists in enumerate(rates)]
     for end, block in zip(ends[1:], blocks[1:], strict=True):
         closure.append(weights * _difference(end, ends[0]))
         closure_rates.append(weights[:, :, None] * (block - blocks[0]))
     pose, pose_rates = _pose_gap(ends[0], blocks[0], chains.pose, goal, length)
-    return Gaps(np.hstack(closure), pose, np.concatenate(closure_rates, axis=1), pose_rates, ends[0], blocks[0])
+    units = units_of(chains, length)[:, None, :]
+    return Gaps(
+        np.hstack(closure), pose, np.concatenate(closure_rates, axis=1) * units, pose_rates * units,
+        ends[0], weights[:, :, None] * blocks[0] * units,
+    )  # fmt: skip
+
+
+def units_of(chains: Chains, length: Array) -> Array:
+    """What one unit of each joint coordinate is: 1 rad, or the machine's length of a slide, m [n x coordinates]."""
+    slides = np.array([step.element.mover.point is None for steps in chains.legs for step in steps if step.moves])
+    return np.where(slides, length[:, None], 1.0)
 
 
 def _widened(twists: Array, rates: Sequence[Array], own: int) -> Array:
@@ -278,11 +284,11 @@ def _pose_gap(
     for i, name in enumerate(given):
         left = goal[:, i] - reached[name]
         if name in ("x", "y", "z"):
-            gaps.append(left)
-            rows.append(rates[:, 3 + "xyz".index(name)])
+            gaps.append(left / length)
+            rows.append(rates[:, 3 + "xyz".index(name)] / length[:, None])
         else:
-            gaps.append(length * np.arctan2(np.sin(left), np.cos(left)))
-            rows.append(length[:, None] * changes[:, ("roll", "pitch", "yaw").index(name)])
+            gaps.append(np.arctan2(np.sin(left), np.cos(left)))
+            rows.append(changes[:, ("roll", "pitch", "yaw").index(name)])
     return np.stack(gaps, axis=1), np.stack(rows, axis=1)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.kinematics.closure import Gaps, gaps_at, joints_on_the_way, pose_of
+from kinetostat.kinematics.closure import Gaps, gaps_at, joints_on_the_way, pose_of, units_of
 from kinetostat.machine.machine import Machine
 
 Array = npt.NDArray[np.float64]
@@ -27,8 +27,10 @@ def nearest_pose(machine: Machine) -> dict[str, float]:
     chains = machine.chains()
     goal = np.array([list(chains.pose.values())], dtype=float)
 
+    units = units_of(chains, np.array([float(chains.length)]))[0]
+
     def gaps(joints: Array) -> Gaps:
-        return gaps_at(chains, joints[None, :], goal)
+        return gaps_at(chains, joints[None, :] * units, goal)
 
     def left(joints: Array) -> Array:
         found = gaps(joints)
@@ -38,7 +40,7 @@ def nearest_pose(machine: Machine) -> dict[str, float]:
         found = gaps(joints)
         return -np.concatenate([CLOSING * found.closure_rates[0], found.pose_rates[0]])
 
-    best = _descend(left, slopes, joints_on_the_way(chains, goal)[0])
+    best = _descend(left, slopes, joints_on_the_way(chains, goal)[0] / units)
     coordinates = pose_of(gaps(best).platform)
     return {name: _without_rounding(float(value[0])) for name, value in coordinates.items()}
 

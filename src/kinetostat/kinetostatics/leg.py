@@ -39,9 +39,9 @@ def relaxed(leg: LegScrews) -> LegScrews:
     Only springs that are free by form, of stiffness 0.0 itself, are meant; the others are kept.
     """
     free = [row for s, row in zip(leg.compliance, leg.loads, strict=True) if type(s) is float and s == INFINITE]
-    felt = _independent(free)
     if not free:
         return leg
+    felt = _independent(free)
     basis: list[list[Scalar]] = []
     regularity = leg.regularity
     if len(felt) < len(leg.wrenches):
@@ -59,20 +59,19 @@ def relaxed(leg: LegScrews) -> LegScrews:
 
 
 def _independent(rows: Sequence[Sequence[Scalar]]) -> list[Sequence[Scalar]]:
-    """The rows that are felt at all and do not repeat others, where they are numbers; all others."""
+    """The rows that do not repeat others, where they are numbers; all others."""
     kept: list[Sequence[Scalar]] = []
     for row in rows:
-        if all(isinstance(c, float) for one in (row, *kept) for c in one) and _rank([*kept, row]) == len(kept):
-            continue
-        kept.append(row)
+        numbers = all(isinstance(c, float) for one in (row, *kept) for c in one)
+        if not numbers or _rank([*kept, row]) > len(kept):
+            kept.append(row)
     return kept
 
 
 def _rank(rows: Sequence[Sequence[float]]) -> int:
     """How many rows of numbers are independent, each taken at unit size."""
-    left = [list(row) for row in rows]
-    sizes = [math.hypot(*row) for row in left]
-    left = [[c / size for c in row] for row, size in zip(left, sizes, strict=True) if size > UNSEEN]
+    sizes = [math.hypot(*row) for row in rows]
+    left = [[c / size for c in row] for row, size in zip(rows, sizes, strict=True) if size > 0.0]
     found = 0
     while left:
         axis = max(left, key=lambda row: math.hypot(*row))

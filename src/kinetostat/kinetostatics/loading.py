@@ -14,12 +14,12 @@ from kinetostat.machine.leg import Leg
 
 @dataclass(frozen=True)
 class JointReaction:
-    """What is passed on through a joint, from its base side to its platform side.
+    """The share of the load that a joint passes on towards the base; against it, the joint bears on the platform side.
 
     Attributes:
         leg, joint: names.
         point: where the moment is taken, base frame, m.
-        wrench: moment (N·m) and force (N) on the platform side at that point, base axes.
+        wrench: moment (N·m) and force (N) that the platform side exerts on the base side at that point, base axes.
     """
 
     leg: str

@@ -30,7 +30,7 @@ class Response:
 
     Attributes:
         configuration: where everything is.
-        reference: the tool point T (P itself unless the machine has a tool), base frame, m.
+        reference: the tool point T (P itself unless the machine has a tool), in its plane if it has one, base frame, m.
         legs: screws of every leg at T, base axes.
         guide: of a planar machine, the wrenches against twists that do not exist there; likewise.
         statics: how the springs share loads.
@@ -64,6 +64,7 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
         joints = solve_joints(machine) if machine.family.chains else CLOSED_FORM
     configuration = machine.configure(joints.coordinates)
     reference, length = machine.tool_point(configuration.platform), configuration.length
+    reference = reference if configuration.plane is None else configuration.plane.nearest(reference)
     absent, guide = _out_of_plane(configuration, reference)
     legs = tuple(leg.screws(reference, length, absent) for leg in configuration.legs)
     statics = solve_statics(legs, length, guide)

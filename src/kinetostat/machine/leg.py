@@ -8,10 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from kinetostat.algebra.scalar import Scalar, cos, is_zero, plus, reciprocal, sin, times
+from kinetostat.algebra.scalar import Scalar, cos, is_zero, plus, reciprocal, sin, times, where
 from kinetostat.algebra.screw import Twist, Wrench, force_along, pure_moment, rotation_about, translation_along
 from kinetostat.algebra.solve import complement
 from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector, rotation_along
+
+UNSEEN = 1e-12
+"""Share of the sizes of a wrench and a twist below which the work of one on the other is the rounding of zero."""
 
 RIGID = float("inf")
 """Stiffness of what does not yield: exact, not large."""
@@ -267,7 +270,17 @@ class Leg:
         along = [spring.joint.point is None and line.direction is spring.joint.axis for line in self.lines]
         if any(along):
             return tuple(1.0 if own else wrench.work(twist) for own, wrench in zip(along, wrenches, strict=True))
+        if is_zero(spring.stiffness):
+            return tuple(_felt(wrench, twist) for wrench in wrenches)
         return tuple(wrench.work(twist) for wrench in wrenches)
+
+
+def _felt(wrench: Wrench, twist: Twist) -> Scalar:
+    """The load of a free spring, or nothing where it is but rounding: that must not move the platform."""
+    turning = wrench.rotational.norm() * twist.rotational.norm()
+    size = turning + wrench.translational.norm() * twist.translational.norm()
+    load = wrench.work(twist)
+    return where(abs(load) > UNSEEN * size, load, 0.0)
 
 
 def two_force_leg(
@@ -288,7 +301,7 @@ def two_force_leg(
     along = span * reciprocal(size)
     yielding = [Spring(f"{name} actuator", Joint(along), stiffness, actuated=True)]
     if not (type(axial) is float and axial == RIGID):
-        yielding.append(Spring(f"{name} rod", Joint(along), axial * reciprocal(size)))
+        yielding.append(Spring(f"{name} rod", Joint(along), times(axial, reciprocal(size))))
     chain: tuple[Element, ...] = (
         *revolutes(base_joint, AXES, f"{name} base joint"),
         *yielding,
@@ -335,4 +348,6 @@ def comparable(twist: Twist, shrink: Scalar) -> tuple[Scalar, ...]:
 
 def series(stiffness: Scalar, other: Scalar) -> Scalar:
     """Stiffness of two springs in a row: 1 / (1/k + 1/k'); exact for rigid ones."""
+    if is_zero(stiffness) or is_zero(other):
+        return 0.0
     return reciprocal(plus(reciprocal(stiffness), reciprocal(other)))

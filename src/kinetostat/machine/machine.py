@@ -56,6 +56,11 @@ class Plane:
         axes = self.frame.rotation
         return Joint(axes.x, self.frame.translation), Joint(axes.y, self.frame.translation), Joint(axes.z)
 
+    def nearest(self, point: Vector) -> Vector:
+        """The point of the plane below or above a point, m: in the plane both move alike."""
+        normal = self.frame.rotation.z
+        return point - normal * normal.dot(point - self.frame.translation)
+
     def displaced(self, motion: Displacement) -> "Plane":
         """The plane after a rigid displacement of the whole machine."""
         return Plane(motion @ self.frame)

@@ -7,7 +7,7 @@ form leaves a free joint; arrays and traced values always leave a spring, whatev
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
+from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, times
 from kinetostat.algebra.vector import Z_AXIS, Displacement, Vector
 from kinetostat.machine.leg import RIGID, Joint, Spring, series
 from kinetostat.machine.link import link_axes
@@ -25,7 +25,7 @@ def if_elastic(*springs: Spring) -> tuple[Spring, ...]:
 
 def per_length(rigidity: Scalar, length: Scalar, factor: float = 1.0) -> Scalar:
     """Stiffness of a whole link: factor x rigidity / length (SI), rigid by form where the rigidity is."""
-    return rigidity if is_rigid(rigidity) else factor * rigidity * reciprocal(length)
+    return rigidity if is_rigid(rigidity) else times(times(factor, rigidity), reciprocal(length))
 
 
 def in_series(stiffness: Scalar, rigidity: Scalar, length: Scalar, factor: float = 1.0) -> Scalar:

@@ -4,7 +4,6 @@ In any field of such a kind a table may stand: { shape = "tube", outer_diameter 
 material = "steel" }. Machines written leg by leg have tables of sections instead.
 """
 
-import copy
 from collections.abc import Mapping
 from types import SimpleNamespace
 
@@ -28,13 +27,15 @@ def resolve(document: Document, family: Family, origin: str) -> Document:
     Raises:
         InputError: an unknown shape, size or material; names the field.
     """
-    result = copy.deepcopy(document)
+    result = dict(document)
     for table, section in family.sections.items():
         written = result.get(table)
+        if not isinstance(written, dict):
+            continue
+        result[table] = written = dict(written)
         for name, quantity in quantities(section).items():
-            if quantity.kind in WHICH and isinstance(written, dict) and name in written:
-                where = f'"{origin}": {table}.{name}'
-                written[name] = _number(written[name], WHICH[quantity.kind], where)
+            if quantity.kind in WHICH and name in written:
+                written[name] = _number(written[name], WHICH[quantity.kind], f'"{origin}": {table}.{name}')
     return result
 
 

@@ -138,7 +138,7 @@ def _print_load(console: Console, names: Sequence[str], load: LoadCase) -> None:
             table.add_row(spring.name, number(spring.load), units[0], number(spring.deformation), units[1])
     console.print(table)
     table = numeric_table(
-        "Joint reactions, on the platform side, at the joint (N·m, N)", "joint", ["mx", "my", "mz", "fx", "fy", "fz"]
+        "Load passed on towards the base, at the joint (N·m, N)", "joint", ["mx", "my", "mz", "fx", "fy", "fz"]
     )
     for reaction in load.reactions:
         size = max(abs(float(c)) for c in reaction.wrench.components()) or 1.0
