@@ -87,6 +87,7 @@ EDGES = [
     ("hexapod", TURNED, "base_joint_angle", extreme_tilt("base"), +1),
     ("hexapod", TURNED, "platform_joint_angle", extreme_tilt("platform"), +1),
     ("hexapod", (*TURNED, *LOADED), "actuator_force", lambda m: max(loads(m)), +1),
+    ("hexapod", (*TURNED, "load.force=[0, 0, -800]"), "actuator_force", lambda m: max(loads(m)), +1),
     ("hexapod", TURNED, "leg_diameter", lambda m: min(clearances(m)), -1),
     ("zhang-gosselin-4dof", (), "longest_leg", lambda m: max(lengths(m)), +1),
     ("planar-3rpr", (), "shortest_leg", lambda m: min(lengths(m)), -1),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kinetostat.engine.batch import NATIVE_FROM
+from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import build, load
@@ -65,6 +66,19 @@ def test_two_links_reach_a_ring():
     inside = found.dataset["verdict"].values == 0
     assert inside[(radius > 0.2 + RIM) & (radius < 0.8 - RIM)].all(), "also beside nodes at the very end of the reach"
     assert not inside[(radius < 0.2 - RIM) | (radius > 0.8 + RIM)].any()
+
+
+def test_poses_at_the_end_of_the_reach_leave_the_joints_of_others_alone():
+    """Where rounding decides whether a closed form exists, Newton's method tries; not in place of it elsewhere."""
+    machine = build(document.parse(ARM, "arm"), "arm")
+    angle = np.linspace(0.0, 6.0, 40)
+    radius = np.where(np.arange(40) % 2, 0.8, 0.25)
+    columns = {"pose.x": radius * np.cos(angle), "pose.y": radius * np.sin(angle)}
+    together = solve_joints(with_values(machine, columns))
+    for i in range(0, 40, 2):
+        alone = solve_joints(with_values(machine, {path: float(column[i]) for path, column in columns.items()}))
+        assert alone.status == together.status[i] == Status.OK
+        assert [q[i] for q in together.coordinates] == pytest.approx(list(alone.coordinates), abs=1e-12)
 
 
 def test_a_singular_circle_bounds_a_planar_machine():
