@@ -8,7 +8,7 @@ import pytest
 
 from kinetostat.algebra.vector import IDENTITY, Displacement, Vector
 from kinetostat.kinematics.closing import closing_equations
-from kinetostat.kinematics.closure import gaps_at, pose_of, solve_joints
+from kinetostat.kinematics.closure import gaps_at, pose_of, solve_joints, units_of
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Chains, Step
@@ -16,6 +16,12 @@ from kinetostat.machine.machine import Chains, Step
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 STEP = 1e-5
 HALF = 0.5 * STEP
+
+
+def in_metres(chains, rates):
+    """Rates of gaps in rad and in units of the length as rates in m, per rad or m of each joint coordinate."""
+    length = float(chains.length)
+    return rates * length / units_of(chains, np.array([length]))[0]
 
 
 def arm(lean):
@@ -45,7 +51,7 @@ def test_pose_equations_vanish_and_change_as_the_pose_does(given):
     placed = replace(one, pose={name: float(reached[name][0]) for name in given})
     assert np.array(closing_equations(placed, found)) == pytest.approx(0.0, abs=1e-15)
     own = rates(placed, found)
-    theirs = gaps_at(placed, found[None], np.array([list(placed.pose.values())])).pose_rates[0]
+    theirs = in_metres(placed, gaps_at(placed, found[None], np.array([list(placed.pose.values())])).pose_rates[0])
     rank = np.linalg.matrix_rank(theirs)
     assert rank == len(given)
     assert np.linalg.matrix_rank(np.vstack([own, theirs]), tol=1e-7) == rank, "they fix the same motions"
@@ -57,8 +63,8 @@ def test_gaps_of_legs_change_by_the_difference_of_their_screws():
     found = np.zeros(12)
     gaps = gaps_at(chains, found[None], np.array([[0.5]]))
     assert np.array(closing_equations(chains, found)) == pytest.approx(0.0, abs=1e-15)
-    assert rates(chains, found)[:6] == pytest.approx(gaps.closure_rates[0], abs=1e-9)
-    assert rates(chains, found)[6] == pytest.approx(-gaps.pose_rates[0, 0], abs=1e-9)
+    assert rates(chains, found)[:6] == pytest.approx(in_metres(chains, gaps.closure_rates[0]), abs=1e-9)
+    assert rates(chains, found)[6] == pytest.approx(-in_metres(chains, gaps.pose_rates[0])[0], abs=1e-9)
 
 
 @pytest.mark.parametrize("pose", [(0.5, 0.5, 0.5), (0.4, 0.62, 0.35)])
