@@ -113,7 +113,7 @@ def test_twice_the_stiffness_is_twice_k_and_half_c(case, stiffness, data):
 @few
 @given(data=st.data())
 def test_more_stiffness_anywhere_is_never_softer_in_any_direction(case, data):
-    """Rayleigh: K(k + dk) - K(k) and C(k) - C(k + dk) are positive semi-definite, to the rounding of the larger."""
+    """Rayleigh: K(k + dk) - K(k) and C(k) - C(k + dk) are positive semi-definite, to what the larger may lose."""
     once = data.draw(regular(case))
     every = springs(once.configuration)
     e = data.draw(st.integers(0, len(every) - 1))
@@ -124,7 +124,7 @@ def test_more_stiffness_anywhere_is_never_softer_in_any_direction(case, data):
     share = motion**2 / every[e].stiffness / np.trace(reduced(once, once.compliance, Twist))
     for kind, soft, stiff in ((Wrench, once.stiffness, more.stiffness), (Twist, more.compliance, once.compliance)):
         low, high = reduced(once, soft, kind), reduced(once, stiff, kind)
-        assert np.linalg.eigvalsh(high - low)[0] >= -20 * U * np.linalg.norm(high, 2)
+        assert np.linalg.eigvalsh(high - low)[0] >= -(20 * U + lost(once)) * np.linalg.norm(high, 2)
         if share > FELT:
             assert np.trace(high) > np.trace(low)
 
