@@ -22,8 +22,9 @@ FRAMES = [
 """Start and axes (rows x, y, z) of the legs along z, y and x."""
 
 
-def diagonals(points: Array) -> tuple[Array, Array]:
-    """Diagonals of C and K [n x 6] at platform points [n x 3], m."""
+def diagonals(*pose: Array) -> Array:
+    """Diagonals of C and K at n platform points x, y, z [12 x n], SI."""
+    points = np.stack(pose, axis=1)
     stiffness = np.zeros((len(points), 6, 6))
     for start, axes in FRAMES:
         u, v, _ = axes @ (points - start).T
@@ -32,7 +33,7 @@ def diagonals(points: Array) -> tuple[Array, Array]:
         wrenches[:3, 0], wrenches[:3, 1], wrenches[3:, 2] = x, y, z
         stiffness += wrenches @ np.linalg.inv(leg_compliance(u, v)) @ wrenches.T
     compliance = np.linalg.inv(stiffness)
-    return np.einsum("nii->ni", compliance), np.einsum("nii->ni", stiffness)
+    return np.concatenate([np.einsum("nii->in", compliance), np.einsum("nii->in", stiffness)])
 
 
 def leg_compliance(u: Array, v: Array) -> Array:

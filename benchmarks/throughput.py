@@ -1,197 +1,137 @@
-"""Poses per second of the 4-dof machine: evaluate() beside batched NumPy and hand-written C++, in one run.
+"""Poses per second of three machines: kinetostat beside batched NumPy, hand-written C++ and PyNite, in one run.
 
-Run `python benchmarks/throughput.py`. Every route uses all cores, and the routes take turns, so that a busy machine
-slows all of them; each counts by its best turn.
+Run `python benchmarks/throughput.py`; it prints Markdown. Every route but PyNite's uses all cores, and the routes take
+turns, so that a busy machine slows all of them; each counts by its best turn.
 """
 
 import argparse
-import ctypes
+import json
 import os
-import shutil
+import platform
+import resource
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from math import radians
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from cases import CASES, TWELVE, Case
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Table
 from kinetostat.engine.threads import available_cores
-from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.machine.loading import load
-from numpy_4dof import ACTUATOR, BASE, BENDING, FIRST_LINK, PLATFORM, SECOND_LINK, diagonals
+from routes import TWELVE_OUTPUTS, Array, Route, routes_of
 
-Array = npt.NDArray[np.float64]
-
-RANGES = {
-    "pose.x": (-0.02, 0.02),
-    "pose.z": (0.66, 0.70),
-    "pose.theta5": (radians(-70), radians(-50)),
-    "pose.theta6": (radians(110), radians(130)),
-}
-TWELVE = (*GROUPS["compliance"], *GROUPS["stiffness"])
-NUMPY_CHUNKS = (256, 512, 1024, 2048, 4096, 16384)
-NUMPY_SHARE = 10
-"""NumPy is timed over this fraction of the poses."""
-SLAB = 16384
-FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC")
-FIRST_RESULT = """
-from kinetostat.engine.batch import evaluate
-from kinetostat.engine.points import Table
-from kinetostat.machine.loading import load
-import numpy as np
-evaluate(load("zhang-gosselin-4dof"), Table({{"pose.x": np.linspace(-0.02, 0.02, {count})}}), {names})
-"""
+SIZES = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 
 
-@dataclass
-class Route:
-    """One way to the same numbers.
-
-    Attributes:
-        name: for the table.
-        reference: which result it is compared with: "twelve", "trace" or "".
-        count: number of poses it is timed over.
-        run: does it; returns one array per output [count].
-        prepared: what it took to get ready (imports, compilation), s.
-        best: its best turn, s.
-    """
-
-    name: str
-    reference: str
-    count: int
-    run: Callable[[], Sequence[Array]]
-    prepared: float = 0.0
-    best: float = float("inf")
+def processor() -> str:
+    """The name of the processor at hand."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    return next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.machine())
 
 
-def in_chunks(task: Callable[[int, int], None], count: int, chunk: int) -> None:
-    """The task over [start, stop) of every chunk, by all cores."""
-    with ThreadPoolExecutor(available_cores()) as pool:
-        list(pool.map(lambda start: task(start, min(start + chunk, count)), range(0, count, chunk)))
+def print_routes(case: Case, count: int, turns: int, folder: Path) -> None:
+    """Time the routes of a case in turns and print the table."""
+    routes = routes_of(case, case.poses(count), folder)
+    for turn in range(turns):
+        for route in routes:
+            if turn == 0 or route.count > 1:
+                route.turn()
+    ours = routes[0].run()
+    numpy_rate = next(route.rate for route in routes if "NumPy" in route.name)
+    print(f"\n## {case.title}\n")
+    print(f"{count:,} random poses, a status for each.\n")
+    print("| route | computes | million poses/s | times NumPy | of the fastest C++ | ready after | difference |")
+    print("|---|---|---|---|---|---|---|")
+    for route in routes:
+        rivals = [other.rate for other in routes if other.name.startswith("C++") and other.task == route.task]
+        share = f"{route.rate / max(rivals):.2f}" if rivals else ""
+        prepared = f"{route.prepared:.2f} s" if route.prepared else ""
+        print(
+            f"| {route.name} | {route.task} | {route.rate / 1e6:.3g} | {route.rate / numpy_rate:.3g} | {share} "
+            f"| {prepared} | {difference(route, ours)} |"
+        )
 
 
-def kinetostat_route(poses: dict[str, Array], names: Sequence[str], name: str, reference: str) -> Route:
-    """evaluate(); prepared is what its first call takes above the others: import, trace, compile."""
-    machine, points = load("zhang-gosselin-4dof"), Table(poses)
-    route = Route(name, reference, points.size, lambda: list(evaluate(machine, points, names).values.values()))
-    first = turn(route)
-    route.best = float("inf")
-    route.prepared = max(0.0, first - min(turn(route) for _ in range(3)))
-    return route
+def difference(route: Route, twelve: Sequence[Array]) -> str:
+    """Largest relative difference from evaluate(), where the route gives the same numbers."""
+    found = route.run()
+    if route.name == "kinetostat" and route.task == TWELVE_OUTPUTS:
+        return ""
+    expected = twelve if route.task == TWELVE_OUTPUTS else [np.sum(twelve[:6], axis=0)]
+    if route.count == 1:
+        expected = twelve[:6]
+    pairs = zip(found, expected, strict=True)
+    return f"{max(float(np.abs(a / b[: len(a)] - 1.0).max()) for a, b in pairs):.0e}"
 
 
-def numpy_route(poses: dict[str, Array]) -> Route:
-    """Arrays of matrices, in the best of several chunk sizes."""
-    count = len(poses["pose.x"]) // NUMPY_SHARE
-    results = np.empty((12, count))
-
-    def run(chunk: int) -> Array:
-        def task(start: int, stop: int) -> None:
-            results[:, start:stop] = diagonals(*(column[start:stop] for column in poses.values()))
-
-        in_chunks(task, count, chunk)
-        return results
-
-    trials = [(turn(Route("", "", count, lambda c=chunk: run(c))), chunk) for chunk in NUMPY_CHUNKS]
-    chunk = min(trials)[1]
-    return Route(f"NumPy, arrays of matrices (chunks of {chunk})", "twelve", count, lambda: run(chunk))
+def print_sizes(title: str, name: str, sizes: Sequence[int]) -> None:
+    """Cost against batch size, each in a process of its own, so that its peak of memory is its own."""
+    print(f"\n### {title}: twelve outputs, against the size of the batch\n")
+    print("| poses | first call | later calls | per pose | peak memory of the process |")
+    print("|---|---|---|---|---|")
+    for size in sizes:
+        command = [sys.executable, __file__, "--one", name, str(size)]
+        told = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+        print(
+            f"| {size:,} | {_time(told['first'])} | {_time(told['later'])} | {_time(told['later'] / size)} "
+            f"| {told['peak'] / 1e6:,.0f} MB |"
+        )
 
 
-def cpp_routes(poses: dict[str, Array], folder: Path) -> list[Route]:
-    """The kernels of kernel_4dof.cpp, where there is a compiler."""
-    compiler = next(filter(None, map(shutil.which, ("c++", "g++", "clang++"))), None)
-    if compiler is None:
-        return []
-    started = time.perf_counter()
-    library = folder / "kernel.so"
-    command = [compiler, *FLAGS, "-o", str(library), str(Path(__file__).with_name("kernel_4dof.cpp"))]
-    subprocess.run(command, check=True)
-    prepared = time.perf_counter() - started
-    code = ctypes.CDLL(str(library)).kernel
-    links = [FIRST_LINK, SECOND_LINK]
-    machine = np.concatenate([*BASE.T[:2], *PLATFORM.T[:2], links, [ACTUATOR] * 4, BENDING])
-    count = len(poses["pose.x"])
-
-    def run(reduced: bool, everything: bool) -> Array:
-        results, status = np.empty((12 if everything else 1, count)), np.empty(count, dtype=np.int8)
-
-        def task(start: int, stop: int) -> None:
-            columns = np.array([column[start:stop].ctypes.data for column in poses.values()], dtype=np.uintp)
-            rows = np.array([row[start:stop].ctypes.data for row in results], dtype=np.uintp)
-            pointers = [ctypes.c_void_p(a.ctypes.data) for a in (machine, columns, rows, status[start:stop])]
-            code(*pointers, ctypes.c_int64(stop - start), ctypes.c_int(reduced), ctypes.c_int(everything))
-
-        in_chunks(task, count, SLAB)
-        return results
-
-    return [
-        Route("C++, 6x6 Cholesky (eq. 32)", "twelve", count, lambda: run(False, True), prepared),
-        Route("C++, reduced by hand to 4x4", "twelve", count, lambda: run(True, True), prepared),
-        Route("C++, 6x6 Cholesky, sum of the C diagonal", "trace", count, lambda: run(False, False), prepared),
-        Route("C++, reduced by hand, sum of the C diagonal", "trace", count, lambda: run(True, False), prepared),
-    ]
+def _time(seconds: float) -> str:
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds * 1e9:.3g} ns"
 
 
-def turn(route: Route) -> float:
-    """One turn of a route, s."""
-    started = time.perf_counter()
-    route.run()
-    taken = time.perf_counter() - started
-    route.best = min(route.best, taken)
-    return taken
+def one(name: str, size: int) -> None:
+    """Evaluate one batch a few times and print what it took: the child of `print_sizes`."""
+    case = CASES[name]
+    machine, points = load(case.machine), Table(case.poses(size))
+    taken = []
+    for _ in range(4 if size <= 1_000_000 else 2):
+        started = time.perf_counter()
+        evaluate(machine, points, TWELVE)
+        taken.append(time.perf_counter() - started)
+    print(json.dumps({"first": taken[0], "later": min(taken[1:]), "peak": peak_memory()}))
 
 
-def difference(route: Route, twelve: Sequence[Array]) -> float:
-    """Largest relative difference from evaluate(); NaN where the route gives something else."""
-    expected = {"twelve": twelve, "trace": [np.sum(twelve[:6], axis=0)], "": []}[route.reference]
-    pairs = zip(route.run(), expected, strict=bool(expected))
-    return max((float(np.abs(a / b[: route.count] - 1.0).max()) for a, b in pairs), default=np.nan)
-
-
-def first_result(count: int) -> float:
-    """From the start of a Python process to its end after one evaluate(), s."""
-    started = time.perf_counter()
-    subprocess.run([sys.executable, "-c", FIRST_RESULT.format(count=count, names=TWELVE)], check=True)
-    return time.perf_counter() - started
+def peak_memory() -> int:
+    """The most memory that this process has held, bytes; on Linux not what `getrusage` says, which is the parent's."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        return next(int(line.split()[1]) for line in status.read_text().splitlines() if line.startswith("VmHWM")) * 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
 def main() -> None:
-    """Time the routes in turns and print the table."""
+    """Print all tables."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--machines", nargs="+", choices=CASES, default=[*CASES], help="which machines")
     parser.add_argument("--poses", type=int, default=1_000_000, help="number of random poses")
-    parser.add_argument("--turns", type=int, default=12, help="turns of every route")
+    parser.add_argument("--turns", type=int, default=8, help="turns of every route")
+    parser.add_argument("--sizes", nargs="*", type=int, default=SIZES, help="batch sizes of the second table")
+    parser.add_argument("--one", nargs=2, metavar=("MACHINE", "POSES"), help=argparse.SUPPRESS)
     options = parser.parse_args()
-    random = np.random.default_rng(2002)
-    poses = {path: random.uniform(low, high, options.poses) for path, (low, high) in RANGES.items()}
-    routes = [
-        kinetostat_route(poses, TWELVE, "kinetostat evaluate()", "twelve"),
-        kinetostat_route(poses, ("compliance_x",), "kinetostat evaluate(), one output", ""),
-        numpy_route(poses),
-    ]
+    if options.one:
+        one(options.one[0], int(options.one[1]))
+        return
+    print(f"{processor()}, {available_cores()} of {os.cpu_count()} cores; Python {platform.python_version()}, ", end="")
+    print(f"NumPy {np.__version__}.")
     with tempfile.TemporaryDirectory() as folder:
-        routes += cpp_routes(poses, Path(folder))
-        for _ in range(options.turns):
-            for route in routes:
-                turn(route)
-        rate = {route.name: route.count / route.best / 1e6 for route in routes}
-        twelve = routes[0].run()
-        print(f"\n{options.poses:,} random poses, {available_cores()} of {os.cpu_count()} cores")
-        print(f"{'route':<52}{'million poses/s':>16}{'ratio':>8}{'ready after':>13}{'difference':>12}")
-        for route in routes:
-            ratio = rate[route.name] / rate[routes[0].name]
-            text = f"{route.name:<52}{rate[route.name]:>16.2f}{ratio:>8.3f}{route.prepared:>11.2f} s"
-            print(f"{text}{difference(route, twelve):>12.1e}")
-    print(f"\nC++: {' '.join(FLAGS)}. NumPy: timed over 1/{NUMPY_SHARE} of the poses.")
-    for count in (1, options.poses):
-        print(f"process start to end, twelve outputs at {count:,} poses: {first_result(count):.2f} s")
+        for name in options.machines:
+            print_routes(CASES[name], options.poses, options.turns, Path(folder))
+            if options.sizes:
+                print_sizes(CASES[name].title, name, options.sizes)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ U = float(np.finfo(float).eps)
 """Rounding unit of float64, 2.2e-16."""
 BLOCKS = (slice(0, 3), slice(3, 6))
 DROWNED = 10
-"""Rounding units times the contrast of springs that may be lost where compliances are added up; see `lost`."""
+"""Rounding units times the root of the contrast of springs that may be lost where springs are in a row; see `lost`."""
 REACHED = 1e-9
 """Share of a screw, in one unit, above which a component is surely no rounding; see `reached`."""
 
@@ -89,8 +89,8 @@ def assert_blocks_close(actual: Array, expected: Array, relative: float, scale_o
 def lost(response: Response) -> float:
     """What may be lost beside rounding, as a share of K or C: 0 where each leg is solved spring by spring.
 
-    In a leg with more or fewer springs than wrenches, and where legs constrain the platform twice, compliances are
-    added up before they are inverted: the softest drown the stiffest in rounding, by the contrast between them.
+    In a leg with more or fewer springs than wrenches, and where legs constrain the platform twice, springs are mixed
+    before they are inverted: the softest drown the stiffest in rounding, by the root of the contrast between them.
     """
     carried = sum(len(leg.wrenches) for leg in response.legs) + len(response.guide)
     if carried == 6 and all(len(leg.loads) == len(leg.wrenches) for leg in response.legs):
@@ -99,7 +99,7 @@ def lost(response: Response) -> float:
     every = [s for leg in response.configuration.legs for s in leg.springs]
     sizes = [float(s.stiffness) / (1.0 if s.joint.point is None else length**2) for s in every]
     sizes = [size for size in sizes if 0.0 < size < np.inf] or [1.0]
-    return DROWNED * U * max(sizes) / min(sizes)
+    return DROWNED * U * float(np.sqrt(max(sizes) / min(sizes)))
 
 
 def assert_psd(symmetric: Array, size: float = 0.0) -> None:
@@ -169,14 +169,14 @@ def columns(screws: Sequence[Screw]) -> Array:
     return np.array([s.components() for s in screws], dtype=float).T
 
 
-def reached(screws: Sequence[Screw], indices: Sequence[int], length: float) -> npt.NDArray[np.bool_]:
-    """Entries [6 x 6] to which the screws of these springs contribute beyond rounding; refuses doubtful machines.
+def reached(screws: Sequence[Screw], length: float) -> npt.NDArray[np.bool_]:
+    """Entries [6 x 6] to which some screws contribute beyond rounding; refuses doubtful machines.
 
     For twists `length` is that of the machine (m), for wrenches its inverse: then all six components compare.
     """
     touched = np.zeros((6, 6), dtype=bool)
-    for e in indices:
-        parts = abs(screw(screws[e])) * np.repeat([length, 1.0], 3)
+    for one in screws:
+        parts = abs(screw(one)) * np.repeat([length, 1.0], 3)
         share = parts / (np.linalg.norm(parts) or 1.0)
         assume(not np.any((share > 100 * U) & (share < REACHED)))
         touched |= np.outer(share > REACHED, share > REACHED)

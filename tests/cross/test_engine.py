@@ -251,8 +251,10 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
 
 
 def test_a_program_serves_all_machines_of_one_form() -> None:
+    """What is equal in one is equal in the other, and so are signs."""
     machine, columns = load(FOUR), drawn(CASES[0], "pose.", 20)
-    other = with_values(machine, {"geometry.base_radius": 0.3, "stiffness.actuator.1": 4e4})
+    changed = {"geometry.base_radius": 0.3, "geometry.base_angle": 0.2, "stiffness.actuator.1": 4e4}
+    machine, other = with_values(machine, {"stiffness.actuator.1": 3e4}), with_values(machine, changed)
     first, second = (slab_kernel(m, tuple(columns), NAMES) for m in (machine, other))
     assert first.program is second.program
     assert_same(native(other, columns), by_floats(other, columns))
@@ -350,11 +352,28 @@ def test_what_depends_on_fixed_inputs_is_fixed() -> None:
     assert where(a < 1.0, 2.0, a).fixed
 
 
-def test_ordinary_numbers_are_finite() -> None:
+def test_what_is_known_to_be_ordinary_needs_no_code_for_rigid_and_free() -> None:
     graph = Graph()
-    a, b = graph.input(fixed=True, ordinary=True), graph.input(fixed=True)
+    a, b = graph.input(fixed=True, bounds=(1e-25, 1e25)), graph.input(fixed=True)
     assert (reciprocal(reciprocal(a)) < math.inf) is True
-    assert (reciprocal(b) < math.inf) is not True
+    assert (1.0 / sqrt(a * a * 3.0 + a / 7.0) < math.inf) is True
+    assert (a > 0.0) is True
+    assert (a <= 0.0) is False
+    assert a - a == 0.0
+    assert a * 0.0 == 0.0
+    for unknown in (b, a + b, a - 2.0, reciprocal(b), a * b, b * 2.0):
+        assert (unknown < math.inf) is not True
+        assert (unknown > 0.0) is not True
+        assert not isinstance(unknown - unknown, float)
+
+
+def test_too_many_ordinary_factors_are_not_known_to_be_ordinary() -> None:
+    a = Graph().input(fixed=True, bounds=(1e-25, 1e25))
+    product = a
+    for _ in range(10):
+        product = product * a
+    assert (product < math.inf) is True
+    assert (product * a < math.inf) is not True
 
 
 def test_traced_values_cannot_steer_python() -> None:

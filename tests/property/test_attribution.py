@@ -65,8 +65,9 @@ def redundant(response):
 def test_shares_sum_to_the_whole(case, data):
     """Energies: half the deformation energy of any load or motion is the sum over springs."""
     response = data.draw(regular(case, CONTRASTING))
-    assert_blocks_close(total(compliance_shares(response.statics)), array(response.compliance), SUMMED)
-    assert_blocks_close(total(stiffness_shares(response.statics)), array(response.stiffness), SUMMED)
+    tolerance = SUMMED + lost(response)
+    assert_blocks_close(total(compliance_shares(response.statics)), array(response.compliance), tolerance)
+    assert_blocks_close(total(stiffness_shares(response.statics)), array(response.stiffness), tolerance)
 
 
 @every_machine
@@ -191,7 +192,7 @@ def test_leg_wrenches_hold_any_load(case, data):
     """W times the sharing is the unit wrench itself, over the motions that exist: statics are in balance."""
     response = data.draw(regular(case))
     shares = np.array([screw(t) for leg in response.statics.sharing for t in leg])
-    wrenches = columns([w for leg in response.legs for w in leg.wrenches])
+    wrenches = columns([w for leg in response.statics.wrenches for w in leg])
     exists = motions(response) @ motions(response).T
     length = float(response.configuration.length)
     scale = np.repeat([1.0 / length, 1.0], 3)

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 
-from kinetostat.algebra.solve import complement, diagonalise, dual_basis
+from kinetostat.algebra.solve import complement, conjugate, dual_basis
 from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import Vector, rotation_x, rotation_y
 from numeric import U
@@ -41,9 +41,9 @@ def sparse_complement(a, b, c, d):
     return [*(c for row in rows for c in row), regularity]
 
 
-def diagonal_form(a, b, c):
-    rows, pivots = diagonalise([[a * a + 1.0, a * b, 0.0], [a * b, b * b + 1.0, b * c], [0.0, b * c, c * c + 1.0]])
-    return [*(entry for row in rows for entry in row), *pivots]
+def conjugate_columns(a, b, c):
+    columns, shares, pivots = conjugate([[a, 1.0, 0.0], [b, 0.0, c], [0.0, 1.0, c]], [2.0, a * a, 1.0])
+    return [*(entry for row in (*columns, *shares) for entry in row), *pivots]
 
 
 def triangle(x, z, first, second):
@@ -60,7 +60,7 @@ FORMULAS = {
     "sparse dual basis": (sparse_dual, int(SPARSE.sum())),
     "dense dual basis": (dense_dual, 16),
     "complement": (sparse_complement, 4),
-    "diagonal form": (diagonal_form, 3),
+    "conjugate columns": (conjugate_columns, 3),
     "triangle": (triangle, 4),
     "rotation": (turning, 4),
 }

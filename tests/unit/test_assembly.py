@@ -16,7 +16,7 @@ PLAIN = Twist(Vector(1.0, 2.0, 0.0), Vector(0.0, 3.0, 0.5))
 def test_finite_weights_give_the_weighted_sum():
     other = Twist(Vector(0.0, 1.0, 1.0), ZERO)
     expected = 2.0 * outer(PLAIN) + 7.0 * outer(other)
-    assert np.array_equal(array(weighted_sum([2.0, 7.0], [PLAIN, other], 1.0)), expected)
+    assert np.array_equal(array(weighted_sum([(PLAIN, 2.0), (other, 7.0)], 1.0)), expected)
 
 
 def outer(screw):
@@ -24,7 +24,7 @@ def outer(screw):
 
 
 def test_an_infinite_weight_reaches_what_its_screw_has():
-    found = array(weighted_sum([math.inf, 2.0], [Twist(Vector(1.0, 0.0, -1.0), ZERO), PLAIN], 1.0))
+    found = array(weighted_sum([(Twist(Vector(1.0, 0.0, -1.0), ZERO), math.inf), (PLAIN, 2.0)], 1.0))
     reached = np.zeros((6, 6), dtype=bool)
     reached[np.ix_([0, 2], [0, 2])] = True
     assert np.array_equal(np.isinf(found), reached)
@@ -39,10 +39,10 @@ def test_a_small_component_counts_and_rounding_does_not(share, infinite, length)
     """Compared through the length, so that the unit of it does not matter."""
     screws = [Twist(Vector(1.0, share, 0.0), ZERO), Twist(ZERO, Vector(1.0 / length, share / length, 0.0))]
     for component, screw in zip((1, 4), screws, strict=True):
-        assert math.isinf(weighted_sum([math.inf], [screw], length).entry(component, component)) == infinite
+        assert math.isinf(weighted_sum([(screw, math.inf)], length).entry(component, component)) == infinite
 
 
 def test_infinite_weights_of_several_springs_add_up():
     screws = [Twist(Vector(1.0, 0.0, 0.0), ZERO), Twist(ZERO, Vector(0.0, 0.0, 2.0))]
-    found = weighted_sum([math.inf, math.inf], screws, 1.0).diagonal()
+    found = weighted_sum([(screw, math.inf) for screw in screws], 1.0).diagonal()
     assert [math.isinf(entry) for entry in found] == [True, False, False, False, False, True]

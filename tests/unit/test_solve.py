@@ -1,12 +1,15 @@
 """Small solves against NumPy's LAPACK: random, sparse, ill-scaled and singular input."""
 
+import itertools
+
 import numpy as np
 import pytest
+import sympy
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kinetostat.algebra.scalar import is_zero
-from kinetostat.algebra.solve import complement, diagonalise, dual_basis
+from kinetostat.algebra.solve import complement, conjugate, dual_basis, least_energy
 from numeric import U
 
 STABLE = 50 * U
@@ -104,55 +107,80 @@ def test_complement_of_nothing_new_has_regularity_zero():
     assert complement([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0]])[1] <= STABLE
 
 
-def semidefinite(rows, rank, exponents):
-    """A matrix A A^T of this rank whose leading blocks are regular up to it, and its ill-scaled relative D A A^T D."""
-    square = np.array(rows)
-    root = (square + 2.0 * np.eye(len(square)))[:, :rank]
-    scale = 10.0 ** np.array(exponents[: len(square)])
-    return root @ root.T, scale
+def conjugated(columns, weights):
+    """A' [n x m], L [m x m] and d [m] as arrays."""
+    turned, shares, pivots = conjugate(columns.T.tolist(), weights.tolist())
+    factor = np.eye(len(pivots))
+    for k, row in enumerate(shares):
+        factor[k, :k] = row
+    return np.array(turned).T, factor, np.array(pivots)
 
 
 @given(matrices(), st.integers(0, 6), st.lists(st.floats(-8, 8), min_size=6, max_size=6))
-def test_diagonalise_finds_the_factors_and_the_rank(rows, deficit, exponents):
-    """T H T^T = diag(d), measured where rows have comparable size: elimination does not care for their scale."""
-    size = len(rows)
-    rank = max(0, size - deficit)
-    plain, scale = semidefinite(rows, rank, exponents)
-    assume(rank == 0 or np.linalg.cond(plain[:rank, :rank]) < 1e4)
-    turned, pivots = map(np.array, diagonalise((plain * np.outer(scale, scale)).tolist()))
-    assert np.array_equal(np.tril(turned), turned)
-    assert np.array_equal(np.diag(turned), np.ones(size))
+def test_conjugate_finds_the_factors_and_the_rank(rows, deficit, exponents):
+    """A = A' L^T and A'^T S A' = diag(d), to rounding of the terms; columns that S does not tell apart have d = 0."""
+    columns = np.array(rows) + 2.0 * np.eye(len(rows))
+    rank = max(0, len(columns) - deficit)
+    columns[:, rank:] = columns[:, :rank] @ np.ones((rank, len(columns) - rank))
+    assume(rank == 0 or np.linalg.cond(columns[:, :rank]) < 1e4)
+    weights = np.ones(len(columns))
+    columns = columns * 10.0 ** np.array(exponents[: len(columns)])
+    turned, factor, pivots = conjugated(columns, weights)
     assert np.all(pivots[:rank] > 0.0)
-    assert np.array_equal(pivots[rank:], np.zeros(size - rank)), "a pivot that is rounding is exactly zero"
-    turned, pivots = turned * scale / scale[:, None], pivots / scale**2
-    residual = turned @ plain @ turned.T - np.diag(pivots)
-    size_of_terms = abs(turned) @ abs(plain) @ abs(turned).T
-    assert np.all(abs(residual) <= STABLE * (size_of_terms + np.diag(size_of_terms)[:, None]))
+    assert np.array_equal(pivots[rank:], np.zeros(len(columns) - rank)), "a pivot that is rounding is exactly zero"
+    assert np.all(abs(turned @ factor.T - columns) <= STABLE * (abs(turned) @ abs(factor).T))
+    products, sizes = turned[:, :rank].T @ turned[:, :rank], np.linalg.norm(turned[:, :rank], axis=0)
+    assert np.all(abs(products - np.diag(pivots[:rank])) <= 1e4 * STABLE * np.outer(sizes, sizes))
 
 
-@given(matrices(), st.lists(st.floats(-8, 8), min_size=6, max_size=6))
-def test_diagonalise_gives_the_inverse_of_a_regular_matrix(rows, exponents):
-    """H^-1 = T^T diag(1 / d) T against LAPACK."""
-    plain, scale = semidefinite(rows, len(rows), exponents)
-    condition = np.linalg.cond(plain)
-    assume(condition < 1e6)
-    turned, pivots = map(np.array, diagonalise((plain * np.outer(scale, scale)).tolist()))
-    inverse = (turned.T / pivots @ turned) * np.outer(scale, scale)
-    expected = np.linalg.inv(plain)
-    assert np.linalg.norm(inverse - expected) <= 10 * STABLE * condition * np.linalg.norm(expected)
+@given(matrices(), st.floats(0, 12))
+def test_conjugate_loses_but_the_square_root_of_the_contrast(rows, decades):
+    """The softest of the modes of A^T S A, against exact fractions, where the product itself would drown it."""
+    columns = np.array(rows) + 2.0 * np.eye(len(rows))
+    assume(np.linalg.cond(columns) < 1e3)
+    weights = 10.0 ** -np.linspace(0.0, decades, len(columns))
+    _, _, pivots = conjugated(columns, weights)
+    exact = sympy.Matrix(len(columns), len(columns), [sympy.Rational(float(c)) for c in columns.ravel()])
+    square = exact.T * sympy.diag(*[sympy.Rational(float(w)) for w in weights]) * exact
+    minors = [1, *(square[:k, :k].det() for k in range(1, len(columns) + 1))]
+    expected = [float(b / a) for a, b in itertools.pairwise(minors)]
+    assert pivots == pytest.approx(expected, rel=1e4 * STABLE * 10.0 ** (decades / 2.0))
 
 
-def test_structural_zeros_survive_the_elimination_of_a_sparse_matrix():
-    turned, pivots = diagonalise([[4.0, 0.0, 2.0], [0.0, 5.0, 0.0], [2.0, 0.0, 2.0]])
-    assert np.allclose(turned, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.5, 0.0, 1.0]], atol=STABLE)
-    assert pivots == pytest.approx([4.0, 5.0, 1.0])
+@given(matrices(), st.lists(st.floats(-3, 3), min_size=6, max_size=6))
+def test_least_energy_leaves_nothing_to_gain(rows, exponents):
+    """x^T S x is least: S x is at right angles to every internal column."""
+    every = np.array(rows) + 2.0 * np.eye(len(rows))
+    assume(len(every) > 1 and np.linalg.cond(every) < 1e4)
+    weights = 10.0 ** np.array(exponents[: len(every)])
+    found = np.array(least_energy(every.T[:1].tolist(), every.T[1:].tolist(), weights.tolist()))[0]
+    mix = np.linalg.lstsq(every[:, 1:], found - every[:, 0], rcond=None)[0]
+    assert np.allclose(every[:, 1:] @ mix, found - every[:, 0], rtol=0, atol=1e-9 * np.linalg.norm(every))
+    roots = np.sqrt(weights)
+    best = np.linalg.lstsq(roots[:, None] * every[:, 1:], -roots * every[:, 0], rcond=None)[0]
+    least = np.linalg.norm(roots * (every[:, 0] + every[:, 1:] @ best))
+    assert np.linalg.norm(roots * found) <= least + 1e-9 * np.linalg.norm(roots[:, None] * every)
+
+
+def test_structural_zeros_survive_among_sparse_columns():
+    turned, shares, pivots = conjugate([[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [1.0, 0.0, 5.0]], [1.0, 1.0, 2.0])
+    assert turned == [[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 5.0]]
+    assert pivots == [4.0, 9.0, 50.0]
+    assert shares == [[], [0.0], [0.5, 0.0]]
     assert is_zero(turned[1][0])
-    assert is_zero(turned[2][1])
+    assert is_zero(turned[0][1])
 
 
 @pytest.mark.parametrize("size", [1, 2, 3])
-def test_a_zero_matrix_has_zero_pivots(size):
+def test_what_no_weight_sees_has_zero_pivots(size):
     """A rigid leg: G = 0."""
-    turned, pivots = diagonalise([[0.0] * size] * size)
-    assert np.array_equal(turned, np.eye(size))
+    columns = np.eye(size).tolist()
+    turned, shares, pivots = conjugate(columns, [0.0] * size)
+    assert turned == columns
     assert pivots == [0.0] * size
+    assert not any(any(row) for row in shares)
+
+
+def test_components_without_a_weight_are_carried_along():
+    turned, _, _ = conjugate([[1.0, 10.0], [2.0, 50.0]], [3.0])
+    assert turned == [[1.0, 10.0], [0.0, 30.0]]

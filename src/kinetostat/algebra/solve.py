@@ -1,4 +1,4 @@
-"""Small dense factorisations, unrolled over scalars: dual basis and complement by Householder, diagonal form by Gauss.
+"""Small dense factorisations, unrolled over scalars: dual basis and complement by Householder, modes by Gram-Schmidt.
 
 Every loop runs over a size known while tracing, so that traced code has no loop and no LAPACK call. Structural
 zeros are used: sparse vectors are taken first and only their non-zero rows are touched.
@@ -11,6 +11,7 @@ from kinetostat.algebra.scalar import (
     Scalar,
     is_zero,
     minus,
+    plus,
     reciprocal,
     smaller,
     sqrt,
@@ -21,8 +22,8 @@ from kinetostat.algebra.scalar import (
 
 Row = list[Scalar]
 
-ZERO_PIVOT = 1e-12
-"""Share of its diagonal entry below which a pivot of a semi-definite matrix is the rounding of zero."""
+DEPENDENT = 1e-24
+"""Square of 1e-12: share of its square below which what is left of a column is the rounding of nothing."""
 
 
 @dataclass(frozen=True)
@@ -158,38 +159,57 @@ def _reflect(column: Row, others: list[Row], rows: list[int]) -> None:
     column[rows[0]] = pivot
 
 
-def diagonalise(matrix: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Row]:
-    """T and d >= 0 with T H T^T = diag(d), T unit lower triangular, for a symmetric n x n matrix H >= 0; rows of n.
+def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar]) -> tuple[list[Row], list[Row], Row]:
+    """A', L and d with A = A' L^T and A'^T S A' = diag(d), L unit lower triangular, for A given by its columns.
 
-    A pivot that is but the rounding of its diagonal entry is zero: H is then singular, and d_k = 0.
+    A^T S A = L diag(d) L^T is never formed, so that half as many digits are lost where weights differ much. Where S
+    does not see how a column differs from those before it, up to rounding, its d is 0.
+
+    Args:
+        columns: of A; components beyond the weights have none and are carried along.
+        weights: the diagonal of S, >= 0.
+
+    Returns:
+        Columns of A', rows of L below the diagonal (row k has k entries), and d >= 0.
     """
-    size = len(matrix)
-    left = [list(row) for row in matrix]
-    turned: list[Row] = [[1.0 if i == j else 0.0 for j in range(size)] for i in range(size)]
+    left = [list(column) for column in columns]
+    shares: list[Row] = [[] for _ in left]
     pivots: Row = []
-    for k in range(size):
-        alive = left[k][k] > (times(ZERO_PIVOT, matrix[k][k]) if k else 0.0)
-        pivots.append(where(alive, left[k][k], 0.0))
-        inverse = where(alive, reciprocal(where(alive, left[k][k], 1.0)), 0.0)
-        for i in range(k + 1, size):
-            factor = times(left[i][k], inverse)
-            left[i] = [minus(a, times(factor, b)) for a, b in zip(left[i], left[k], strict=True)]
-            turned[i] = [minus(a, times(factor, b)) for a, b in zip(turned[i], turned[k], strict=True)]
-    return turned, pivots
+    taken: Row = [0.0] * len(left)  # of a^T S a, what lies in the columns before
+    for k, column in enumerate(left):
+        weighted = [times(w, c) for w, c in zip(weights, column, strict=False)]
+        pivot = _product(weighted, column)
+        alive = pivot > times(DEPENDENT, taken[k])
+        pivots.append(where(alive, pivot, 0.0))
+        inverse = where(alive, reciprocal(where(alive, pivot, 1.0)), 0.0)
+        for i in range(k + 1, len(left)):
+            shared = _product(weighted, left[i])
+            share = times(shared, inverse)
+            shares[i].append(share)
+            left[i] = _less(left[i], share, column)
+            taken[i] = plus(taken[i], times(share, shared))
+    return left, shares, pivots
 
 
-def solve_semidefinite(matrix: Sequence[Sequence[Scalar]], right: Sequence[Sequence[Scalar]]) -> list[Row]:
-    """A solution X of H X = B for a symmetric n x n matrix H >= 0 and a B in its range; rows of scalars.
+def least_energy(
+    columns: Sequence[Sequence[Scalar]], internal: Sequence[Sequence[Scalar]], weights: Sequence[Scalar]
+) -> list[Row]:
+    """Each column x less the mix of the internal ones that leaves x^T S x least; S as in `conjugate`.
 
-    Of the solutions of a singular H, the one without components along its zero pivots.
+    What S does not see of the internal columns is left as it is.
     """
-    turned, pivots = diagonalise(matrix)
-    size, wide = len(matrix), len(right[0])
-    inverses = [where(d > 0.0, reciprocal(where(d > 0.0, d, 1.0)), 0.0) for d in pivots]
-    inner = [
-        [times(inverses[k], total([times(turned[k][i], right[i][c]) for i in range(k + 1)])) for c in range(wide)]
-        for k in range(size)
-    ]
-    return [
-        [total([times(turned[k][i], inner[k][c]) for k in range(i, size)]) for c in range(wide)] for i in range(size)
-    ]
+    modes, _, pivots = conjugate(internal, weights)
+    left = [list(column) for column in columns]
+    for mode, pivot in zip(modes, pivots, strict=True):
+        inverse = where(pivot > 0.0, reciprocal(where(pivot > 0.0, pivot, 1.0)), 0.0)
+        weighted = [times(w, c) for w, c in zip(weights, mode, strict=True)]
+        left = [_less(column, times(_product(weighted, column), inverse), mode) for column in left]
+    return left
+
+
+def _product(weighted: Sequence[Scalar], column: Sequence[Scalar]) -> Scalar:
+    return total([times(a, b) for a, b in zip(weighted, column, strict=False)])
+
+
+def _less(column: Sequence[Scalar], share: Scalar, other: Sequence[Scalar]) -> Row:
+    return [minus(a, times(share, b)) for a, b in zip(column, other, strict=True)]

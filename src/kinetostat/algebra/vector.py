@@ -6,7 +6,7 @@ No screws here (see `screw`) and no machine. All components are in the axes the 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, cos, minus, plus, sin, sqrt, times, total
+from kinetostat.algebra.scalar import Scalar, cos, is_one, minus, plus, sin, sqrt, times, total
 
 
 @dataclass(frozen=True)
@@ -97,9 +97,17 @@ def rotation_z(c: Scalar, s: Scalar) -> Rotation:
 
 
 def rotation_along(axis: Vector, c: Scalar, s: Scalar) -> Rotation:
-    """Rotation about the unit vector `axis` by the angle whose cosine is c and sine s (Rodrigues)."""
+    """Rotation about the unit vector `axis` by the angle whose cosine is c and sine s (Rodrigues).
+
+    What is 1 by form on the diagonal stays so: about a base axis, it is as sparse as `rotation_x` and the like.
+    """
     rest = minus(1.0, c)
-    columns = [unit * c + axis * times(rest, axis.dot(unit)) + axis.cross(unit) * s for unit in AXES]
+    columns = []
+    for i, (unit, part) in enumerate(zip(AXES, axis.components(), strict=True)):
+        column = list((unit * c + axis * times(rest, part) + axis.cross(unit) * s).components())
+        if is_one(times(part, part)):
+            column[i] = 1.0
+        columns.append(Vector(*column))
     return Rotation(*columns)
 
 

@@ -22,6 +22,7 @@ from kinetostat.engine.points import Points
 from kinetostat.engine.questions import Weights, equations_of, objectives_of
 from kinetostat.engine.threads import available_cores
 from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 
@@ -31,6 +32,8 @@ SMALL_SLAB = 512
 """Points per slab of NumPy calls and of linear systems: some thousand arrays of it wait in memory at once."""
 KEPT = 32
 """Programs kept in memory."""
+SAME, ROUNDED = 1e-6, 1e-9
+"""Relative difference up to which two ways to a derivative agree, and share of the largest that may be rounding."""
 
 Objective: TypeAlias = str | Mapping[str, float]
 """A quantity by name, or a weighted sum of several: weights, in whatever unit, by name."""
@@ -72,7 +75,7 @@ def evaluate_gradient(
     wanted = [objectives] if isinstance(objectives, str | Mapping) else list(objectives)
     weights = tuple(((one, 1.0),) if isinstance(one, str) else tuple(one.items()) for one in wanted)
     native = points.size >= MACHINE_CODE_FROM
-    slab = NATIVE_SLAB if native and machine.family.chains is None else SMALL_SLAB
+    slab = NATIVE_SLAB if native else SMALL_SLAB
 
     def method(one: Machine, varying: Sequence[str], _names: Sequence[str]) -> Fill:
         return _fill(one, varying, weights, tuple(paths), native)
@@ -90,31 +93,100 @@ def _fill(
     machine: Machine, varying: Sequence[str], weights: tuple[Weights, ...], paths: tuple[str, ...], native: bool
 ) -> Fill:
     """Evaluates slabs of points of one machine: objectives, then their derivatives by each path."""
-    ends = {path: slope for path, slope in _at_ends(machine).items() if path in paths and path not in varying}
-    by = tuple(path for path in paths if path not in ends)
-    form, fixed = form_of(machine, varying, by)
-    kind, turning, count = Kind(machine), angles(machine), len(weights)
-    objectives = _program(kind, form, weights, by, native)
-    equations = _program(kind, form, (), by, native) if machine.family.chains else None
+    given = _Given(machine, varying, weights, paths, native)
+    if machine.family.chains is None:
+        return given.direct()
+    if native and _closed_forms_hold(Kind(machine), given.form, weights, paths):
+        return given.closed()
+    return given.followed
 
-    def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-        served = {path: np.ascontiguousarray(columns[path], dtype=float) for path in form.varying}
-        given = [reduced(column) if path in turning else column for path, column in served.items()]
-        if equations is None and not ends:
-            objectives.runnable.run(fixed, given, results, status)
-            return
-        if equations is not None:
-            joints = solve_joints(with_values(machine, columns))
-            found = [np.broadcast_to(c, status.shape) for c in (*joints.coordinates, joints.status)]
-            given += [np.ascontiguousarray(column, dtype=float) for column in found]
-        rates = equations.slopes(fixed, given, np.empty_like(status))[1] if equations else None
-        results[:count], slopes = objectives.slopes(fixed, given, status)
-        slopes = slopes if rates is None else _followed(slopes, rates, len(by))
-        rows = results[count:].reshape(count, len(paths), len(status))
-        for k, path in enumerate(paths):
-            rows[:, k] = ends[path] if path in ends else slopes[:, by.index(path)]
 
-    return fill
+@lru_cache(KEPT)
+def _closed_forms_hold(kind: Kind, form: Form, weights: tuple[Weights, ...], paths: tuple[str, ...]) -> bool:
+    """Whether closed forms hold while parameters change: at the machine's own pose both ways must agree.
+
+    They do not where a parameter changes what they take as given: that axes are parallel, say, or that the platform
+    keeps the coordinates that its pose does not give.
+    """
+    from kinetostat.engine.kernel import needs_iteration
+
+    if needs_iteration(kind.machine):
+        return False
+    held, given = values(kind.machine), _Given(kind.machine, form.varying, weights, paths, native=False)
+    columns = {path: np.array([held[path]]) for path in form.varying}
+    direct, followed = np.empty((2, len(weights) * (1 + len(paths)), 1))
+    for fill, results in ((given.direct(closed=True), direct), (given.followed, followed)):
+        fill(columns, results, np.empty(1, dtype=np.int8))
+    return np.allclose(direct, followed, rtol=SAME, atol=ROUNDED * np.nanmax(np.abs(followed)), equal_nan=True)
+
+
+class _Given:
+    """What is differentiated by what, and the ways to do it."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        varying: Sequence[str],
+        weights: tuple[Weights, ...],
+        paths: tuple[str, ...],
+        native: bool,
+    ) -> None:
+        at_ends = {path: slope for path, slope in _at_ends(machine).items() if path in paths and path not in varying}
+        self._machine, self._weights, self._paths, self._native = machine, weights, paths, native
+        self._ends, self._by = at_ends, tuple(path for path in paths if path not in at_ends)
+        self.form, self._fixed = form_of(machine, varying, self._by)
+        self._angles = angles(machine)
+
+    def direct(self, closed: bool = False) -> Fill:
+        """All from one program: the family places the joints, or they are `closed` forms."""
+        program = self._program(self._weights, closed)
+
+        def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+            given = self._columns(columns)
+            if self._ends:
+                self._spread(*program.slopes(self._fixed, given, status), results)
+            else:
+                program.runnable.run(self._fixed, given, results, status)
+
+        return fill
+
+    def followed(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        """Fill with joints by Newton's method and their slopes from the closing equations."""
+        joints = solve_joints(with_values(self._machine, columns))
+        found = [np.broadcast_to(c, status.shape) for c in (*joints.coordinates, joints.status)]
+        given = self._columns(columns) + [np.ascontiguousarray(column, dtype=float) for column in found]
+        rates = self._program(()).slopes(self._fixed, given, np.empty_like(status))[1]
+        values, partial = self._program(self._weights).slopes(self._fixed, given, status)
+        self._spread(values, _followed(partial, rates, len(self._by)), results)
+
+    def closed(self) -> Fill:
+        """Fill in closed form, and with joints by Newton's method where closed forms do not close the legs."""
+        direct = self.direct(closed=True)
+
+        def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+            direct(columns, results, status)
+            left = np.flatnonzero(status == Status.NOT_CONVERGED)
+            if left.size:
+                found, codes = np.empty((len(results), left.size)), np.empty(left.size, dtype=status.dtype)
+                self.followed({path: column[left] for path, column in columns.items()}, found, codes)
+                results[:, left], status[left] = found, codes
+
+        return fill
+
+    def _spread(self, found: Array, slopes: Array, results: Array) -> None:
+        """Put objectives and slopes in their rows, and what is known by rigid and free springs."""
+        count = len(self._weights)
+        results[:count] = found
+        rows = results[count:].reshape(count, len(self._paths), results.shape[1])
+        for k, path in enumerate(self._paths):
+            rows[:, k] = self._ends[path] if path in self._ends else slopes[:, self._by.index(path)]
+
+    def _columns(self, columns: Mapping[str, Array]) -> list[Array]:
+        served = {path: np.ascontiguousarray(columns[path], dtype=float) for path in self.form.varying}
+        return [reduced(column) if path in self._angles else column for path, column in served.items()]
+
+    def _program(self, weights: tuple[Weights, ...], closed: bool = False) -> "_Program":
+        return _program(Kind(self._machine), self.form, weights, self._by, self._native, closed)
 
 
 def _at_ends(machine: Machine) -> dict[str, float]:
@@ -147,9 +219,11 @@ class _Program:
 
 
 @lru_cache(KEPT)
-def _program(kind: Kind, form: Form, weights: tuple[Weights, ...], paths: tuple[str, ...], native: bool) -> _Program:
+def _program(
+    kind: Kind, form: Form, weights: tuple[Weights, ...], paths: tuple[str, ...], native: bool, closed: bool
+) -> _Program:
     """The program of objectives and their derivatives; without weights, that of the closing equations."""
-    asked = objectives_of(kind, form, weights, paths) if weights else equations_of(kind, form, paths)
+    asked = objectives_of(kind, form, weights, paths, closed) if weights else equations_of(kind, form, paths)
     count, inputs = len(asked.body.results), len(asked.inputs)
     if not native:
         return _Program(Interpreted(asked.body, asked.inputs), count, inputs)

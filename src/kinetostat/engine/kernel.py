@@ -1,7 +1,8 @@
 """A machine as a program for slabs of points: its formulas traced, compiled and kept. Holds no formula.
 
 Fixed parameters that are exactly 0 or infinite become part of the code, so that what they multiply is not computed at
-all, and where all springs are ordinary the code for rigid and free ones is left out. A new machine of the same form,
+all, what cancels by form is not computed either, and where all springs are ordinary the code for rigid and free ones is
+left out. A new machine of the same form,
 with other numbers, uses the same program.
 """
 
@@ -115,7 +116,7 @@ def _program(kind: Kind, form: Form, quantities: tuple[str, ...], iterated: bool
     accepted = response.status < Status.OK + 0.5
     results = [where(accepted, QUANTITIES[name].value(response), math.nan) for name in quantities]
     numbers = [_number(result) for result in results]
-    return Program(Body([*given.fixed.values()], [*given.columns.values(), *joints], numbers, _number(response.status)))
+    return Program(Body(given.fixed, [*given.columns.values(), *joints], numbers, _number(response.status)))
 
 
 def _joints(machine: Machine, columns: Sequence[Traced]) -> Joints | None:

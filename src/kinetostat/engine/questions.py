@@ -9,6 +9,7 @@ from kinetostat.algebra.scalar import Scalar, plus, times, where
 from kinetostat.engine.body import Body
 from kinetostat.engine.form import Form, Inputs, Kind, traced
 from kinetostat.engine.trace import Operand, Traced
+from kinetostat.kinematics.closed_form import closed_joints
 from kinetostat.kinematics.closing import closing_equations
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinematics.status import Status
@@ -27,14 +28,21 @@ class Question:
     inputs: tuple[Traced, ...]
 
 
-def objectives_of(kind: Kind, form: Form, objectives: Sequence[Weights], paths: Sequence[str]) -> Question:
+def objectives_of(
+    kind: Kind, form: Form, objectives: Sequence[Weights], paths: Sequence[str], closed: bool = False
+) -> Question:
     """Objectives as functions of parameters and joint coordinates; NaN where the status is not OK.
 
-    Columns are the varying parameters and, where joints are found elsewhere, their coordinates and a status.
+    Columns are the varying parameters and, where joints are found elsewhere, their coordinates and a status. With
+    `closed`, joints are functions of the parameters in closed form.
     """
     given = traced(kind, form)
-    joints, placed = _joints(given)
-    response = respond(given.machine, Joints(joints, placed[0]) if placed else None)
+    joints, placed = ((), ()) if closed else _joints(given)
+    known = closed_joints(given.machine.chains()) if closed else None
+    if known is not None:
+        response = respond(given.machine, Joints(tuple(known[0]), known[1]))
+    else:
+        response = respond(given.machine, Joints(joints, placed[0]) if placed else None)
     accepted = response.status < Status.OK + 0.5
     results = [_number(where(accepted, _weighted(response, weights), math.nan)) for weights in objectives]
     return _question(given, (*joints, *placed), results, _number(response.status), (*_inputs(given, paths), *joints))
@@ -51,12 +59,11 @@ def equations_of(kind: Kind, form: Form, paths: Sequence[str]) -> Question:
 def _question(
     given: Inputs, joints: Sequence[Traced], results: Sequence[Operand], code: Operand, inputs: tuple[Traced, ...]
 ) -> Question:
-    return Question(Body([*given.fixed.values()], [*given.columns.values(), *joints], results, code), inputs)
+    return Question(Body(given.fixed, [*given.columns.values(), *joints], results, code), inputs)
 
 
 def _inputs(given: Inputs, paths: Sequence[str]) -> list[Traced]:
-    known = {**given.fixed, **given.columns}
-    return [known[path] for path in paths]
+    return [given.parameters[path] for path in paths]
 
 
 def _joints(given: Inputs) -> tuple[tuple[Traced, ...], tuple[Traced, ...]]:

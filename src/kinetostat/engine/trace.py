@@ -12,8 +12,11 @@ from typing import Any, NoReturn, TypeAlias
 from kinetostat.engine.trigonometry import cos_and_sin
 
 Operand: TypeAlias = "Node | float"
+Bounds: TypeAlias = tuple[float, float]
 
 COMMUTATIVE = {"add", "mul", "and"}
+ORDINARY = (1e-280, 1e280)
+"""Bounds beyond which nothing is known: rounding and a few more operations lead from them to no end of float64."""
 
 
 class Node:
@@ -24,20 +27,20 @@ class Node:
         operands: nodes and floats; empty for an input.
         number: position in the graph; operands have smaller ones.
         fixed: whether it depends on inputs alone that are the same at all points.
-        ordinary: whether it is known to be neither zero nor infinite nor NaN.
+        bounds: between which positive numbers it is known to lie; None if it may be anything.
     """
 
-    __slots__ = ("fixed", "graph", "number", "operands", "operation", "ordinary")
+    __slots__ = ("bounds", "fixed", "graph", "number", "operands", "operation")
 
     def __init__(
-        self, graph: "Graph", operation: str, operands: tuple[Operand, ...], fixed: bool, ordinary: bool
+        self, graph: "Graph", operation: str, operands: tuple[Operand, ...], fixed: bool, bounds: Bounds | None
     ) -> None:
         self.graph = graph
         self.operation = operation
         self.operands = operands
         self.number = len(graph.nodes)
         self.fixed = fixed
-        self.ordinary = ordinary
+        self.bounds = bounds
         graph.nodes.append(self)
 
     def __array_namespace__(self) -> "Namespace":
@@ -95,7 +98,7 @@ class Traced(Node):
 
     def __abs__(self) -> "Traced":
         inner = self if _negated(self) is None else _negated(self)
-        return inner if inner.operation in {"abs", "sqrt"} else self.graph.number("abs", inner)
+        return inner if inner.operation in {"abs", "sqrt"} or inner.bounds else self.graph.number("abs", inner)
 
     def __lt__(self, other: Operand) -> Condition | bool:
         return _compare("lt", self, other)
@@ -162,9 +165,9 @@ class Graph:
         self.turns: dict[Node, tuple[Traced, Operand]] = {}
         self._known: dict[tuple[Any, ...], Any] = {}
 
-    def input(self, fixed: bool = False, ordinary: bool = False) -> Traced:
-        """A new input: the same at all points if `fixed`; never zero, infinite or NaN if `ordinary`."""
-        return Traced(self, "input", (), fixed, ordinary)
+    def input(self, fixed: bool = False, bounds: Bounds | None = None) -> Traced:
+        """A new input: the same at all points if `fixed`; bounds as of a node."""
+        return Traced(self, "input", (), fixed, bounds)
 
     def number(self, operation: str, *operands: Operand) -> Traced:
         """The number that an operation gives."""
@@ -182,7 +185,7 @@ class Graph:
         key = _key(operation, operands)
         if key not in self._known:
             fixed = all(isinstance(operand, float) or operand.fixed for operand in operands)
-            self._known[key] = kind(self, operation, operands, fixed, _ordinary(operation, operands))
+            self._known[key] = kind(self, operation, operands, fixed, bounds_of(operation, operands))
         return self._known[key]
 
 
@@ -205,12 +208,34 @@ def _key(operation: str, operands: tuple[Operand, ...]) -> tuple[Any, ...]:
     return operation, *names
 
 
-def _ordinary(operation: str, operands: tuple[Operand, ...]) -> bool:
-    """An ordinary number stays ordinary under a change of sign and in a reciprocal."""
-    last = operands[-1]
-    if operation == "div" and operands[0] != 1.0:
-        return False
-    return operation in {"neg", "abs", "div"} and isinstance(last, Node) and last.ordinary
+def bounds_of(operation: str, operands: tuple[Operand, ...]) -> Bounds | None:
+    """Between which positive numbers the result of an operation lies, if that is known: far from both ends of float64.
+
+    What is known to be ordinary needs no code for what is rigid (infinite) or free (zero).
+    """
+    known = [_bounds(operand) for operand in operands if not isinstance(operand, Condition)]
+    if any(bounds is None for bounds in known):
+        return None
+    match operation, [bounds for bounds in known if bounds]:
+        case "add", [(low, high), (least, most)]:
+            found = low + least, high + most
+        case "mul", [(low, high), (least, most)]:
+            found = low * least, high * most
+        case "div", [(low, high), (least, most)]:
+            found = low / most, high / least
+        case "where", [(low, high), (least, most)]:
+            found = min(low, least), max(high, most)
+        case "sqrt", [(low, high)]:
+            found = math.sqrt(low), math.sqrt(high)
+        case _:
+            return None
+    return found if ORDINARY[0] < found[0] and found[1] < ORDINARY[1] else None
+
+
+def _bounds(operand: Operand) -> Bounds | None:
+    if isinstance(operand, Node):
+        return operand.bounds
+    return (operand, operand) if 0.0 < operand < math.inf else None
 
 
 def _operand(a: Any) -> Any:
@@ -250,6 +275,8 @@ def _sub(a: Any, b: Any) -> Any:
         return a
     if _is(a, 0.0):
         return -b
+    if a is b and a.bounds:
+        return 0.0
     if (minus := _negated(b)) is not None:
         return _add(a, minus)
     if (minus := _negated(a)) is not None:
@@ -265,6 +292,8 @@ def _mul(a: Any, b: Any) -> Any:
         a, b = b, a
     if _is(b, 1.0):
         return a
+    if _is(b, 0.0) and isinstance(a, Node) and a.bounds:
+        return 0.0
     if isinstance(b, float) and math.copysign(1.0, b) < 0.0:
         return -_mul(a, -b)
     if (minus := _negated(a)) is not None:
@@ -278,6 +307,8 @@ def _div(a: Any, b: Any) -> Any:
     a, b = _operand(a), _operand(b)
     if _is(b, 1.0):
         return a
+    if a is b and a.bounds:
+        return 1.0
     if (minus := _negated(a)) is not None:
         return -_div(minus, b)
     if (minus := _negated(b)) is not None:
@@ -290,6 +321,8 @@ _COMPARISONS = {"lt": operator.lt, "le": operator.le}
 
 def _compare(operation: str, a: Any, b: Any) -> Condition | bool:
     a, b = _operand(a), _operand(b)
-    if isinstance(a, Node) and a.ordinary and _is(b, math.inf):
-        return True
+    if isinstance(a, Node) and a.bounds and isinstance(b, float) and (b <= 0.0 or b == math.inf):
+        return b > 0.0
+    if isinstance(b, Node) and b.bounds and isinstance(a, float) and (a <= 0.0 or a == math.inf):
+        return a <= 0.0
     return (a if isinstance(a, Node) else b).graph.condition(operation, a, b)

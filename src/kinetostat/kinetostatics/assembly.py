@@ -6,12 +6,12 @@ One form serves rigid and flexible machines: springs enter by compliance, and a 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, minus, reciprocal, times, total, where
+from kinetostat.algebra.scalar import Scalar, reciprocal, times, total, where
 from kinetostat.algebra.screw import Screw, Twist, Wrench
-from kinetostat.algebra.solve import dual_basis, right_inverse, solve_semidefinite
+from kinetostat.algebra.solve import dual_basis, least_energy, right_inverse
 from kinetostat.algebra.symmetric import POSITIONS, SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
-from kinetostat.kinetostatics.leg import INFINITE, combine, leg_compliance, leg_modes, leg_resistance, relaxed
+from kinetostat.kinetostatics.leg import INFINITE, Action, Modes, combine, leg_modes, leg_resistance, modes_of, relaxed
 from kinetostat.machine.leg import LegScrews
 
 ROUNDING = 1e-26
@@ -21,26 +21,36 @@ ROUNDING = 1e-26
 NO_MOTION = Twist(ZERO, ZERO)
 
 
+Motion = tuple[Twist, Scalar]
+"""A twist xi (per unit of a load) and a compliance s (of that load): the share s xi xi^T of C."""
+
+
 @dataclass(frozen=True)
 class Statics:
     """How the springs of a machine share any load, and resist any motion.
 
     Attributes:
-        sharing: per leg, and per wrench that it carries, its amount per unit platform wrench, as a twist.
+        wrenches: per leg, a basis of what it carries.
+        sharing: per leg, and per wrench of its basis, the amount of it per unit platform wrench, as a twist.
         flexibility: per spring, the load in it per unit platform wrench (xi_e); in a machine without redundancy also
             the platform twist per unit deformation of it alone.
         compliance: per spring, s_e.
-        resistance: per spring, and per load that nothing yields to, a platform wrench (b_e or c_e).
-        stiffness: per entry of `resistance`, its weight in K (k_e or s_e, or 0 or infinity).
+        resistance: per spring, a platform wrench (b_e or c_e).
+        stiffness: per spring, its weight in K (k_e or s_e).
+        motions: the fewest shares that add up to C: one per spring, or per wrench of a leg that has more springs.
+        actions: the fewest shares that add up to K; infinite against what is rigid.
         length: characteristic length, m; rotations and translations compare through it where rounding is judged.
         regularity: 0 where the wrenches do not span all six dimensions: the platform is free with locked actuators.
     """
 
+    wrenches: tuple[tuple[Wrench, ...], ...]
     sharing: tuple[tuple[Twist, ...], ...]
     flexibility: tuple[Twist, ...]
     compliance: tuple[Scalar, ...]
     resistance: tuple[Wrench, ...]
     stiffness: tuple[Scalar, ...]
+    motions: tuple[Motion, ...]
+    actions: tuple[Action, ...]
     length: Scalar
     regularity: Scalar
 
@@ -55,25 +65,60 @@ def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
 
     Source: theory section 2; eqs. 21 and 32.
     """
-    balanced = list(legs)
-    if sum(len(leg.wrenches) for leg in legs) + len(guide) > SIZE:
-        balanced = [relaxed(leg) for leg in legs]
+    redundant = sum(len(leg.wrenches) for leg in legs) + len(guide) > SIZE
+    balanced = [relaxed(leg) for leg in legs] if redundant else legs
+    modes = [modes_of(leg) if redundant or _in_series(leg) else _unchanged(leg) for leg in balanced]
     wrenches = [wrench for leg in balanced for wrench in leg.wrenches] + list(guide)
     if len(wrenches) == SIZE:
         twists, regularity = dual_twists(wrenches, length)
+        rows = in_modes(modes, [twist.components() for twist in twists])
     else:
-        twists, regularity = least_energy_twists(balanced, wrenches, length)
+        rows, regularity = least_energy_rows(modes, wrenches, length)
     sharing: list[tuple[Twist, ...]] = []
     flexibility: list[Twist] = []
-    for leg in balanced:
-        taken = sum(len(own) for own in sharing)
-        sharing.append(tuple(twists[taken : taken + len(leg.wrenches)]))
-        flexibility += [combine(sharing[-1], row) if row else NO_MOTION for row in leg.loads]
-    parts = [leg_resistance(leg) for leg in legs]
-    actions = [action for shares, _ in parts for action in shares] + [action for _, held in parts for action in held]
-    compliance = tuple(s for leg in legs for s in leg.compliance)
-    resistance, stiffness = tuple(b for b, _ in actions), tuple(k for _, k in actions)
-    return Statics(tuple(sharing), tuple(flexibility), compliance, resistance, stiffness, length, regularity)
+    motions: list[Motion] = []
+    for leg, own in zip(balanced, modes, strict=True):
+        taken = sum(len(one) for one in sharing)
+        shares = tuple(Twist(Vector(*row[:3]), Vector(*row[3:])) for row in rows[taken : taken + len(own.wrenches)])
+        felt = [combine(shares, row) if row else NO_MOTION for row in own.loads]
+        sharing.append(shares)
+        flexibility += felt
+        motions += zip(*((shares, own.compliance) if _in_series(leg) else (felt, leg.compliance)), strict=True)
+    resistances = [leg_resistance(leg) for leg in legs]
+    shares_of_k = [share for one in resistances for share in one.shares]
+    return Statics(
+        tuple(own.wrenches for own in modes),
+        tuple(sharing),
+        tuple(flexibility),
+        tuple(s for leg in legs for s in leg.compliance),
+        tuple(b for b, _ in shares_of_k),
+        tuple(k for _, k in shares_of_k),
+        tuple(motions),
+        tuple(mode for one in resistances for mode in one.modes),
+        length,
+        regularity,
+    )
+
+
+def _in_series(leg: LegScrews) -> bool:
+    """Whether the leg has more springs than wrenches, none of them free by form."""
+    free = any(type(s) is float and s == INFINITE for s in leg.compliance)
+    return len(leg.loads) > len(leg.wrenches) and not free
+
+
+def _unchanged(leg: LegScrews) -> Modes:
+    """The wrenches of a leg as they are: nothing is known of how it yields to each."""
+    return Modes(leg.wrenches, leg.loads, (), ())
+
+
+def in_modes(modes: Sequence[Modes], rows: Sequence[Sequence[Scalar]]) -> list[tuple[Scalar, ...]]:
+    """Amounts of the legs' modes, a row for each, from amounts of their wrenches; what follows is left as it is."""
+    found: list[tuple[Scalar, ...]] = []
+    for own in modes:
+        part = rows[len(found) : len(found) + len(own.wrenches)]
+        columns = [own.amounts(column) if own.shares else list(column) for column in zip(*part, strict=True)]
+        found += zip(*columns, strict=True)
+    return found + [tuple(row) for row in rows[len(found) :]]
 
 
 def compliance_matrix(statics: Statics) -> Symmetric6:
@@ -81,7 +126,7 @@ def compliance_matrix(statics: Statics) -> Symmetric6:
 
     Source: eq. 21, extended to flexible links.
     """
-    return weighted_sum(statics.compliance, statics.flexibility, reciprocal(statics.length))
+    return weighted_sum(statics.motions, reciprocal(statics.length))
 
 
 def stiffness_matrix(statics: Statics) -> Symmetric6:
@@ -89,7 +134,7 @@ def stiffness_matrix(statics: Statics) -> Symmetric6:
 
     Source: eq. 32.
     """
-    return weighted_sum(statics.stiffness, statics.resistance, statics.length)
+    return weighted_sum(statics.actions, statics.length)
 
 
 def flexible_stiffness(legs: Sequence[LegScrews]) -> Symmetric6:
@@ -117,61 +162,43 @@ def dual_twists(wrenches: Sequence[Wrench], length: Scalar) -> tuple[list[Twist]
     return [Twist(Vector(*row[:3]) * shrink, Vector(*row[3:])) for row in rows], regularity
 
 
-def least_energy_twists(
-    legs: Sequence[LegScrews], wrenches: Sequence[Wrench], length: Scalar
-) -> tuple[list[Twist], Scalar]:
+def least_energy_rows(
+    modes: Sequence[Modes], wrenches: Sequence[Wrench], length: Scalar
+) -> tuple[list[tuple[Scalar, ...]], Scalar]:
     """How legs that carry more than six wrenches share a load: of all balances, the one of least elastic energy.
 
-    lambda = W+ w + N z with W N = 0, and (N^T G N) z = -N^T G W+ w (force method). Where rigid parts leave z undecided,
-    no displacement depends on it: the undecided internal load is taken as zero.
+    lambda = W+ w + N z with W N = 0 and lambda^T G lambda least (force method). Where rigid parts leave z undecided, no
+    displacement depends on it: the undecided internal load is left out.
 
     Args:
-        legs: at P, base axes; their G may be singular.
-        wrenches: of all legs in order, columns of W.
+        modes: of the legs.
+        wrenches: of all legs in order, and of a guide, which does not yield: columns of W, at P in base axes.
         length: m, scales rows.
 
     Returns:
-        lambda per unit platform wrench, a twist for each leg wrench, and the regularity of W.
+        Amounts of the modes per unit platform wrench [wrenches x 6], and the regularity of W.
     """
     shrink = reciprocal(length)
     columns = [Wrench(wrench.rotational * shrink, wrench.translational).components() for wrench in wrenches]
     if len(wrenches) < SIZE:
-        return [NO_MOTION] * len(wrenches), 0.0
+        return [NO_MOTION.components()] * len(wrenches), 0.0
     balance, internal, regularity = right_inverse([list(row) for row in zip(*columns, strict=True)])
-    yielding = [_yield(legs, mode) for mode in internal]
-    energy = [[_product(mode, other) for other in yielding] for mode in internal]
-    work = [[_product(other, [row[c] for row in balance]) for c in range(SIZE)] for other in yielding]
-    shift = solve_semidefinite(energy, work)
-    every = range(len(wrenches))
-    shifts = [[_product([mode[a] for mode in internal], [z[c] for z in shift]) for c in range(SIZE)] for a in every]
-    rows = [[minus(p, q) for p, q in zip(row, other, strict=True)] for row, other in zip(balance, shifts, strict=True)]
-    return [Twist(Vector(*row[:3]) * shrink, Vector(*row[3:])) for row in rows], regularity
+    compliance = [d for own in modes for d in own.compliance]
+    every, null = (in_modes(modes, rows) for rows in (balance, [*zip(*internal, strict=True)]))
+    weights = compliance + [0.0] * (len(wrenches) - len(compliance))
+    shared = least_energy([*zip(*every, strict=True)], [*zip(*null, strict=True)], weights)
+    return [(*(times(c, shrink) for c in row[:3]), *row[3:]) for row in zip(*shared, strict=True)], regularity
 
 
-def _yield(legs: Sequence[LegScrews], amounts: Sequence[Scalar]) -> list[Scalar]:
-    """G lambda, leg by leg."""
-    result: list[Scalar] = []
-    for leg in legs:
-        own = amounts[len(result) : len(result) + len(leg.wrenches)]
-        result += [_product(row, own) for row in leg_compliance(leg)]
-    return result + [0.0] * (len(amounts) - len(result))  # a plane's guide does not yield
-
-
-def _product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
-    return total([times(p, q) for p, q in zip(a, b, strict=True)])
-
-
-def weighted_sum(weights: Sequence[Scalar], screws: Sequence[Screw], length: Scalar) -> Symmetric6:
-    """sum_e w_e a_e a_e^T, where an infinite weight makes infinite just what its screw reaches beyond rounding.
+def weighted_sum(shares: Sequence[tuple[Screw, Scalar]], length: Scalar) -> Symmetric6:
+    """sum w a a^T, where an infinite weight makes infinite just what its screw reaches beyond rounding.
 
     Args:
-        weights: >= 0, infinity included.
-        screws: as many.
+        shares: screws a and weights w >= 0, infinity included.
         length: what to multiply translational components by, to compare them with rotational ones.
     """
-    dyads = [Symmetric6.dyad(screw, screw) for screw in screws]
-    finite = Symmetric6.total([d * where(w < INFINITE, w, 0.0) for w, d in zip(weights, dyads, strict=True)])
-    reached = [_endless(w, screw, length) for w, screw in zip(weights, screws, strict=True)]
+    finite = Symmetric6.total([Symmetric6.dyad(a, a) * where(w < INFINITE, w, 0.0) for a, w in shares])
+    reached = [_endless(w, screw, length) for screw, w in shares]
     entries = []
     for k, (i, j) in enumerate(POSITIONS):
         together = total([times(flags[i], flags[j]) for flags in reached])
@@ -181,7 +208,7 @@ def weighted_sum(weights: Sequence[Scalar], screws: Sequence[Screw], length: Sca
 
 def _endless(weight: Scalar, screw: Screw, length: Scalar) -> list[Scalar]:
     """1 for each component of the screw that an infinite weight reaches beyond rounding, else 0."""
-    sizes = [times(c, c) * scale for c, scale in zip(screw.components(), _squares(length), strict=True)]
+    sizes = [times(times(c, c), scale) for c, scale in zip(screw.components(), _squares(length), strict=True)]
     limit = ROUNDING * total(sizes)
     return [where(weight < INFINITE, 0.0, where(size > limit, 1.0, 0.0)) for size in sizes]
 

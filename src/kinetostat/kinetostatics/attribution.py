@@ -7,8 +7,8 @@ from kinetostat.kinetostatics.assembly import Statics, weighted_sum
 
 def compliance_shares(statics: Statics) -> list[Symmetric6]:
     """Per spring s_e xi_e xi_e^T: what C would lose if this spring became rigid (theory section 2)."""
-    pairs = zip(statics.compliance, statics.flexibility, strict=True)
-    return [weighted_sum([s], [twist], reciprocal(statics.length)) for s, twist in pairs]
+    pairs = zip(statics.flexibility, statics.compliance, strict=True)
+    return [weighted_sum([pair], reciprocal(statics.length)) for pair in pairs]
 
 
 def stiffness_shares(statics: Statics) -> list[Symmetric6]:
@@ -17,8 +17,7 @@ def stiffness_shares(statics: Statics) -> list[Symmetric6]:
     In a leg with as many springs as wrenches it is also what K would lose if this spring became free. Where something
     is rigid whatever the springs, K is infinite and the shares do not add up to it.
     """
-    pairs = zip(statics.stiffness, statics.resistance, statics.compliance, strict=False)
-    return [weighted_sum([k], [wrench], statics.length) for k, wrench, _ in pairs]
+    return [weighted_sum([pair], statics.length) for pair in zip(statics.resistance, statics.stiffness, strict=True)]
 
 
 def stiffness_coefficients(statics: Statics) -> list[Symmetric6]:

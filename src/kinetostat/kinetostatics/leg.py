@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from kinetostat.algebra.scalar import Scalar, is_one, is_zero, reciprocal, smaller, sqrt, times, total, where
+from kinetostat.algebra.scalar import Scalar, is_one, plus, reciprocal, smaller, sqrt, times, total, where
 from kinetostat.algebra.screw import Screw, Wrench
-from kinetostat.algebra.solve import complement, diagonalise, dual_basis
+from kinetostat.algebra.solve import complement, conjugate, dual_basis
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.machine.leg import LegScrews
 
@@ -93,17 +93,65 @@ def _identity(size: int) -> list[list[Scalar]]:
     return [[1.0 if i == j else 0.0 for j in range(size)] for i in range(size)]
 
 
+@dataclass(frozen=True)
+class Modes:
+    """A leg in wrenches to which it yields one by one: to the platform, as many springs that feel one wrench each.
+
+    Attributes:
+        wrenches: W' with W = W' L^T.
+        loads: load in each spring of the leg per unit of each of them.
+        compliance: d with G = L diag(d) L^T.
+        shares: rows of L, unit lower triangular, below the diagonal.
+    """
+
+    wrenches: tuple[Wrench, ...]
+    loads: tuple[tuple[Scalar, ...], ...]
+    compliance: tuple[Scalar, ...]
+    shares: tuple[tuple[Scalar, ...], ...]
+
+    def amounts(self, amounts: Sequence[Scalar]) -> list[Scalar]:
+        """Of the modes, in a load that is given by amounts of the leg's own wrenches: L^T times these."""
+        size = range(len(amounts))
+        return [plus(amounts[k], total([times(self.shares[j][k], amounts[j]) for j in size if j > k])) for k in size]
+
+
+def modes_of(leg: LegScrews) -> Modes:
+    """The modes of a leg; each is one of its wrenches less a mix of those before."""
+    springs = len(leg.loads)
+    columns = [(*(row[k] for row in leg.loads), *wrench.components()) for k, wrench in enumerate(leg.wrenches)]
+    found, shares, pivots = conjugate(columns, leg.compliance)
+    return Modes(
+        tuple(Wrench(Vector(*column[springs : springs + 3]), Vector(*column[springs + 3 :])) for column in found),
+        tuple(tuple(column[e] for column in found) for e in range(springs)),
+        tuple(pivots),
+        tuple(tuple(row) for row in shares),
+    )
+
+
 def leg_modes(leg: LegScrews) -> list[Action]:
     """The leg's stiffness W G^-1 W^T as m shares: wrenches for which G is diagonal, infinite where G vanishes.
 
     Source: theory section 2, eq. 32.
     """
-    rows, pivots = diagonalise(leg_compliance(leg))
-    return [(combine(leg.wrenches, row), reciprocal(pivot)) for row, pivot in zip(rows, pivots, strict=True)]
+    modes = modes_of(leg)
+    return [(wrench, reciprocal(d)) for wrench, d in zip(modes.wrenches, modes.compliance, strict=True)]
 
 
-def leg_resistance(leg: LegScrews) -> tuple[list[Action], list[Action]]:
-    """The leg's stiffness spring by spring: one share for each, and what is rigid whatever the springs.
+@dataclass(frozen=True)
+class Resistance:
+    """How a leg resists motion of the platform.
+
+    Attributes:
+        shares: one for each spring: its share in W G^-1 W^T.
+        modes: the fewest shares that add up to it, with what is rigid whatever the springs.
+    """
+
+    shares: list[Action]
+    modes: list[Action]
+
+
+def leg_resistance(leg: LegScrews) -> Resistance:
+    """The leg's stiffness spring by spring.
 
     With as many springs as wrenches, the share of spring e is k_e b_e b_e^T, where b_e loads e alone by one unit: exact
     for any k_e from free to rigid. With more (springs in series) or fewer, and where a load is felt by no spring, it is
@@ -114,34 +162,29 @@ def leg_resistance(leg: LegScrews) -> tuple[list[Action], list[Action]]:
     if len(leg.loads) != len(leg.wrenches):
         leg = relaxed(leg)
     if not leg.wrenches:
-        return [(NOTHING, 0.0)] * len(leg.loads), []
+        return Resistance([(NOTHING, 0.0)] * len(leg.loads), [])
     stiffness = [reciprocal(s) for s in leg.compliance]
     if len(leg.loads) == len(leg.wrenches) == 1 and is_one(leg.loads[0][0]):
-        return [(leg.wrenches[0], stiffness[0])], []
-    load, modes = leg.loads, leg_modes(leg)
-    rows, pivots = diagonalise(leg_compliance(leg))
-    held = [(wrench, where(pivot > 0.0, 0.0, INFINITE)) for (wrench, _), pivot in zip(modes, pivots, strict=True)]
-    yielding = [reciprocal(where(pivot > 0.0, pivot, INFINITE)) for pivot in pivots]
-    felt = [[total([times(r, c) for r, c in zip(row, one, strict=True)]) for row in rows] for one in load]
+        alone = [(leg.wrenches[0], stiffness[0])]
+        return Resistance(alone, alone)
+    modes = modes_of(leg)
+    yielding = [reciprocal(where(d > 0.0, d, INFINITE)) for d in modes.compliance]
     in_modes = [
-        (combine([w for w, _ in modes], [times(f, y) for f, y in zip(feels, yielding, strict=True)]), s)
-        for feels, s in zip(felt, leg.compliance, strict=True)
+        (combine(modes.wrenches, [times(f, y) for f, y in zip(row, yielding, strict=True)]), s)
+        for row, s in zip(modes.loads, leg.compliance, strict=True)
     ]
-    if len(load) != len(leg.wrenches):
-        return in_modes, _effective(held)
-    sizes = [reciprocal(sqrt(total([times(c, c) for c in row]))) for row in load]
-    unload, sine = dual_basis([_unit(row) for row in load])
+    pairs = list(zip(modes.wrenches, modes.compliance, strict=True))
+    if len(leg.loads) != len(leg.wrenches):
+        return Resistance(in_modes, [(wrench, reciprocal(d)) for wrench, d in pairs])
+    held = [(wrench, where(d > 0.0, 0.0, INFINITE)) for wrench, d in pairs]
+    sizes = [reciprocal(sqrt(total([times(c, c) for c in row]))) for row in leg.loads]
+    unload, sine = dual_basis([_unit(row) for row in leg.loads])
     apart = sine > UNSEEN
     springwise = [combine(leg.wrenches, row) * size for row, size in zip(unload, sizes, strict=True)]
     shares = [
         (_either(apart, b, c), where(apart, k, s)) for b, k, (c, s) in zip(springwise, stiffness, in_modes, strict=True)
     ]
-    return shares, _effective([(_either(apart, NOTHING, wrench), where(apart, 0.0, k)) for wrench, k in held])
-
-
-def _effective(actions: list[Action]) -> list[Action]:
-    """The actions without those that are known to do nothing."""
-    return [(wrench, k) for wrench, k in actions if not is_zero(k)]
+    return Resistance(shares, shares + [(_either(apart, NOTHING, w), where(apart, 0.0, k)) for w, k in held])
 
 
 def combine(screws: Sequence[AnyScrew], weights: Sequence[Scalar]) -> AnyScrew:

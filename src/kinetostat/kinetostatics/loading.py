@@ -7,7 +7,6 @@ from kinetostat.algebra.scalar import Scalar, times, total
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.symmetric import SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
-from kinetostat.kinetostatics.leg import relaxed
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Leg
 
@@ -46,8 +45,7 @@ def leg_wrenches(response: Response, load: Wrench) -> list[Wrench]:
     Their sum is the load. Where rigid parts leave internal loads undecided, those are taken as zero.
     """
     carried = []
-    for leg, shares in zip(response.legs, response.statics.sharing, strict=True):
-        basis = leg.wrenches if len(shares) == len(leg.wrenches) else relaxed(leg).wrenches
+    for basis, shares in zip(response.statics.wrenches, response.statics.sharing, strict=True):
         parts = [wrench * load.work(share) for wrench, share in zip(basis, shares, strict=True)]
         carried.append(sum_of(parts))
     return carried

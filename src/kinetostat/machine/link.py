@@ -38,10 +38,10 @@ class Rigidity:
     shear_z: Scalar = RIGID
 
 
-def link_axes(start: Vector, end: Vector, up: Vector, length: Scalar | None = None) -> tuple[Rotation, Scalar]:
+def link_axes(start: Vector, end: Vector, up: Vector) -> tuple[Rotation, Scalar]:
     """The link's axes in the base frame and its length (m): x from start to end, z nearest to `up`, y = z x x."""
     span = end - start
-    length = span.norm() if length is None else length
+    length = span.norm()
     along = span * reciprocal(length)
     side = up.cross(along)
     side = side * reciprocal(side.norm())
@@ -60,7 +60,7 @@ class Beam:
         start, end: of its axis, base frame, m.
         up: not along the link; the section's z axis lies in the plane of both.
         rigidity: of its section.
-        length: of its axis, m; known without the ends once it has been displaced, which does not change it.
+        placed: its axes and its length, m: known without the ends once it has been displaced.
     """
 
     name: str
@@ -68,7 +68,12 @@ class Beam:
     end: Vector
     up: Vector
     rigidity: Rigidity
-    length: Scalar | None = None
+    placed: tuple[Rotation, Scalar] | None = None
+
+    @property
+    def axes(self) -> tuple[Rotation, Scalar]:
+        """The section's axes in the base frame and the length of the link, m."""
+        return self.placed or link_axes(self.start, self.end, self.up)
 
     @property
     def freedoms(self) -> tuple[Joint, ...]:
@@ -78,7 +83,7 @@ class Beam:
     @property
     def springs(self) -> tuple[Spring, ...]:
         """Six at the middle: torsion GJ/L, bending EI/L, tension EA/L, and shear 1/(L^3/12EI + L/kappa GA)."""
-        axes, length = link_axes(self.start, self.end, self.up, self.length)
+        axes, length = self.axes
         middle, shrink, own = (self.start + self.end) * 0.5, reciprocal(length), self.rigidity
         cubed = length * length * length * (1.0 / 12.0)
         shear = [
@@ -105,9 +110,10 @@ class Beam:
 
     def displaced(self, motion: Displacement) -> "Beam":
         """The link after a rigid displacement of the whole machine."""
+        axes, length = self.axes
+        placed = motion.rotation @ axes, length
         ends = motion.apply(self.start), motion.apply(self.end)
-        length = (self.end - self.start).norm() if self.length is None else self.length
-        return Beam(self.name, *ends, motion.rotation.apply(self.up), self.rigidity, length)
+        return Beam(self.name, *ends, motion.rotation.apply(self.up), self.rigidity, placed)
 
 
 def lumped_springs(name: str, start: Vector, end: Vector, up: Vector, rigidity: Rigidity) -> tuple[Spring, ...]:

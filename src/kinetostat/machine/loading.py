@@ -148,12 +148,12 @@ def as_toml(machine: Machine) -> str:
             continue
         lines += ["", f"[{'.'.join(_key(part) for part in name.split('.'))}]"]
         lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get(name, {}).items()]
-        lines += _quantity_lines(section) if section is not None else []
+        lines += _quantity_lines(machine.family.every_section[name], section) if section is not None else []
     return "\n".join(lines) + "\n"
 
 
-def _quantity_lines(section: Any) -> Iterator[str]:
-    for field, quantity in quantities(type(section)).items():
+def _quantity_lines(fields: type, section: Any) -> Iterator[str]:
+    for field, quantity in quantities(fields).items():
         held = getattr(section, field)
         if quantity.unset is not None and held == quantity.unset:
             continue

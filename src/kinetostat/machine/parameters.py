@@ -58,9 +58,9 @@ def find(family: Family, text: str) -> Parameter:
 def values(machine: Machine) -> dict[str, Scalar]:
     """Every scalar of a machine by path, SI."""
     found: dict[str, Scalar] = {}
-    for section, data in machine.sections.items():
-        for name, quantity in quantities(type(data)).items():
-            held = getattr(data, name)
+    for section, fields in machine.family.every_section.items():
+        for name, quantity in quantities(fields).items():
+            held = getattr(machine.sections[section], name)
             entries = (held,) if quantity.count is None else held
             found.update(zip(leaves(f"{section}.{name}", quantity), entries, strict=True))
     return found

@@ -5,8 +5,10 @@ the validation, the JSON Schema, the field paths and the messages; no family wri
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields
+from functools import lru_cache
+from types import MappingProxyType
 from typing import Any, TypeVar, dataclass_transform, get_type_hints
 
 from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -130,10 +132,11 @@ class Quantity:
         return {"anyOf": [one, many], "description": f"{rule}; one for all, or a list of {self.count}"}
 
 
-def quantities(section_type: type) -> dict[str, Quantity]:
+@lru_cache(1024)
+def quantities(section_type: type) -> Mapping[str, Quantity]:
     """The fields of a section by name."""
     hints = get_type_hints(section_type, include_extras=True)
-    return {field.name: hints[field.name].__metadata__[0] for field in fields(section_type)}
+    return MappingProxyType({field.name: hints[field.name].__metadata__[0] for field in fields(section_type)})
 
 
 def optional(section_type: type) -> set[str]:

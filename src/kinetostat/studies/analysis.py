@@ -204,21 +204,26 @@ def machine_length(machine: Machine) -> float:
 
 
 def _turned(statics: Statics, turn: Rotation) -> Statics:
-    """The same statics in axes turned back by `turn`."""
+    """The shares of the springs, of K and of C in axes turned back by `turn`."""
     return replace(
         statics,
-        sharing=tuple(tuple(twist.rotated(turn) for twist in own) for own in statics.sharing),
         flexibility=tuple(twist.rotated(turn) for twist in statics.flexibility),
         resistance=tuple(wrench.rotated(turn) for wrench in statics.resistance),
+        motions=tuple((twist.rotated(turn), s) for twist, s in statics.motions),
+        actions=tuple((wrench.rotated(turn), k) for wrench, k in statics.actions),
     )
 
 
 def _without_rounding(statics: Statics) -> Statics:
     """The same statics with exact zeros where a screw's component is but rounding beside its others."""
     length = statics.length
-    flexibility = tuple(_rounded(twist, 1.0 / length) for twist in statics.flexibility)
-    resistance = tuple(_rounded(wrench, length) for wrench in statics.resistance)
-    return replace(statics, flexibility=flexibility, resistance=resistance)
+    return replace(
+        statics,
+        flexibility=tuple(_rounded(twist, 1.0 / length) for twist in statics.flexibility),
+        resistance=tuple(_rounded(wrench, length) for wrench in statics.resistance),
+        motions=tuple((_rounded(twist, 1.0 / length), s) for twist, s in statics.motions),
+        actions=tuple((_rounded(wrench, length), k) for wrench, k in statics.actions),
+    )
 
 
 def _rounded(screw: AnyScrew, length: float) -> AnyScrew:
@@ -231,10 +236,10 @@ def _rounded(screw: AnyScrew, length: float) -> AnyScrew:
 def _rank(statics: Statics, endless: bool) -> int:
     """Rank of C, or of K where C is not finite; independent of how much the springs differ."""
     if endless:
-        held: list[Screw] = [wrench for k, wrench in zip(statics.stiffness, statics.resistance, strict=True) if k > 0.0]
+        held: list[Screw] = [wrench for wrench, k in statics.actions if k > 0.0]
         return independent(held, statics.length, INDEPENDENT)
-    motions = [twist for s, twist in zip(statics.compliance, statics.flexibility, strict=True) if s > 0.0]
-    return independent(motions, 1.0 / statics.length, INDEPENDENT)
+    moved: list[Screw] = [twist for twist, s in statics.motions if s > 0.0]
+    return independent(moved, 1.0 / statics.length, INDEPENDENT)
 
 
 def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...], yielding: bool) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from kinetostat.algebra.scalar import Scalar, plus, reciprocal, sqrt, times, total, where
+from kinetostat.algebra.scalar import Scalar, is_zero, plus, reciprocal, sqrt, times, total, where
 from kinetostat.algebra.vector import AXES, IDENTITY, X_AXIS, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector
 from kinetostat.machine.leg import Element, Joint, Leg, Spring, Turn, revolutes
 from kinetostat.machine.link import Beam, Parallelogram, lumped_springs, matrix_springs
@@ -123,6 +123,9 @@ def _yielding(
 def _any_up(ends: tuple[Vector, Vector]) -> Vector:
     """The base axis that is furthest from a link's direction: for sections that look alike from all sides."""
     sizes = [times(c, c) for c in (ends[1] - ends[0]).components()]
+    across = [axis for axis, size in zip(AXES, sizes, strict=True) if is_zero(size)]
+    if across:
+        return across[0]
     best, least = X_AXIS, sizes[0]
     for axis, size in ((Y_AXIS, sizes[1]), (Z_AXIS, sizes[2])):
         nearer = size < least

@@ -1,5 +1,6 @@
-// The 4-dof machine by hand in C++ with GCC vector extensions: what evaluate() is measured against.
-// Two ways: the paper's (K of eq. 32, 6x6 Cholesky inverse) and one that uses all that is known of this machine (4x4).
+// Machines by hand in C++ with GCC vector extensions: what evaluate() is measured against.
+// The 4-dof machine in two ways: the paper's (K of eq. 32, 6x6 Cholesky inverse), and one that uses all that is known of
+// it (4x4). The hexapod and the Tripteron: K, then a 6x6 Cholesky inverse.
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -156,29 +157,152 @@ static inline V compliance_reduced(const Machine& m, const Pose& o, V* C) {
     return determinant < 0.0 ? -determinant : determinant;
 }
 
-template <bool REDUCED, bool ALL>
-static void run(const Machine& m, const double* const* in, double* const* out, int8_t* status, int64_t count) {
+// C = K^-1 by Cholesky from the lower triangle of K; returns the smallest pivot.
+static inline V inverse_diagonal(V K[6][6], V* C) {
+    V unit[6], none = K[0][0] * 0.0, smallest = none + 1e300;
+    for (int j = 0; j < 6; j++)
+        for (int i = j; i < 6; i++) {
+            V sum = K[i][j];
+            for (int k = 0; k < j; k++) sum -= K[i][k] * K[j][k];
+            if (i == j) smallest = sum < smallest ? sum : smallest, unit[j] = 1.0 / root(sum);
+            else K[i][j] = sum * unit[j];
+        }
+    for (int j = 0; j < 6; j++) {
+        V column[6];
+        column[j] = unit[j];
+        C[j] = column[j] * column[j];
+        for (int i = j + 1; i < 6; i++) {
+            V sum = none;
+            for (int k = j; k < i; k++) sum -= K[i][k] * column[k];
+            column[i] = sum * unit[i];
+            C[j] += column[i] * column[i];
+        }
+    }
+    return smallest;
+}
+
+struct Hexapod { double base[3][6], top[3][6], actuator[6]; };
+
+// Columns x y z roll pitch yaw.
+static inline V hexapod(const Hexapod& m, const double* const* in, int64_t at, V* C, V* D) {
+    V p[3], c[3], s[3], K[6][6];
+    for (int i = 0; i < 3; i++) p[i] = load(in[i] + at), cos_sin(load(in[3 + i] + at), c[i], s[i]);
+    V R[3][3] = {{c[2] * c[1], c[2] * s[1] * s[0] - s[2] * c[0], c[2] * s[1] * c[0] + s[2] * s[0]},
+                 {s[2] * c[1], s[2] * s[1] * s[0] + c[2] * c[0], s[2] * s[1] * c[0] - c[2] * s[0]},
+                 {-s[1], c[1] * s[0], c[1] * c[0]}};
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j <= i; j++) K[i][j] = p[0] * 0.0;
+    for (int leg = 0; leg < 6; leg++) {
+        V r[3], v[3];
+        for (int i = 0; i < 3; i++) {
+            r[i] = R[i][0] * m.top[0][leg] + R[i][1] * m.top[1][leg] + R[i][2] * m.top[2][leg];
+            v[i] = r[i] + p[i] - m.base[i][leg];
+        }
+        V unit = 1.0 / root(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+        for (int i = 0; i < 3; i++) v[i] *= unit;
+        V w[6] = {r[1] * v[2] - r[2] * v[1], r[2] * v[0] - r[0] * v[2], r[0] * v[1] - r[1] * v[0], v[0], v[1], v[2]};
+        for (int i = 0; i < 6; i++)
+            for (int j = 0; j <= i; j++) K[i][j] += m.actuator[leg] * w[i] * w[j];
+    }
+    for (int i = 0; i < 6; i++) D[i] = K[i][i];
+    return inverse_diagonal(K, C);
+}
+
+struct Tripteron { double link, torsion, bending, shear, actuator; };  // compliances of a link; N/m
+
+// Columns x y z. G of a leg for moments across its slide (a, b) and a force along it; P at (u, v) in its plane.
+static inline void tripteron_leg(const Tripteron& m, V u, V v, V G[3][3]) {
+    V square = u * u + v * v, across = root(m.link * m.link / square - 0.25), none = u * 0.0;
+    V eu = 0.5 * u + across * v, ev = 0.5 * v - across * u;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) G[i][j] = none;
+    G[2][2] = none + 1.0 / m.actuator;
+    for (int k = 0; k < 2; k++) {
+        V from_u = k ? eu : none, from_v = k ? ev : none, to_u = k ? u : eu, to_v = k ? v : ev;
+        V du = (to_u - from_u) * (1.0 / m.link), dv = (to_v - from_v) * (1.0 / m.link);
+        V lever_u = v - 0.5 * (from_v + to_v), lever_v = 0.5 * (from_u + to_u) - u;
+        V axes[2][2] = {{du, dv}, {-dv, du}};
+        for (int n = 0; n < 2; n++) {
+            V load[3] = {axes[n][0], axes[n][1], axes[n][0] * lever_u + axes[n][1] * lever_v};
+            double soft = n ? m.bending : m.torsion;
+            for (int i = 0; i < 3; i++)
+                for (int j = 0; j <= i; j++) G[i][j] += soft * load[i] * load[j];
+        }
+        G[2][2] += m.shear;
+    }
+}
+
+static inline V tripteron(const Tripteron& m, const double* const* in, int64_t at, V* C, V* D) {
+    V x = load(in[0] + at), y = load(in[1] + at), z = load(in[2] + at), K[6][6];
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j <= i; j++) K[i][j] = x * 0.0;
+    // axes x, y, z of each leg are base axes with a sign: which, and coordinates of P from where the leg starts
+    const int axis[3][3] = {{0, 1, 2}, {0, 2, 1}, {2, 1, 0}};
+    const double sign[3][3] = {{1, 1, 1}, {1, -1, 1}, {1, -1, 1}};
+    V plane[3][2] = {{x, y}, {x, 1.0 - z}, {z, 1.0 - y}};
+    for (int leg = 0; leg < 3; leg++) {
+        V G[3][3];
+        tripteron_leg(m, plane[leg][0], plane[leg][1], G);
+        V a = G[1][1] * G[2][2] - G[2][1] * G[2][1], b = G[2][0] * G[2][1] - G[1][0] * G[2][2];
+        V c = G[1][0] * G[2][1] - G[2][0] * G[1][1], shrink = 1.0 / (G[0][0] * a + G[1][0] * b + G[2][0] * c);
+        V I[3][3];
+        I[0][0] = a * shrink; I[1][0] = b * shrink; I[2][0] = c * shrink;
+        I[1][1] = (G[0][0] * G[2][2] - G[2][0] * G[2][0]) * shrink;
+        I[2][1] = (G[1][0] * G[2][0] - G[0][0] * G[2][1]) * shrink;
+        I[2][2] = (G[0][0] * G[1][1] - G[1][0] * G[1][0]) * shrink;
+        int row[3] = {axis[leg][0], axis[leg][1], 3 + axis[leg][2]};
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j <= i; j++) {
+                int r = row[i] > row[j] ? row[i] : row[j], q = row[i] > row[j] ? row[j] : row[i];
+                K[r][q] += sign[leg][i] * sign[leg][j] * I[i][j];
+            }
+    }
+    for (int i = 0; i < 6; i++) D[i] = K[i][i];
+    return inverse_diagonal(K, C);
+}
+
+static inline V pose_4dof(const Machine& m, const double* const* in, int64_t at, bool reduced, bool all, V* C, V* D,
+                          Mask& reached) {
+    Pose pose;
+    place(m, load(in[0] + at), load(in[1] + at), load(in[2] + at), load(in[3] + at), pose);
+    V regular = reduced ? compliance_reduced(m, pose, C) : compliance_cholesky(m, pose, C);
+    if (all) stiffness_diagonal(m, pose, D);
+    reached = pose.reached;
+    return regular;
+}
+
+enum Kind { FOUR_DOF, FOUR_DOF_REDUCED, HEXAPOD, TRIPTERON };
+
+template <Kind KIND, bool ALL>
+static void run(const void* m, const double* const* in, double* const* out, int8_t* status, int64_t count) {
     for (int64_t k = 0; k < count; k += LANES) {
         int64_t at = k <= count - LANES ? k : count - LANES;
-        Pose pose;
-        V C[6], K[6];
-        place(m, load(in[0] + at), load(in[1] + at), load(in[2] + at), load(in[3] + at), pose);
-        V regular = REDUCED ? compliance_reduced(m, pose, C) : compliance_cholesky(m, pose, C);
-        Mask solvable = regular > 1e-9, ok = pose.reached & solvable;
+        V C[6], K[6], regular;
+        Mask reached = Mask{} - 1;
+        if (KIND == HEXAPOD) regular = hexapod(*static_cast<const Hexapod*>(m), in, at, C, K);
+        else if (KIND == TRIPTERON) regular = tripteron(*static_cast<const Tripteron*>(m), in, at, C, K);
+        else regular = pose_4dof(*static_cast<const Machine*>(m), in, at, KIND == FOUR_DOF_REDUCED, ALL, C, K, reached);
+        Mask solvable = regular > 1e-9, ok = reached & solvable;
         V nan = regular * 0.0 + NAN;
-        if (ALL) {
-            stiffness_diagonal(m, pose, K);
+        if (ALL)
             for (int i = 0; i < 6; i++) store(out[i] + at, ok ? C[i] : nan), store(out[6 + i] + at, ok ? K[i] : nan);
-        } else {
-            store(out[0] + at, ok ? C[0] + C[1] + C[2] + C[3] + C[4] + C[5] : nan);
-        }
-        Mask code = pose.reached ? (solvable ? Mask{} : Mask{} + 3) : Mask{} + 1;
+        else store(out[0] + at, ok ? C[0] + C[1] + C[2] + C[3] + C[4] + C[5] : nan);
+        Mask code = reached ? (solvable ? Mask{} : Mask{} + 3) : Mask{} + 1;
         for (int i = 0; i < LANES; i++) status[at + i] = int8_t(code[i]);
     }
 }
 
-extern "C" void kernel(const Machine* m, const double* const* in, double* const* out, int8_t* status, int64_t count,
-                       int reduced, int all) {
-    if (reduced) all ? run<true, true>(*m, in, out, status, count) : run<true, false>(*m, in, out, status, count);
-    else all ? run<false, true>(*m, in, out, status, count) : run<false, false>(*m, in, out, status, count);
+template <Kind KIND>
+static void either(const void* m, const double* const* in, double* const* out, int8_t* status, int64_t count, int all) {
+    all ? run<KIND, true>(m, in, out, status, count) : run<KIND, false>(m, in, out, status, count);
+}
+
+extern "C" void kernel(int kind, const void* m, const double* const* in, double* const* out, int8_t* status,
+                       int64_t count, int all) {
+    switch (kind) {
+        case FOUR_DOF: either<FOUR_DOF>(m, in, out, status, count, all); break;
+        case FOUR_DOF_REDUCED: either<FOUR_DOF_REDUCED>(m, in, out, status, count, all); break;
+        case HEXAPOD: either<HEXAPOD>(m, in, out, status, count, all); break;
+        case TRIPTERON: either<TRIPTERON>(m, in, out, status, count, all); break;
+    }
 }

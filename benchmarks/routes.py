@@ -1,0 +1,168 @@
+"""Ways to the same numbers, to be timed in turns: kinetostat, batched NumPy, hand-written C++, PyNite pose by pose."""
+
+import ctypes
+import importlib.util
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from cases import SUM, TWELVE, Case
+from kinetostat.engine.batch import evaluate
+from kinetostat.engine.derivatives import evaluate_gradient
+from kinetostat.engine.points import Table
+from kinetostat.engine.threads import available_cores
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.loading import load
+from kinetostat.machine.parameters import with_values
+
+Array = npt.NDArray[np.float64]
+
+NUMPY_CHUNKS = (256, 512, 1024, 2048, 4096, 16384)
+NUMPY_SHARE = 20
+"""NumPy is timed over this fraction of the poses."""
+SLAB = 16384
+FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC")
+TWELVE_OUTPUTS, SUM_OF_C, WITH_GRADIENT = "diagonals of C and K", "sum of C", "sum of C and gradient by 7"
+
+
+@dataclass
+class Route:
+    """One way to the same numbers.
+
+    Attributes:
+        name: for the table.
+        task: what it computes.
+        count: number of poses it is timed over.
+        run: does it; returns one array per output [count].
+        prepared: what it took to get ready (imports, compilation), s.
+        best: its best turn, s.
+    """
+
+    name: str
+    task: str
+    count: int
+    run: Callable[[], Sequence[Array]]
+    prepared: float = 0.0
+    best: float = float("inf")
+
+    def turn(self) -> float:
+        """Do it once; returns s."""
+        started = time.perf_counter()
+        self.run()
+        taken = time.perf_counter() - started
+        self.best = min(self.best, taken)
+        return taken
+
+    @property
+    def rate(self) -> float:
+        """Poses per second in its best turn."""
+        return self.count / self.best
+
+
+def routes_of(case: Case, poses: dict[str, Array], folder: Path) -> list[Route]:
+    """All ways to the numbers of a case that this machine offers."""
+    return [
+        *our_routes(case, poses),
+        numpy_route(case, poses),
+        *cpp_routes(case, poses, folder),
+        *pynite_route(case, poses),
+    ]
+
+
+def our_routes(case: Case, poses: dict[str, Array]) -> list[Route]:
+    """evaluate() and evaluate_gradient()."""
+    machine, points = load(case.machine), Table(poses)
+    tasks: dict[str, Callable[[], Sequence[Array]]] = {
+        TWELVE_OUTPUTS: lambda: [*evaluate(machine, points, TWELVE).values.values()],
+        SUM_OF_C: lambda: [*evaluate_gradient(machine, points, SUM, ()).values],
+        WITH_GRADIENT: lambda: [*evaluate_gradient(machine, points, SUM, case.design).values],
+    }
+    return [_prepared(Route("kinetostat", task, points.size, run)) for task, run in tasks.items()]
+
+
+def _prepared(route: Route) -> Route:
+    """What its first call takes above the others: import, trace, compile."""
+    first = route.turn()
+    route.best = float("inf")
+    route.prepared = max(0.0, first - min(route.turn() for _ in range(2)))
+    return route
+
+
+def numpy_route(case: Case, poses: dict[str, Array]) -> Route:
+    """Arrays of matrices, in the best of several chunk sizes, on all cores."""
+    count = len(next(iter(poses.values()))) // NUMPY_SHARE
+    results = np.empty((12, count))
+
+    def run(chunk: int) -> Array:
+        def task(start: int, stop: int) -> None:
+            results[:, start:stop] = case.diagonals(*(column[start:stop] for column in poses.values()))
+
+        in_chunks(task, count, chunk)
+        return results
+
+    trials = [(Route("", "", count, lambda c=chunk: run(c)).turn(), chunk) for chunk in NUMPY_CHUNKS]
+    chunk = min(trials)[1]
+    return Route(f"batched NumPy, chunks of {chunk}", TWELVE_OUTPUTS, count, lambda: run(chunk))
+
+
+def in_chunks(task: Callable[[int, int], None], count: int, chunk: int) -> None:
+    """The task over [start, stop) of every chunk, by all cores."""
+    with ThreadPoolExecutor(available_cores()) as pool:
+        list(pool.map(lambda start: task(start, min(start + chunk, count)), range(0, count, chunk)))
+
+
+def cpp_routes(case: Case, poses: dict[str, Array], folder: Path) -> list[Route]:
+    """The kernels of kernels.cpp, where there is a compiler."""
+    compiler = next(filter(None, map(shutil.which, ("c++", "g++", "clang++"))), None)
+    if compiler is None:
+        return []
+    started = time.perf_counter()
+    library = folder / f"{case.machine}.so"
+    subprocess.run([compiler, *FLAGS, "-o", str(library), str(Path(__file__).with_name("kernels.cpp"))], check=True)
+    prepared = time.perf_counter() - started
+    code = ctypes.CDLL(str(library)).kernel
+    count = len(next(iter(poses.values())))
+
+    def run(kind: int, everything: bool) -> Array:
+        results, status = np.empty((12 if everything else 1, count)), np.empty(count, dtype=np.int8)
+
+        def task(start: int, stop: int) -> None:
+            columns = np.array([column[start:stop].ctypes.data for column in poses.values()], dtype=np.uintp)
+            rows = np.array([row[start:stop].ctypes.data for row in results], dtype=np.uintp)
+            pointers = [ctypes.c_void_p(a.ctypes.data) for a in (case.numbers, columns, rows, status[start:stop])]
+            code(ctypes.c_int(kind), *pointers, ctypes.c_int64(stop - start), ctypes.c_int(everything))
+
+        in_chunks(task, count, SLAB)
+        return results
+
+    return [
+        Route(f"C++, {name}", task, count, lambda k=kind, a=everything: run(k, a), prepared)
+        for task, everything in ((TWELVE_OUTPUTS, True), (SUM_OF_C, False))
+        for name, kind in case.kernels.items()
+    ]
+
+
+def pynite_route(case: Case, poses: dict[str, Array]) -> list[Route]:
+    """The validation's frame of straight members at the first pose, where PyNite is installed: C alone.
+
+    What is rigid gets ten stiffnesses in turn, from which the limit is extrapolated: ten frames per pose.
+    """
+    if importlib.util.find_spec("Pynite") is None:
+        return []
+    from kinetostat.validation.pynite_machine import solve
+
+    pose = {path: float(column[0]) for path, column in poses.items()}
+    response = respond(with_values(load(case.machine), pose))
+
+    def run() -> list[Array]:
+        found = np.diag(solve(response.configuration, response.reference).compliance)
+        return [np.array([entry]) for entry in found]
+
+    return [Route("PyNite, ten frames per pose", "diagonal of C", 1, run)]
