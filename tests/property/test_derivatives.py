@@ -13,6 +13,7 @@ from kinetostat.kinematics.closing import closing_equations
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import parameters, values, with_values
 from machines import CASES, KINDS, elastic_paths, every_machine, few, one_of_each, regular_machines
 
@@ -123,6 +124,25 @@ def test_machine_code_and_arrays_give_the_same_derivatives(case, monkeypatch):
         np.testing.assert_array_equal(np.isnan(one), np.isnan(other))
         size = np.nan_to_num(np.abs(one)).max(axis=-1, keepdims=True)
         assert (np.abs(one - other) <= SAME * size + ROUNDED)[~np.isnan(one)].all()
+
+
+BAR = ["sections.bar.diameter", "legs.x.slide.stiffness", "legs.z.shoulder.point.0", "legs.z.elbow.point.1", "pose.z"]
+
+
+@pytest.mark.parametrize("paths", [BAR, [*BAR, "legs.z.elbow.axis.0"]], ids=["closed forms hold", "an axis tilts"])
+def test_closed_forms_and_closing_equations_give_the_same_derivatives(paths, monkeypatch):
+    """Machine code goes through closed forms where they hold whatever changes, arrays always through the equations."""
+    machine = load("tripteron")
+    table = Table({path: np.random.default_rng(8).uniform(0.2, 0.8, 40) for path in ("pose.x", "pose.y", "pose.z")})
+    followed = evaluate_gradient(machine, table, ["compliance_x", "compliance_ry"], paths)
+    monkeypatch.setattr(derivatives, "MACHINE_CODE_FROM", 1)
+    found = evaluate_gradient(machine, table, ["compliance_x", "compliance_ry"], paths)
+    np.testing.assert_allclose(found.values, followed.values, rtol=1e-10)
+    size = np.nan_to_num(np.abs(followed.gradients)).max(axis=2, keepdims=True)
+    assert np.isnan(followed.gradients[:, len(BAR) :]).all(), "an axis that tilts opens its leg"
+    np.testing.assert_array_equal(np.isnan(found.gradients), np.isnan(followed.gradients))
+    rounding = 1e-13 * followed.values.max(axis=1)[:, None, None]
+    assert np.all(np.nan_to_num(np.abs(found.gradients - followed.gradients)) <= 1e-9 * size + rounding)
 
 
 @one_of_each

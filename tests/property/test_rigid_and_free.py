@@ -26,8 +26,9 @@ from numeric import (
     trace_product,
 )
 
-STIFF = 1e14
-"""N/m or N·m/rad: 1e8 times and more the other springs here."""
+STIFF = 1e17
+"""N/m or N·m/rad: 1e11 times and more the other springs here, so that where they share loads with those, in redundant
+machines, the square of what they yield is nothing."""
 SOFT = 1e-3
 """N/m or N·m/rad: one part in 1e6 and less of the other springs here."""
 MOST_FREE = 3

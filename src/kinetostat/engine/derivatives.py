@@ -34,6 +34,8 @@ KEPT = 32
 """Programs kept in memory."""
 SAME, ROUNDED = 1e-6, 1e-9
 """Relative difference up to which two ways to a derivative agree, and share of the largest that may be rounding."""
+NEAR, TRIED = 0.03, 5
+"""How far from a machine's own numbers, as a share of them, and at how many points closed forms are tried."""
 
 Objective: TypeAlias = str | Mapping[str, float]
 """A quantity by name, or a weighted sum of several: weights, in whatever unit, by name."""
@@ -103,21 +105,26 @@ def _fill(
 
 @lru_cache(KEPT)
 def _closed_forms_hold(kind: Kind, form: Form, weights: tuple[Weights, ...], paths: tuple[str, ...]) -> bool:
-    """Whether closed forms hold while parameters change: at the machine's own pose both ways must agree.
+    """Whether closed forms hold while parameters change: near the machine's own pose both ways must agree.
 
     They do not where a parameter changes what they take as given: that axes are parallel, say, or that the platform
-    keeps the coordinates that its pose does not give.
+    keeps the coordinates that its pose does not give. (At the home pose itself legs close whatever their axes.)
     """
     from kinetostat.engine.kernel import needs_iteration
 
     if needs_iteration(kind.machine):
         return False
     held, given = values(kind.machine), _Given(kind.machine, form.varying, weights, paths, native=False)
-    columns = {path: np.array([held[path]]) for path in form.varying}
-    direct, followed = np.empty((2, len(weights) * (1 + len(paths)), 1))
+    drawn = np.random.default_rng(0).uniform(-NEAR, NEAR, (len(form.varying), TRIED))
+    columns = {path: held[path] + (abs(held[path]) or 1.0) * row for path, row in zip(form.varying, drawn, strict=True)}
+    direct, followed = np.empty((2, len(weights) * (1 + len(paths)), TRIED))
+    status = np.empty(TRIED, dtype=np.int8)
     for fill, results in ((given.direct(closed=True), direct), (given.followed, followed)):
-        fill(columns, results, np.empty(1, dtype=np.int8))
-    return np.allclose(direct, followed, rtol=SAME, atol=ROUNDED * np.nanmax(np.abs(followed)), equal_nan=True)
+        fill(columns, results, status)
+    direct, followed = direct[:, status == Status.OK], followed[:, status == Status.OK]
+    rounded = ROUNDED * np.nan_to_num(np.abs(followed)).max(initial=0.0)
+    agree = np.allclose(direct, followed, rtol=SAME, atol=rounded, equal_nan=True)
+    return bool((status == Status.OK).any()) and agree
 
 
 class _Given:
