@@ -23,7 +23,7 @@ from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Table
 from kinetostat.engine.threads import available_cores
 from kinetostat.machine.loading import load
-from routes import TWELVE_OUTPUTS, Array, Route, routes_of
+from routes import DIAGONAL_OF_C, ONE, ONE_OF_C, TWELVE_OUTPUTS, Array, Route, routes_of
 
 SIZES = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 
@@ -65,9 +65,11 @@ def difference(route: Route, twelve: Sequence[Array]) -> str:
     found = route.run()
     if route.name == "kinetostat" and route.task == TWELVE_OUTPUTS:
         return ""
-    expected = twelve if route.task == TWELVE_OUTPUTS else [np.sum(twelve[:6], axis=0)]
-    if route.count == 1:
-        expected = twelve[:6]
+    expected = {
+        TWELVE_OUTPUTS: twelve,
+        DIAGONAL_OF_C: twelve[:6],
+        ONE_OF_C: [twelve[TWELVE.index(ONE)]],
+    }.get(route.task, [np.sum(twelve[:6], axis=0)])
     pairs = zip(found, expected, strict=True)
     return f"{max(float(np.abs(a / b[: len(a)] - 1.0).max()) for a, b in pairs):.0e}"
 

@@ -14,7 +14,8 @@ from functools import lru_cache
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, where
-from kinetostat.engine.body import Array, Body, Codes
+from kinetostat.engine.body import Array, Body, Codes, Runnable
+from kinetostat.engine.device import Device
 from kinetostat.engine.form import Form, Kind, angles, form_of, reduced, traced
 from kinetostat.engine.native import Program
 from kinetostat.engine.trace import Operand, Traced
@@ -42,15 +43,17 @@ class Kernel:
         machine: of which this is the program.
         quantities: names of its results.
         iterated: whether joint coordinates are found slab by slab, by Newton's method, and are columns of the program.
+        device: what the program runs on.
     """
 
-    program: Program
+    program: Runnable
     fixed: Array
     varying: tuple[str, ...]
     angles: frozenset[str]
     machine: Machine
     quantities: tuple[str, ...]
     iterated: bool
+    device: Device
 
     def run(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab of points; other threads run meanwhile.
@@ -76,13 +79,17 @@ class Kernel:
         left = np.flatnonzero(status == Status.NOT_CONVERGED)
         if left.size:
             found, codes = np.empty((len(results), left.size)), np.empty(left.size, dtype=status.dtype)
-            kernel = slab_kernel(self.machine, self.varying, self.quantities, iterated=True)
+            kernel = slab_kernel(self.machine, self.varying, self.quantities, True, self.device)
             kernel.run({path: column[left] for path, column in columns.items()}, found, codes)
             results[:, left], status[left] = found, codes
 
 
 def slab_kernel(
-    machine: Machine, varying: Sequence[str], quantities: Sequence[str], iterated: bool | None = None
+    machine: Machine,
+    varying: Sequence[str],
+    quantities: Sequence[str],
+    iterated: bool | None = None,
+    device: Device = Device.CPU,
 ) -> Kernel:
     """The program for slabs of points of a machine; about 0.1 s unless one of the same form has been compiled.
 
@@ -91,13 +98,14 @@ def slab_kernel(
         varying: leaf paths of the parameters that vary.
         quantities: names from `QUANTITIES`.
         iterated: see `Kernel`; None to decide.
+        device: what it runs on.
     """
     if iterated is None:
         iterated = needs_iteration(machine)
     form, numbers = form_of(machine, varying)
     names = tuple(quantities)
-    program = _program(Kind(machine), form, names, iterated)
-    return Kernel(program, numbers, form.varying, angles(machine), machine, names, iterated)
+    program = _program(Kind(machine), form, names, iterated, device)
+    return Kernel(program, numbers, form.varying, angles(machine), machine, names, iterated, device)
 
 
 def needs_iteration(machine: Machine) -> bool:
@@ -109,14 +117,20 @@ def needs_iteration(machine: Machine) -> bool:
 
 
 @lru_cache(KEPT)
-def _program(kind: Kind, form: Form, quantities: tuple[str, ...], iterated: bool) -> Program:
+def _program(kind: Kind, form: Form, quantities: tuple[str, ...], iterated: bool, device: Device) -> Runnable:
     given = traced(kind, form)
     joints = [given.graph.input() for _ in range(kind.machine.chains().size + 1)] if iterated else []
     response = respond(given.machine, _joints(given.machine, joints))
     accepted = response.status < Status.OK + 0.5
     results = [where(accepted, QUANTITIES[name].value(response), math.nan) for name in quantities]
     numbers = [_number(result) for result in results]
-    return Program(Body(given.fixed, [*given.columns.values(), *joints], numbers, _number(response.status)))
+    body = Body(given.fixed, [*given.columns.values(), *joints], numbers, _number(response.status))
+    if device is Device.CPU:
+        return Program(body)
+    from kinetostat.engine.cuda import GpuProgram
+    from kinetostat.engine.cuda_driver import gpu
+
+    return GpuProgram(body, gpu())
 
 
 def _joints(machine: Machine, columns: Sequence[Traced]) -> Joints | None:

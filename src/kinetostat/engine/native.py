@@ -6,7 +6,6 @@ alone, which takes 50 ms. The order of tracing beats an order by depth: a tenth 
 """
 
 import ctypes
-import struct
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
@@ -16,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.engine.body import Array, Body, Codes
-from kinetostat.engine.trace import Condition, Node, Operand, Traced, needed
+from kinetostat.engine.llvm_text import declarations, line, name_of, type_of
+from kinetostat.engine.trace import Node, Operand, Traced, needed
 
 
 class Program:
@@ -105,15 +105,11 @@ exit:
 }}
 """
 """The last vector of points is moved back to end with the last point, and so may repeat some: %count >= lanes."""
-ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
-FUSIBLE = "contract"
-"""LLVM may fuse a product and a sum into one operation with one rounding; nothing else is relaxed (no fast-math)."""
-FUNCTIONS = {"abs": "fabs", "sqrt": "sqrt"}
 
 
 def source(body: Body, lanes: int) -> str:
     """A body as LLVM assembly; lanes are the points of one vector."""
-    numbers = _type(Traced, lanes)
+    numbers = type_of(Traced, lanes)
     before, inside = [], []
     for k, given in enumerate(body.fixed):
         before.append(f"%fixed{k} = getelementptr double, ptr %fixed, i64 {k}")
@@ -124,62 +120,30 @@ def source(body: Body, lanes: int) -> str:
         inside.append(f"%v{given.number} = load {numbers}, ptr %at.column{k}, align 8")
     used = needed([*body.results, body.code])
     for node in used:
-        if node.operation != "input":
-            (before if node.fixed else inside).append(f"%v{node.number} = {_instruction(node, lanes)}")
-    before += [line for node in used if node.fixed for line in _spread(node, lanes)]
+        if node.fixed and node.operation != "input":
+            before.append(line(node, [name_of(operand, 1) for operand in node.operands], 1))
+        elif node.operation != "input":
+            inside.append(line(node, [_vector(operand, lanes) for operand in node.operands], lanes))
+    before += [text for node in used if node.fixed for text in _spread(node, lanes)]
     for k, result in enumerate(body.results):
         before += _pointer("row", k)
         inside.append(f"%at.row{k} = getelementptr double, ptr %row{k}, i64 %i")
-        inside.append(f"store {numbers} {_operand(result, lanes)}, ptr %at.row{k}, align 8")
-    inside.append(f"%code = fptosi {numbers} {_operand(body.code, lanes)} to <{lanes} x i8>")
+        inside.append(f"store {numbers} {_vector(result, lanes)}, ptr %at.row{k}, align 8")
+    inside.append(f"%code = fptosi {numbers} {_vector(body.code, lanes)} to <{lanes} x i8>")
     inside.append("%at.code = getelementptr i8, ptr %codes, i64 %i")
     inside.append(f"store <{lanes} x i8> %code, ptr %at.code, align 1")
     texts = {"before": "\n  ".join(before), "inside": "\n  ".join(inside)}
-    return FUNCTION.format(declarations=_declarations(lanes), name=NAME, lanes=lanes, **texts)
+    return FUNCTION.format(declarations=declarations(lanes), name=NAME, lanes=lanes, **texts)
 
 
-def _instruction(node: Node, lanes: int) -> str:
-    lanes = 1 if node.fixed else lanes
-    operands = [_operand(operand, lanes) for operand in node.operands]
-    numbers, conditions = _type(Traced, lanes), _type(Condition, lanes)
-    match node.operation:
-        case "add" | "sub" | "mul" | "div":
-            return f"{ARITHMETIC[node.operation]}{_relaxed(node)} {numbers} {', '.join(operands)}"
-        case "neg":
-            return f"fneg {numbers} {operands[0]}"
-        case "abs" | "sqrt":
-            return f"call {numbers} {_intrinsic(node.operation, lanes)}({numbers} {operands[0]})"
-        case "lt" | "le":
-            return f"fcmp o{node.operation} {numbers} {', '.join(operands)}"
-        case "and":
-            return f"and {conditions} {', '.join(operands)}"
-        case "where":
-            return f"select {conditions} {operands[0]}, {numbers} {operands[1]}, {numbers} {operands[2]}"
-    raise ValueError(f"no instruction for {node.operation}")
-
-
-def _relaxed(node: Node) -> str:
-    """Nothing for a difference of two products, which would not vanish where both are equal if one were not rounded."""
-    products = [isinstance(operand, Node) and operand.operation == "mul" for operand in node.operands]
-    return "" if node.operation == "sub" and all(products) else f" {FUSIBLE}"
-
-
-def _operand(operand: Operand, lanes: int) -> str:
-    """The name of a node's value, or a constant."""
-    if isinstance(operand, Node):
-        return f"%s{operand.number}" if operand.fixed and lanes > 1 else f"%v{operand.number}"
-    bits = f"0x{struct.unpack('<Q', struct.pack('<d', operand))[0]:016X}"
-    return bits if lanes == 1 else f"<{', '.join([f'double {bits}'] * lanes)}>"
-
-
-def _type(kind: type[Node], lanes: int) -> str:
-    one = "i1" if issubclass(kind, Condition) else "double"
-    return one if lanes == 1 else f"<{lanes} x {one}>"
+def _vector(operand: Operand, lanes: int) -> str:
+    """The name of a value in all lanes."""
+    return f"%s{operand.number}" if isinstance(operand, Node) and operand.fixed else name_of(operand, lanes)
 
 
 def _spread(node: Node, lanes: int) -> list[str]:
     """A fixed value in all lanes of a vector; code for those that no vector needs is dropped by LLVM."""
-    one, many, name = _type(type(node), 1), _type(type(node), lanes), f"%s{node.number}"
+    one, many, name = type_of(type(node), 1), type_of(type(node), lanes), f"%s{node.number}"
     return [
         f"{name}.first = insertelement {many} poison, {one} %v{node.number}, i64 0",
         f"{name} = shufflevector {many} {name}.first, {many} poison, <{lanes} x i32> zeroinitializer",
@@ -188,15 +152,3 @@ def _spread(node: Node, lanes: int) -> list[str]:
 
 def _pointer(name: str, k: int) -> list[str]:
     return [f"%at.{name}s{k} = getelementptr ptr, ptr %{name}s, i64 {k}", f"%{name}{k} = load ptr, ptr %at.{name}s{k}"]
-
-
-def _intrinsic(operation: str, lanes: int) -> str:
-    return f"@llvm.{FUNCTIONS[operation]}.{'f64' if lanes == 1 else f'v{lanes}f64'}"
-
-
-def _declarations(lanes: int) -> str:
-    widths = [(operation, width) for operation in FUNCTIONS for width in (1, lanes)]
-    return "\n".join(
-        f"declare {_type(Traced, width)} {_intrinsic(operation, width)}({_type(Traced, width)})"
-        for operation, width in widths
-    )
