@@ -205,7 +205,7 @@ def notes(answer: Sensitivity) -> Iterator[str]:
         "axis": "of a direction, a percent is one of its length",
     }
     said = [meaning for measure, meaning in meanings.items() if measure in used]
-    yield "; ".join(["Percent by which the index changes per percent of the parameter", *said]) + "."
+    yield "; ".join(["Percent of the result per percent of the parameter", *said]) + "."
     for reason in dict.fromkeys(reason for _, reason in answer.skipped):
         yield f"Left out {reason}: {', '.join(path for path, why in answer.skipped if why == reason)}."
     if answer.none:
