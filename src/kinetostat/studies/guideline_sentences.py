@@ -11,7 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.kinetostatics.elements import LINKS_TOGETHER, Element
-from kinetostat.studies.guidelines import ROUNDING, Array, Guidelines, Move, Roles
+from kinetostat.studies.guidelines import Guidelines
+from kinetostat.studies.moves import Move
+from kinetostat.studies.roles import ROUNDING, Array, Roles
 
 MATTERS = 0.01
 """Share of an entry of C from which an element is named as one that decides it."""
@@ -72,6 +74,9 @@ def _what_yields(found: Guidelines, here: Roles) -> Iterator[Statement]:
     rigid = [i for i, c in enumerate(found.compliance) if c == 0.0]
     if rigid:
         yield Statement("yields", f"Nothing yields in {_named(found, rigid)}.", None)
+    free = [i for i, c in enumerate(found.compliance) if c == math.inf]
+    if free:
+        yield Statement("yields", f"Nothing holds the platform in {_named(found, free)}.", None)
 
 
 def _weakest(found: Guidelines, here: Roles) -> Iterator[Statement]:

@@ -6,7 +6,9 @@ from typing import Any
 
 from kinetostat.kinetostatics.elements import Element
 from kinetostat.studies.guideline_sentences import limit_of, statements
-from kinetostat.studies.guidelines import EXCESS, Guidelines, Move, Roles
+from kinetostat.studies.guidelines import Guidelines
+from kinetostat.studies.moves import Move
+from kinetostat.studies.roles import EXCESS, Roles
 
 
 def as_json(found: Guidelines) -> dict[str, Any]:

@@ -10,7 +10,8 @@ from matplotlib.lines import Line2D
 
 from kinetostat.kinetostatics.elements import Element
 from kinetostat.studies.guideline_sentences import limit_of
-from kinetostat.studies.guidelines import EXCESS, Guidelines, stiffening
+from kinetostat.studies.guidelines import Guidelines
+from kinetostat.studies.roles import EXCESS, stiffening
 from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout
 from kinetostat.views.sensitivity_figure import draw_cells
 
@@ -75,7 +76,7 @@ def _curves(panel: Axes, found: Guidelines, element: Element, limits: np.ndarray
     ends = np.log10([*finite, *([] if rigid_now else [1.0])])
     factors = np.logspace(ends.min() - 2.0 * DECADES, ends.max() + DECADES, POINTS)
     own = 1.0 if element.stiffness is None else limit_of(element.stiffness, 1.0)
-    stiff = stiffening(found, element, factors)
+    stiff = stiffening(found.machine, element, factors)
     for colour, dash, curve, limit in zip(COLOURS, DASHES, stiff, limits, strict=False):
         if limit == math.inf:
             continue

@@ -6,7 +6,9 @@ from rich.console import Console
 from rich.padding import Padding
 
 from kinetostat.studies.guideline_sentences import LEAST, MATTERS, statements
-from kinetostat.studies.guidelines import Guidelines, Move, Roles
+from kinetostat.studies.guidelines import Guidelines
+from kinetostat.studies.moves import Move
+from kinetostat.studies.roles import Roles
 from kinetostat.views.tables import number, numeric_table
 
 TOPICS = {

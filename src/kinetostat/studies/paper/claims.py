@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.kinetostatics.elements import LINKS_TOGETHER
+from kinetostat.kinetostatics.elements import elements, rigid_from, with_links_together
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
-from kinetostat.studies.guidelines import guidelines
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.tables import at, coefficients
 
@@ -81,9 +81,9 @@ def _nearly_rigid() -> Claim:
         float(np.max(np.array(at(f"stiffness.passive_links={1e3 * r}").compliance_diagonal)[list(FREE)] / rigid - 1))
         for r in ratios
     ]
-    here = guidelines(load(printed.MACHINE))
-    links = [element.name for element in here.found].index(LINKS_TOGETHER)
-    within = float(np.max(here.here.rigid[links, list(FREE), 0])) if here.here else np.nan
+    response = respond(load(printed.MACHINE))
+    links = with_links_together(elements(response.configuration))[-1]
+    within = float(np.max(1.0 / rigid_from(response, links, 0.01)[list(FREE)]))
     falling = all(later < earlier for earlier, later in pairwise(gaps))
     return Claim(
         "Guideline (i)",

@@ -3,12 +3,14 @@
 from collections.abc import Iterator, Sequence
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.kinetostatics.elements import elements
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import Analysis, analyze
-from kinetostat.studies.guidelines import guidelines
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.comparison import Comparison, compare, rounds_to
+from kinetostat.studies.roles import equations_of_k
 
 COMPLIANCE_UNITS = [QUANTITIES[name].unit for name in GROUPS["compliance"]]
 STIFFNESS_UNITS = [QUANTITIES[name].unit for name in GROUPS["stiffness"]]
@@ -55,8 +57,9 @@ def _row(place: str, values: Sequence[str], computed: Sequence[float], units: Se
 
 def coefficients(*settings: str) -> dict[str, tuple[float, ...]]:
     """Per stiffness Ka, k52, k54, its coefficients in the six diagonal entries of K (all actuators alike)."""
-    found = guidelines(load(printed.MACHINE, settings))
-    return {SYMBOLS.get(name, "Ka"): row for name, row in (found.equations or {}).items()}
+    response = respond(load(printed.MACHINE, settings))
+    found = equations_of_k(response, elements(response.configuration), range(len(COMPONENTS)))
+    return {SYMBOLS.get(name, "Ka"): row for name, row in (found or {}).items()}
 
 
 def equations_33_38() -> Iterator[Comparison]:
