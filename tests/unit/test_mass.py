@@ -9,7 +9,7 @@ from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Table
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.catalogue import families
-from kinetostat.machine.loading import as_toml, build, load
+from kinetostat.machine.loading import as_toml, build, bundled, load
 from kinetostat.machine.mass import PLATFORM, moving_masses
 from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError
@@ -131,3 +131,20 @@ def test_mistakes_are_refused(machine, settings, said):
 
 def test_nothing_known_is_not_zero():
     assert analyze(load("zhang-gosselin-4dof")).mass is None
+
+
+def test_a_post_on_the_base_does_not_move():
+    """What comes after a fixed joint from the base is clamped to it: it bends, and weighs nothing here."""
+    text = bundled()["tripteron"]
+    slide = '{ name = "slide",    type = "prismatic", joins = ["base", "carriage"],     point = [0, 0, 0.5]'
+    post = '{ name = "clamp", type = "fixed", joins = ["base", "post"], point = [0, 0, 0] },\n  '
+    text = text.replace(slide, post + slide.replace('"base"', '"post"'))
+    text = text.replace("links = { proximal", 'links = { post = { model = "beam", section = "bar" }, proximal', 1)
+    found = masses(build(parse(text, "x"), "x"))
+    assert "z post" not in found
+    assert found["z proximal"] == pytest.approx(masses(load("tripteron"))["z proximal"])
+
+
+def test_a_rigid_link_weighs_what_its_section_says():
+    rigid = load("tripteron", ["legs.z.proximal.model=rigid"])
+    assert masses(rigid) == pytest.approx(masses(load("tripteron")))
