@@ -60,6 +60,16 @@ def test_the_softest_direction_and_who_is_to_blame():
     assert next(iter(softest["y"])) == "actuator ×3"
 
 
+def test_fields_of_one_name_keep_their_own_units(capsys):
+    """An actuator is N·m/rad in the one and N/m in the other; the number of entries may differ as well."""
+    assert main(["compare", "delta", "orthoglide"]) == 0
+    row = next(line for line in capsys.readouterr().out.splitlines() if "stiffness.actuator" in line)
+    assert "3 x 20000.0 N·m/rad" in row
+    assert "3 x 50000000.0 N/m" in row
+    found, _ = rows("hexapod", "tricept")
+    assert [len(own) for own in found["differences"]["stiffness.actuator"]] == [6, 3]
+
+
 def test_a_rigid_direction_is_no_number():
     found, by_name = rows(PAPER, f"{PAPER}:stiffness.passive_links=rigid")
     assert by_name["K_y"]["values"][1] is None

@@ -54,11 +54,11 @@ class Difference:
     """A field that all designs have, and of which not all say the same.
 
     Attributes:
-        parameter: of the first design.
+        parameters: of each design; the kind need not be the same.
         values: SI, entry by entry.
     """
 
-    parameter: Parameter
+    parameters: tuple[Parameter, ...]
     values: tuple[tuple[float, ...], ...]
 
 
@@ -147,15 +147,16 @@ def compare(designs: Sequence[Design], ranges: Sequence[str] = (), progress: Pro
 def _differences(designs: Sequence[Design]) -> tuple[Difference, ...]:
     """Fields that all designs have, whole ones where they have entries, and of which not all say the same."""
     held = [values(design.machine) for design in designs]
-    every = list(parameters(designs[0].machine.family))
-    entries = {leaf for parameter in every if parameter.quantity.count for leaf in parameter.leaves}
+    known = [{p.path: p for p in parameters(design.machine.family)} for design in designs]
+    entries = {leaf for parameter in known[0].values() if parameter.quantity.count for leaf in parameter.leaves}
     found = []
-    for parameter in every:
-        if parameter.path in entries or not all(leaf in own for own in held for leaf in parameter.leaves):
+    for path in known[0]:
+        if path in entries or not all(path in fields for fields in known):
             continue
-        rows = tuple(tuple(own[leaf] for leaf in parameter.leaves) for own in held)
-        if len(set(rows)) > 1:
-            found.append(Difference(parameter, rows))
+        own = tuple(fields[path] for fields in known)
+        rows = tuple(tuple(numbers[leaf] for leaf in p.leaves) for numbers, p in zip(held, own, strict=True))
+        if len(set(zip((p.quantity.kind for p in own), rows, strict=True))) > 1:
+            found.append(Difference(own, rows))
     return tuple(found)
 
 

@@ -22,7 +22,7 @@ def as_json(found: Comparison) -> dict[str, Any]:
         for design, own in zip(found.designs, found.softest, strict=True)
     ]
     differences = {
-        one.parameter.path: [[_plain(value) for value in row] for row in one.values] for one in found.differences
+        one.parameters[0].path: [[_plain(value) for value in row] for row in one.values] for one in found.differences
     }
     over = None
     if found.ranges:

@@ -34,14 +34,15 @@ def print_comparison(console: Console, found: Comparison) -> None:
 def _print_differences(console: Console, found: Comparison, letters: str) -> None:
     families = [design.machine.family.name for design in found.designs]
     rows = {"family": families} if len(set(families)) > 1 else {}
-    rows |= {
-        one.parameter.path: [readable(row, one.parameter.quantity) for row in one.values] for one in found.differences
-    }
-    for shown in _abreast(console, letters):
-        table = text_table("Where the files differ", "field", *(letters[i] for i in shown))
+    for one in found.differences:
+        pairs = zip(one.parameters, one.values, strict=True)
+        rows[one.parameters[0].path] = [readable(row, parameter.quantity) for parameter, row in pairs]
+    for abreast in _abreast(console, letters):
+        table = text_table("Where the files differ", "field", *(letters[i] for i in abreast))
         for path, cells in rows.items():
-            table.add_row(path, *(cells[i] for i in shown))
-        if rows:
+            if len({cells[i] for i in abreast}) > 1:
+                table.add_row(path, *(cells[i] for i in abreast))
+        if table.row_count:
             console.print(table)
     if not rows:
         console.print("The files do not differ.")
