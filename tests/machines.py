@@ -27,7 +27,7 @@ TURN = radians(6)
 """How far an angle varies about its value in the file."""
 TOOL = 0.1
 """How far the tool point lies from the platform point P along each axis, m: what holds, holds at a tool as well."""
-UNCHANGED = ("load.", "limits.")
+UNCHANGED = ("load.", "limits.", "linear_density.", "tool.mass")
 """Sections on which neither K nor C depends."""
 TINY = 1e-12
 """Lengths (m) and angles (rad) below which a drawn one is 0."""
@@ -67,7 +67,7 @@ class Case:
         for parameter, path in paths:
             kind, here = parameter.quantity.kind, written[path]
             wanted: Range = 0.0
-            if path.startswith("tool."):
+            if path.startswith("tool.offset"):
                 wanted = TOOL
             elif path.startswith(UNCHANGED):
                 wanted = 0.0

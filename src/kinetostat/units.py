@@ -24,6 +24,11 @@ class Kind:
         """Whether it says how something resists: from 0 (free) to "rigid"."""
         return self.name.endswith(("stiffness", "rigidity"))
 
+    @property
+    def heavy(self) -> bool:
+        """Whether it says how much matter there is: never negative."""
+        return self.name.endswith(("mass", "density"))
+
 
 KINDS = {
     kind.name: kind
@@ -45,6 +50,8 @@ KINDS = {
         Kind("area", "m**2", "12 cm**2"),
         Kind("second moment of area", "m**4", "80 cm**4"),
         Kind("density", "kg/m**3", "7850 kg/m**3"),
+        Kind("linear density", "kg/m", "3.5 kg/m"),
+        Kind("mass", "kg", "12 kg"),
         Kind("direction", "", "1.0"),
     )
 }

@@ -43,6 +43,10 @@ def _regularity(response: Response) -> Scalar:
     return response.regularity
 
 
+def _mass(response: Response) -> Scalar:
+    return response.mass
+
+
 def _compliance_unit(i: int, j: int) -> str:
     rows = "rad" if i < ROTATIONS else "m"
     return f"{rows}/(N·m)" if j < ROTATIONS else f"{rows}/N"
@@ -71,10 +75,11 @@ QUANTITIES = {
         *_entries("compliance", "C", _compliance_unit, _compliance),
         *_entries("stiffness", "K", _stiffness_unit, _stiffness),
         MapQuantity("regularity", "1", "regularity", _regularity),
+        MapQuantity("mass", "kg", "moving mass", _mass),
         MapQuantity("side", "1", "side of singularities", side),
     )
 }
-"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., regularity, side."""
+"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., regularity, mass, side."""
 
 GROUPS = {
     "compliance": tuple(f"compliance_{name}" for name in COMPONENTS),

@@ -18,6 +18,7 @@ from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_
 from kinetostat.kinetostatics.overload import actuator_checks
 from kinetostat.machine.leg import Joint, LegScrews, reciprocal_wrenches
 from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.mass import moving_mass
 
 SINGULAR = 1e-6
 """Regularity below which a pose counts as singular: results have then lost six of their digits. A leg exactly at its
@@ -39,6 +40,7 @@ class Response:
         regularity: distance from a singularity, 0 to 1 (dimensionless); the smaller of the legs' and the platform's.
         status: a `Status` code.
         checks: the limits of the machine that are set, each with what it is compared with.
+        mass: of what moves, as far as it is known, kg.
     """
 
     configuration: Configuration
@@ -51,6 +53,7 @@ class Response:
     regularity: Scalar
     status: Scalar
     checks: tuple[Check, ...] = ()
+    mass: Scalar = 0.0
 
 
 def respond(machine: Machine, joints: Joints | None = None) -> Response:
@@ -86,6 +89,7 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
         regularity,
         pose_status(joints.status, reached, regularity, within(geometric), within(loaded)),
         (*geometric, *loaded),
+        moving_mass(machine, configuration),
     )
 
 

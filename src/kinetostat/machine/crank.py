@@ -8,6 +8,7 @@ from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin
 from kinetostat.algebra.triangle import crank_end, crank_range
 from kinetostat.algebra.vector import AXES, Z_AXIS, Vector, rotation_z
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, Spring, revolutes
+from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure
 from kinetostat.machine.parts import Arm, if_elastic, per_length
 from kinetostat.spec.fields import Quantity, section
@@ -37,6 +38,13 @@ class CrankLinks:
     rod: Scalar
     bending: Scalar = RIGID
     axial: Scalar = RIGID
+
+
+CRANK_LINKS = (
+    LinkKind("cranks", ("crank_bending",), in_each_leg("crank", "crank_length")),
+    LinkKind("rods", ("leg_axial",), in_each_leg("rod", "rod_length")),
+)
+"""The links of R-U-S legs, whose rods have the rigidity `leg_axial`."""
 
 
 def outward(base: Sequence[Vector], radius: Scalar, turns: Sequence[Scalar]) -> list[Vector]:

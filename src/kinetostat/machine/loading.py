@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 from kinetostat.machine.catalogue import families
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.limits import check_limits
-from kinetostat.machine.machine import COMMON, Family, Machine
+from kinetostat.machine.machine import Family, Machine
 from kinetostat.machine.rigidities import resolve
 from kinetostat.machine.written import family as written
 from kinetostat.machine.written.checking import check_numbers, completed
@@ -26,7 +26,7 @@ from kinetostat.machine.written.schema import written_schema
 from kinetostat.spec import document as documents
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.spec.fields import NO_LIMIT, quantities
+from kinetostat.spec.fields import NO_LIMIT, optional, quantities
 from kinetostat.spec.validation import SCHEMA_VERSION, file_model, sections_in, validate
 from kinetostat.units import RIGID
 
@@ -144,12 +144,17 @@ def as_toml(machine: Machine) -> str:
     lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get("", {}).items()]
     for name in [*machine.sections, *(literals.keys() - machine.sections.keys() - {""})]:
         section = machine.sections.get(name)
-        if name in COMMON and section == COMMON[name]():
+        if section is not None and _left_out(machine.family.every_section[name], section):
             continue
         lines += ["", f"[{'.'.join(_key(part) for part in name.split('.'))}]"]
         lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get(name, {}).items()]
         lines += _quantity_lines(machine.family.every_section[name], section) if section is not None else []
     return "\n".join(lines) + "\n"
+
+
+def _left_out(fields: type, section: Any) -> bool:
+    """Whether a section says nothing that is not so without it."""
+    return optional(fields) == set(quantities(fields)) and bool(section == fields())
 
 
 def _quantity_lines(fields: type, section: Any) -> Iterator[str]:

@@ -5,6 +5,7 @@ Parameters may be floats or traced scalars; nothing here validates (that is `spe
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Annotated, Any, Protocol
 
 from kinetostat.algebra.scalar import Scalar
@@ -12,6 +13,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.leg import Joint, Leg, Spring, Turn
 from kinetostat.machine.limits import Limits
+from kinetostat.machine.links import LinkKind, density_section
 from kinetostat.spec.fields import Quantity, section
 
 
@@ -85,6 +87,21 @@ class Configuration:
     plane: Plane | None = None
 
 
+@dataclass(frozen=True)
+class Member:
+    """A link that can move.
+
+    Attributes:
+        name: unique within the machine.
+        length: from joint to joint, m.
+        linear_density: kg/m; 0 where nothing says it.
+    """
+
+    name: str
+    length: Scalar
+    linear_density: Scalar
+
+
 @section
 class Tool:
     """Table [tool], in any machine file: where on the platform loads act and motions are given."""
@@ -93,6 +110,7 @@ class Tool:
         tuple[float, float, float],
         Quantity("length", "tool point T from P in platform axes: x, y, z; K, C and the load are given at T", count=3),
     ] = (0.0, 0.0, 0.0)
+    mass: Annotated[float, Quantity("mass", "of the platform and the tool together; 0: not counted")] = 0.0
 
 
 @section
@@ -159,6 +177,8 @@ class Family:
         chains: where there is no closed form, from the sections to the legs at the home pose, so that joint coordinates
             can be found that close them (`kinematics.closure`); `configure` then takes these as `joints`.
         literals: what its machine files say beside numbers, by section.
+        links: those with a mass, of a family in closed form.
+        members: of a machine written leg by leg, from the sections to all links that can move.
     """
 
     name: str
@@ -168,6 +188,8 @@ class Family:
     planar: bool = False
     chains: Callable[..., "Chains"] | None = None
     literals: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    links: tuple[LinkKind, ...] = ()
+    members: Callable[..., list[Member]] | None = None
 
     @property
     def components(self) -> tuple[int, ...]:
@@ -179,10 +201,11 @@ class Family:
         """Their names: rx ry rz x y z, or rz x y."""
         return tuple(COMPONENTS[i] for i in self.components)
 
-    @property
+    @cached_property
     def every_section(self) -> dict[str, type]:
         """Its own sections and the common ones."""
-        return {**self.sections, **COMMON}
+        densities = {"linear_density": density_section(self.links)} if self.links else {}
+        return {**self.sections, **densities, **COMMON}
 
 
 @dataclass(frozen=True)

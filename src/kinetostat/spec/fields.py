@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import lru_cache
 from types import MappingProxyType
-from typing import Any, TypeVar, dataclass_transform, get_type_hints
+from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints
 
 from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
@@ -102,6 +102,8 @@ class Quantity:
             raise UnitError(
                 f'a {self.kind.split()[-1]} cannot be negative; write 0 for a free element, {example}, or "{RIGID}"'
             )
+        if kind.heavy and number < 0:
+            raise UnitError(f"a {self.kind} cannot be negative, {example}")
         if self.positive and number <= 0:
             raise UnitError(f"it must be greater than 0, {example}")
         if number > self.most:
@@ -130,6 +132,23 @@ class Quantity:
             return {**one, "description": rule}
         many = {"type": "array", "items": one, "minItems": self.count, "maxItems": self.count}
         return {"anyOf": [one, many], "description": f"{rule}; one for all, or a list of {self.count}"}
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of a section that is made while the program runs: what it holds, its default if it may be left out."""
+
+    quantity: Quantity
+    default: Any = None
+
+
+def made_section(name: str, given: Mapping[str, Field]) -> type:
+    """A section class from its fields, those that may be left out last."""
+    ordered = dict(sorted(given.items(), key=lambda item: item[1].default is not None))
+    kinds = {key: float if one.quantity.count is None else tuple[float, ...] for key, one in ordered.items()}
+    hints = {key: Annotated[kinds[key], one.quantity] for key, one in ordered.items()}
+    defaults = {key: one.default for key, one in ordered.items() if one.default is not None}
+    return section(type(name, (), {"__annotations__": hints, "__module__": __name__, **defaults}))
 
 
 @lru_cache(1024)

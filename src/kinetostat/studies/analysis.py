@@ -24,6 +24,7 @@ from kinetostat.kinetostatics.leg import AnyScrew
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Configuration, Machine, springs
+from kinetostat.machine.mass import Mass, moving_masses
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.studies.indices import Along, Indices, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
@@ -79,6 +80,7 @@ class Analysis:
         mobility: what can move, and the kind of pose.
         internal: statically indeterminate loads.
         load: what the machine's [load] does, None without one.
+        masses: of what moves, part by part.
         condition: ratio of the extreme singular values of W, moments divided by the characteristic length.
         jacobian_condition: of the actuators' Jacobian, angles multiplied by that length; None where actuators are of
             two kinds, or there is none.
@@ -103,9 +105,16 @@ class Analysis:
     mobility: Mobility | None = None
     internal: InternalLoads | None = None
     load: LoadCase | None = None
+    masses: tuple[Mass, ...] = ()
     condition: float | None = None
     jacobian_condition: float | None = None
     length: float | None = None
+
+    @property
+    def mass(self) -> float | None:
+        """Of what moves as far as it is known, kg; None where nothing is known."""
+        known = [float(one.mass) for one in self.masses if one.mass is not None]
+        return sum(known) if known else None
 
     def along(self, direction: Sequence[float]) -> Along:
         """Stiffness along and about a direction, in the axes of K and C.
@@ -158,6 +167,7 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
         mobility=mobility(configuration, _around(machine), response.reference),
         internal=internal_loads([leg.name for leg in configuration.legs], response.legs, length, response.guide),
         load=load_case(machine, replace(response, compliance=compliance), turn),
+        masses=tuple(moving_masses(machine, configuration)),
         condition=float(extremes[0] / extremes[-1]),
         jacobian_condition=_jacobian_condition(response, length),
         length=length,

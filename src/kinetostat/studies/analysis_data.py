@@ -41,6 +41,8 @@ def as_json(analysis: Analysis, along: Sequence[Along] = ()) -> dict[str, Any]:
         "mobility": _mobility(analysis),
         "internal_loads": analysis.internal and _lists(asdict(analysis.internal)),
         "load": analysis.load and _load(analysis.load),
+        "moving_mass": analysis.mass,
+        "masses": {one.name: one.mass and float(one.mass) for one in analysis.masses},
         "attribution": [
             {
                 "spring": share.name,

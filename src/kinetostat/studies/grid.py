@@ -160,7 +160,7 @@ def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONE
     found: list[str] = []
     for name in names:
         if name not in GROUPS and not (name in QUANTITIES and _exists(name, components)):
-            known = ", ".join([*GROUPS, *(n for group in groups.values() for n in group), "regularity"])
+            known = ", ".join([*GROUPS, *(n for group in groups.values() for n in group), "regularity", "mass"])
             example = f"compliance_{components[0]}_{components[-1]}"
             raise InputError(f'"{name}" is not a quantity; choose from {known}, or an entry such as {example}.')
         found += groups.get(name, [name])

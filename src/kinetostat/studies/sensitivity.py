@@ -21,7 +21,7 @@ from kinetostat.studies.grid import resolve_quantities
 from kinetostat.units import KINDS
 
 WITHOUT_INFLUENCE = ("load", "limits")
-"""Sections on which K and C do not depend."""
+"""Sections on which no index depends."""
 ZERO = 1e-9
 """Share of what a number is compared with below which it counts as zero: it is then the rounding of one."""
 NEGLIGIBLE = 1e-9
@@ -101,7 +101,7 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
         InputError: an unknown quantity.
     """
     names = tuple(resolve_quantities(quantities, machine.family.component_names))
-    asked = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(p.path)]
+    asked = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(p, names)]
     held = values(machine)
     by = [p.path for p in asked if not math.isinf(held[p.path])]
     anywhere = next(path for path in held if path.startswith("pose."))
@@ -120,8 +120,10 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     )
 
 
-def _decides(path: str) -> bool:
-    return path.split(".")[0] not in WITHOUT_INFLUENCE
+def _decides(parameter: Parameter, names: Sequence[str]) -> bool:
+    if KINDS[parameter.quantity.kind].heavy and "mass" not in names:
+        return False
+    return parameter.path.split(".")[0] not in WITHOUT_INFLUENCE
 
 
 def _why_not(parameter: Parameter, held: dict[str, float], slopes: dict[str, list[float]]) -> str:
@@ -203,7 +205,7 @@ def notes(answer: Sensitivity) -> Iterator[str]:
         "axis": "of a direction, a percent is one of its length",
     }
     said = [meaning for measure, meaning in meanings.items() if measure in used]
-    yield "; ".join(["Percent by which the index changes per percent of the parameter", *said]) + "."
+    yield "; ".join(["Percent of the result per percent of the parameter", *said]) + "."
     for reason in dict.fromkeys(reason for _, reason in answer.skipped):
         yield f"Left out {reason}: {', '.join(path for path, why in answer.skipped if why == reason)}."
     if answer.none:

@@ -14,6 +14,8 @@ from kinetostat.views.tables import number, numeric_table
 
 UNITS_OF_K = "N·m/rad, N/rad, N/m"
 UNITS_OF_C = "rad/(N·m), rad/N, m/N"
+MOST_NAMED = 4
+"""Parts of unknown mass that are named."""
 ROUNDING = 1e-12
 """Share of the geometric mean of its diagonal entries below which an entry is shown as zero."""
 
@@ -174,5 +176,18 @@ def _print_summary(console: Console, analysis: Analysis) -> None:
             f"{number(analysis.jacobian_condition, 'infinite')}; "
             f"rotations compared through {number(analysis.length)} m."
         )
+    if analysis.masses:
+        lines.append(_moving(analysis))
     for line in lines:
-        console.print(line, highlight=False)
+        console.print(line, highlight=False, markup=False)
+
+
+def _moving(analysis: Analysis) -> str:
+    """What moves, and what of it is not counted."""
+    unknown = [one.name for one in analysis.masses if one.mass is None]
+    if analysis.mass is None:
+        return "Moving mass: not known; give links a cross-section, and the platform [tool] mass."
+    shown = ", ".join(unknown[:MOST_NAMED])
+    more = f" and {len(unknown) - MOST_NAMED} more" if len(unknown) > MOST_NAMED else ""
+    without = f"; without {shown}{more}, of which no mass is given" if unknown else ", all links and the platform"
+    return f"Moving mass: {number(analysis.mass)} kg{without}."

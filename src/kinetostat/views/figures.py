@@ -38,7 +38,7 @@ STYLE: Any = {
 }
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito: distinct for colour-blind readers and in grey."""
-DASHES = ("-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
+DASHES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
 LEVELS = 12
 FLAT = 1e-9
 """Relative spread below which a map is constant and has no contours."""

@@ -2,6 +2,8 @@
 
 import matplotlib as mpl
 import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
@@ -23,25 +25,37 @@ def sensitivity_figure(answer: Sensitivity) -> Figure:
     """A table of coloured cells: red where the index grows with the parameter, blue where it falls."""
     shown = answer.influences[:MOST_ROWS]
     cells = np.array([[np.nan if p is None else p for p in one.percents] for one in shown], dtype=float)
-    most = max(float(np.nanmax(np.abs(cells), initial=0.0)), 10.0 * LINEAR)
-    scale = SymLogNorm(LINEAR, vmin=-most, vmax=most)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(2.6 + 0.75 * cells.shape[1], 1.1 + 0.2 * len(shown)), layout="constrained")
         panel = figure.subplots()
-        image = panel.imshow(np.ma.masked_invalid(cells), cmap="RdBu_r", norm=scale, aspect="auto")
-        panel.set_facecolor("#eeeeee")
-        panel.grid(visible=False)
+        draw_cells(panel, cells, "RdBu_r", "percent per percent")
         panel.set_yticks(range(len(shown)), [one.path for one in shown])
         panel.set_xticks(range(cells.shape[1]), [QUANTITIES[name].symbol for name in answer.quantities])
-        panel.tick_params(length=0, top=False)
-        for (row, column), value in np.ndenumerate(cells):
-            if np.isfinite(value):
-                dark = abs(float(scale(value)) - 0.5) > 0.5 * DARK
-                text = f"{value:.2g}" if abs(value) >= LEAST else "0"
-                panel.text(column, row, text, ha="center", va="center", fontsize=6, color="white" if dark else "black")
-        bar = figure.colorbar(image, ax=panel, pad=0.02, label="percent per percent")
-        bar.outline.set_linewidth(0.4)
-        bar.ax.tick_params(labelsize=6.5, width=0.4)
         figure.suptitle(answer.machine.name, fontsize=10)
         fix_layout(figure)
     return figure
+
+
+def draw_cells(panel: Axes, cells: npt.NDArray[np.float64], colours: str, label: str) -> None:
+    """Numbers in cells [rows x columns], coloured by sign and size; NaN is grey.
+
+    Args:
+        panel: to draw in.
+        cells: percent per percent.
+        colours: name of a diverging colour map.
+        label: of its bar.
+    """
+    most = max(float(np.nanmax(np.abs(cells), initial=0.0)), 10.0 * LINEAR)
+    scale = SymLogNorm(LINEAR, vmin=-most, vmax=most)
+    image = panel.imshow(np.ma.masked_invalid(cells), cmap=colours, norm=scale, aspect="auto")
+    panel.set_facecolor("#eeeeee")
+    panel.grid(visible=False)
+    panel.tick_params(length=0, top=False)
+    for (row, column), value in np.ndenumerate(cells):
+        if np.isfinite(value):
+            dark = abs(float(scale(value)) - 0.5) > 0.5 * DARK
+            text = f"{value:.2g}" if abs(value) >= LEAST else "0"
+            panel.text(column, row, text, ha="center", va="center", fontsize=6, color="white" if dark else "black")
+    bar = panel.figure.colorbar(image, ax=panel, pad=0.02, label=label)
+    bar.outline.set_linewidth(0.4)
+    bar.ax.tick_params(labelsize=6.5, width=0.4)

@@ -36,11 +36,16 @@ def print_machine(console: Console, machine: Machine) -> None:
     entries = {leaf for parameter in found if parameter.quantity.count for leaf in parameter.leaves}
     whole = [parameter for parameter in found if parameter.path not in entries]
     for parameter in whole:
-        texts = [_readable(held[leaf], parameter.quantity) for leaf in parameter.leaves]
-        alike = f"{len(texts)} x {texts[0]}" if len(texts) > 1 else texts[0]
-        shown = alike if len(set(texts)) == 1 else ", ".join(texts)
+        shown = readable([held[leaf] for leaf in parameter.leaves], parameter.quantity)
         table.add_row(parameter.path, shown, parameter.quantity.meaning)
     console.print(table)
+
+
+def readable(values: Sequence[float], quantity: Quantity) -> str:
+    """All entries of a field for a table; one for all where they are alike."""
+    texts = [_readable(value, quantity) for value in values]
+    alike = f"{len(texts)} x {texts[0]}" if len(texts) > 1 else texts[0]
+    return alike if len(set(texts)) == 1 else ", ".join(texts)
 
 
 def _readable(value: float, quantity: Quantity) -> str:

@@ -11,6 +11,7 @@ from kinetostat.algebra.vector import IDENTITY, Z_AXIS, Displacement, Vector, po
 from kinetostat.machine.bars import BarPair
 from kinetostat.machine.crank import CrankLinks, place
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring
+from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm
 from kinetostat.machine.rings import Rings, Three
@@ -86,4 +87,8 @@ FAMILY = Family(
     summary="Delta: 3 actuated cranks with pairs of bars; freedoms x, y, z",
     sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
+    links=(
+        LinkKind("arms", ("arm_bending", "arm_torsion"), in_each_leg("arm", "arm_length")),
+        LinkKind("bars", ("bar_axial",), in_each_leg("bar", "bar_length", bars=2)),
+    ),
 )

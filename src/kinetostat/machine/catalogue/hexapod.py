@@ -8,6 +8,7 @@ from typing import Annotated
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import Displacement, Vector, rotation_x, rotation_y, rotation_z
 from kinetostat.machine.leg import RIGID, two_force_legs
+from kinetostat.machine.links import LinkKind, straight_legs
 from kinetostat.machine.machine import Configuration, Family
 from kinetostat.machine.rings import Rings, ends
 from kinetostat.spec.fields import Quantity, section
@@ -73,4 +74,5 @@ FAMILY = Family(
     summary="6 U-P-S legs (Gough-Stewart); freedoms x, y, z, roll, pitch, yaw",
     sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
+    links=(LinkKind("legs", ("leg_axial",), straight_legs),),
 )

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from kinetostat.machine.catalogue import hexapod
 from kinetostat.machine.catalogue.hexapod import LEGS, Pose, Six, placed
-from kinetostat.machine.crank import CrankLinks, Cranks, crank_legs, outward
+from kinetostat.machine.crank import CRANK_LINKS, CrankLinks, Cranks, crank_legs, outward
 from kinetostat.machine.leg import RIGID
 from kinetostat.machine.machine import Configuration, Family
 from kinetostat.spec.fields import Quantity, section
@@ -46,4 +46,5 @@ FAMILY = Family(
     summary="6 R-U-S legs with actuated cranks; freedoms x, y, z, roll, pitch, yaw",
     sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
+    links=CRANK_LINKS,
 )

@@ -12,6 +12,7 @@ from kinetostat.algebra.triangle import slide_travel
 from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.bars import BarPair
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring
+from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm
 from kinetostat.machine.rings import Three
@@ -91,4 +92,8 @@ FAMILY = Family(
     summary="Orthoglide: 3 actuated slides along x, y, z with pairs of bars; freedoms x, y, z",
     sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
+    links=(
+        LinkKind("feet", ("foot_bending", "foot_torsion"), in_each_leg("foot", "foot_length")),
+        LinkKind("bars", ("bar_axial",), in_each_leg("bar", "bar_length", bars=2)),
+    ),
 )

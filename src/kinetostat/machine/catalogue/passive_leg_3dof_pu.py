@@ -9,6 +9,7 @@ from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import AXES, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector, rotation_x, rotation_y
 from kinetostat.machine.guide import Guide
 from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes, two_force_legs
+from kinetostat.machine.links import LinkKind, from_origin, straight_legs
 from kinetostat.machine.machine import Configuration, Family
 from kinetostat.machine.parts import in_series, servo
 from kinetostat.machine.rings import Three, ThreeLegs, ends
@@ -75,9 +76,13 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
     return ram.moved_by(two_force_legs(base, top, stiffness.actuator, stiffness.leg_axial), geometry.size)
 
 
+RAM = LinkKind("ram", ("ram_bending", "ram_torsion"), from_origin("ram"))
+
+
 FAMILY = Family(
     name="passive-leg-3dof-pu",
     summary="3 U-P-S legs and a passive P-U ram; freedoms z, theta1, theta2",
     sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
+    links=(LinkKind("legs", ("leg_axial",), straight_legs), RAM),
 )

@@ -11,6 +11,7 @@ from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import Y_AXIS, Displacement, Rotation, Vector, rotation_x, rotation_y
 from kinetostat.machine.guide import Guide
 from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes, two_force_legs
+from kinetostat.machine.links import LinkKind, listed, straight_legs
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import bent_links, servo
 from kinetostat.machine.rings import Rings, four_joints
@@ -122,9 +123,13 @@ def joints(geometry: Geometry, platform: Displacement) -> tuple[list[Vector], li
     return four_joints(geometry.base_radius, geometry.base_angle), [platform.apply(point) for point in top]
 
 
+PASSIVE_LINKS = LinkKind("passive_links", ("passive_link_bending",), listed("passive link", "passive_links"), count=2)
+
+
 FAMILY = Family(
     name="passive-leg-4dof",
     summary="4 U-P-S legs and a passive R-R-Hooke leg (Zhang and Gosselin); freedoms x, z, theta5, theta6",
     sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
+    links=(LinkKind("legs", ("leg_axial",), straight_legs), PASSIVE_LINKS),
 )

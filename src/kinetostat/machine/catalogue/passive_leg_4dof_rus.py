@@ -7,7 +7,7 @@ from typing import Annotated
 
 from kinetostat.machine.catalogue import passive_leg_4dof
 from kinetostat.machine.catalogue.passive_leg_4dof import LEGS, Four, Pose, guide, joints
-from kinetostat.machine.crank import CrankLinks, Cranks, crank_legs, outward
+from kinetostat.machine.crank import CRANK_LINKS, CrankLinks, Cranks, crank_legs, outward
 from kinetostat.machine.leg import RIGID
 from kinetostat.machine.machine import Configuration, Family
 from kinetostat.spec.fields import Quantity, section
@@ -50,4 +50,5 @@ FAMILY = Family(
     summary="4 R-U-S legs and a passive R-R-Hooke leg; freedoms x, z, theta5, theta6",
     sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
+    links=(*CRANK_LINKS, passive_leg_4dof.PASSIVE_LINKS),
 )

@@ -12,6 +12,7 @@ from kinetostat.algebra.vector import X_AXIS, Y_AXIS, ZERO, Displacement, Rotati
 from kinetostat.machine.catalogue.passive_leg_4dof import Two, platform_pitch
 from kinetostat.machine.guide import Guide
 from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes, two_force_legs
+from kinetostat.machine.links import LinkKind, listed, straight_legs
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import bent_links, servo
 from kinetostat.machine.rings import Rings, ends
@@ -112,9 +113,13 @@ def _passive_leg(
     return Leg("passive leg", chain)
 
 
+PASSIVE_LINKS = LinkKind("passive_links", ("passive_link_bending",), listed("passive link", "passive_links"), count=2)
+
+
 FAMILY = Family(
     name="passive-leg-5dof",
     summary="5 U-P-S legs and a passive U-R-U leg; freedoms x, y, z, theta5, theta6",
     sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
+    links=(LinkKind("legs", ("leg_axial",), straight_legs), PASSIVE_LINKS),
 )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from kinetostat.machine.catalogue import passive_leg_5dof
 from kinetostat.machine.catalogue.passive_leg_5dof import LEGS, Five, Pose, guide
-from kinetostat.machine.crank import CrankLinks, Cranks, crank_legs, outward
+from kinetostat.machine.crank import CRANK_LINKS, CrankLinks, Cranks, crank_legs, outward
 from kinetostat.machine.leg import RIGID
 from kinetostat.machine.machine import Configuration, Family
 from kinetostat.machine.rings import ends
@@ -51,4 +51,5 @@ FAMILY = Family(
     summary="5 R-U-S legs and a passive U-R-U leg; freedoms x, y, z, theta5, theta6",
     sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
+    links=(*CRANK_LINKS, passive_leg_5dof.PASSIVE_LINKS),
 )

@@ -8,6 +8,7 @@ from typing import Annotated
 from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin
 from kinetostat.algebra.vector import Z_AXIS, Displacement, Vector, rotation_z
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, Spring
+from kinetostat.machine.links import LinkKind, straight_legs
 from kinetostat.machine.machine import Configuration, Family, Plane
 from kinetostat.machine.parts import if_elastic, per_length
 from kinetostat.machine.rings import Three, ThreeLegs, ends
@@ -77,5 +78,6 @@ FAMILY = Family(
     summary="planar: 3 R-P-R legs with actuated slides; freedoms x, y, angle",
     sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
+    links=(LinkKind("legs", ("leg_axial",), straight_legs),),
     planar=True,
 )

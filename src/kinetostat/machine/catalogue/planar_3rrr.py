@@ -12,6 +12,7 @@ from kinetostat.algebra.vector import Z_AXIS, Vector
 from kinetostat.machine.catalogue.planar_3rpr import LEGS, Pose, placed
 from kinetostat.machine.crank import CrankLinks, place
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, Spring
+from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family, Plane
 from kinetostat.machine.parts import Arm, if_elastic, per_length
 from kinetostat.machine.rings import Three, ThreeLegs
@@ -73,5 +74,9 @@ FAMILY = Family(
     summary="planar: 3 R-R-R legs with actuated base revolutes; freedoms x, y, angle",
     sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
+    links=(
+        LinkKind("proximal_links", ("proximal_bending",), in_each_leg("proximal link", "proximal_link")),
+        LinkKind("distal_links", ("distal_axial",), in_each_leg("distal link", "distal_link")),
+    ),
     planar=True,
 )

@@ -9,6 +9,7 @@ from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import Y_AXIS, ZERO, Displacement, rotation_x, rotation_y
 from kinetostat.machine.guide import Guide
 from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes, two_force_legs
+from kinetostat.machine.links import LinkKind, from_origin, straight_legs
 from kinetostat.machine.machine import Configuration, Family
 from kinetostat.machine.parts import in_series, servo
 from kinetostat.machine.rings import Three, ThreeLegs, ends
@@ -74,9 +75,13 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
     return tube.moved_by(two_force_legs(base, top, stiffness.actuator, stiffness.leg_axial), geometry.size)
 
 
+TUBE = LinkKind("tube", ("tube_bending", "tube_torsion"), from_origin("tube"))
+
+
 FAMILY = Family(
     name="tricept",
     summary="3 U-P-S legs and a passive U-P tube (Tricept); freedoms theta1, theta2, length",
     sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
+    links=(LinkKind("legs", ("leg_axial",), straight_legs), TUBE),
 )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from kinetostat.machine.catalogue import tricept
 from kinetostat.machine.catalogue.tricept import LEGS, Pose, guide
-from kinetostat.machine.crank import CrankLinks, Cranks, crank_legs, outward
+from kinetostat.machine.crank import CRANK_LINKS, CrankLinks, Cranks, crank_legs, outward
 from kinetostat.machine.leg import RIGID
 from kinetostat.machine.machine import Configuration, Family
 from kinetostat.machine.rings import Three, ends
@@ -51,4 +51,5 @@ FAMILY = Family(
     summary="3 R-U-S legs and a passive U-P tube; freedoms theta1, theta2, length",
     sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
+    links=(*CRANK_LINKS, tricept.TUBE),
 )

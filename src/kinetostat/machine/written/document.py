@@ -206,7 +206,7 @@ def _check_chain(joints: tuple[JointPlan, ...], where: str) -> None:
 def _link(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str]) -> LinkPlan:
     model = choice(part.pop("model", None), LINK_MODELS, f"{where}: model")
     section = part.pop("section", "")
-    if model in ("lumped", "beam", "timoshenko"):
+    if section or model in ("lumped", "beam", "timoshenko"):
         section = choice(section or None, shapes, f"{where}: section")
     up = part.pop("up", None)
     if up is not None and not _numbers(up, 3):

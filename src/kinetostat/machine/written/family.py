@@ -11,9 +11,9 @@ from kinetostat.algebra.scalar import Scalar, is_zero, plus, reciprocal, sqrt, t
 from kinetostat.algebra.vector import AXES, IDENTITY, X_AXIS, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector
 from kinetostat.machine.leg import Element, Joint, Leg, Spring, Turn, revolutes
 from kinetostat.machine.link import Beam, Parallelogram, lumped_springs, matrix_springs
-from kinetostat.machine.machine import Chains, Configuration, Family, Plane, Step
+from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
 from kinetostat.machine.written.plan import JointPlan, LegPlan, LinkPlan, Plan, literals
-from kinetostat.machine.written.sections import rigidity_of, sections_of
+from kinetostat.machine.written.sections import linear_density_of, rigidity_of, sections_of
 
 NAME = "legs"
 """As machine files name this kind."""
@@ -24,7 +24,14 @@ SUMMARY = "any machine, written leg by leg: joints by point and axis at the home
 def family_of(plan: Plan) -> Family:
     """The family of all machines with this plan."""
     return Family(
-        NAME, SUMMARY, sections_of(plan), partial(configure, plan), plan.planar, partial(chains, plan), literals(plan)
+        NAME,
+        SUMMARY,
+        sections_of(plan),
+        partial(configure, plan),
+        plan.planar,
+        partial(chains, plan),
+        literals(plan),
+        members=partial(members, plan),
     )
 
 
@@ -118,6 +125,22 @@ def _yielding(
     if link.model == "lumped":
         return lumped_springs(title, *ends, up, own)
     return (Beam(title, *ends, up, own),)
+
+
+def members(plan: Plan, **sections: Any) -> list[Member]:
+    """The links between two joints that can move: those after the first joint of their leg that is not fixed."""
+    found = []
+    for leg in plan.legs:
+        points = [Vector(*sections[f"legs.{leg.name}.{joint.name}"].point) for joint in leg.joints]
+        moves = False
+        for joint, start, end in zip(leg.joints, points, points[1:], strict=False):
+            moves = moves or joint.kind != "fixed"
+            if moves:
+                section = leg.links[joint.joins[1]].section if joint.joins[1] in leg.links else ""
+                held = sections[f"sections.{section}"] if section else None
+                density = linear_density_of(plan.shapes[section], held) if section else 0.0
+                found.append(Member(f"{leg.name} {joint.joins[1]}", (end - start).norm(), density))
+    return found
 
 
 def _any_up(ends: tuple[Vector, Vector]) -> Vector:

@@ -5,7 +5,8 @@ from typing import Any
 from kinetostat.machine.section import MATERIALS
 from kinetostat.machine.written.family import NAME, SUMMARY
 from kinetostat.machine.written.plan import JOINT_TYPES, LINK_MODELS, SHAPES, SPATIAL_POSE
-from kinetostat.machine.written.sections import JOINT_FIELDS, SHAPE_KINDS, Field
+from kinetostat.machine.written.sections import JOINT_FIELDS, SHAPE_KINDS
+from kinetostat.spec.fields import Field
 from kinetostat.units import KINDS
 
 QUANTITY = {"type": ["number", "string"]}

@@ -1,25 +1,17 @@
 """The numbers of a machine written leg by leg: one section for each of its parts, as the plan has them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
+from kinetostat.algebra.scalar import Scalar, times
 from kinetostat.machine.leg import RIGID
 from kinetostat.machine.link import Rigidity
 from kinetostat.machine.section import MATERIALS, Section, rectangular_section, rigidity, tube_section
 from kinetostat.machine.written.plan import SHAPES, JointPlan, Plan
-from kinetostat.spec.fields import Quantity, section
+from kinetostat.spec.fields import Field, Quantity, made_section
 
 AXIS = Quantity("direction", "direction of the joint, of any length, base axes at the home pose", count=3)
 POINT = Quantity("length", "a point of the joint, base frame, at the home pose", count=3)
-
-
-@dataclass(frozen=True)
-class Field:
-    """A field of a section: what it holds, and its default if it may be left out."""
-
-    quantity: Quantity
-    default: Any = None
 
 
 JOINT_FIELDS: Mapping[str, Mapping[str, Field]] = {
@@ -57,14 +49,14 @@ POSE_KINDS = {"x": "length", "y": "length", "z": "length", "roll": "angle", "pit
 def sections_of(plan: Plan) -> dict[str, type]:
     """The sections of the plan's machine files, by dotted name."""
     point = Quantity("length", "platform point P at the home pose, base frame", count=3)
-    found = {"platform": _section("Platform", {"point": Field(point)})}
+    found = {"platform": made_section("Platform", {"point": Field(point)})}
     for name, shape in plan.shapes.items():
-        found[f"sections.{name}"] = _section("CrossSection", _shape_fields(shape, plan.materials[name]))
+        found[f"sections.{name}"] = made_section("CrossSection", _shape_fields(shape, plan.materials[name]))
     for leg in plan.legs:
         for joint in leg.joints:
-            found[f"legs.{leg.name}.{joint.name}"] = _section("JointSection", _joint_fields(joint))
+            found[f"legs.{leg.name}.{joint.name}"] = made_section("JointSection", _joint_fields(joint))
     pose = {name: Field(Quantity(POSE_KINDS[name], f"{name} of the platform")) for name in plan.pose}
-    return {**found, "pose": _section("Pose", pose)}
+    return {**found, "pose": made_section("Pose", pose)}
 
 
 def _joint_fields(joint: JointPlan) -> dict[str, Field]:
@@ -91,15 +83,6 @@ def _shape_fields(shape: str, material: str) -> dict[str, Field]:
     return fields
 
 
-def _section(name: str, fields: Mapping[str, Field]) -> type:
-    """A section class from its fields, those that may be left out last."""
-    ordered = dict(sorted(fields.items(), key=lambda item: item[1].default is not None))
-    kinds = {key: float if one.quantity.count is None else tuple[float, ...] for key, one in ordered.items()}
-    hints = {key: Annotated[kinds[key], one.quantity] for key, one in ordered.items()}
-    defaults = {key: one.default for key, one in ordered.items() if one.default is not None}
-    return section(type(name, (), {"__annotations__": hints, "__module__": __name__, **defaults}))
-
-
 def rigidity_of(shape: str, data: Any, shear: bool) -> Rigidity:
     """The rigidity of a bar with a cross-section of the file.
 
@@ -108,14 +91,20 @@ def rigidity_of(shape: str, data: Any, shear: bool) -> Rigidity:
         data: an instance of its section.
         shear: whether it yields in shear (Timoshenko).
     """
-    young, slide = data.youngs_modulus, data.shear_modulus
-    poisson = 0.5 * young / slide - 1.0
+    return rigidity(data.youngs_modulus, data.shear_modulus, _profile(shape, data), shear)
+
+
+def linear_density_of(shape: str, data: Any) -> Scalar:
+    """Mass per length of such a bar, kg/m; arguments as for `rigidity_of`."""
+    return times(data.density, _profile(shape, data).area)
+
+
+def _profile(shape: str, data: Any) -> Section:
+    poisson = 0.5 * data.youngs_modulus / data.shear_modulus - 1.0
     if shape == "round":
-        profile = tube_section(data.diameter, 0.0, poisson)
-    elif shape == "tube":
-        profile = tube_section(data.outer_diameter, data.inner_diameter, poisson)
-    elif shape == "rectangle":
-        profile = rectangular_section(data.width, data.height)
-    else:
-        profile = Section(data.area, data.second_moment_y, data.second_moment_z, data.torsion_constant, 5.0 / 6.0)
-    return rigidity(young, slide, profile, shear)
+        return tube_section(data.diameter, 0.0, poisson)
+    if shape == "tube":
+        return tube_section(data.outer_diameter, data.inner_diameter, poisson)
+    if shape == "rectangle":
+        return rectangular_section(data.width, data.height)
+    return Section(data.area, data.second_moment_y, data.second_moment_z, data.torsion_constant, 5.0 / 6.0)

@@ -3,14 +3,14 @@
 from collections.abc import Iterator, Sequence
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.kinetostatics.attribution import stiffness_coefficients
+from kinetostat.kinetostatics.elements import elements
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
-from kinetostat.machine.machine import springs
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.comparison import Comparison, compare, rounds_to
+from kinetostat.studies.roles import equations_of_k
 
 COMPLIANCE_UNITS = [QUANTITIES[name].unit for name in GROUPS["compliance"]]
 STIFFNESS_UNITS = [QUANTITIES[name].unit for name in GROUPS["stiffness"]]
@@ -58,11 +58,8 @@ def _row(place: str, values: Sequence[str], computed: Sequence[float], units: Se
 def coefficients(*settings: str) -> dict[str, tuple[float, ...]]:
     """Per stiffness Ka, k52, k54, its coefficients in the six diagonal entries of K (all actuators alike)."""
     response = respond(load(printed.MACHINE, settings))
-    found: dict[str, tuple[float, ...]] = dict.fromkeys(("Ka", "k52", "k54"), (0.0,) * 6)
-    for spring, dyad in zip(springs(response.configuration), stiffness_coefficients(response.statics), strict=True):
-        symbol = SYMBOLS.get(spring.name, "Ka")
-        found[symbol] = tuple(a + b for a, b in zip(found[symbol], dyad.diagonal(), strict=True))
-    return found
+    found = equations_of_k(response, elements(response.configuration), range(len(COMPONENTS)))
+    return {SYMBOLS.get(name, "Ka"): row for name, row in (found or {}).items()}
 
 
 def equations_33_38() -> Iterator[Comparison]:
@@ -72,8 +69,7 @@ def equations_33_38() -> Iterator[Comparison]:
         number, known = printed.EQUATIONS_33_38[name]
         for symbol in ("Ka", "k52", "k54"):
             unit = _coefficient_unit(symbol, name)
-            value = found[symbol][i] if found[symbol][i] > 1e-20 else 0.0
-            yield compare(f"Eq. {number}", f"{symbol} in K_{name}", known.get(symbol, "0"), value, unit)
+            yield compare(f"Eq. {number}", f"{symbol} in K_{name}", known.get(symbol, "0"), found[symbol][i], unit)
 
 
 def _coefficient_unit(symbol: str, component: str) -> str:

@@ -1,0 +1,80 @@
+"""`guidelines`: what a design depends on, in sentences, tables and figures. No formula lives here."""
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinetostat.commands.common import (
+    DONE,
+    NO_ANSWER,
+    add_command,
+    load_machine,
+    no_answer,
+    print_json,
+    takes_json,
+    takes_machine,
+)
+
+if TYPE_CHECKING:
+    from kinetostat.commands.common import Commands
+    from kinetostat.studies.guidelines import Guidelines
+
+STEM = "guidelines"
+
+
+def add_guidelines_command(commands: "Commands") -> None:
+    """Add `guidelines`."""
+    command = add_command(
+        commands, "guidelines", _guidelines, "what stiffness depends on, what counts as rigid, what to change",
+        'kinetostat guidelines zhang-gosselin-4dof --over "x=-2 cm:2 cm:11" --over "z=66 cm:70 cm:11" -o out',
+    )  # fmt: skip
+    takes_machine(command)
+    command.add_argument(
+        "--over", metavar="FIELD=from:to:count", action="append", default=[], dest="ranges",
+        help="a coordinate of the pose and its range: at how many poses the guidelines hold; repeatable",
+    )  # fmt: skip
+    command.add_argument(
+        "--full", action="store_true", help="every parameter, and a sentence for those that matter most"
+    )
+    command.add_argument("-o", "--output", type=Path, help="folder for the figures (PNG, SVG, PDF) and JSON")
+    takes_json(command)
+
+
+def _guidelines(options: argparse.Namespace) -> int:
+    from kinetostat.kinematics.status import Status
+    from kinetostat.studies.guidelines import guidelines
+    from kinetostat.views.progress import progress_bar
+
+    machine = load_machine(options)
+    with progress_bar("computing") as progress:
+        found = guidelines(machine, options.ranges, progress)
+    answered = found.status is Status.OK
+    written = _write(found, options.output) if options.output and answered else []
+    if options.json:
+        from kinetostat.studies.guidelines_data import as_json
+
+        print_json(as_json(found))
+        return DONE if answered else NO_ANSWER
+    if not answered:
+        return no_answer(found.message)
+    from kinetostat.views.grid_tables import print_written
+    from kinetostat.views.guideline_tables import print_guidelines
+    from kinetostat.views.tables import terminal
+
+    console = terminal()
+    print_guidelines(console, found, options.full)
+    print_written(console, written)
+    return DONE
+
+
+def _write(found: "Guidelines", folder: Path) -> list[Path]:
+    from kinetostat.studies.guidelines_data import as_json
+    from kinetostat.studies.storage import write_text
+    from kinetostat.views.figures import save
+    from kinetostat.views.guideline_figures import guideline_figures
+
+    written = [folder / f"{STEM}.json"]
+    write_text(written[0], json.dumps(as_json(found), ensure_ascii=False, allow_nan=False, indent=1) + "\n")
+    drawn = guideline_figures(found)
+    return written + [path for name, figure in drawn.items() for path in save(figure, folder / f"{STEM}-{name}")]

@@ -1,0 +1,209 @@
+"""Elastic elements: springs that a designer changes together, and what C becomes when one of them is stiffened.
+
+Formulas are over any scalar: one pose, or many as arrays. What they mean for a design is a study's business.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.algebra.scalar import Scalar, reciprocal, times
+from kinetostat.algebra.symmetric import SIZE, Symmetric6
+from kinetostat.kinetostatics.assembly import compliance_matrix, solve_statics, weighted_sum
+from kinetostat.kinetostatics.attribution import stiffness_coefficients
+from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.leg import Spring
+from kinetostat.machine.machine import Configuration
+
+SOFTEST = 1e12
+"""Factor on compliances beyond which an element counts as not there."""
+LINKS_TOGETHER = "links together"
+"""Name of all elements but the actuators, as one."""
+ROUNDING = 1e-12
+"""Share of what an element adds to an entry of C below which all that is left of it is rounding."""
+UNSEEN = 1e-24
+"""Square of 1e-12: share of the largest entry below which a diagonal entry of C is rounding."""
+SECANTS = 12
+"""Steps of the search for the limit of rigidity: they converge faster than by halving, six to eight are needed."""
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Element:
+    """Springs that belong together: a joint or link, or one in each of several legs that are alike.
+
+    Attributes:
+        name: for people, e.g. "actuator".
+        parts: names of the joints and links.
+        springs: their places in the order of all springs of the machine.
+        actuated: whether they are actuators.
+        unit: of their stiffness; empty where one part has several springs.
+        stiffness: of each, SI; None where they differ or one part has several springs.
+    """
+
+    name: str
+    parts: tuple[str, ...]
+    springs: tuple[int, ...]
+    actuated: bool
+    unit: str
+    stiffness: float | None
+
+
+def elements(configuration: Configuration) -> list[Element]:
+    """The elastic elements of a machine, actuators first.
+
+    Springs that are free carry nothing and are none, nor is a part of several springs that are all rigid.
+    """
+    groups: dict[tuple[object, ...], dict[str, list[tuple[int, Spring]]]] = {}
+    number = 0
+    for leg in configuration.legs:
+        parts: dict[str, list[tuple[int, Spring]]] = {}
+        for spring in leg.springs:
+            if spring.stiffness != 0.0:
+                parts.setdefault(spring.part or spring.name, []).append((number, spring))
+            number += 1
+        alike = tuple((part.removeprefix(f"{leg.name} "), len(own)) for part, own in parts.items())
+        for part, own in parts.items():
+            if len(own) > 1 and all(spring.stiffness == math.inf for _, spring in own):
+                continue
+            label = part.removeprefix(f"{leg.name} ")
+            kind = (label, tuple(_unit(spring) for _, spring in own), own[0][1].actuated, alike)
+            groups.setdefault(kind, {})[part] = own
+    found = [_element(str(kind[0]), parts) for kind, parts in groups.items()]
+    return sorted(found, key=lambda element: not element.actuated)
+
+
+def with_links_together(found: Sequence[Element]) -> list[Element]:
+    """The elements, and all that are no actuators once more as one, where there are several of them."""
+    links = [element for element in found if not element.actuated]
+    if len(links) < 2 or len(links) == len(found):
+        return list(found)
+    parts = tuple(part for element in links for part in element.parts)
+    springs = tuple(place for element in links for place in element.springs)
+    units, sizes = {element.unit for element in links}, {element.stiffness for element in links}
+    alike = len(units) == len(sizes) == 1
+    unit, stiffness = (units.pop(), sizes.pop()) if alike else ("", None)
+    return [*found, Element(LINKS_TOGETHER, parts, springs, False, unit, stiffness)]
+
+
+def _element(label: str, parts: Mapping[str, Sequence[tuple[int, Spring]]]) -> Element:
+    held = [spring for own in parts.values() for _, spring in own]
+    single = len(held) == len(parts)
+    sizes = {float(spring.stiffness) for spring in held}
+    return Element(
+        name=f"{label} ×{len(parts)}" if len(parts) > 1 else next(iter(parts)),
+        parts=tuple(parts),
+        springs=tuple(number for own in parts.values() for number, _ in own),
+        actuated=held[0].actuated,
+        unit=_unit(held[0]) if single else "",
+        stiffness=sizes.pop() if single and len(sizes) == 1 else None,
+    )
+
+
+def _unit(spring: Spring) -> str:
+    return "N/m" if spring.joint.point is None else "N·m/rad"
+
+
+def element_share(response: Response, element: Element) -> list[Scalar]:
+    """What an element adds to the six diagonal entries of C: the sum of s_e xi_e^2 over its springs, SI.
+
+    A rigid one that stands alone is taken with a compliance of 1 (SI): what it would add per unit of it.
+    """
+    statics = response.statics
+    shares = [(statics.flexibility[place], weight) for place, weight in _weights(response, element).items()]
+    return list(weighted_sum(shares, reciprocal(statics.length)).diagonal())
+
+
+def diagonal_with(response: Response, element: Element, factor: Scalar) -> list[Scalar]:
+    """The six diagonal entries of C once the compliances of an element are multiplied by a factor >= 0; 0 is rigid."""
+    chosen, number, legs = _weights(response, element), 0, []
+    for leg in response.legs:
+        places = range(number, number + len(leg.compliance))
+        own = [times(chosen[i], factor) if i in chosen else s for i, s in zip(places, leg.compliance, strict=True)]
+        legs.append(replace(leg, compliance=tuple(own)))
+        number += len(leg.compliance)
+    return list(compliance_matrix(solve_statics(legs, response.statics.length, response.guide)).diagonal())
+
+
+def rigid_from(response: Response, element: Element, excess: float) -> Array:
+    """By which factor the compliances of an element may be multiplied so that it only just counts as rigid.
+
+    That is where an entry of the diagonal of C exceeds the one with the element rigid by the share `excess` of it. C is
+    affine in compliances where the machine is isostatic; otherwise it is solved for. 0 where nothing else yields,
+    infinity where no softness of it is felt as much.
+
+    Args:
+        response: of the machine at one pose, or at several as arrays.
+        element: whose springs are changed together.
+        excess: e.g. 0.01.
+
+    Returns:
+        The factor for each component at each pose [6 x poses].
+    """
+    with np.errstate(all="ignore"):
+        rest = without_rounding(diagonal_with(response, element, 0.0), response)
+        shares = without_rounding(element_share(response, element), response)
+        rest = np.where(rest > ROUNDING * shares, rest, 0.0)
+        if is_isostatic(response):
+            return np.where(shares > 0.0, excess * rest / shares, math.inf)
+        return _factor_for(response, element, rest, excess * rest)
+
+
+def without_rounding(entries: Sequence[Scalar], response: Response) -> Array:
+    """Diagonal entries of C at one pose or at many [6 x poses], 0 where they are but rounding beside the others."""
+    rows = np.stack(np.broadcast_arrays(*(np.atleast_1d(np.asarray(entry, dtype=float)) for entry in entries)))
+    length = np.broadcast_to(np.asarray(response.statics.length, dtype=float), rows.shape[1:])
+    sizes = rows / np.stack([np.ones_like(length)] * 3 + [length * length] * 3)
+    largest = np.where(np.isfinite(sizes), sizes, 0.0).max(axis=0)
+    return np.where(sizes > UNSEEN * largest, rows, np.where(np.isnan(rows), math.nan, 0.0))
+
+
+def is_isostatic(response: Response) -> bool:
+    """Whether the legs carry six wrenches, so that statics alone says how they share a load."""
+    return sum(len(own) for own in response.statics.sharing) + len(response.guide) == SIZE
+
+
+def stiffness_equations(response: Response, found: Sequence[Element]) -> dict[str, Symmetric6] | None:
+    """K as a sum over elements of stiffness times a matrix that no stiffness is in: eqs. 33-38, all entries.
+
+    None where there is no such sum: where springs of a leg work in a row, a part has several, or an element has several
+    stiffnesses.
+    """
+    square = all(len(leg.loads) == len(leg.wrenches) for leg in response.legs)
+    if not square or any(element.stiffness is None for element in found):
+        return None
+    dyads = stiffness_coefficients(response.statics)
+    return {element.name: Symmetric6.total([dyads[i] for i in element.springs]) for element in found}
+
+
+def _weights(response: Response, element: Element) -> dict[int, Scalar]:
+    compliance = response.statics.compliance
+    return {i: 1.0 if element.stiffness == math.inf else compliance[i] for i in element.springs}
+
+
+def _factor_for(response: Response, element: Element, rest: Array, excess: Array) -> Array:
+    """The factor at which each entry of the diagonal of C exceeds `rest` by `excess`, both [6 x poses].
+
+    Secants of 1/excess over 1/factor: a line where one internal load is undecided, concave where there are several.
+    """
+
+    def more(factor: Array) -> Array:
+        grown = enumerate(diagonal_with(response, element, factor))
+        return np.stack([np.broadcast_to(entry, rest.shape)[i] for i, entry in grown]) - rest
+
+    aim = 1.0 / excess
+    present = more(np.ones_like(rest))
+    before = present / excess
+    then = 1.0 / more(1.0 / before)
+    here = before * aim / then
+    for _ in range(SECANTS):
+        now = 1.0 / more(1.0 / here)
+        steep = (now - then) / (here - before)
+        step = np.where(np.isfinite(steep) & (steep > 0.0), (aim - now) / steep, 0.0)
+        before, then, here = here, now, np.where(here + step > 0.0, here + step, 0.5 * here)
+    never = more(np.full_like(rest, SOFTEST)) <= excess
+    return np.where(rest > 0.0, np.where(never, math.inf, 1.0 / here), 0.0)

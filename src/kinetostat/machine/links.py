@@ -1,0 +1,79 @@
+"""Links of a family that have a mass: what people call them, where their cross-section may stand, how long they are.
+
+What they weigh together is `mass`' business; links of machines written leg by leg are in their files.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from kinetostat.algebra.scalar import Scalar, is_zero
+from kinetostat.algebra.vector import Vector
+from kinetostat.machine.leg import Leg
+from kinetostat.spec.fields import Field, Quantity, made_section
+
+Lengths = Callable[[Sequence[Leg], Vector, Any], list[tuple[str, Scalar]]]
+"""From the legs at a pose, P (base frame, m) and the section `geometry` to names and lengths (m) of links."""
+
+
+@dataclass(frozen=True)
+class LinkKind:
+    """Links of a family that are alike.
+
+    Attributes:
+        name: their field in the table [linear_density].
+        rigidities: fields of [stiffness] in which their cross-section may be written.
+        lengths: of each of them.
+        count: how many entries those fields have; None where one is for all links.
+    """
+
+    name: str
+    rigidities: tuple[str, ...]
+    lengths: Lengths
+    count: int | None = None
+
+
+def density_section(kinds: Sequence[LinkKind]) -> type:
+    """The section [linear_density] of a family with these links; it may be left out."""
+    found = {}
+    for kind in kinds:
+        words = kind.name.replace("_", " ")
+        quantity = Quantity("linear density", f"mass per length of the {words}; 0: not counted", count=kind.count)
+        found[kind.name] = Field(quantity, 0.0 if kind.count is None else (0.0,) * kind.count)
+    return made_section("LinearDensity", found)
+
+
+def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[tuple[str, Scalar]]:
+    """Legs from the first to the last of their passive joints, as long as the pose makes them."""
+    ends = [(leg.name, leg.passive[0].point, leg.passive[-1].point) for leg in actuated_legs(legs)]
+    return [(name, (end - start).norm()) for name, start, end in ends if start is not None and end is not None]
+
+
+def in_each_leg(what: str, field: str, bars: int = 1) -> Lengths:
+    """Links of the actuated legs, all as long as a field of [geometry] says; in pairs where `bars` is 2."""
+
+    def lengths(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[tuple[str, Scalar]]:
+        names = [what] if bars == 1 else [f"{what} {i}" for i in range(1, bars + 1)]
+        return [(f"{leg.name} {name}", getattr(geometry, field)) for leg in actuated_legs(legs) for name in names]
+
+    return lengths
+
+
+def listed(what: str, field: str) -> Lengths:
+    """Links whose lengths are the entries of a field of [geometry]."""
+
+    def lengths(_legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[tuple[str, Scalar]]:
+        return [(f"{what} {i}", length) for i, length in enumerate(getattr(geometry, field), 1)]
+
+    return lengths
+
+
+def from_origin(what: str) -> Lengths:
+    """One link from the origin of the base frame to P."""
+    return lambda _legs, tip, _geometry: [(what, tip.norm())]
+
+
+def actuated_legs(legs: Sequence[Leg]) -> list[Leg]:
+    """The legs "leg ..." that are there: one whose actuator has no stiffness by form has been removed."""
+    named = [leg for leg in legs if leg.name.startswith("leg ")]
+    return [leg for leg in named if not any(s.actuated and is_zero(s.stiffness) for s in leg.springs)]

@@ -1,0 +1,60 @@
+"""What moves and how heavy it is: links with a cross-section and a density, and the platform with its tool.
+
+A mass is a plain sum, over any scalar: how it is distributed, and what it does to dynamics, is not asked here.
+"""
+
+from dataclasses import dataclass
+
+from kinetostat.algebra.scalar import Scalar, is_zero, plus, times, total
+from kinetostat.machine.machine import Configuration, Machine, Member
+
+PLATFORM = "platform and tool"
+
+
+@dataclass(frozen=True)
+class Mass:
+    """What one part weighs at a pose.
+
+    Attributes:
+        name: of the link, or `PLATFORM`.
+        mass: kg; None where nothing says it.
+    """
+
+    name: str
+    mass: Scalar | None
+
+
+def moving_masses(machine: Machine, configuration: Configuration) -> list[Mass]:
+    """Every link that can move, and the platform with its tool.
+
+    A link counts from joint to joint with its whole length: a telescopic leg as a bar as long as the pose makes it.
+
+    Args:
+        machine: says which links there are, their densities, and the mass of the platform.
+        configuration: of it, at its pose.
+    """
+    platform = machine.sections["tool"].mass
+    links = [Mass(one.name, _weighed(one)) for one in _members(machine, configuration)]
+    return [*links, Mass(PLATFORM, None if is_zero(platform) else platform)]
+
+
+def moving_mass(machine: Machine, configuration: Configuration) -> Scalar:
+    """What all those weigh together of which a mass is known, kg; arguments as for `moving_masses`."""
+    return total([mass.mass for mass in moving_masses(machine, configuration) if mass.mass is not None])
+
+
+def _weighed(link: Member) -> Scalar | None:
+    return None if is_zero(link.linear_density) else plus(0.0, times(link.linear_density, link.length))
+
+
+def _members(machine: Machine, configuration: Configuration) -> list[Member]:
+    family = machine.family
+    if family.members is not None:
+        return family.members(**machine.own_sections)
+    found = []
+    for kind in family.links:
+        density = getattr(machine.sections["linear_density"], kind.name)
+        placed = configuration.legs, configuration.platform.translation, machine.sections["geometry"]
+        for i, (name, length) in enumerate(kind.lengths(*placed)):
+            found.append(Member(name, length, density if kind.count is None else density[i]))
+    return found

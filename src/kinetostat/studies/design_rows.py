@@ -1,0 +1,143 @@
+"""Numbers of several designs in rows: at the pose of each, and over a grid of poses that all of them have."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.engine.batch import Progress
+from kinetostat.engine.points import Array
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.machine import Machine
+from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.grid import evaluate_grid
+
+PERCENTILE = 95.0
+"""Of the poses of a grid, the share that is at least as good."""
+SAME = 1e-9
+"""Relative difference up to which two values are one."""
+
+
+class Better(StrEnum):
+    """Which of two values is the better one."""
+
+    LESS = "less"
+    MORE = "more"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One number of every design.
+
+    Attributes:
+        group: what rows belong together.
+        name: of the number.
+        unit: SI.
+        better: which is the better one.
+        values: None where a design has none; infinite where it is rigid or free.
+    """
+
+    group: str
+    name: str
+    unit: str
+    better: Better
+    values: tuple[float | None, ...]
+
+    @property
+    def percents(self) -> tuple[float | None, ...]:
+        """Change against the first design, percent; None where there is no such number."""
+        first = self.values[0]
+        if first is None or first == 0.0 or not math.isfinite(first):
+            return (None,) * len(self.values)
+        return tuple(None if v is None or not math.isfinite(v) else 100.0 * (v / first - 1.0) for v in self.values)
+
+    @property
+    def best(self) -> tuple[int, ...]:
+        """Places of the best ones; none where all are alike."""
+        known = {i: v for i, v in enumerate(self.values) if v is not None}
+        if len(known) < 2:
+            return ()
+        top = (min if self.better is Better.LESS else max)(known.values())
+        found = tuple(i for i, v in known.items() if v == top or math.isclose(v, top, rel_tol=SAME))
+        return found if len(found) < len(known) else ()
+
+
+def rows_at_poses(analyses: Sequence[Analysis]) -> tuple[Row, ...]:
+    """Numbers at each design's pose; rows that no design has are left out."""
+    found = []
+    for group, letter, better in (("compliance", "C", Better.LESS), ("stiffness", "K", Better.MORE)):
+        for name in COMPONENTS:
+            entry = QUANTITIES[f"{group}_{name}"]
+            own = tuple(_diagonal(one, group, name) for one in analyses)
+            found.append(Row(group, f"{letter}_{name}", entry.unit, better, own))
+    scalars: list[tuple[str, str, Better, Callable[[Analysis], float | None]]] = [
+        ("least stiffness, force", "N/m", Better.MORE, lambda one: _least(one, "translation")),
+        ("least stiffness, moment", "N·m/rad", Better.MORE, lambda one: _least(one, "rotation")),
+        ("condition of K", "1", Better.LESS, _condition),
+        ("regularity", "1", Better.MORE, _regularity),
+        ("moving mass", "kg", Better.LESS, lambda one: one.mass),
+    ]
+    for name, unit, better, value in scalars:
+        own = tuple(value(one) if one.status is Status.OK else None for one in analyses)
+        found.append(Row("indices", name, unit, better, own))
+    return tuple(row for row in found if any(value is not None for value in row.values))
+
+
+def _diagonal(analysis: Analysis, group: str, name: str) -> float | None:
+    diagonal = analysis.compliance_diagonal if group == "compliance" else analysis.stiffness_diagonal
+    return dict(zip(analysis.components, diagonal, strict=False)).get(name)
+
+
+def _least(analysis: Analysis, block: str) -> float | None:
+    """The least principal stiffness of a block, the other free to follow."""
+    blocks = analysis.indices.free if analysis.indices else None
+    return {str(name): one.stiffnesses[0] for name, one in (blocks or {}).items()}.get(block)
+
+
+def _regularity(analysis: Analysis) -> float:
+    return float(respond(analysis.machine).regularity)
+
+
+def _condition(analysis: Analysis) -> float | None:
+    value = analysis.indices.condition if analysis.indices else math.inf
+    return value if math.isfinite(value) else None
+
+
+def rows_over(
+    machines: Sequence[Machine], ranges: Sequence[str], progress: Progress
+) -> tuple[tuple[Row, ...], tuple[tuple[int, int], ...]]:
+    """Worst, percentile and mean over a grid; and for each design how many of how many poses have an answer.
+
+    Raises:
+        InputError: a range that one of the machines does not take.
+    """
+    common = [name for name in COMPONENTS if any(name in one.family.component_names for one in machines)]
+    found: list[dict[str, tuple[float, ...]]] = []
+    poses = []
+    for done, machine in enumerate(machines, 1):
+        dataset = evaluate_grid(machine, ranges, ["compliance", "regularity"])
+        good = dataset["status"].values == Status.OK
+        poses.append((int(good.sum()), int(good.size)))
+        own = {str(name): dataset[name].values[good] for name in dataset.data_vars if name != "status"}
+        found.append({name: _spread(name, row) for name, row in own.items() if row.size})
+        progress(done, len(machines))
+    rows = []
+    for name in [*(f"compliance_{component}" for component in common), "regularity"]:
+        better = Better.MORE if name == "regularity" else Better.LESS
+        shown = name.replace("compliance_", "C_")
+        for k, what in enumerate(("worst", f"{PERCENTILE:g} %", "mean")):
+            own_values = tuple(spread[name][k] if name in spread else None for spread in found)
+            rows.append(Row(shown, what, QUANTITIES[name].unit, better, own_values))
+    return tuple(rows), tuple(poses)
+
+
+def _spread(name: str, row: Array) -> tuple[float, ...]:
+    """Worst, what so many percent of the poses are at least as good as, and mean."""
+    if name == "regularity":
+        return float(row.min()), float(np.percentile(row, 100.0 - PERCENTILE)), float(row.mean())
+    return float(row.max()), float(np.percentile(row, PERCENTILE)), float(row.mean())

@@ -1,0 +1,180 @@
+"""Designs side by side: where their files differ, how stiff each is, and who gains what against the first.
+
+Any machines can be compared, of one family or not; what only some of them have is missing for the others. What is
+printed or drawn is in `views`.
+"""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.engine.batch import Progress, silent
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.elements import element_share, elements, without_rounding
+from kinetostat.kinetostatics.quantities import ROTATIONS
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.loading import bundled, load
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import Parameter, parameters, values
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.analysis import Analysis, analyze
+from kinetostat.studies.design_rows import Row, rows_at_poses, rows_over
+
+MOST_DESIGNS = 12
+SEPARATOR = ";"
+"""Between overrides of one design."""
+
+_OVERRIDDEN = re.compile(r"(.+?):(\s*[A-Za-z_][\w.-]*\s*=.*)", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Design:
+    """A machine under the name by which it was given.
+
+    Attributes:
+        label: as written.
+        machine: with its pose.
+        analysis: of it.
+    """
+
+    label: str
+    machine: Machine
+    analysis: Analysis
+
+    @property
+    def answered(self) -> bool:
+        """Whether its pose has an answer."""
+        return self.analysis.status is Status.OK
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A field that all designs have, and of which not all say the same.
+
+    Attributes:
+        parameters: of each design; the kind need not be the same.
+        values: SI, entry by entry.
+    """
+
+    parameters: tuple[Parameter, ...]
+    values: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class Blame:
+    """What makes a direction of a design soft.
+
+    Attributes:
+        component: the softest one of its kind.
+        shares: of the elements in its compliance, the greatest first.
+    """
+
+    component: str
+    shares: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The answer.
+
+    Attributes:
+        designs: in order; the first is what the others are compared with.
+        differences: fields that differ.
+        rows: numbers at the pose of each design.
+        softest: the softest rotation and translation of each design; fewer where it has none.
+        ranges: of the grid, as written.
+        poses: of each design, how many poses of the grid have an answer, and how many there are.
+        over: numbers over those poses.
+    """
+
+    designs: tuple[Design, ...]
+    differences: tuple[Difference, ...]
+    rows: tuple[Row, ...]
+    softest: tuple[tuple[Blame, ...], ...]
+    ranges: tuple[str, ...] = ()
+    poses: tuple[tuple[int, int], ...] = ()
+    over: tuple[Row, ...] = ()
+
+
+def read_design(text: str, settings: Sequence[str] = ()) -> Design:
+    """A design from what people write: a file or bundled name, and after a colon overrides of its fields.
+
+    Args:
+        text: "NAME" or "NAME:path=value;path=value".
+        settings: overrides for all designs, applied first.
+
+    Raises:
+        InputError: no such machine, or a mistake in it.
+    """
+    match = None if text in bundled() else _OVERRIDDEN.fullmatch(text)
+    if match is None:
+        machine = load(text, settings)
+    else:
+        own = [setting.strip() for setting in match[2].split(SEPARATOR) if setting.strip()]
+        machine = load(match[1], [*settings, *own])
+    return Design(text, machine, analyze(machine))
+
+
+def compare(designs: Sequence[Design], ranges: Sequence[str] = (), progress: Progress = silent) -> Comparison:
+    """Designs side by side, each at its own pose and, where ranges are given, all over the same grid.
+
+    Args:
+        designs: two or more.
+        ranges: "FIELD=from:to:count", of fields that all of them have.
+        progress: told how far the work is.
+
+    Raises:
+        InputError: fewer than two designs or too many, or a range that one of them does not take.
+    """
+    if not 2 <= len(designs) <= MOST_DESIGNS:
+        raise InputError(
+            f"compare takes 2 to {MOST_DESIGNS} designs, not {len(designs)}; give files, names or NAME:path=value."
+        )
+    over, poses = rows_over([design.machine for design in designs], ranges, progress) if ranges else ((), ())
+    return Comparison(
+        tuple(designs),
+        _differences(designs),
+        rows_at_poses([design.analysis for design in designs]),
+        tuple(_softest(design) for design in designs),
+        tuple(ranges),
+        poses,
+        over,
+    )
+
+
+def _differences(designs: Sequence[Design]) -> tuple[Difference, ...]:
+    """Fields that all designs have, whole ones where they have entries, and of which not all say the same."""
+    held = [values(design.machine) for design in designs]
+    known = [{p.path: p for p in parameters(design.machine.family)} for design in designs]
+    entries = {leaf for parameter in known[0].values() if parameter.quantity.count for leaf in parameter.leaves}
+    found = []
+    for path in known[0]:
+        if path in entries or not all(path in fields for fields in known):
+            continue
+        own = tuple(fields[path] for fields in known)
+        rows = tuple(tuple(numbers[leaf] for leaf in p.leaves) for numbers, p in zip(held, own, strict=True))
+        if len(set(zip((p.quantity.kind for p in own), rows, strict=True))) > 1:
+            found.append(Difference(own, rows))
+    return tuple(found)
+
+
+def _softest(design: Design) -> tuple[Blame, ...]:
+    """The softest rotation and translation of a design, and what is to blame."""
+    if not design.answered:
+        return ()
+    response, components = respond(design.machine), design.machine.family.components
+    whole = without_rounding(response.compliance.diagonal(), response)[:, 0]
+    found = []
+    for block in (range(ROTATIONS), range(ROTATIONS, len(COMPONENTS))):
+        own = [i for i in components if i in block and 0.0 < whole[i] < math.inf]
+        if own:
+            i = max(own, key=lambda i: whole[i])
+            parts = [
+                (element.name, float(element_share(response, element)[i] / whole[i]))
+                for element in elements(response.configuration)
+                if element.stiffness != math.inf
+            ]
+            found.append(Blame(COMPONENTS[i], tuple(sorted(parts, key=lambda part: -part[1]))))
+    return tuple(found)

@@ -1,0 +1,105 @@
+"""Designs side by side as grouped bars for print; every axis has its unit."""
+
+import math
+import string
+from collections.abc import Sequence
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from kinetostat.studies.design_rows import Row
+from kinetostat.studies.designs import Comparison
+from kinetostat.views.display import prefixed_scale
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout
+
+WIDE = 30.0
+"""Ratio of the largest to the least bar from which an axis is logarithmic."""
+LONGEST = 100
+"""Characters of a design's name in the legend."""
+
+
+def comparison_figure(found: Comparison) -> Figure:
+    """Compliance about and along the axes, regularity and mass: a bar for each design; over a grid mean and worst."""
+    grid = bool(found.ranges)
+    rows = found.over if grid else found.rows
+    panels = [panel for panel in (*_compliance(rows, grid), *_scalars(found, rows, grid)) if panel[1]]
+    widths = [0.9 + 0.55 * len(bars) for _, bars in panels]
+    with mpl.rc_context(STYLE):
+        height = 2.9 + 0.17 * len(found.designs)
+        figure = Figure(figsize=(sum(widths) + 0.6 * len(panels) + 0.6, height), layout="constrained")
+        axes = figure.subplots(1, len(panels), squeeze=False, width_ratios=widths).flat
+        for panel, (title, bars) in zip(axes, panels, strict=True):
+            _bars(panel, title, bars, len(found.designs))
+        styles = zip(string.ascii_uppercase, found.designs, strict=False)
+        handles = [
+            Patch(color=_colour(i), label=f"{letter}  {_short(design.label)}")
+            for i, (letter, design) in enumerate(styles)
+        ]
+        figure.legend(handles=handles, loc="outside lower left")
+        what = f"mean (bars) and worst (dots) over {', '.join(found.ranges)}" if grid else "at the pose of each design"
+        figure.suptitle(f"Designs compared, {what}", fontsize=10)
+        fix_layout(figure)
+    return figure
+
+
+Bars = list[tuple[str, Row, Row | None]]
+"""Label, heights, and where dots stand."""
+
+
+def _compliance(rows: Sequence[Row], grid: bool) -> list[tuple[str, Bars]]:
+    own = [row for row in rows if (row.group.startswith("C_") if grid else row.group == "compliance")]
+    panels: dict[str, Bars] = {"compliance about axes": [], "compliance along axes": []}
+    for label, bar, dot in _pairs(own, grid):
+        panels[f"compliance {'about' if label.startswith('r') else 'along'} axes"].append((label, bar, dot))
+    return list(panels.items())
+
+
+def _scalars(found: Comparison, rows: Sequence[Row], grid: bool) -> list[tuple[str, Bars]]:
+    regular = [row for row in rows if (row.group if grid else row.name) == "regularity"]
+    mass = [row for row in found.rows if row.name == "moving mass"]
+    return [("regularity", _pairs(regular, grid)), ("moving mass", [("", row, None) for row in mass])]
+
+
+def _pairs(rows: Sequence[Row], grid: bool) -> Bars:
+    if not grid:
+        return [(row.name.removeprefix("C_").replace("regularity", ""), row, None) for row in rows]
+    groups: dict[str, dict[str, Row]] = {}
+    for row in rows:
+        groups.setdefault(row.group.removeprefix("C_").replace("regularity", ""), {})[row.name] = row
+    return [(label, own["mean"], own["worst"]) for label, own in groups.items()]
+
+
+def _bars(panel: Axes, title: str, bars: Bars, count: int) -> None:
+    unit = bars[0][1].unit
+    heights = np.array([_numbers(bar) for _, bar, _ in bars])
+    dots = np.array([_numbers(dot) if dot else [math.nan] * count for _, _, dot in bars])
+    scale = prefixed_scale(unit, np.concatenate([heights, dots]))
+    heights, dots = heights * scale.factor, dots * scale.factor
+    width = 0.8 / count
+    for i in range(count):
+        places = np.arange(len(bars)) + (i - (count - 1) / 2) * width
+        panel.bar(places, heights[:, i], width * 0.92, color=_colour(i))
+        panel.plot(places, dots[:, i], "o", color="#333333", markersize=2.5)
+    seen = heights[np.isfinite(heights) & (heights > 0.0)]
+    if seen.size and seen.max() > WIDE * seen.min():
+        panel.set_yscale("log")
+    panel.set_xticks(range(len(bars)), [label for label, _, _ in bars])
+    panel.grid(visible=False, axis="x")
+    panel.set_axisbelow(True)
+    panel.tick_params(axis="x", length=0)
+    panel.set_ylabel(scale.label(title) if unit != "1" else f"{title} (0 to 1)")
+
+
+def _numbers(row: Row) -> list[float]:
+    return [math.nan if value is None or not math.isfinite(value) else value for value in row.values]
+
+
+def _colour(i: int) -> str:
+    return ("#999999", *COLOURS)[i % (len(COLOURS) + 1)]
+
+
+def _short(label: str) -> str:
+    return label if len(label) <= LONGEST else f"{label[: LONGEST - 1]}…"

@@ -1,0 +1,92 @@
+"""Guidelines as figures for print: what the design does, and stiffness against that of each element."""
+
+import math
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from kinetostat.kinetostatics.elements import Element
+from kinetostat.studies.guideline_sentences import limit_of
+from kinetostat.studies.guidelines import Guidelines
+from kinetostat.studies.roles import EXCESS, stiffening
+from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout
+from kinetostat.views.sensitivity_figure import draw_cells
+
+MOST_ROWS = 30
+"""Parameters that are shown."""
+MOST_PANELS = 6
+"""Elements that are shown."""
+POINTS = 161
+"""Along each curve."""
+DECADES = 1.0
+"""How far curves go beyond the limits of rigidity and the present stiffness, in powers of ten."""
+
+
+def guideline_figures(found: Guidelines) -> dict[str, Figure]:
+    """Figures by name: "design", and "rigid" where there are elements with a limit of rigidity."""
+    if found.here is None:
+        return {}
+    drawn = {"design": design_figure(found)} if found.moves else {}
+    limits = [(one, found.here.rigid[k, :, 0]) for k, one in enumerate(found.found) if not one.actuated]
+    shown = [(one, row) for one, row in limits if (np.isfinite(row) & (row > 0.0)).any()]
+    return {**drawn, "rigid": rigid_figure(found, shown[-MOST_PANELS:])} if shown else drawn
+
+
+def design_figure(found: Guidelines) -> Figure:
+    """Parameters against directions: blue where one percent more makes a direction stiffer, red where softer."""
+    shown = found.moves[:MOST_ROWS]
+    cells = np.array([[math.nan if p is None else p for p in move.percents] for move in shown], dtype=float)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(2.6 + 0.62 * cells.shape[1], 1.1 + 0.2 * len(shown)), layout="constrained")
+        panel = figure.subplots()
+        draw_cells(panel, cells, "RdBu", "percent stiffer per percent more")
+        panel.set_yticks(range(len(shown)), [move.path for move in shown])
+        panel.set_xticks(range(cells.shape[1]), found.components)
+        figure.suptitle(f"{found.machine.name}: what the design does", fontsize=10)
+        fix_layout(figure)
+    return figure
+
+
+def rigid_figure(found: Guidelines, shown: list[tuple[Element, np.ndarray]]) -> Figure:
+    """Stiffness of each direction against that of each element, with the points from which on it counts as rigid."""
+    columns = min(3, len(shown))
+    rows = -(-len(shown) // columns)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(2.9 * columns + 0.9, 2.5 * rows + 0.7), layout="constrained")
+        panels = figure.subplots(rows, columns, squeeze=False).flat
+        for panel, (element, limits) in zip(panels, shown, strict=False):
+            _curves(panel, found, element, limits)
+        for unused in list(figure.axes)[len(shown) :]:
+            unused.remove()
+        styles = zip(found.components, COLOURS, DASHES, strict=False)
+        lines = [Line2D([], [], color=colour, linestyle=dash, label=name) for name, colour, dash in styles]
+        dot = Line2D([], [], color="#444444", marker="o", markersize=4, linestyle="", label="within 1 %")
+        figure.legend(handles=[*lines, dot], loc="outside right center", title="direction")
+        figure.suptitle(f"{found.machine.name}: from which stiffness on an element counts as rigid", fontsize=10)
+        fix_layout(figure)
+    return figure
+
+
+def _curves(panel: Axes, found: Guidelines, element: Element, limits: np.ndarray) -> None:
+    finite = limits[np.isfinite(limits) & (limits > 0.0)]
+    rigid_now = element.stiffness == math.inf
+    ends = np.log10([*finite, *([] if rigid_now else [1.0])])
+    factors = np.logspace(ends.min() - 2.0 * DECADES, ends.max() + DECADES, POINTS)
+    own = 1.0 if element.stiffness is None else limit_of(element.stiffness, 1.0)
+    stiff = stiffening(found.machine, element, factors)
+    for colour, dash, curve, limit in zip(COLOURS, DASHES, stiff, limits, strict=False):
+        if limit == math.inf:
+            continue
+        panel.plot(own * factors, 100.0 * curve, linestyle=dash, color=colour, linewidth=1.3)
+        if 0.0 < limit < math.inf:
+            panel.plot(own * limit, 100.0 / (1.0 + EXCESS), "o", color=colour, markersize=4, zorder=3)
+    if not rigid_now:
+        panel.axvline(own, color="#888888", linewidth=0.8, linestyle=":")
+        panel.text(own, 3.0, " now", fontsize=6.5, color="#666666", ha="left")
+    unit = f"stiffness ({element.unit})" if element.stiffness is not None else "times its present stiffness"
+    panel.set(xscale="log", ylim=(0.0, 104.0), xlabel=unit, ylabel="stiffness, % of that\nwith it rigid")
+    panel.set_title(element.name)
+    panel.margins(x=0.0)

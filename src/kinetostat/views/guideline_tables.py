@@ -1,0 +1,150 @@
+"""Guidelines on a terminal: sentences, and the tables behind them. Nothing is computed but rounding."""
+
+import math
+
+from rich.console import Console
+from rich.padding import Padding
+
+from kinetostat.studies.guideline_sentences import LEAST, MATTERS, statements
+from kinetostat.studies.guidelines import Guidelines
+from kinetostat.studies.moves import Move
+from kinetostat.studies.roles import Roles
+from kinetostat.views.tables import number, numeric_table
+
+TOPICS = {
+    "yields": "What each direction depends on",
+    "weakest": "Where stiffness is spent best",
+    "rigid": "What counts as rigid, within 1 %",
+    "design": "What the design does",
+}
+MOST_ROWS = 16
+"""Parameters that are printed; all of them on demand."""
+MOST_NAMED = 8
+
+
+def print_guidelines(console: Console, found: Guidelines, full: bool = False) -> None:
+    """Sentences and tables; every parameter, and a sentence for those that matter most, if `full`."""
+    console.print(f"[bold]{found.machine.name}[/bold]  design guidelines")
+    answered, poses = found.poses
+    about = f"Directions {' '.join(found.components)}: deflection under a load in the same direction, base axes."
+    if poses:
+        about += f" Over {', '.join(found.ranges)}: {answered:,} of {poses:,} poses have an answer."
+    console.print(about, style="dim", highlight=False, markup=False)
+    if found.here is None:
+        return
+    _print_sentences(console, found, full)
+    _print_equations(console, found)
+    _print_shares(console, found, found.here)
+    _print_limits(console, found, found.here)
+    _print_moves(console, found, full)
+
+
+def _print_sentences(console: Console, found: Guidelines, full: bool) -> None:
+    said = statements(found)
+    for topic, title in TOPICS.items():
+        own = [one for one in said if one.topic == topic]
+        if own and (full or topic != "design"):
+            console.print(f"\n[bold]{title}[/bold]")
+            for one in own:
+                aside = "" if one.holds is None else f" \\[{_over_poses(one.holds)}]"
+                console.print(Padding(f"- {one.text}[dim]{aside}[/dim]", (0, 0, 0, 1)), highlight=False)
+    console.print()
+
+
+def _over_poses(share: float) -> str:
+    return "everywhere" if share == 1.0 else f"at {100 * share:.3g} % of the poses"
+
+
+def _print_equations(console: Console, found: Guidelines) -> None:
+    """K as sums over elements, as the paper's equations 33-38."""
+    if found.equations is None:
+        return
+    console.print("[bold]K at this pose[/bold], by the stiffness k of one part of each element (SI)")
+    for i, name in enumerate(found.components):
+        terms = [f"{number(row[i])} k({element})" for element, row in found.equations.items() if row[i] != 0.0]
+        console.print(f"  K_{name} = {' + '.join(terms) or '0'}", highlight=False, markup=False)
+    console.print()
+
+
+def _print_shares(console: Console, found: Guidelines, here: Roles) -> None:
+    table = numeric_table("Shares in the diagonal of C", "element", found.components)
+    for element, row in zip(found.found, here.shares[:, :, 0].tolist(), strict=True):
+        cells = ["–" if math.isnan(p) else f"[bold]{100 * p:.1f} %[/bold]" if p >= 0.5 else _share(p) for p in row]
+        table.add_row(element.name, *cells)
+    console.print(table)
+
+
+def _share(part: float) -> str:
+    text = f"{100 * part:.1f} %"
+    return "·" if part == 0.0 else text if part >= MATTERS else f"[dim]{text}[/dim]"
+
+
+def _print_limits(console: Console, found: Guidelines, here: Roles) -> None:
+    """From which stiffness on each element counts as rigid: absolute where it has one stiffness, else relative."""
+    table = numeric_table("Counts as rigid from (within 1 %)", "element", ["now", *found.components])
+    for k, element in enumerate(found.found):
+        row = here.rigid[k, :, 0].tolist()
+        if element.stiffness is None:
+            table.add_row(element.name, "1 × now", *(_limit(factor) for factor in row))
+        else:
+            rigid = element.stiffness == math.inf
+            own = 1.0 if rigid else element.stiffness
+            now = "rigid" if rigid else f"{_limit(element.stiffness)} {element.unit}"
+            table.add_row(element.name, now, *(_limit(factor * own) for factor in row))
+    console.print(table)
+    console.print("· any stiffness will do; never: nothing else yields in that direction.\n", style="dim")
+
+
+def _limit(value: float) -> str:
+    """A limit in at most five characters."""
+    if math.isnan(value):
+        return "–"
+    if value == 0.0 or math.isinf(value):
+        return "·" if value == 0.0 else "never"
+    text = f"{value:.2g}" if value >= 1000.0 else f"{value:.3g}"
+    return text.replace("e+0", "e").replace("e+", "e").replace("e-0", "e-")
+
+
+def _print_moves(console: Console, found: Guidelines, full: bool) -> None:
+    grid = bool(found.poses[0])
+    heads = ["parameter", *found.components, *(["poses"] if grid else [])]
+    table = numeric_table("What one percent more does: percent stiffer ▲ or softer ▼", heads[0], heads[1:])
+    shown = found.moves if full else found.moves[:MOST_ROWS]
+    for move in shown:
+        table.add_row(move.path, *(_arrow(p) for p in move.percents), *([_alike(move)] if grid else []))
+    console.print(table)
+    if grid:
+        console.print("poses: at how many of them all arrows of the row point as they do here.", style="dim")
+    console.print(found.meaning, highlight=False, style="dim")
+    hidden = len(found.moves) - len(shown)
+    if hidden:
+        console.print(f"{hidden} more do less; --full has all.", highlight=False)
+    if found.idle:
+        console.print(f"No direction depends on {_few(found.idle)}.", highlight=False)
+    for reason in dict.fromkeys(why for _, why in found.skipped):
+        paths = [path for path, why in found.skipped if why == reason]
+        console.print(f"Left out {reason}: {_few(paths)}.", highlight=False)
+
+
+def _few(paths: tuple[str, ...] | list[str]) -> str:
+    more = f" and {len(paths) - MOST_NAMED} more" if len(paths) > MOST_NAMED else ""
+    return ", ".join(paths[:MOST_NAMED]) + more
+
+
+def _arrow(percent: float | None) -> str:
+    if percent is None:
+        return "–"
+    if abs(percent) < LEAST:
+        return "·"
+    size = f"{abs(percent):.2f}" if abs(percent) < 1.0 else f"{abs(percent):.2g}"
+    return f"[blue]▲{size}[/blue]" if percent > 0.0 else f"[red]▼{size}[/red]"
+
+
+def _alike(move: Move) -> str:
+    felt = [
+        move.stiffer[i] if p > 0.0 else move.softer[i]
+        for i, p in enumerate(move.percents)
+        if p is not None and abs(p) >= LEAST
+    ]
+    least = min(felt, default=1.0)
+    return "all" if least == 1.0 else f"{100 * least:.0f} %"
