@@ -203,7 +203,7 @@ def _first(gains: Array) -> npt.NDArray[np.int64]:
 
 def _percents(least: float, most: float) -> str:
     low, high = f"{100 * least:.3g}", f"{100 * most:.3g}"
-    return f"{high} %" if low == high else f"{low} to {high} %"
+    return f"{high}\N{NO-BREAK SPACE}%" if low == high else f"{low} to {high}\N{NO-BREAK SPACE}%"
 
 
 def _stiffness(element: Element, factor: float) -> str:
