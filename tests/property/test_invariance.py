@@ -120,7 +120,9 @@ def test_the_length_that_scales_rows(case, data, factor):
 UNITS = {
     "angle": (0, 0),
     "direction": (0, 0),
-    "density": (0, 0),
+    "density": (0, 0),  # of what weighs: K and C do not feel it
+    "linear density": (0, 0),
+    "mass": (0, 0),
     "length": (1, 0),
     "area": (2, 0),
     "second moment of area": (4, 0),
