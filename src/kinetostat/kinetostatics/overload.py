@@ -1,8 +1,6 @@
 """Whether the actuators bear the load of a machine: limits of force and moment. Limits of geometry are elsewhere."""
 
 from kinetostat.algebra.scalar import is_zero, times
-from kinetostat.algebra.screw import Wrench
-from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.limits import SLACK, Check
 from kinetostat.kinetostatics.assembly import Statics
 from kinetostat.machine.limits import is_set
@@ -18,9 +16,8 @@ def actuator_checks(machine: Machine, configuration: Configuration, statics: Sta
         machine: with [limits] and [load]; the load acts at the tool point, base axes.
         configuration, statics: of it at its pose.
     """
-    limits, load = machine.sections["limits"], machine.sections["load"]
+    limits, wrench = machine.sections["limits"], machine.load
     bounds = {True: ("actuator_force", limits.actuator_force), False: ("actuator_moment", limits.actuator_moment)}
-    wrench = Wrench(Vector(*load.moment), Vector(*load.force))
     if all(is_zero(c) for c in wrench.components()) or not any(is_set(bound) for _, bound in bounds.values()):
         return []
     found = []

@@ -7,11 +7,18 @@ from functools import partial
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.symmetric import POSITIONS
+from kinetostat.kinetostatics.extremes import (
+    ROTATIONS,
+    TRANSLATIONS,
+    actuator_load,
+    frobenius_condition,
+    greatest_stiffness,
+    least_stiffness,
+    longest_leg,
+    shortest_leg,
+)
 from kinetostat.kinetostatics.response import Response
 from kinetostat.kinetostatics.sides import side
-
-ROTATIONS = 3
-"""How many of the six components are rotations; they come first."""
 
 
 @dataclass(frozen=True)
@@ -22,13 +29,15 @@ class MapQuantity:
         name: as in files and on the command line.
         unit: SI, for people.
         symbol: for axis labels (matplotlib mathematics).
-        value: from a response.
+        value: from a response; NaN where the machine lacks the part that it is about.
+        components: names of those that it is about: the machine must have them.
     """
 
     name: str
     unit: str
     symbol: str
     value: Callable[[Response], Scalar]
+    components: tuple[str, ...] = ()
 
 
 def _compliance(response: Response, i: int, j: int) -> Scalar:
@@ -48,14 +57,14 @@ def _mass(response: Response) -> Scalar:
 
 
 def _compliance_unit(i: int, j: int) -> str:
-    rows = "rad" if i < ROTATIONS else "m"
-    return f"{rows}/(N·m)" if j < ROTATIONS else f"{rows}/N"
+    rows = "rad" if i in ROTATIONS else "m"
+    return f"{rows}/(N·m)" if j in ROTATIONS else f"{rows}/N"
 
 
 def _stiffness_unit(i: int, j: int) -> str:
-    if j < ROTATIONS:
+    if j in ROTATIONS:
         return "N·m/rad"
-    return "N/rad" if i < ROTATIONS else "N/m"
+    return "N/rad" if i in ROTATIONS else "N/m"
 
 
 def _entries(
@@ -65,7 +74,18 @@ def _entries(
     for i, j in POSITIONS:
         names = [COMPONENTS[i]] if i == j else [COMPONENTS[i], COMPONENTS[j]]
         symbol = rf"${letter}_{{\mathrm{{{','.join(names)}}}}}$"
-        found.append(MapQuantity("_".join([matrix, *names]), unit(i, j), symbol, partial(value, i=i, j=j)))
+        name = "_".join([matrix, *names])
+        found.append(MapQuantity(name, unit(i, j), symbol, partial(value, i=i, j=j), tuple(names)))
+    return found
+
+
+def _extremes() -> list[MapQuantity]:
+    blocks = (("translational", "N/m", "t", TRANSLATIONS), ("rotational", "N·m/rad", "r", ROTATIONS))
+    found = []
+    for word, unit, letter, block in blocks:
+        least, greatest = partial(least_stiffness, block=block), partial(greatest_stiffness, block=block)
+        found.append(MapQuantity(f"least_{word}_stiffness", unit, rf"$k_{{\mathrm{{{letter},min}}}}$", least))
+        found.append(MapQuantity(f"greatest_{word}_stiffness", unit, rf"$k_{{\mathrm{{{letter},max}}}}$", greatest))
     return found
 
 
@@ -77,12 +97,26 @@ QUANTITIES = {
         MapQuantity("regularity", "1", "regularity", _regularity),
         MapQuantity("mass", "kg", "moving mass", _mass),
         MapQuantity("side", "1", "side of singularities", side),
+        *_extremes(),
+        MapQuantity("condition", "1", "condition of K", frobenius_condition),
+        MapQuantity("shortest_leg", "m", "shortest leg", shortest_leg),
+        MapQuantity("longest_leg", "m", "longest leg", longest_leg),
+        MapQuantity("actuator_force", "N", "greatest actuator force", partial(actuator_load, sliding=True)),
+        MapQuantity("actuator_moment", "N·m", "greatest actuator moment", partial(actuator_load, sliding=False)),
     )
 }
-"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., regularity, mass, side."""
+"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., regularity, condition, ..."""
 
 GROUPS = {
     "compliance": tuple(f"compliance_{name}" for name in COMPONENTS),
     "stiffness": tuple(f"stiffness_{name}" for name in COMPONENTS),
 }
 """Names that stand for several quantities: the six diagonal entries of C and of K."""
+
+PARTS = {
+    "shortest_leg": "a leg with an actuated slide between two joints",
+    "longest_leg": "a leg with an actuated slide between two joints",
+    "actuator_force": "an actuated slide",
+    "actuator_moment": "an actuated revolute",
+}
+"""What a machine must have for a quantity to mean something; it is NaN where that is missing."""

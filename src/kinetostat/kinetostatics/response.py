@@ -39,6 +39,7 @@ class Response:
             machine only rz, x, y have a meaning, and the other entries are 0.
         regularity: distance from a singularity, 0 to 1 (dimensionless); the smaller of the legs' and the platform's.
         status: a `Status` code.
+        load: the wrench of the machine's table [load], at T, base axes (N·m, N).
         checks: the limits of the machine that are set, each with what it is compared with.
         mass: of what moves, as far as it is known, kg.
     """
@@ -52,6 +53,7 @@ class Response:
     compliance: Symmetric6
     regularity: Scalar
     status: Scalar
+    load: Wrench
     checks: tuple[Check, ...] = ()
     mass: Scalar = 0.0
 
@@ -88,6 +90,7 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
         compliance_matrix(statics),
         regularity,
         pose_status(joints.status, reached, regularity, within(geometric), within(loaded)),
+        machine.load,
         (*geometric, *loaded),
         moving_mass(machine, configuration),
     )

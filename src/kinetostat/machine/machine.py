@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Annotated, Any, Protocol
 
 from kinetostat.algebra.scalar import Scalar
-from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.algebra.screw import COMPONENTS, Wrench
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.leg import Joint, Leg, Spring, Turn
 from kinetostat.machine.limits import Limits
@@ -237,6 +237,12 @@ class Machine:
     def own_sections(self) -> dict[str, Any]:
         """The sections that its family asks for, by name."""
         return {name: self.sections[name] for name in self.family.sections}
+
+    @property
+    def load(self) -> Wrench:
+        """The wrench of the file's table [load], at the tool point, base axes (N·m, N)."""
+        given = self.sections["load"]
+        return Wrench(Vector(*given.moment), Vector(*given.force))
 
     def tool_point(self, platform: Displacement) -> Vector:
         """The tool point T in the base frame, m: P itself unless the file has a table [tool]."""

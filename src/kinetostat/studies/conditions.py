@@ -19,7 +19,11 @@ HOW = 'write QUANTITY < VALUE or QUANTITY > VALUE, e.g. "stiffness_z > 20 N/um"'
 LONGEST = 200
 
 _FORM = re.compile(r"\s*([a-z_]+)\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")
-_BY_UNIT = {kind.unit: kind.name for kind in KINDS.values() if kind.name.endswith(("stiffness", "compliance", "mass"))}
+_BY_UNIT = {
+    kind.unit: kind.name
+    for kind in KINDS.values()
+    if kind.name.endswith(("stiffness", "compliance")) or kind.name in ("length", "force", "moment")
+}
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from kinetostat.engine.batch import Evaluation, Progress, evaluate, silent
 from kinetostat.engine.chunks import Compute, here, in_chunks
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
+from kinetostat.kinetostatics.quantities import GROUPS, PARTS, QUANTITIES
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find
@@ -70,6 +71,7 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
     pairs = list(zip(wanted, chosen, strict=True))
     grid = Grid([Axis(parameter.leaves, one.values(parameter.quantity)) for one, parameter in pairs])
     names = resolve_quantities(quantities, machine.family.component_names)
+    refuse_absent(machine, names)
     origin = {"machine": machine.name, "machine_file": as_toml(machine), "kinetostat": version("kinetostat")}
     attributes = {**origin, "frame": "base axes at the platform point P"}
     labels = xr.Dataset({}, _coordinates(grid, pairs), attributes)
@@ -160,16 +162,30 @@ def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONE
     found: list[str] = []
     for name in names:
         if name not in GROUPS and not (name in QUANTITIES and _exists(name, components)):
-            known = ", ".join([*GROUPS, *(n for group in groups.values() for n in group), "regularity", "mass"])
+            others = (name for name, quantity in QUANTITIES.items() if not quantity.components)
+            known = ", ".join([*GROUPS, *(n for group in groups.values() for n in group), *others])
             example = f"compliance_{components[0]}_{components[-1]}"
             raise InputError(f'"{name}" is not a quantity; choose from {known}, or an entry such as {example}.')
         found += groups.get(name, [name])
     return list(dict.fromkeys(found))
 
 
+def refuse_absent(machine: Machine, names: Sequence[str]) -> None:
+    """Refuse quantities of parts that a machine lacks.
+
+    Raises:
+        InputError: names the quantity and what the machine lacks.
+    """
+    wanted = [name for name in names if name in PARTS]
+    response = respond(machine) if wanted else None
+    for name in wanted:
+        if np.isnan(QUANTITIES[name].value(response)) and response.status == Status.OK:
+            raise InputError(f'"{name}" has no meaning here: {machine.name} lacks {PARTS[name]}; leave it out.')
+
+
 def _exists(name: str, components: Sequence[str]) -> bool:
     """Whether all components that a quantity is about exist."""
-    return all(part in components for part in name.split("_")[1:])
+    return all(part in components for part in QUANTITIES[name].components)
 
 
 def failures(dataset: xr.Dataset) -> dict[Status, int]:

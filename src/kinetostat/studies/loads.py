@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from kinetostat.algebra.screw import Wrench
-from kinetostat.algebra.vector import Rotation, Vector
+from kinetostat.algebra.vector import Rotation
 from kinetostat.kinetostatics.loading import JointReaction, deflection, joint_reactions, spring_loads
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine, springs
@@ -52,8 +51,7 @@ def load_case(machine: Machine, response: Response, turn: Rotation) -> LoadCase 
         response: of it, with C in the axes of the results.
         turn: from base axes to those.
     """
-    given = machine.sections["load"]
-    wrench = Wrench(Vector(*given.moment), Vector(*given.force))
+    wrench = machine.load
     if not any(wrench.components()):
         return None
     seen = wrench.rotated(turn)

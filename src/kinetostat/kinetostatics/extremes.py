@@ -1,0 +1,102 @@
+"""Numbers of one pose that machines are designed by: softest and stiffest direction, condition, legs, actuators.
+
+All over scalars, so that the engine evaluates them for whole populations. Directions and tables are in `indices`.
+"""
+
+import math
+from collections.abc import Sequence
+
+from kinetostat.algebra.eigenvalues import greatest_eigenvalue
+from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller, sqrt, times, total, where
+from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
+from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.limits import rods
+from kinetostat.machine.machine import springs
+
+ROTATIONS, TRANSLATIONS = range(3), range(3, 6)
+
+
+def components(response: Response) -> tuple[int, ...]:
+    """Which of rx ry rz x y z = 0 ... 5 the machine has."""
+    return SPATIAL if response.configuration.plane is None else PLANAR
+
+
+def least_stiffness(response: Response, block: Sequence[int]) -> Scalar:
+    """Stiffness of the softest direction of a block, the other block free to follow: 1 / max eig(C_bb).
+
+    Args:
+        response: of a pose.
+        block: `ROTATIONS` (N·m/rad) or `TRANSLATIONS` (N/m).
+
+    Returns:
+        0 where a direction is free.
+    """
+    return reciprocal(_greatest(response.compliance, response, block))
+
+
+def greatest_stiffness(response: Response, block: Sequence[int]) -> Scalar:
+    """Stiffness of the stiffest direction of a block, the other block held: max eig(K_bb); infinite where rigid."""
+    return _greatest(response.stiffness, response, block)
+
+
+def _greatest(matrix: Symmetric6, response: Response, block: Sequence[int]) -> Scalar:
+    """Greatest eigenvalue of a block; infinite where an entry is."""
+    there = [i for i in components(response) if i in block]
+    greatest = greatest_eigenvalue([[matrix.entry(i, j) for j in there] for i in there])
+    return where(total([matrix.entry(i, i) for i in there]) < math.inf, greatest, math.inf)
+
+
+def frobenius_condition(response: Response) -> Scalar:
+    """Condition of K in the Frobenius norm: |D K D| |D^-1 C D^-1| / n, D = diag(1/L for rotations, 1 for translations).
+
+    It is 1 where K is the same in all directions, else greater, and unlike the ratio of eigenvalues it is smooth. L is
+    the machine's characteristic length. Infinite where something is rigid or free while other things yield.
+
+    Source: Angeles, Fundamentals of Robotic Mechanical Systems, section 5.8 (there of a Jacobian).
+    """
+    length, there = response.configuration.length, components(response)
+    stiff = _squares(response.stiffness, reciprocal(length), there)
+    soft = _squares(response.compliance, length, there)
+    return sqrt(stiff) * sqrt(soft) * (1.0 / len(there))
+
+
+def _squares(matrix: Symmetric6, arm: Scalar, there: Sequence[int]) -> Scalar:
+    """Sum of the squares of a matrix whose rotational rows and columns are multiplied by a length or its reciprocal."""
+    scaled = [[_scaled(matrix.entry(i, j), arm, (i < 3) + (j < 3)) for j in there] for i in there]
+    return total([times(one, one) for row in scaled for one in row])
+
+
+def _scaled(value: Scalar, arm: Scalar, power: int) -> Scalar:
+    for _ in range(power):
+        value = times(value, arm)
+    return value
+
+
+def shortest_leg(response: Response) -> Scalar:
+    """Least distance of the two joints of a leg with an actuated slide between them, m; NaN if there is no such leg."""
+    return _least([rod.span.norm() for rod in rods(response.configuration.legs) if rod.telescopic])
+
+
+def longest_leg(response: Response) -> Scalar:
+    """Greatest such distance, m."""
+    return -_least([-rod.span.norm() for rod in rods(response.configuration.legs) if rod.telescopic])
+
+
+def actuator_load(response: Response, sliding: bool) -> Scalar:
+    """Greatest force (N) of an actuated slide, or moment (N·m) of an actuated revolute, under the load of the machine.
+
+    Load in a spring: xi_e times w. NaN where the machine has no such actuator.
+    """
+    pairs = zip(springs(response.configuration), response.statics.flexibility, strict=True)
+    driven = [
+        (spring, twist) for spring, twist in pairs if spring.actuated and (spring.joint.point is None) is sliding
+    ]
+    return -_least([-abs(response.load.work(twist)) for spring, twist in driven if not is_zero(spring.stiffness)])
+
+
+def _least(values: Sequence[Scalar]) -> Scalar:
+    result: Scalar = values[0] if values else math.nan
+    for value in values[1:]:
+        result = smaller(value, result)
+    return result
