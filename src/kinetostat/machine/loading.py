@@ -56,18 +56,11 @@ def load(machine: str | Path, settings: Sequence[str] = ()) -> Machine:
     if name in shipped:
         return build(documents.parse(shipped[name], name), name, settings)
     path = Path(machine)
-    if not _exists(path):
+    if not documents.exists(path):
         near = difflib.get_close_matches(name, shipped, 1)
         hint = f'did you mean "{near[0]}"?' if near else f"bundled machines: {', '.join(shipped)}."
         raise InputError(f"{shorten(name)} is neither a file nor a bundled machine; {hint}")
     return build(documents.read(path), name, settings)
-
-
-def _exists(path: Path) -> bool:
-    try:
-        return path.exists()
-    except (OSError, ValueError):  # a name that no file can have
-        return False
 
 
 def build(document: Document, origin: str, settings: Sequence[str] = ()) -> Machine:

@@ -1,4 +1,4 @@
-"""Machine files as text: read safely, override, write. Nothing is interpreted here; see `validation`."""
+"""Machine and study files as text: read safely, override, write. Nothing is interpreted here; see `validation`."""
 
 import copy
 import tomllib
@@ -17,6 +17,14 @@ DEEPEST = 8
 Document = dict[str, Any]
 
 
+def exists(path: Path) -> bool:
+    """Whether there is a file or folder of that name; not where no file can have it."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
+
+
 def read(path: Path) -> Document:
     """The TOML document in a file.
 
@@ -31,12 +39,12 @@ def read(path: Path) -> Document:
     except OSError as error:
         raise InputError(f'"{path}" cannot be read: {error.strerror}.') from None
     if len(data) > LARGEST_FILE:
-        raise InputError(f'"{path}" is larger than {LARGEST_FILE >> 20} MiB; a machine file is a short TOML text.')
+        raise InputError(f'"{path}" is larger than {LARGEST_FILE >> 20} MiB; it should be a short TOML text.')
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(
-            f'"{path}" is not text: byte {error.start} is not UTF-8; a machine file is TOML, saved as UTF-8.'
+            f'"{path}" is not text: byte {error.start} is not UTF-8; it must be TOML, saved as UTF-8.'
         ) from None
     return parse(text, str(path))
 
@@ -54,7 +62,7 @@ def parse(text: str, origin: str) -> Document:
     except RecursionError:
         document = None
     if document is None or _deeper_than(document, DEEPEST):
-        raise InputError(f'"{origin}" is nested too deeply; a machine file has tables of values and lists.')
+        raise InputError(f'"{origin}" is nested too deeply; it should have tables of values and lists.')
     return document
 
 

@@ -1,5 +1,6 @@
 """Conditions on quantities as people write them, "stiffness_z > 20 N/um": read, and tested at many points."""
 
+import math
 import operator
 import re
 from collections.abc import Sequence
@@ -64,17 +65,24 @@ def parse_condition(text: str, components: Sequence[str]) -> Condition:
     if name in GROUPS:
         raise InputError(f'"{name}" stands for several quantities; name one of {", ".join(GROUPS[name])}.')
     resolve_quantities([name], components)
-    return Condition(f"{name} {comparison} {written}", name, comparison, _value(name, written))
+    value = value_of(QUANTITIES[name].unit, written, f"the condition on {name}")
+    return Condition(f"{name} {comparison} {written}", name, comparison, value)
 
 
-def _value(name: str, written: str) -> float:
-    unit = QUANTITIES[name].unit
+def value_of(unit: str, written: float | str | None, where: str) -> float:
+    """The value, SI, with which a quantity of some unit is compared; `where` it is written goes into messages.
+
+    Raises:
+        InputError: it is of another kind, or not finite.
+    """
     try:
-        return float(written) if unit == "1" else _finite(parse(written, _BY_UNIT[unit]))
+        if unit in _BY_UNIT:
+            return _finite(parse(written, _BY_UNIT[unit]))
+        return _finite(float(written if written is not None else math.nan))
     except UnitError as error:
-        raise InputError(f"in the condition on {name}, {shorten(written)}: {error}.") from None
+        raise InputError(f"in {where}, {shorten(written)}: {error}.") from None
     except ValueError:
-        raise InputError(f"in the condition on {name}, {shorten(written)} must be a plain number, e.g. 0.05.") from None
+        raise InputError(f"in {where}, {shorten(written)} must be a plain number, e.g. 0.05.") from None
 
 
 def _finite(value: float) -> float:

@@ -74,7 +74,7 @@ def create(path: Path, labels: xr.Dataset, dims: Sequence[str], variables: Mappi
             if sys.platform == "linux":
                 os.posix_fallocate(stream.fileno(), 0, path.stat().st_size)
             _fill_status(stream, _offsets(path)[STATUS], prod(labels.sizes[dim] for dim in dims))
-            _settle(stream)
+            settle(stream)
 
 
 def _reserved() -> Any:
@@ -125,14 +125,15 @@ class ResultFile:
             for name, data in (*values.items(), (STATUS, status)):
                 self._stream.seek(self._offsets[name] + start * data.itemsize)
                 self._stream.write(np.ascontiguousarray(data).data)
-            _settle(self._stream)
+            settle(self._stream)
 
     def close(self) -> None:
         """Let go of the file."""
         self._stream.close()
 
 
-def _settle(stream: BinaryIO) -> None:
+def settle(stream: BinaryIO) -> None:
+    """See that what was written to a file is on the disk."""
     stream.flush()
     os.fsync(stream.fileno())
 

@@ -61,8 +61,9 @@ def estimate_volume(inside: npt.NDArray[np.bool_], sizes: Sequence[float], units
     cell = box / len(pairs)
     divided = int((pairs[:, 0] != pairs[:, 1]).sum())
     value, error = cell * float(inside.sum()) / PER_CELL, 0.5 * cell * sqrt(divided)
-    return Volume(value, error, _product(units), box, len(pairs), divided)
+    return Volume(value, error, unit_product(units), box, len(pairs), divided)
 
 
-def _product(units: Sequence[str]) -> str:
+def unit_product(units: Sequence[str]) -> str:
+    """The product of some units as people read it, e.g. "m²·rad"."""
     return "·".join(f"{unit}{POWERS[count]}" for unit, count in Counter(units).items())

@@ -1,0 +1,218 @@
+"""Study files: what people may write about an optimisation, and what is wrong with it. Nothing is looked up or solved.
+
+Which fields and quantities exist depends on the machine and is checked by whoever builds the problem.
+"""
+
+import difflib
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from kinetostat.spec.document import Document, override
+from kinetostat.spec.errors import InputError, shorten
+
+MOST_POPULATION = 100_000
+MOST_GENERATIONS = 100_000
+MOST_STARTS = 1000
+MOST_SAMPLES = 100_000
+MOST_LISTED = 10_000
+
+Written: TypeAlias = float | str
+"""A value of a field as people write it: text with a unit, or a bare number in SI."""
+Path: TypeAlias = Annotated[str, Field(min_length=1, max_length=200)]
+Method: TypeAlias = Literal["genetic", "gradient", "hybrid", "nsga2"]
+OVER = "worst, mean or percentile P"
+
+
+class Table(BaseModel):
+    """A table of a study file: refuses keys that it does not have."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False)
+
+
+class VariableTable(Table):
+    """A table [[variables]]: a field of the machine, or several tied together, and what it may be."""
+
+    path: Path | None = Field(None, description="a field of the machine file, e.g. geometry.base_radius")
+    paths: list[Path] | None = Field(None, description="several fields tied together", min_length=1, max_length=100)
+    ratios: list[float] | None = Field(None, description="of each of `paths` to the variable; 1 unless given")
+    start: Written | None = Field(None, alias="from", description="least value, with its unit")
+    end: Written | None = Field(None, alias="to", description="greatest value")
+    choices: list[Written | list[Written]] | None = Field(
+        None,
+        description="instead of bounds: a catalogue, each entry a value, or a list of one for each of `paths`",
+        min_length=1,
+        max_length=MOST_LISTED,
+    )
+    labels: list[str] | None = Field(None, description="what people call the choices")
+    fixed: bool = Field(False, description="held at the machine's value: it is not searched, but has its tolerance")
+    tolerance: Written | None = Field(None, description="how far manufacture may miss it, plus and minus")
+
+    @property
+    def fields(self) -> list[str]:
+        """The fields, as written."""
+        return self.paths or ([self.path] if self.path else [])
+
+
+class TermTable(Table):
+    """What objectives and constraints have in common: a quantity, and how it is taken over the poses."""
+
+    quantity: Path = Field(description="e.g. compliance_sum, stiffness_z, condition; docs/design.md lists all")
+    weights: list[float] | None = Field(None, description="of a weighted sum, one for each of rx ry rz x y z")
+    direction: Annotated[list[float], Field(min_length=3, max_length=3)] | None = Field(
+        None, description="of a quantity along a direction: x, y, z in base axes"
+    )
+    over: str = Field("worst", description=f"how it is taken over the poses: {OVER}")
+
+
+class ObjectiveTable(TermTable):
+    """A table [[objectives]]."""
+
+    goal: Literal["minimize", "maximize"] | None = Field(
+        None, description="stiffness and regularity are maximized unless this says otherwise, all else is minimized"
+    )
+
+
+class ConstraintTable(TermTable):
+    """A table [[constraints]]."""
+
+    at_least: Written | None = Field(None, description="lower bound, with its unit")
+    at_most: Written | None = Field(None, description="upper bound")
+
+
+class PosesTable(Table):
+    """Table [poses]: where the machine is judged; its own pose unless more is said."""
+
+    listed: list[dict[str, Written]] | None = Field(
+        None, alias="list", description="poses, each with the fields in which it differs", max_length=MOST_LISTED
+    )
+    over: list[str] | None = Field(
+        None, description='a grid: ranges as "x=-2 cm:2 cm:21", all combinations', min_length=1, max_length=6
+    )
+    within: Literal["workspace"] | None = Field(
+        None, description="only those nodes of the grid that lie in the workspace of the machine as its file says"
+    )
+    where: list[str] = Field([], description='conditions of that workspace, e.g. "stiffness_z > 50 N/um"')
+    required: float = Field(1.0, description="share of the poses that a design must reach", ge=0.0, le=1.0)
+
+
+class OptimizerTable(Table):
+    """Table [optimizer]: how the best design is looked for."""
+
+    method: Method | None = Field(None, description="genetic, gradient, hybrid (genetic, then gradient) or nsga2")
+    population: int = Field(80, description="designs of a generation", ge=4, le=MOST_POPULATION)
+    generations: int = Field(100, description="generations, the first random one included", ge=1, le=MOST_GENERATIONS)
+    starts: int = Field(16, description="of the gradient method: from how many designs", ge=1, le=MOST_STARTS)
+    seed: int = Field(1, description="of the random numbers", ge=0, lt=2**32)
+
+
+class RobustnessTable(Table):
+    """Table [robustness]: how manufacture within the tolerances is taken into account."""
+
+    samples: int = Field(1000, description="random machines around the best design", ge=1, le=MOST_SAMPLES)
+    distribution: Literal["uniform", "normal"] = Field(
+        "uniform", description="within the tolerance; normal: the tolerance is three standard deviations"
+    )
+    objective: str = Field("nominal", description=f"what is optimised: nominal, or {OVER} of what manufacture makes")
+    search_samples: int = Field(16, description="machines around each design during the search", ge=1, le=1000)
+
+
+class StudyFile(Table):
+    """A study file."""
+
+    schema_version: Literal[1] = Field(1, alias="schema", description="version of the file format")
+    name: str = Field(description="what people call the study", min_length=1, max_length=80)
+    machine: str = Field(description="a bundled machine, or the path of a machine file from this file", min_length=1)
+    changes: dict[str, Any] = Field({}, alias="set", description="fields of the machine that differ from its file")
+    variables: list[VariableTable] = Field(description="what may change", min_length=1, max_length=200)
+    objectives: list[ObjectiveTable] = Field(description="what is wanted", min_length=1, max_length=6)
+    constraints: list[ConstraintTable] = Field([], description="what must hold", max_length=50)
+    poses: PosesTable = Field(PosesTable(), description="where the machine is judged")
+    optimizer: OptimizerTable = Field(OptimizerTable(), description="how to search")
+    robustness: RobustnessTable = Field(RobustnessTable(), description="tolerances of manufacture")
+
+
+def read_study(document: Document, origin: str, settings: Sequence[str] = ()) -> StudyFile:
+    """The study that a document describes.
+
+    Args:
+        document: what was written.
+        origin: name of the file, for messages.
+        settings: overrides "path=value", as `--set` takes them, e.g. "optimizer.seed=3", "variables.0.to=15 cm".
+
+    Raises:
+        InputError: one sentence for each mistake, at most five.
+    """
+    changed = override(document, settings, {})
+    try:
+        return StudyFile.model_validate(changed)
+    except ValidationError as error:
+        found = list(dict.fromkeys(_sentence(dict(mistake), changed) for mistake in error.errors()))
+        more = f" (and {len(found) - 5} more)" if len(found) > 5 else ""
+        raise InputError(f'"{origin}": {" ".join(found[:5])}{more}') from None
+
+
+def study_schema() -> dict[str, Any]:
+    """The JSON Schema of study files."""
+    schema = StudyFile.model_json_schema(by_alias=True)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "kinetostat study file"}
+
+
+def _sentence(mistake: dict[str, Any], document: Document) -> str:
+    path, value = _place(mistake["loc"], document)
+    name = ".".join(path)
+    if mistake["type"] == "missing":
+        return f"{name} is missing ({_field(path)}); `kinetostat new study` prints a complete file."
+    if mistake["type"] == "extra_forbidden":
+        known = _allowed(path[:-1])
+        near = difflib.get_close_matches(path[-1], known, 1)
+        return f"{name} is not known; " + (f"did you mean {near[0]}?" if near else f"it may be {', '.join(known)}.")
+    if mistake["type"] in ("model_type", "model_attributes_type"):
+        return f"{name} is {shorten(value)}; it must be a table with the keys {', '.join(_allowed(path))}."
+    said = str(mistake["msg"]).removeprefix("Input ")
+    return f"{name} is {shorten(value)}: it {said[0].lower()}{said[1:]}{_hint(path)}."
+
+
+def _place(location: Sequence[Any], document: Document) -> tuple[list[str], Any]:
+    """The path of a mistake as people write it, without the names of alternatives, and what stands there."""
+    path: list[str] = []
+    at: Any = document
+    for i, part in enumerate(location):
+        inside = (isinstance(at, dict) and part in at) or (isinstance(at, list) and isinstance(part, int))
+        if inside or i == 0 or (isinstance(at, dict) and i == len(location) - 1):
+            path.append(str(part))
+            at = at[part] if inside else None
+    return path, at
+
+
+def _model(path: Sequence[str]) -> type[BaseModel] | None:
+    """The model of the table at a path."""
+    if not path:
+        return StudyFile
+    tables: dict[str, type[BaseModel]] = {
+        "variables": VariableTable,
+        "objectives": ObjectiveTable,
+        "constraints": ConstraintTable,
+        "poses": PosesTable,
+        "optimizer": OptimizerTable,
+        "robustness": RobustnessTable,
+    }
+    depth = 2 if len(path) > 1 and path[1].isdecimal() else 1
+    return tables.get(path[0]) if len(path) == depth else None
+
+
+def _allowed(path: Sequence[str]) -> list[str]:
+    model = _model(path)
+    return [field.alias or name for name, field in model.model_fields.items()] if model else []
+
+
+def _field(path: Sequence[str]) -> str:
+    model = _model(path[:-1])
+    described = {f.alias or n: f.description for n, f in model.model_fields.items()} if model else {}
+    return described.get(path[-1]) or "it is needed"
+
+
+def _hint(path: Sequence[str]) -> str:
+    about = _field(path)
+    return f" ({about})" if about != "it is needed" else ""

@@ -1,0 +1,208 @@
+"""Gradient searches: from many designs, each downhill to where it ends, with exact derivatives.
+
+Sequential quadratic programming keeps within bounds and constraints. What is the worst over poses has kinks where two
+poses are equally bad; there the worst poses each become a condition f(pose) <= t, and t is minimised (the epigraph).
+Other aggregates over several poses change smoothly except where the order of poses does; their derivatives are those of
+the order at hand.
+
+Source: Kraft, A software package for sequential quadratic programming, DFVLR-FB 88-28 (1988), as in scipy.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.stats import qmc
+
+from kinetostat.engine.points import Array
+from kinetostat.studies.optimisation.assessment import Assessor
+from kinetostat.studies.optimisation.log import Log, Step
+from kinetostat.studies.optimisation.problem import Problem
+from kinetostat.studies.optimisation.slopes import Local, Surveyor
+from kinetostat.studies.optimisation.terms import PoseTerm
+
+ITERATIONS = 200
+"""Of one descent."""
+PRECISION = 1e-13
+"""Relative change of the objective at which a descent ends."""
+WORST_POSES = 24
+"""Conditions that stand for the worst of all poses; more than a design has variables at nearly all kinks."""
+ROUNDS = 8
+"""Descents with newly chosen worst poses, until nothing is gained."""
+GAIN = 1e-9
+"""Relative gain below which a round has gained nothing."""
+BLOCKED = 1e6
+"""What counts as the objective, in units of its size at the start, where a design cannot be judged: no step ends
+there."""
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """Descents from the machine as it is and from designs spread over the space.
+
+    Attributes:
+        assess: judges designs.
+    """
+
+    assess: Assessor
+
+    @property
+    def problem(self) -> Problem:
+        """What is searched."""
+        return self.assess.problem
+
+    @property
+    def steps(self) -> int:
+        """Descents."""
+        return self.problem.study.optimizer.starts
+
+    @cached_property
+    def _survey(self) -> Surveyor:
+        return Surveyor(self.problem)
+
+    def step(self, number: int, log: Log) -> Step:
+        """One descent."""
+        return self.descend(self._start(number), log)
+
+    def _start(self, number: int) -> Array:
+        """The machine as it is, if that is allowed, then points of a scrambled Sobol' sequence."""
+        space, settings = self.problem.space, self.problem.study.optimizer
+        if number == 0 and space.holds(space.initial):
+            return space.initial
+        sequence = qmc.Sobol(space.size, rng=np.random.default_rng([settings.seed, 2]))
+        genes = sequence.random(1 << max(1, (settings.starts - 1).bit_length()))[number]
+        return np.where(space.catalogue > 0, np.floor(genes * np.maximum(space.catalogue, 1)), genes)
+
+    def descend(self, start: Array, log: Log) -> Step:
+        """Downhill from a design [variables]; everything that was tried is judged and logged."""
+        descent = _Descent(self.problem, self._survey, start)
+        descent.run()
+        genes = np.unique(np.array(descent.tried), axis=0)
+        outcome = self.assess(genes)
+        signed = self.problem.objectives[0].sign * outcome.objectives[:, 0]
+        best = int(np.lexsort([signed, outcome.violation])[0])
+        found = [log.count + best]
+        if log.steps:
+            found = self._better(log, log.kept[0], found[0], signed[best], float(outcome.violation[best]))
+        return Step(genes, outcome, np.array(found), {"method": "gradient"})
+
+    def _better(self, log: Log, old: int, new: int, value: float, violation: float) -> list[int]:
+        """The better of the best so far and a new design, then the other."""
+        held = log.outcome([int(old)])
+        before = (float(held.violation[0]), self.problem.objectives[0].sign * float(held.objectives[0, 0]))
+        return [new, int(old)] if (violation, value) < before else [int(old), new]
+
+
+@dataclass
+class _Descent:
+    """One descent: genes of continuous variables, all else held."""
+
+    problem: Problem
+    survey: Surveyor
+    start: Array
+    tried: list[Array] = field(default_factory=list)
+    _last: tuple[bytes, Local] | None = None
+
+    def run(self) -> None:
+        """Descend; new rounds where the worst poses have to be chosen anew."""
+        self.tried.append(self.start)
+        first = self._at(self.start[self.survey.free])
+        if not first.sound:
+            return
+        kinked = isinstance(self._term, PoseTerm) and self._term.aggregate.share == 1.0 and first.there.size > 1
+        kinked = kinked and (self.problem.robust is None or self.problem.robust.share == 1.0)
+        scale = abs(self._objective(first)[0]) or 1.0
+        genes, value = self.start[self.survey.free], np.inf
+        for _ in range(ROUNDS if kinked else 1):
+            genes = self._minimised(genes, scale, kinked)
+            here = self._at(genes)
+            reached = self._objective(here)[0] / scale if here.sound else np.inf
+            if not value - reached > GAIN:
+                break
+            value = reached
+
+    @property
+    def _term(self) -> Any:
+        return self.problem.objectives[0].term
+
+    def _at(self, genes: Array) -> Local:
+        """The surroundings of a design, remembered from one question to the next."""
+        clipped = np.clip(genes, 0.0, 1.0)
+        key = clipped.tobytes()
+        if self._last is None or self._last[0] != key:
+            whole = self.start.copy()
+            whole[self.survey.free] = clipped
+            self.tried.append(whole)
+            self._last = key, self.survey(whole)
+        return self._last[1]
+
+    def _objective(self, here: Local) -> tuple[float, Array]:
+        sign = self.problem.objectives[0].sign
+        value, slope = here.term(self._term, sign > 0)
+        return sign * value, sign * slope
+
+    def _minimised(self, genes: Array, scale: float, kinked: bool) -> Array:
+        """One call of the solver; in the epigraph the last unknown is the bound t."""
+        count = len(genes)
+        sign = self.problem.objectives[0].sign
+        conditions = [self._condition(one.term, one.sign, one.bound, one.scale) for one in self.problem.constraints]
+
+        def plain(x: Array) -> tuple[float, Array]:
+            here = self._at(x)
+            if not here.sound:
+                return BLOCKED, np.zeros(count)
+            value, slope = self._objective(here)
+            return value / scale, slope / scale
+
+        def pieces(x: Array) -> tuple[Array, Array]:
+            here = self._at(x[:count])
+            if not here.sound:
+                return np.full(WORST_POSES, x[count] - BLOCKED), np.eye(1, count + 1, count).repeat(WORST_POSES, axis=0)
+            values, slopes = here.pieces(self._term, WORST_POSES)
+            numbers, rows = np.full(WORST_POSES, np.inf), np.zeros((WORST_POSES, count + 1))
+            rows[:, count] = 1.0
+            numbers[: len(values)] = x[count] - sign * values / scale
+            rows[: len(values), :count] = -sign * slopes / scale
+            numbers[len(values) :], rows[len(values) :] = numbers[0], rows[0]
+            return numbers, rows
+
+        unknowns, bounds, function = genes, [(0.0, 1.0)] * count, plain
+        if kinked:
+            unknowns = np.append(genes, self._objective(self._at(genes))[0] / scale)
+            bounds = [*bounds, (-BLOCKED, BLOCKED)]
+            conditions.append({"type": "ineq", "fun": lambda x: pieces(x)[0], "jac": lambda x: pieces(x)[1]})
+            function = _last_unknown
+        found = minimize(
+            function,
+            unknowns,
+            jac=True,
+            bounds=bounds,
+            constraints=conditions,
+            method="SLSQP",
+            options={"maxiter": ITERATIONS, "ftol": PRECISION},
+        )
+        return np.clip(found.x[:count], 0.0, 1.0)
+
+    def _condition(self, term: Any, sign: float, bound: float, scale: float) -> dict[str, Any]:
+        """A constraint as the solver takes it: a function that must not be negative, and its derivatives."""
+        size = len(self.survey.free)
+
+        def at(x: Array) -> tuple[float, Array]:
+            here = self._at(x[:size])
+            slope = np.zeros(len(x))
+            if not here.sound:
+                return -1.0, slope
+            value, slope[:size] = here.term(term, sign > 0)
+            return sign * (bound - value) / scale, -sign * slope / scale
+
+        fun: Callable[[Array], float] = lambda x: at(x)[0]  # noqa: E731
+        return {"type": "ineq", "fun": fun, "jac": lambda x: at(x)[1]}
+
+
+def _last_unknown(x: Array) -> tuple[float, Array]:
+    slope = np.zeros(len(x))
+    slope[-1] = 1.0
+    return float(x[-1]), slope

@@ -1,0 +1,109 @@
+"""All designs that were judged, in order, and what each step of a search kept of them. Nothing is judged here.
+
+A step depends on the log before it and on the seed alone. So a search that was stopped goes on from its last whole
+step, and ends as if it had never been stopped.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.engine.points import Array
+from kinetostat.studies.optimisation.assessment import Outcome, joined
+from kinetostat.studies.optimisation.problem import Problem
+
+Rows = npt.NDArray[np.int64]
+"""Numbers of designs in a log."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one step of a search did.
+
+    Attributes:
+        genes: designs that it judged, in order [designs x variables].
+        outcome: what they are worth.
+        kept: numbers in the log, these designs included, of those that the search goes on with, the best first.
+        told: plain data about it.
+    """
+
+    genes: Array
+    outcome: Outcome
+    kept: Rows
+    told: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Log:
+    """The designs of a search, as rows of one table: genes, objectives, constraints, violation, verdict."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self._sizes = np.cumsum([problem.space.size, len(problem.objectives), len(problem.constraints), 1])
+        self._rows: Array = np.empty((0, self.width))
+        self.count = 0
+        self.steps: list[dict[str, Any]] = []
+
+    @property
+    def width(self) -> int:
+        """Numbers in a row."""
+        return int(self._sizes[-1]) + 1
+
+    @property
+    def rows(self) -> Array:
+        """All rows [designs x width]."""
+        return self._rows[: self.count]
+
+    @property
+    def kept(self) -> Rows:
+        """What the last step kept."""
+        return np.array(self.steps[-1]["kept"], dtype=np.int64)
+
+    def genes(self, numbers: Rows | Sequence[int] | slice = slice(None)) -> Array:
+        """Genes of some designs."""
+        return self.rows[numbers, : self._sizes[0]]
+
+    def outcome(self, numbers: Rows | Sequence[int] | slice = slice(None)) -> Outcome:
+        """What some designs are worth."""
+        _, objectives, constraints, violation, verdict = np.split(self.rows[numbers], self._sizes, axis=1)
+        return Outcome(objectives, constraints, violation[:, 0], verdict[:, 0].astype(np.int8))
+
+    def as_rows(self, step: Step) -> Array:
+        """The rows of a step."""
+        found = step.outcome
+        return np.column_stack([step.genes, found.objectives, found.constraints, found.violation, found.verdict])
+
+    def add(self, rows: Array, record: dict[str, Any]) -> None:
+        """Add the rows of a step and what is noted about it."""
+        needed = self.count + len(rows)
+        if needed > len(self._rows):
+            grown = np.empty((max(needed, 2 * len(self._rows)), self.width))
+            grown[: self.count] = self.rows
+            self._rows = grown
+        self._rows[self.count : needed] = rows
+        self.count = needed
+        self.steps.append(record)
+
+
+def record_of(log: Log, step: Step) -> dict[str, Any]:
+    """What is noted about a step: its number, how many designs it judged, what it kept, and how good that is."""
+    problem, old = log.problem, step.kept < log.count
+    every = joined([log.outcome(step.kept[old]), step.outcome])
+    place = np.where(old, np.cumsum(old) - 1, old.sum() + step.kept - log.count)
+    kept = every.chosen(place)
+    feasible = kept.violation == 0.0
+    told: dict[str, Any] = {}
+    if len(problem.objectives) == 1 and feasible.any():
+        values = kept.objectives[feasible, 0]
+        best = values.min() if problem.objectives[0].sign > 0 else values.max()
+        told = {"best": float(best), "mean": float(values.mean())}
+    return {
+        "chunk": len(log.steps),
+        "designs": len(step.genes),
+        "kept": step.kept.tolist(),
+        "feasible": int(feasible.sum()),
+        **told,
+        **step.told,
+    }

@@ -1,0 +1,214 @@
+"""A study file and its machine as an optimisation problem: nothing is evaluated here but the machine as it is."""
+
+import difflib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from kinetostat.machine.loading import bundled, load
+from kinetostat.machine.machine import Machine
+from kinetostat.spec import document as documents
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, read_study
+from kinetostat.studies.conditions import value_of
+from kinetostat.studies.optimisation.aggregate import Aggregate, parse_aggregate
+from kinetostat.studies.optimisation.catalogue import more_is_better, read_term
+from kinetostat.studies.optimisation.poses import PoseSet, read_poses
+from kinetostat.studies.optimisation.terms import Term
+from kinetostat.studies.optimisation.variables import Space, read_space
+
+SUFFIX = ".toml"
+NOMINAL = "nominal"
+MOST_EVALUATIONS = 5_000_000
+"""Designs of one study: their table then fits in half a gigabyte."""
+
+
+@dataclass(frozen=True)
+class Objective:
+    """A term that is wanted small (sign 1) or large (sign -1)."""
+
+    term: Term
+    sign: float
+
+    @property
+    def goal(self) -> str:
+        """In a word."""
+        return "minimize" if self.sign > 0 else "maximize"
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A term that must not exceed a bound (sign 1), or not fall short of it (sign -1); bound in SI."""
+
+    term: Term
+    sign: float
+    bound: float
+
+    @property
+    def label(self) -> str:
+        """As people read it."""
+        return f"{self.term.label} {'<=' if self.sign > 0 else '>='} {self.bound:.6g} {self.term.unit}"
+
+    @property
+    def scale(self) -> float:
+        """What an excess is compared with."""
+        return abs(self.bound) or 1.0
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is optimised.
+
+    Attributes:
+        study: as written, overrides included.
+        machine: as it is before.
+        space: what may change.
+        poses: where it is judged.
+        objectives, constraints: what is wanted and what must hold.
+        robust: how objectives are taken over what manufacture makes; None where the design itself counts.
+        method: genetic, gradient, hybrid or nsga2.
+    """
+
+    study: StudyFile
+    machine: Machine
+    space: Space
+    poses: PoseSet
+    objectives: tuple[Objective, ...]
+    constraints: tuple[Constraint, ...]
+    robust: Aggregate | None
+    method: str
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """Of all objectives, then of all constraints."""
+        return tuple(one.term for one in (*self.objectives, *self.constraints))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The quantities that have to be known."""
+        return tuple(dict.fromkeys(name for term in self.terms for name in term.names))
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Leaf paths of what varies: of designs, then of poses."""
+        return *self.space.paths, *self.poses.columns
+
+
+@cache
+def bundled_studies() -> dict[str, str]:
+    """The text of every bundled study file by name, in alphabetical order."""
+    found = (resources.files("kinetostat.studies") / "bundled").iterdir()
+    files = sorted((f for f in found if f.name.endswith(SUFFIX)), key=lambda f: f.name)
+    return {f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files}
+
+
+def load_problem(study: str | Path, settings: Sequence[str] = ()) -> Problem:
+    """The problem of a study file, or of a bundled study by its name.
+
+    Args:
+        study: path of a TOML file, or a name from `bundled_studies()`.
+        settings: overrides "path=value" of the study's fields, as `--set` takes them.
+
+    Raises:
+        InputError: no such study or machine, or a mistake in it or in an override.
+    """
+    name, shipped = str(study), bundled_studies()
+    if name in shipped:
+        return build_problem(read_study(documents.parse(shipped[name], name), name, settings))
+    path = Path(study)
+    if not documents.exists(path):
+        near = difflib.get_close_matches(name, shipped, 1)
+        hint = f'did you mean "{near[0]}"?' if near else f"bundled studies: {', '.join(shipped)}."
+        raise InputError(f"{shorten(name)} is neither a file nor a bundled study; {hint}")
+    return build_problem(read_study(documents.read(path), name, settings), path.parent)
+
+
+def build_problem(study: StudyFile, folder: Path = Path()) -> Problem:
+    """The problem of a study; a machine that is not bundled is looked for from `folder`.
+
+    Raises:
+        InputError: a field, quantity, bound or value that does not fit the machine.
+    """
+    named = study.machine in bundled()
+    machine = load(study.machine if named else folder / study.machine, list(_settings(study.changes)))
+    poses = read_poses(machine, study.poses)
+    space = read_space(machine, study.variables)
+    both = [path for path in space.paths if path in poses.columns]
+    if both:
+        raise InputError(f"{both[0]} is a variable and varies over the poses too; leave it out of one of them.")
+    objectives = tuple(_objective(machine, table, poses, f"objectives.{i}") for i, table in enumerate(study.objectives))
+    constraints = tuple(
+        _constraint(machine, table, poses, f"constraints.{i}") for i, table in enumerate(study.constraints)
+    )
+    labels = [one.term.label for one in objectives]
+    if len(set(labels)) < len(labels):
+        raise InputError("two objectives are the same; leave one out, or take it differently over the poses.")
+    found = Problem(study, machine, space, poses, objectives, constraints, _robust(study, space), _method(study))
+    _check(found)
+    return found
+
+
+def _settings(changes: Mapping[str, Any], above: str = "") -> Iterator[str]:
+    """Overrides of the machine from a table, whose keys may be dotted or tables in tables."""
+    for key, value in changes.items():
+        path = f"{above}.{key}" if above else key
+        if isinstance(value, dict):
+            yield from _settings(value, path)
+        else:
+            yield f"{path}={json.dumps(value)}"
+
+
+def _objective(machine: Machine, table: ObjectiveTable, poses: PoseSet, where: str) -> Objective:
+    default = "maximize" if more_is_better(table.quantity) else "minimize"
+    small = (table.goal or default) == "minimize"
+    return Objective(read_term(machine, table, poses, small, where), 1.0 if small else -1.0)
+
+
+def _constraint(machine: Machine, table: ConstraintTable, poses: PoseSet, where: str) -> Constraint:
+    if (table.at_least is None) == (table.at_most is None):
+        raise InputError(f"{where} needs either at_least or at_most.")
+    upper = table.at_most is not None
+    term = read_term(machine, table, poses, upper, where)
+    written = table.at_most if table.at_most is not None else table.at_least
+    key = "at_most" if upper else "at_least"
+    return Constraint(term, 1.0 if upper else -1.0, value_of(term.unit, written, f"{where}.{key}"))
+
+
+def _robust(study: StudyFile, space: Space) -> Aggregate | None:
+    text = study.robustness.objective.strip().lower()
+    if text == NOMINAL:
+        return None
+    if not any(variable.tolerance for variable in space.variables):
+        raise InputError("robustness.objective needs tolerances; add tolerance = ... to at least one variable.")
+    return parse_aggregate(text, "robustness.objective")
+
+
+def _method(study: StudyFile) -> str:
+    return study.optimizer.method or ("nsga2" if len(study.objectives) > 1 else "genetic")
+
+
+def _check(problem: Problem) -> None:
+    """Refuse a method that cannot solve the problem, and problems that are too large."""
+    settings, several = problem.study.optimizer, len(problem.objectives) > 1
+    if several != (problem.method == "nsga2"):
+        advice = "nsga2" if several else "genetic, gradient or hybrid"
+        raise InputError(
+            f"optimizer.method is {problem.method}, but the study has {len(problem.objectives)} objectives: "
+            f"take {advice}{'' if several else ', or add an objective'}."
+        )
+    if problem.method in ("gradient", "hybrid"):
+        stepped = [term.label for term in problem.terms if not term.differentiable]
+        if stepped:
+            raise InputError(f"{stepped[0]} changes in steps and has no gradient; take optimizer.method = genetic.")
+        if problem.method == "gradient" and not (problem.space.catalogue == 0).any():
+            raise InputError("all variables are choices, along which there is no gradient; take method = genetic.")
+    if problem.method != "gradient" and settings.population * settings.generations > MOST_EVALUATIONS:
+        raise InputError(
+            f"{settings.population:,} designs in {settings.generations:,} generations are more than the "
+            f"{MOST_EVALUATIONS:,} that are kept; lower optimizer.population or optimizer.generations."
+        )
+

@@ -1,0 +1,124 @@
+"""Runs a search step by step, in memory or into a study folder, from where it stands."""
+
+import json
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Protocol
+
+from kinetostat.machine.loading import as_toml
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.optimisation.assessment import Assessor
+from kinetostat.studies.optimisation.genetic import Genetic
+from kinetostat.studies.optimisation.gradient import Gradient
+from kinetostat.studies.optimisation.hybrid import Hybrid
+from kinetostat.studies.optimisation.log import Log, Step, record_of
+from kinetostat.studies.optimisation.problem import Problem
+from kinetostat.studies.row_file import RowFile
+from kinetostat.studies.study_folder import Record, StudyFolder, holds_study, study_folder
+
+ROWS = "designs.bin"
+STUDY_VERSION = 1
+
+Watch = Callable[[int, int, float | None], None]
+"""Told (steps done, steps in all, best objective so far) after each step."""
+
+
+def unwatched(_done: int, _total: int, _best: float | None) -> None:
+    """A search that nobody watches."""
+
+
+class Method(Protocol):
+    """A way to search: so many steps, each of which depends on the log before it and on the seed alone."""
+
+    @property
+    def steps(self) -> int:
+        """How many."""
+
+    def step(self, number: int, log: Log) -> Step:
+        """The one of that number."""
+
+
+def method_of(assess: Assessor) -> Method:
+    """The method that a study asks for."""
+    match assess.problem.method:
+        case "gradient":
+            return Gradient(assess)
+        case "hybrid":
+            return Hybrid(Genetic(assess), Gradient(assess))
+        case "nsga2":
+            return Genetic(assess, crowded=True)
+    return Genetic(assess)
+
+
+def search(assess: Assessor, watch: Watch = unwatched) -> Log:
+    """Search in memory."""
+    log = Log(assess.problem)
+    method = method_of(assess)
+    while len(log.steps) < method.steps:
+        _take(method, log)
+        watch(len(log.steps), method.steps, log.steps[-1].get("best"))
+    return log
+
+
+def search_into(assess: Assessor, folder: Path, watch: Watch = unwatched, resume: bool = False) -> Log:
+    """Search into a folder; go on with what it holds of the same study.
+
+    Args:
+        assess: of the problem.
+        folder: of this study alone.
+        watch: told how far the search is.
+        resume: insist that the folder holds a part of it.
+
+    Raises:
+        InputError: another study or another process in the folder, nothing to resume, a full disk.
+    """
+    if resume and not holds_study(folder):
+        raise InputError(f'"{folder}" holds no study that could be resumed; check -o, or leave out --resume.')
+    with study_folder(folder) as study:
+        log, method = Log(assess.problem), method_of(assess)
+        _take_up(assess.problem, study, log)
+        with RowFile(folder / ROWS, log.width) as file:
+            for record in study.records().values():
+                log.add(file.read(log.count, record["designs"]), record)
+            while len(log.steps) < method.steps:
+                start = log.count
+                _take(method, log)
+                file.write(start, log.rows[start:])
+                study.note(log.steps[-1])
+                watch(len(log.steps), method.steps, log.steps[-1].get("best"))
+        return log
+
+
+def _take(method: Method, log: Log) -> None:
+    step = method.step(len(log.steps), log)
+    record = record_of(log, step)
+    log.add(log.as_rows(step), record)
+
+
+def _take_up(problem: Problem, study: StudyFolder, log: Log) -> None:
+    """See that the folder holds this study, or begin it."""
+    asked, held = question_of(problem, log.width), study.question()
+    if held is None:
+        (study.path / ROWS).unlink(missing_ok=True)
+        study.begin(asked)
+        return
+    different = [key for key in asked if asked[key] != held.get(key)]
+    if different:
+        raise InputError(
+            f'"{study.path}" holds another study (its {" and ".join(different)} differ); choose another folder with '
+            "-o, or remove that one."
+        )
+
+
+def question_of(problem: Problem, width: int) -> Record:
+    """All that the designs depend on."""
+    written = problem.study.model_dump(mode="json", by_alias=True)
+    question: dict[str, Any] = {
+        "study": STUDY_VERSION,
+        "kinetostat": version("kinetostat"),
+        "machine": as_toml(problem.machine),
+        "optimisation": written | {"machine": problem.study.machine},
+        "numbers in a row": width,
+    }
+    return json.loads(json.dumps(question))

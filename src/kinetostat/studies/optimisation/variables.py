@@ -1,0 +1,249 @@
+"""What may change in a design: variables with bounds or choices, and the genes that searches work on.
+
+A gene is a share of the way between the bounds, 0 to 1, or the number of a choice.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kinetostat.engine.points import Array
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import Parameter, find, values
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.fields import Quantity
+from kinetostat.spec.study import VariableTable
+from kinetostat.units import KINDS, UnitError, parse, show
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A field of the machine, or several tied together.
+
+    Attributes:
+        fields: what it sets; the first one names it.
+        ratios: of each field to the variable's value.
+        low, high: bounds, SI; of a catalogue, numbers of its first and last choice.
+        choices: values of each field [choices x fields], SI; None where bounds say what is allowed.
+        labels: names of the choices.
+        fixed: whether it is not searched.
+        tolerance: how far manufacture may miss it, SI.
+        initial: the machine's own value, SI; of a catalogue, the number of the choice, -1 if it is none of them.
+    """
+
+    fields: tuple[Parameter, ...]
+    ratios: tuple[float, ...]
+    low: float
+    high: float
+    choices: Array | None
+    labels: tuple[str, ...]
+    fixed: bool
+    tolerance: float
+    initial: float
+
+    @property
+    def name(self) -> str:
+        """The path of its first field."""
+        return self.fields[0].path
+
+    @property
+    def quantity(self) -> Quantity:
+        """Of its first field."""
+        return self.fields[0].quantity
+
+    @property
+    def unit(self) -> str:
+        """SI; of a catalogue none."""
+        return "1" if self.choices is not None else KINDS[self.quantity.kind].unit
+
+    def columns(self, held: Array) -> dict[str, Array]:
+        """Values of its leaves by path, SI [designs], from its own values [designs]."""
+        found: dict[str, Array] = {}
+        for k, (field, ratio) in enumerate(zip(self.fields, self.ratios, strict=True)):
+            value = ratio * held if self.choices is None else self.choices[held.astype(int), k]
+            found.update(dict.fromkeys(field.leaves, value))
+        return found
+
+    def shown(self, value: float) -> str:
+        """A value as people read it: a label, degrees, or SI with the unit."""
+        if self.choices is not None:
+            return self.labels[int(value)] if value >= 0 else "none of the choices"
+        if self.quantity.kind == "angle":
+            return f"{math.degrees(value):.6g} deg"
+        return show(float(f"{value:.6g}"), self.quantity.kind)
+
+
+@dataclass(frozen=True)
+class Space:
+    """All variables of a study."""
+
+    variables: tuple[Variable, ...]
+
+    @cached_property
+    def searched(self) -> tuple[Variable, ...]:
+        """Those that are not fixed."""
+        return tuple(variable for variable in self.variables if not variable.fixed)
+
+    @property
+    def size(self) -> int:
+        """How many are searched."""
+        return len(self.searched)
+
+    @cached_property
+    def catalogue(self) -> Array:
+        """Number of choices of each searched variable; 0 where it has bounds."""
+        return np.array([0 if v.choices is None else len(v.choices) for v in self.searched])
+
+    @cached_property
+    def paths(self) -> tuple[str, ...]:
+        """Leaf paths of everything that the variables set, the fixed ones last."""
+        ordered = [*self.searched, *(variable for variable in self.variables if variable.fixed)]
+        return tuple(leaf for variable in ordered for field in variable.fields for leaf in field.leaves)
+
+    @cached_property
+    def _bounds(self) -> tuple[Array, Array]:
+        pairs = [(0.0, 1.0) if v.choices is not None else (v.low, v.high - v.low) for v in self.searched]
+        lows, spans = np.array(pairs).T
+        return lows, spans
+
+    def values(self, genes: Array) -> Array:
+        """Values of the searched variables, SI or numbers of choices, from genes; any [... x variables]."""
+        lows, spans = self._bounds
+        return lows + spans * genes
+
+    def genes(self, held: Array) -> Array:
+        """Genes from values."""
+        lows, spans = self._bounds
+        return (held - lows) / spans
+
+    def columns(self, genes: Array, deviations: Mapping[str, Array] | None = None) -> dict[str, Array]:
+        """Values by leaf path, SI, in the order of `paths` [designs].
+
+        Args:
+            genes: [designs x variables].
+            deviations: by name of a variable with bounds, what is added to its value, SI [designs].
+        """
+        added = deviations or {}
+        found: dict[str, Array] = {}
+        for variable, held in zip(self.searched, self.values(genes).T, strict=True):
+            found |= variable.columns(held + added.get(variable.name, 0.0))
+        for variable in (one for one in self.variables if one.fixed):
+            found |= variable.columns(np.full(len(genes), variable.initial) + added.get(variable.name, 0.0))
+        return found
+
+    @property
+    def initial(self) -> Array:
+        """Genes of the machine as its file says [variables]; those of values beyond the bounds lie beyond 0 and 1."""
+        return self.genes(np.array([variable.initial for variable in self.searched]))
+
+    def holds(self, genes: Array) -> bool:
+        """Whether a design lies within bounds and choices."""
+        most = np.where(self.catalogue > 0, self.catalogue - 1, 1)
+        return bool(np.all((genes >= 0.0) & (genes <= most)))
+
+
+def read_space(machine: Machine, tables: Sequence[VariableTable]) -> Space:
+    """The variables of a study file.
+
+    Raises:
+        InputError: an unknown field, one twice, a bound that the field does not allow, nothing left to search.
+    """
+    found = tuple(_variable(machine, table, f"variables.{i}") for i, table in enumerate(tables))
+    taken = [leaf for variable in found for field in variable.fields for leaf in field.leaves]
+    for leaf in taken:
+        if taken.count(leaf) > 1:
+            raise InputError(f"{leaf} is set by two variables; give each field to one.")
+    if all(variable.fixed for variable in found):
+        raise InputError("all variables are fixed; leave at least one free to be searched.")
+    return Space(found)
+
+
+def _variable(machine: Machine, table: VariableTable, where: str) -> Variable:
+    if (table.path is None) == (table.paths is None):
+        raise InputError(f"{where} needs either path (one field) or paths (several tied together).")
+    fields = tuple(find(machine.family, path) for path in table.fields)
+    if table.choices is not None:
+        return _catalogue(machine, table, fields, where)
+    name = f"{where} ({fields[0].path})"
+    ratios = _ratios(table, fields, name)
+    held = values(machine)
+    initial = float(held[fields[0].leaves[0]]) / ratios[0]
+    if table.fixed:
+        low = high = initial
+    else:
+        low, high = (_bound(end, fields[0].quantity, f"{name}.{key}") for key, end in _ends(table, name))
+        if low >= high:
+            raise InputError(f"{name}: from must be less than to; exchange or widen them.")
+    return Variable(fields, ratios, low, high, None, (), table.fixed, _tolerance(table, fields[0], name), initial)
+
+
+def _ends(table: VariableTable, name: str) -> list[tuple[str, float | str]]:
+    if table.start is None or table.end is None:
+        raise InputError(f'{name} needs from and to, e.g. from = "10 cm", to = "14 cm"; or choices, or fixed = true.')
+    return [("from", table.start), ("to", table.end)]
+
+
+def _ratios(table: VariableTable, fields: Sequence[Parameter], name: str) -> tuple[float, ...]:
+    ratios = tuple(table.ratios or (1.0,) * len(fields))
+    if len(ratios) != len(fields) or not all(ratios):
+        raise InputError(f"{name}.ratios must be one number other than 0 for each of its {len(fields)} paths.")
+    if len({field.quantity.kind for field in fields}) > 1:
+        raise InputError(f"{name}: fields that are tied together must be of one kind; use choices for a catalogue.")
+    return ratios
+
+
+def _catalogue(machine: Machine, table: VariableTable, fields: tuple[Parameter, ...], where: str) -> Variable:
+    name = f"{where} ({fields[0].path})"
+    if table.start is not None or table.end is not None or table.ratios is not None or table.tolerance is not None:
+        raise InputError(f"{name} has choices; leave out from, to, ratios and tolerance.")
+    rows = [entry if isinstance(entry, list) else [entry] for entry in table.choices or []]
+    for k, row in enumerate(rows):
+        if len(row) != len(fields):
+            raise InputError(f"{name}.choices.{k} has {len(row)} values; give one for each of {len(fields)} fields.")
+    read = [[_value(v, f.quantity, f"{name}.choices.{k}") for v, f in zip(r, fields, strict=True)] for k, r in enumerate(rows)]
+    labels = table.labels or [", ".join(str(value) for value in row) for row in rows]
+    if len(labels) != len(rows):
+        raise InputError(f"{name}.labels has {len(labels)} entries; give one for each of {len(rows)} choices.")
+    held = values(machine)
+    own = [[float(held[leaf]) for leaf in field.leaves] for field in fields]
+    same = [k for k, row in enumerate(read) if all({v} == set(leaves) for v, leaves in zip(row, own, strict=True))]
+    if table.fixed and not same:
+        raise InputError(f"{name} is fixed, but the machine has none of its choices; set it to one of them.")
+    initial = float(same[0]) if same else -1.0
+    choices, ratios = np.array(read, dtype=float), (1.0,) * len(fields)
+    return Variable(fields, ratios, 0.0, len(rows) - 1.0, choices, tuple(labels), table.fixed, 0.0, initial)
+
+
+def _tolerance(table: VariableTable, field: Parameter, name: str) -> float:
+    if table.tolerance is None:
+        return 0.0
+    read = _parsed(table.tolerance, field.quantity, f"{name}.tolerance")
+    if not 0.0 <= read < math.inf:
+        raise InputError(f"{name}.tolerance is {shorten(table.tolerance)}; it must not be negative.")
+    return read
+
+
+def _bound(written: float | str, quantity: Quantity, name: str) -> float:
+    read = _value(written, quantity, name)
+    if math.isinf(read):
+        raise InputError(f"{name} cannot be {shorten(written)}; give a large value, or use choices.")
+    return read
+
+
+def _value(written: float | str, quantity: Quantity, name: str) -> float:
+    read = _parsed(written, quantity, name)
+    try:
+        quantity.check(read)
+    except UnitError as error:
+        raise InputError(f"{name} is {shorten(written)}: {error}.") from None
+    return read
+
+
+def _parsed(written: float | str, quantity: Quantity, name: str) -> float:
+    try:
+        return parse(written, quantity.kind)
+    except UnitError as error:
+        raise InputError(f"{name} is {shorten(written)}: {error}.") from None
