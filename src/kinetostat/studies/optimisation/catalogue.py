@@ -61,15 +61,16 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
         refuse_absent(machine, StrokeTerm.names)
         return StrokeTerm()
     over = parse_aggregate(table.over, f"{where}.over")
+    label = name if poses.count == 1 else f"{name} ({over.text})"
     if name in SUMS:
         weights = _sum_weights(machine, name, table.weights, where)
-        return PoseTerm(name, "SI", tuple(weights.items()), False, over, high_is_bad)
+        return PoseTerm(label, "SI", tuple(weights.items()), False, over, high_is_bad)
     if name in ALONG:
         matrix, first, inverse, unit = ALONG[name]
         weights = _direction_weights(machine, matrix, first, table.direction, where)
-        return PoseTerm(name, unit, tuple(weights.items()), inverse, over, high_is_bad)
+        return PoseTerm(label, unit, tuple(weights.items()), inverse, over, high_is_bad)
     refuse_absent(machine, [name])
-    return PoseTerm(name, QUANTITIES[name].unit, ((name, 1.0),), False, over, high_is_bad)
+    return PoseTerm(label, QUANTITIES[name].unit, ((name, 1.0),), False, over, high_is_bad)
 
 
 def _volume(poses: PoseSet, where: str) -> Term:

@@ -17,7 +17,7 @@ class Term(Protocol):
 
     @property
     def label(self) -> str:
-        """For people, e.g. "compliance_sum, worst"."""
+        """For people, e.g. "compliance_sum (worst)"."""
 
     @property
     def unit(self) -> str:
@@ -47,7 +47,7 @@ class PoseTerm:
     """A weighted sum of quantities of a pose, or its reciprocal, taken over the poses.
 
     Attributes:
-        name: of the catalogue.
+        label: see `Term`.
         unit: SI.
         weights: of the quantities by name; without zeros.
         inverse: whether the reciprocal of the sum is meant.
@@ -55,17 +55,12 @@ class PoseTerm:
         high_is_bad: which poses are the bad ones.
     """
 
-    name: str
+    label: str
     unit: str
     weights: tuple[tuple[str, float], ...]
     inverse: bool
     aggregate: Aggregate
     high_is_bad: bool
-
-    @property
-    def label(self) -> str:
-        """The name, and how it is taken over the poses."""
-        return f"{self.name}, {self.aggregate.text}"
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -1,0 +1,215 @@
+"""The answer to a study: the best design beside the machine as it was, what holds it there, and what it costs.
+
+What is printed, drawn or written of it is elsewhere.
+"""
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from kinetostat.engine.batch import evaluate
+from kinetostat.engine.points import Array, Table
+from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import values, with_values
+from kinetostat.studies.optimisation.assessment import Assessor, Outcome, Verdict
+from kinetostat.studies.optimisation.front import front_of, knee_of
+from kinetostat.studies.optimisation.log import Log, Rows
+from kinetostat.studies.optimisation.problem import Problem
+from kinetostat.studies.optimisation.ridges import Ridge, at_bounds, find_ridges
+from kinetostat.studies.optimisation.robustness import Robustness, robustness_of
+from kinetostat.studies.optimisation.search import Watch, search, search_into, unwatched
+from kinetostat.studies.optimisation.slopes import Surveyor
+
+LONGEST_NAME = 80
+
+
+@dataclass(frozen=True)
+class Direction:
+    """The compliance of one direction before and after, the worst over the poses, SI."""
+
+    name: str
+    unit: str
+    before: float
+    after: float
+
+    @property
+    def gain(self) -> float:
+        """How many times stiffer it is afterwards; NaN where nothing yields."""
+        if self.before == self.after:
+            return 1.0 if self.after else float("nan")
+        return self.before / self.after if self.after else float("inf")
+
+
+@dataclass(frozen=True)
+class Influence:
+    """What one variable does to the objectives at the best design.
+
+    Attributes:
+        name: of the variable.
+        slopes: derivatives of each objective by it, SI; where an objective has a kink, of the part that decides.
+        percents: percent by which each objective changes per percent of the variable; NaN where one of them is 0.
+        bound: "lower" or "upper" if the variable is at that bound, else nothing.
+    """
+
+    name: str
+    slopes: tuple[float, ...]
+    percents: tuple[float, ...]
+    bound: str
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a study found.
+
+    Attributes:
+        problem: that was solved.
+        log: of all designs.
+        initial: what the machine is worth as its file says.
+        front: numbers of the Pareto-optimal designs, by the first objective; of one objective the best design alone.
+        knee: place in `front` of the design that is called the best.
+        directions: before and after.
+        influences: of the continuous variables; empty where an objective has no derivatives.
+        ridges: ways that leave the objective as it is.
+        no_ridges: why none were looked for.
+        robustness: of the best design; None without tolerances.
+    """
+
+    problem: Problem
+    log: Log
+    initial: Outcome
+    front: Rows
+    knee: int
+    directions: tuple[Direction, ...] = ()
+    influences: tuple[Influence, ...] = ()
+    ridges: tuple[Ridge, ...] = ()
+    no_ridges: str = ""
+    robustness: Robustness | None = None
+
+    @property
+    def solved(self) -> bool:
+        """Whether any feasible design was found."""
+        return bool(len(self.front))
+
+    @property
+    def best(self) -> int:
+        """Number of the best design."""
+        return int(self.front[self.knee])
+
+    @cached_property
+    def genes(self) -> Array:
+        """Of the best design [variables]."""
+        return np.asarray(self.log.genes([self.best])[0])
+
+    @property
+    def outcome(self) -> Outcome:
+        """What the best design is worth."""
+        return self.log.outcome([self.best])
+
+    @property
+    def machine(self) -> Machine:
+        """The best design as a machine."""
+        return designed(self.problem, self.genes)
+
+    @property
+    def counts(self) -> dict[Verdict, int]:
+        """How many designs have each verdict."""
+        found = Counter(self.log.outcome().verdict.tolist())
+        return {verdict: found[verdict] for verdict in Verdict if found[verdict]}
+
+
+def designed(problem: Problem, genes: Array) -> Machine:
+    """A design [variables] as a machine."""
+    columns = problem.space.columns(genes[None])
+    machine = with_values(problem.machine, {path: float(value[0]) for path, value in columns.items()})
+    return replace(machine, name=f"{problem.machine.name}, optimised"[:LONGEST_NAME])
+
+
+def optimize(
+    problem: Problem, folder: Path | None = None, watch: Watch = unwatched, resume: bool = False
+) -> Result:
+    """Solve a problem.
+
+    Args:
+        problem: from `problem.load_problem`.
+        folder: where every step is kept, so that a search that was stopped goes on; None to keep nothing.
+        watch: told how far the search is, and the best objective.
+        resume: insist that the folder holds a part of the search.
+
+    Raises:
+        InputError: see `search.search_into`.
+    """
+    assess = Assessor(problem)
+    log = search(assess, watch) if folder is None else search_into(assess, folder, watch, resume)
+    initial = assess.nominal(_as_it_is(problem))
+    several = len(problem.objectives) > 1
+    front = front_of(log) if several else _single(log)
+    found = Result(problem, log, initial, front, knee_of(log, front) if several and len(front) else 0)
+    return _explained(assess, found) if found.solved else found
+
+
+def _as_it_is(problem: Problem) -> Array:
+    """Genes of the machine as its file says; a value that is no choice of its catalogue counts as the first one."""
+    picked = problem.space.catalogue > 0
+    return np.where(picked, np.maximum(problem.space.initial, 0.0), problem.space.initial)[None]
+
+
+def _single(log: Log) -> Rows:
+    first = log.kept[:1]
+    return first if log.outcome(first).violation[0] == 0.0 else first[:0]
+
+
+def _explained(assess: Assessor, found: Result) -> Result:
+    """The result with everything that is asked of its best design."""
+    problem = assess.problem
+    survey = None
+    if all(one.term.differentiable for one in problem.objectives) and (problem.space.catalogue == 0).any():
+        survey = Surveyor(problem)
+    ridges, reason = [], "The objective has no derivatives; ridges are not looked for."
+    if survey is not None and len(problem.objectives) == 1:
+        ridges, reason = find_ridges(problem, survey, found.genes)
+    return replace(
+        found,
+        directions=tuple(_directions(problem, found.machine)),
+        influences=tuple(_influences(problem, survey, found.genes)) if survey else (),
+        ridges=tuple(ridges),
+        no_ridges=reason if len(problem.objectives) == 1 else "",
+        robustness=robustness_of(assess, found.genes),
+    )
+
+
+def _directions(problem: Problem, machine: Machine) -> list[Direction]:
+    there = problem.machine.family.component_names
+    names = [name for name in GROUPS["compliance"] if QUANTITIES[name].components[0] in there]
+    before, after = (_worst(problem, one, names) for one in (problem.machine, machine))
+    return [Direction(name, QUANTITIES[name].unit, before[name], after[name]) for name in names]
+
+
+def _worst(problem: Problem, machine: Machine, names: list[str]) -> dict[str, float]:
+    """The greatest compliance over the poses that are reached; NaN where none is."""
+    held = values(machine)
+    anywhere = next(path for path in held if path.startswith("pose."))
+    columns = dict(problem.poses.columns) or {anywhere: np.array([float(held[anywhere])])}
+    found = evaluate(machine, Table(columns), names)
+    reached = found.status == 0
+    return {name: float(found.values[name][reached].max()) if reached.any() else float("nan") for name in names}
+
+
+def _influences(problem: Problem, survey: Surveyor, genes: Array) -> list[Influence]:
+    here, bounds, held = survey(genes), at_bounds(problem, genes), problem.space.values(genes)
+    if not here.sound:
+        return []
+    numbers = [here.term(one.term, one.sign > 0) for one in problem.objectives]
+    found = []
+    for place, k in enumerate(survey.free):
+        variable = problem.space.searched[k]
+        slopes = tuple(float(slope[place]) / (variable.high - variable.low) for _, slope in numbers)
+        percents = tuple(
+            slope * float(held[k]) / value if value and held[k] else float("nan")
+            for slope, (value, _) in zip(slopes, numbers, strict=True)
+        )
+        found.append(Influence(variable.name, slopes, percents, bounds[k]))
+    return found
