@@ -23,7 +23,7 @@ from kinetostat.commands.common import (
 )
 from kinetostat.commands.compare import add_compare_command
 from kinetostat.commands.grid import add_grid_commands
-from kinetostat.commands.guidelines import add_guidelines_command
+from kinetostat.commands.optimize import add_optimize_commands
 from kinetostat.commands.sensitivity import add_sensitivity_command
 from kinetostat.commands.workspace import add_workspace_command
 
@@ -33,6 +33,7 @@ EXAMPLES = """examples:
   kinetostat analyze zhang-gosselin-4dof --set stiffness.passive_links=rigid --json
   kinetostat sweep   zhang-gosselin-4dof --vary "stiffness.passive_links=1e3:1e10:8:log"
   kinetostat map     zhang-gosselin-4dof --over "x=-2 cm:2 cm:41" --over "z=66 cm:70 cm:41" -o maps
+  kinetostat optimize zhang-gosselin-2002 -o better
   kinetostat validate tripteron
   kinetostat reproduce
 """
@@ -70,11 +71,11 @@ def _parser() -> Parser:
     parser.add_argument("--version", action="store_true", help="print the version and stop")
     parser.set_defaults(run=_version_or_help, parser=parser)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", parser_class=Parser)
-    add_command(commands, "list", _list, "bundled machines and families", "kinetostat list")
+    add_command(commands, "list", _list, "bundled machines and studies, and families", "kinetostat list")
     new = add_command(
-        commands, "new", _new, "print a commented machine file", "kinetostat new passive-leg-4dof > mine.toml"
+        commands, "new", _new, "print a commented machine or study file", "kinetostat new passive-leg-4dof > mine.toml"
     )
-    new.add_argument("family", metavar="FAMILY", help="a family, see `kinetostat list`")
+    new.add_argument("family", metavar="FAMILY", help="a family, see `kinetostat list`; or study, for a study file")
     schema = add_command(
         commands,
         "schema",
@@ -82,7 +83,7 @@ def _parser() -> Parser:
         "print the JSON Schema of a file",
         "kinetostat schema machine > machine.schema.json",
     )
-    schema.add_argument("what", choices=["machine"], help="kind of file")
+    schema.add_argument("what", choices=["machine", "study"], help="kind of file")
     takes_machine(
         add_command(commands, "check", _check, "read a machine and show what it says", "kinetostat check mine.toml")
     )
@@ -114,8 +115,7 @@ def _parser() -> Parser:
     add_grid_commands(commands)
     add_workspace_command(commands)
     add_sensitivity_command(commands)
-    add_guidelines_command(commands)
-    add_compare_command(commands)
+    add_optimize_commands(commands)
     reproduce = add_command(
         commands, "reproduce", _reproduce, "every table, equation and figure of the paper, printed beside computed",
         "kinetostat reproduce -o reproduce",
@@ -145,24 +145,28 @@ def _version_or_help(options: argparse.Namespace) -> int:
 
 def _list(options: argparse.Namespace) -> int:
     from kinetostat.machine.loading import bundled, load
-    from kinetostat.views.tables import print_machines, terminal
+    from kinetostat.studies.bundled import bundled_studies, study_of
+    from kinetostat.views.tables import print_machines, print_studies, terminal
 
     names = list(bundled())
     print_machines(terminal(), [load(name) for name in names], names)
+    print_studies(terminal(), {name: study_of(name) for name in bundled_studies()})
     return DONE
 
 
 def _new(options: argparse.Namespace) -> int:
     from kinetostat.machine.loading import template
+    from kinetostat.studies.bundled import study_template
 
-    print(template(options.family), end="")
+    print(study_template() if options.family == "study" else template(options.family), end="")
     return DONE
 
 
 def _schema(options: argparse.Namespace) -> int:
     from kinetostat.machine.loading import machine_schema
+    from kinetostat.spec.study import study_schema
 
-    print_json(machine_schema())
+    print_json(study_schema() if options.what == "study" else machine_schema())
     return DONE
 
 

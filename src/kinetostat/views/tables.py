@@ -2,7 +2,7 @@
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from rich import box
 from rich.console import Console
@@ -12,6 +12,7 @@ from kinetostat.machine.loading import kinds_of_machine
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.spec.fields import Quantity
+from kinetostat.spec.study import StudyFile
 
 Number = float | None
 
@@ -25,6 +26,14 @@ def print_machines(console: Console, bundled: Sequence[Machine], names: Sequence
     table = text_table("Families (kinetostat new FAMILY prints a commented file)", "family", "machine")
     for name, summary in kinds_of_machine().items():
         table.add_row(name, summary)
+    console.print(table)
+
+
+def print_studies(console: Console, studies: Mapping[str, StudyFile]) -> None:
+    """The bundled studies by name."""
+    table = text_table("Bundled studies (kinetostat optimize STUDY)", "name", "study", "machine")
+    for name, study in studies.items():
+        table.add_row(name, study.name, study.machine)
     console.print(table)
 
 

@@ -15,7 +15,7 @@ def front_of(log: Log) -> Rows:
         return feasible
     wanted = _wanted(log)[log.kept[feasible]]
     _, single = np.unique(wanted, axis=0, return_index=True)
-    first = NonDominatedSorting().do(wanted[single], only_non_dominated_front=True)[0]
+    first = NonDominatedSorting().do(wanted[single], only_non_dominated_front=True)
     return log.kept[feasible][single][first[np.argsort(wanted[single][first, 0], kind="stable")]]
 
 

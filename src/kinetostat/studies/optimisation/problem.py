@@ -4,8 +4,6 @@ import difflib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +12,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, read_study
+from kinetostat.studies.bundled import bundled_studies, study_of
 from kinetostat.studies.conditions import value_of
 from kinetostat.studies.optimisation.aggregate import Aggregate, parse_aggregate
 from kinetostat.studies.optimisation.catalogue import more_is_better, read_term
@@ -21,7 +20,6 @@ from kinetostat.studies.optimisation.poses import PoseSet, read_poses
 from kinetostat.studies.optimisation.terms import Term
 from kinetostat.studies.optimisation.variables import Space, read_space
 
-SUFFIX = ".toml"
 NOMINAL = "nominal"
 MOST_EVALUATIONS = 5_000_000
 """Designs of one study: their table then fits in half a gigabyte."""
@@ -98,14 +96,6 @@ class Problem:
         return *self.space.paths, *self.poses.columns
 
 
-@cache
-def bundled_studies() -> dict[str, str]:
-    """The text of every bundled study file by name, in alphabetical order."""
-    found = (resources.files("kinetostat.studies") / "bundled").iterdir()
-    files = sorted((f for f in found if f.name.endswith(SUFFIX)), key=lambda f: f.name)
-    return {f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files}
-
-
 def load_problem(study: str | Path, settings: Sequence[str] = ()) -> Problem:
     """The problem of a study file, or of a bundled study by its name.
 
@@ -118,7 +108,7 @@ def load_problem(study: str | Path, settings: Sequence[str] = ()) -> Problem:
     """
     name, shipped = str(study), bundled_studies()
     if name in shipped:
-        return build_problem(read_study(documents.parse(shipped[name], name), name, settings))
+        return build_problem(study_of(name, settings))
     path = Path(study)
     if not documents.exists(path):
         near = difflib.get_close_matches(name, shipped, 1)
@@ -135,6 +125,15 @@ def build_problem(study: StudyFile, folder: Path = Path()) -> Problem:
     """
     named = study.machine in bundled()
     machine = load(study.machine if named else folder / study.machine, list(_settings(study.changes)))
+    return problem_of(study, machine)
+
+
+def problem_of(study: StudyFile, machine: Machine) -> Problem:
+    """The problem of a study about a machine in which the study's changes are made already.
+
+    Raises:
+        InputError: a field, quantity, bound or value that does not fit the machine.
+    """
     poses = read_poses(machine, study.poses)
     space = read_space(machine, study.variables)
     both = [path for path in space.paths if path in poses.columns]

@@ -192,10 +192,10 @@ def told(ridges: Sequence[Ridge], problem: Problem) -> list[str]:
     by_name = {variable.name: variable for variable in problem.space.searched}
     said = []
     for ridge in ridges:
-        parts = [
+        ways = [
             f"{name} from {by_name[name].shown(start)} to {by_name[name].shown(end)}"
             for name, start, end in zip(ridge.names, ridge.start, ridge.end, strict=True)
         ]
-        together = "together " if len(parts) > 1 else ""
-        said.append(f"The objective does not change ({ridge.change:.0e}) along {together}{', '.join(parts)}.")
+        how = f", together with {', '.join(ways[1:])}" if ways[1:] else ""
+        said.append(f"Ridge: {ways[0]}{how} leaves the objective as it is (to {ridge.change:.0e}); choose freely there.")
     return said

@@ -6,16 +6,18 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
 
-from kinetostat.machine.loading import as_toml
+from kinetostat.machine.loading import as_toml, build
+from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.study import read_study
 from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.genetic import Genetic
 from kinetostat.studies.optimisation.gradient import Gradient
 from kinetostat.studies.optimisation.hybrid import Hybrid
 from kinetostat.studies.optimisation.log import Log, Step, record_of
-from kinetostat.studies.optimisation.problem import Problem
+from kinetostat.studies.optimisation.problem import Problem, problem_of
 from kinetostat.studies.row_file import RowFile
-from kinetostat.studies.study_folder import Record, StudyFolder, holds_study, study_folder
+from kinetostat.studies.study_folder import QUESTION, Record, StudyFolder, holds_study, study_folder
 
 ROWS = "designs.bin"
 STUDY_VERSION = 1
@@ -111,14 +113,26 @@ def _take_up(problem: Problem, study: StudyFolder, log: Log) -> None:
         )
 
 
+def stored_problem(folder: Path) -> Problem:
+    """The problem that a study folder is about.
+
+    Raises:
+        InputError: it is not the folder of an optimisation.
+    """
+    held = json.loads((folder / QUESTION).read_text("utf-8")) if holds_study(folder) else {}
+    if "optimisation" not in held:
+        raise InputError(f'"{folder}" is not the folder of an optimisation; give a study file, or such a folder.')
+    machine = build(documents.parse(held["machine"], str(folder)), str(folder))
+    return problem_of(read_study(held["optimisation"], str(folder)), machine)
+
+
 def question_of(problem: Problem, width: int) -> Record:
     """All that the designs depend on."""
-    written = problem.study.model_dump(mode="json", by_alias=True)
     question: dict[str, Any] = {
         "study": STUDY_VERSION,
         "kinetostat": version("kinetostat"),
         "machine": as_toml(problem.machine),
-        "optimisation": written | {"machine": problem.study.machine},
+        "optimisation": problem.study.model_dump(mode="json", by_alias=True, exclude_none=True),
         "numbers in a row": width,
     }
     return json.loads(json.dumps(question))

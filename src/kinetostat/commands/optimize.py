@@ -1,0 +1,110 @@
+"""`optimize` and `pareto`: better designs of a machine, and what they give up for each other. No formula lives here."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinetostat.commands.common import DONE, NO_ANSWER, add_command, no_answer, print_json, takes_json
+
+if TYPE_CHECKING:
+    from kinetostat.commands.common import Commands
+    from kinetostat.studies.optimisation.result import Result
+
+STUDY = "a study file, the name of a bundled study (see `kinetostat list`), or the folder of a study to go on with"
+
+
+def add_optimize_commands(commands: "Commands") -> None:
+    """Add `optimize` and `pareto`."""
+    optimize = add_command(
+        commands, "optimize", _optimize, "the best design that a study file asks for, beside the machine as it is",
+        "kinetostat optimize zhang-gosselin-2002 --set optimizer.seed=3 -o better",
+    )  # fmt: skip
+    pareto = add_command(
+        commands, "pareto", _pareto, "the designs of which none beats another in everything, for several objectives",
+        "kinetostat pareto zhang-gosselin-front -o front",
+    )  # fmt: skip
+    for command in (optimize, pareto):
+        command.add_argument("study", metavar="STUDY", help=STUDY)
+        command.add_argument(
+            "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",
+            help='override a field of the study, e.g. --set optimizer.seed=3, --set variables.0.to="15 cm"; repeatable',
+        )  # fmt: skip
+        command.add_argument(
+            "-o", "--output", type=Path,
+            help="folder for the result, its figures and all designs; a search that was stopped goes on in it",
+        )  # fmt: skip
+        command.add_argument(
+            "--resume", action="store_true", help="go on with what the folder holds, and refuse where it holds nothing"
+        )
+        takes_json(command)
+
+
+def _optimize(options: argparse.Namespace) -> int:
+    found = _found(options)
+    if options.json:
+        from kinetostat.studies.optimisation.result_data import as_json
+
+        print_json(as_json(found))
+    return _told(options, found)
+
+
+def _pareto(options: argparse.Namespace) -> int:
+    found = _found(options, least=2)
+    if options.json:
+        from kinetostat.studies.optimisation.result_data import as_json
+
+        told = as_json(found)
+        print_json({key: told.get(key) for key in ("name", "status", "message", "evaluations", "front")})
+    return _told(options, found)
+
+
+def _found(options: argparse.Namespace, least: int = 1) -> "Result":
+    """Search, with a bar, into the folder if there is one."""
+    from kinetostat.spec.errors import InputError
+    from kinetostat.studies.optimisation.problem import load_problem
+    from kinetostat.studies.optimisation.result import optimize
+    from kinetostat.studies.optimisation.search import stored_problem
+    from kinetostat.studies.study_folder import holds_study
+    from kinetostat.views.progress import telling_bar
+
+    given = Path(options.study)
+    if holds_study(given):
+        if options.settings or options.output:
+            raise InputError(f'"{given}" holds a study with settings of its own; leave out --set and -o.')
+        problem, options.output = stored_problem(given), given
+    else:
+        problem = load_problem(options.study, options.settings)
+    if options.resume and options.output is None:
+        raise InputError("--resume goes on in a folder; give it with -o.")
+    if len(problem.objectives) < least:
+        raise InputError("a Pareto front needs two objectives or more; for one, use `kinetostat optimize`.")
+    with telling_bar("searching") as tell:
+        return optimize(
+            problem,
+            options.output,
+            lambda done, total, best: tell(done, total, "" if best is None else f"(best {best:.8g})"),
+            options.resume,
+        )
+
+
+def _told(options: argparse.Namespace, found: "Result") -> int:
+    """Write files, and print what is not JSON."""
+    from kinetostat.studies.optimisation.result_data import message, write_result
+
+    written = write_result(found, options.output) if options.output else []
+    if found.solved and options.output:
+        from kinetostat.views.figures import save
+        from kinetostat.views.optimisation_figures import pictures
+
+        for name, figure in pictures(found).items():
+            written += save(figure, options.output / name)
+    if not found.solved:
+        return NO_ANSWER if options.json else no_answer(message(found))
+    if not options.json:
+        from kinetostat.views.grid_tables import print_written
+        from kinetostat.views.optimisation_tables import print_result
+        from kinetostat.views.tables import terminal
+
+        print_result(terminal(), found)
+        print_written(terminal(), written)
+    return DONE

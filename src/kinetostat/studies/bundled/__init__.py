@@ -1,0 +1,33 @@
+"""Bundled study files, and how to get at them by name. Nothing is evaluated here."""
+
+from collections.abc import Sequence
+from functools import cache
+from importlib import resources
+
+from kinetostat.spec import document as documents
+from kinetostat.spec.study import StudyFile, read_study
+
+SUFFIX = ".toml"
+SIMPLEST = "zhang-gosselin-2002"
+
+
+@cache
+def bundled_studies() -> dict[str, str]:
+    """The text of every bundled study file by name, in alphabetical order."""
+    found = resources.files("kinetostat.studies.bundled").iterdir()
+    files = sorted((f for f in found if f.name.endswith(SUFFIX)), key=lambda f: f.name)
+    return {f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files}
+
+
+def study_of(name: str, settings: Sequence[str] = ()) -> StudyFile:
+    """A bundled study with overrides "path=value".
+
+    Raises:
+        InputError: a mistake in an override.
+    """
+    return read_study(documents.parse(bundled_studies()[name], name), name, settings)
+
+
+def study_template() -> str:
+    """The text of a commented study file to start from."""
+    return bundled_studies()[SIMPLEST]

@@ -1,0 +1,187 @@
+"""Figures of a study for print: convergence, what each direction gains, the Pareto front, and scatter by tolerances."""
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from kinetostat.studies.optimisation.log import Log
+from kinetostat.studies.optimisation.problem import Objective
+from kinetostat.studies.optimisation.result import Result
+from kinetostat.studies.optimisation.robustness import Scatter
+from kinetostat.views.display import Scale, prefixed_scale
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout
+
+BINS = 40
+CEILING = 99.0
+"""Percentile of all designs up to which a front is drawn: far ones would squeeze it."""
+
+
+def pictures(found: Result) -> dict[str, Figure]:
+    """The figures of a study that found something, by file name."""
+    drawn = {"comparison": comparison(found)}
+    if len(found.problem.objectives) == 1:
+        drawn["convergence"] = convergence(found.log, found.problem.study.name)
+    else:
+        drawn["front"] = front(found)
+    if found.robustness:
+        drawn["tolerances"] = tolerances(found)
+    return drawn
+
+
+def convergence(log: Log, title: str) -> Figure:
+    """Best and mean of the designs that each step kept (Fig. 6 of the paper), and how far they are from the end."""
+    objective = log.problem.objectives[0]
+    across = "descent" if log.problem.method == "gradient" else "generation"
+    steps = np.arange(1, len(log.steps) + 1)
+    best, mean = (np.array([step.get(key, np.nan) for step in log.steps], dtype=float) for key in ("best", "mean"))
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(6.8, 3.0), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        left.plot(steps, mean, color=COLOURS[1], label="mean of the kept", linestyle="--")
+        left.plot(steps, best, color=COLOURS[0], label="best")
+        left.set(xlabel=across, ylabel=_axis(objective, Scale(1.0, objective.term.unit)))
+        left.legend()
+        end = best[np.isfinite(best)][-1:] if np.isfinite(best).any() else np.array([np.nan])
+        for values, colour, label, dash in ((mean, COLOURS[1], "mean", "--"), (best, COLOURS[0], "best", "-")):
+            away = np.abs(values - end) / np.abs(end)
+            right.plot(steps, np.where(away > 0.0, away, np.nan), dash, color=colour, label=label)
+        right.set(xlabel=across, ylabel="relative distance to the last best", yscale="log")
+        for panel in (left, right):
+            panel.margins(x=0.02)
+        figure.suptitle(title, fontsize=10)
+        fix_layout(figure)
+    return figure
+
+
+def comparison(found: Result) -> Figure:
+    """How many times stiffer each direction is, and where each variable lies between its bounds, before and after."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 0.9 + 0.3 * max(6, found.problem.space.size)), layout="constrained")
+        left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
+        _gains(left, found)
+        _places(right, found)
+        figure.suptitle(f"{found.problem.study.name}: {found.problem.machine.name}", fontsize=10)
+        fix_layout(figure)
+    return figure
+
+
+def _gains(panel: Axes, found: Result) -> None:
+    known = [one for one in found.directions if np.isfinite(one.gain) and one.gain > 0.0]
+    places, gains = np.arange(len(known)), np.array([one.gain for one in known])
+    colours = [COLOURS[2] if gain >= 1.0 else COLOURS[1] for gain in gains]
+    panel.barh(places, gains - 1.0, left=1.0, color=colours, height=0.6)
+    panel.axvline(1.0, color="#444444", linewidth=0.8)
+    wide = gains.size and gains.max() / gains.min() > 30.0
+    panel.set(xscale="log" if wide else "linear", xlabel="times as stiff as before")
+    panel.set_yticks(places, [one.name.removeprefix("compliance_") for one in known])
+    panel.invert_yaxis()
+    panel.grid(visible=False, axis="y")
+    for place, gain in zip(places, gains, strict=True):
+        inside = wide and gain < 1.0 / 30.0
+        panel.annotate(
+            f"{gain:.3g}", (max(gain, 1.0) if not inside else gain, place), (3, 0), textcoords="offset points",
+            va="center", fontsize=7, color="white" if inside else "black",
+        )  # fmt: skip
+    panel.margins(x=0.18)
+
+
+def _places(panel: Axes, found: Result) -> None:
+    """Each variable on its own scale from its lower to its upper bound."""
+    space = found.problem.space
+    most = np.where(space.catalogue > 0, np.maximum(space.catalogue - 1, 1), 1)
+    before, after = space.initial / most, found.genes / most
+    for place, variable in enumerate(space.searched):
+        panel.plot([0.0, 1.0], [place, place], color="#cccccc", linewidth=1.2, zorder=1)
+        if -0.05 <= before[place] <= 1.05:
+            panel.plot(before[place], place, "o", color="white", markeredgecolor="#444444", zorder=2)
+            panel.annotate(
+                "", (after[place], place), (before[place], place),
+                arrowprops={"arrowstyle": "-", "color": "#888888", "linewidth": 0.8}, zorder=1,
+            )  # fmt: skip
+        panel.plot(after[place], place, "o", color=COLOURS[0], zorder=3)
+        value = variable.shown(float(space.values(found.genes)[place]))
+        panel.annotate(value, (1.04, place), va="center", fontsize=7)
+        ends = [variable.shown(0.0 if variable.choices is not None else variable.low)]
+        ends.append(variable.shown(variable.high))
+        for x, text, side in zip((0.0, 1.0), ends, ("left", "right"), strict=True):
+            panel.annotate(text, (x, place), (0, 5), textcoords="offset points", ha=side, fontsize=5.5, color="#777777")
+    panel.set_yticks(range(space.size), [variable.name for variable in space.searched])
+    panel.set(xlim=(-0.05, 1.45), xticks=[], xlabel="○ before   ● best, between its bounds")
+    panel.set_ylim(space.size - 0.4, -0.7)
+    panel.grid(visible=False)
+    panel.spines[["top", "right", "bottom"]].set_visible(False)
+
+
+def front(found: Result) -> Figure:
+    """Every pair of objectives: all feasible designs, the front, and its knee."""
+    problem, outcome = found.problem, found.log.outcome()
+    feasible = outcome.objectives[outcome.violation == 0.0]
+    best = outcome.objectives[found.front]
+    pairs = [(i, j) for i in range(best.shape[1]) for j in range(i + 1, best.shape[1])]
+    columns = min(3, len(pairs))
+    rows = -(-len(pairs) // columns)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(4.2 * columns if columns == 1 else 3.1 * columns, 3.2 * rows), layout="constrained")
+        panels = figure.subplots(rows, columns, squeeze=False).flat
+        for panel, (i, j) in zip(panels, pairs, strict=False):
+            x, y = (_scaled(problem.objectives[k], best[:, k]) for k in (i, j))
+            panel.scatter(
+                feasible[:, i] * x.factor, feasible[:, j] * y.factor, s=3, color="#c8c8c8", linewidths=0, rasterized=True,
+                label="designs that were judged",
+            )  # fmt: skip
+            panel.plot(best[:, i] * x.factor, best[:, j] * y.factor, "o", markersize=3, color=COLOURS[0], label="front")
+            knee = best[found.knee, [i, j]] * (x.factor, y.factor)
+            panel.plot(*knee, "D", markersize=7, markerfacecolor="none", markeredgecolor=COLOURS[1], label="knee")
+            if np.isfinite(found.initial.objectives).all():
+                before = found.initial.objectives[0, [i, j]] * (x.factor, y.factor)
+                panel.plot(*before, "s", color="#444444", markersize=4, label="initial")
+            panel.set(xlabel=_axis(problem.objectives[i], x), ylabel=_axis(problem.objectives[j], y))
+            panel.set_xlim(*_limits(best[:, i] * x.factor, feasible[:, i] * x.factor))
+            panel.set_ylim(*_limits(best[:, j] * y.factor, feasible[:, j] * y.factor))
+        figure.axes[0].legend(loc="best")
+        figure.suptitle(problem.study.name, fontsize=10)
+        fix_layout(figure)
+    return figure
+
+
+def tolerances(found: Result) -> Figure:
+    """How each objective scatters over the machines that manufacture makes of the best design."""
+    scatters = found.robustness.scatters if found.robustness else ()
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(3.6 * len(scatters) + 0.6, 2.9), layout="constrained")
+        for panel, one in zip(figure.subplots(1, len(scatters), squeeze=False).flat, scatters, strict=True):
+            _histogram(panel, one)
+        figure.suptitle(f"{found.problem.study.name}: under the tolerances", fontsize=10)
+        fix_layout(figure)
+    return figure
+
+
+def _histogram(panel: Axes, one: Scatter) -> None:
+    samples = one.samples[np.isfinite(one.samples)]
+    scale = prefixed_scale(one.unit, samples) if one.unit != "SI" else Scale(1.0, one.unit)
+    panel.hist(samples * scale.factor, bins=BINS, color=COLOURS[5], edgecolor="white", linewidth=0.3)
+    marks = (("nominal", one.nominal, "-"), ("95 % within", one.usual, "--"), ("worst", one.worst, ":"))
+    for (label, value, dash), colour in zip(marks, ("#222222", COLOURS[0], COLOURS[1]), strict=True):
+        panel.axvline(value * scale.factor, color=colour, linestyle=dash, label=f"{label}: {value * scale.factor:.6g}")
+    panel.set(xlabel=scale.label(one.label), ylabel="machines")
+    panel.margins(x=0.03)
+    panel.set_ylim(top=panel.get_ylim()[1] * 1.4)
+    panel.legend(loc="upper left", fontsize=6.5, frameon=True, framealpha=1.0, edgecolor="none")
+
+
+def _scaled(objective: Objective, values: np.ndarray) -> Scale:
+    unit = objective.term.unit
+    return Scale(1.0, unit) if unit == "SI" else prefixed_scale(unit, values)
+
+
+def _axis(objective: Objective, scale: Scale) -> str:
+    return scale.label(objective.term.label)
+
+
+def _limits(front_values: np.ndarray, every: np.ndarray) -> tuple[float, float]:
+    """From a little before the front to where most designs are, at most three times its span."""
+    low, high = float(front_values.min()), float(front_values.max())
+    span = (high - low) or abs(high) or 1.0
+    near, far = np.percentile(every, [100.0 - CEILING, CEILING])
+    return max(float(near), low - span) - 0.05 * span, min(float(far), high + span) + 0.05 * span

@@ -1,0 +1,130 @@
+"""The answer to a study on a terminal: the best design beside the machine as it was, and what holds it there."""
+
+import math
+from collections.abc import Iterator
+
+from rich.console import Console
+
+from kinetostat.studies.optimisation.result import Result
+from kinetostat.studies.optimisation.result_data import message
+from kinetostat.studies.optimisation.ridges import told
+from kinetostat.studies.optimisation.robustness import Robustness
+from kinetostat.views.tables import number, numeric_table
+
+MOST_ROWS = 25
+"""Designs of a front that are printed; result.json has all."""
+FEW = 1e-4
+"""Percent per percent below which a 0 is printed."""
+MUCH = 0.01
+"""Stiffness that is left, as a share, below which the loss is pointed out."""
+
+
+def print_result(console: Console, found: Result) -> None:
+    """All tables of a study that found something."""
+    problem = found.problem
+    console.print(f"{problem.study.name}: {problem.machine.name}", style="bold", highlight=False)
+    console.print(f"{message(found)} Judged at {problem.poses.told}; method {problem.method}.", highlight=False)
+    if len(problem.objectives) > 1:
+        _print_front(console, found)
+    _print_worth(console, found)
+    _print_design(console, found)
+    _print_directions(console, found)
+    if found.robustness:
+        _print_robustness(console, found.robustness)
+    for line in _remarks(found):
+        console.print(line, highlight=False)
+
+
+def _print_worth(console: Console, found: Result) -> None:
+    best = "knee of the front" if len(found.problem.objectives) > 1 else "best"
+    table = numeric_table("What it is worth", "", ["initial", best, "gain", "unit"])
+    for k, objective in enumerate(found.problem.objectives):
+        before, after = found.initial.objectives[0, k], found.outcome.objectives[0, k]
+        gain = before / after if objective.sign > 0 else after / before
+        name = f"{objective.goal} {objective.term.label}"
+        table.add_row(name, _exact(before), _exact(after), _times(gain), objective.term.unit)
+    for k, one in enumerate(found.problem.constraints):
+        before, after = found.initial.constraints[0, k], found.outcome.constraints[0, k]
+        table.add_row(one.label, number(before), number(after), "", one.term.unit)
+    console.print(table)
+
+
+def _print_design(console: Console, found: Result) -> None:
+    objectives = found.problem.objectives
+    heads = ["% per %"] if len(objectives) == 1 else [f"% per % ({k + 1})" for k in range(len(objectives))]
+    table = numeric_table("The design", "variable", ["initial", "best", "at bound", *heads])
+    influences = {one.name: one for one in found.influences}
+    held = found.problem.space.values(found.genes)
+    for variable, value in zip(found.problem.space.searched, held, strict=True):
+        own = influences.get(variable.name)
+        percents = [_percent(p) for p in own.percents] if own else [""] * len(objectives)
+        bound = own.bound if own else ""
+        table.add_row(variable.name, variable.shown(variable.initial), variable.shown(value), bound, *percents)
+        for field in variable.fields[1:]:
+            table.add_row(f"  with {field.path}", "", "", "", *[""] * len(heads))
+    console.print(table)
+
+
+def _print_directions(console: Console, found: Result) -> None:
+    worst = "" if found.problem.poses.count == 1 else ", the worst of all poses"
+    table = numeric_table(f"Compliance{worst}", "direction", ["initial", "best", "times stiffer", "unit"])
+    for one in found.directions:
+        name = one.name.removeprefix("compliance_")
+        table.add_row(name, number(one.before), number(one.after), _times(one.gain), one.unit)
+    console.print(table)
+
+
+def _print_robustness(console: Console, robustness: Robustness) -> None:
+    title = f"Under the tolerances: {robustness.machines:,} random machines"
+    title += f" and {robustness.corners:,} with every tolerance at an end" if robustness.corners else ""
+    table = numeric_table(title, "", ["nominal", "mean", "std. dev.", "95 % within", "worst", "unit"])
+    for one in robustness.scatters:
+        figures = (_exact(value) for value in (one.nominal, one.mean))
+        rest = (number(one.deviation), _exact(one.usual), _exact(one.worst))
+        table.add_row(one.label, *figures, *rest, one.unit)
+    console.print(table)
+    if robustness.failing:
+        console.print(f"{robustness.failing:.3g} of the random machines are not feasible.", highlight=False)
+
+
+def _print_front(console: Console, found: Result) -> None:
+    problem, outcome = found.problem, found.log.outcome(found.front)
+    shown = {round(k * (len(found.front) - 1) / (MOST_ROWS - 1)) for k in range(MOST_ROWS)} | {found.knee}
+    names = [f"{one.term.label}\n{one.term.unit}".replace(" (", "\n(") for one in problem.objectives]
+    variables = [variable.name.split(".", 1)[1].replace("_", "\n") for variable in problem.space.searched]
+    title = f"Pareto front: {len(found.front)} designs" + (f", {len(shown)} shown" if len(found.front) > len(shown) else "")
+    table = numeric_table(title, "", [*names, *variables])
+    for k in sorted(k for k in shown if k < len(found.front)):
+        genes = found.log.genes(found.front[k : k + 1])[0]
+        held = zip(problem.space.searched, problem.space.values(genes), strict=True)
+        cells = [number(value) for value in outcome.objectives[k]] + [one.shown(value) for one, value in held]
+        table.add_row("knee" if k == found.knee else "", *cells, style="bold" if k == found.knee else None)
+    console.print(table)
+
+
+def _remarks(found: Result) -> Iterator[str]:
+    """What a designer should not overlook."""
+    bounded = [one for one in found.influences if one.bound]
+    if bounded and len(found.problem.objectives) == 1:
+        names = ", ".join(f"{one.name} ({one.bound})" for one in bounded)
+        yield f"At its bounds: {names}. The objective would gain from wider ones, by the percentages above."
+    lost = [one for one in found.directions if one.gain < MUCH]
+    for one in lost:
+        name = one.name.removeprefix("compliance_")
+        yield f"The best design gives up {name}: only {one.gain:.2g} of its stiffness is left; add a constraint to keep it."
+    if len(found.problem.objectives) == 1:
+        yield from told(found.ridges, found.problem) or ([found.no_ridges] if found.no_ridges else ["No ridges."])
+
+
+def _exact(value: float) -> str:
+    return number(value) if not math.isfinite(value) else f"{value:.9g}"
+
+
+def _times(gain: float) -> str:
+    return "–" if math.isnan(gain) else f"{gain:.4g}"
+
+
+def _percent(value: float) -> str:
+    if math.isnan(value):
+        return "–"
+    return "0" if abs(value) < FEW else f"{value:.3g}"
