@@ -89,9 +89,7 @@ def actuator_load(response: Response, sliding: bool) -> Scalar:
     Load in a spring: xi_e times w. NaN where the machine has no such actuator.
     """
     pairs = zip(springs(response.configuration), response.statics.flexibility, strict=True)
-    driven = [
-        (spring, twist) for spring, twist in pairs if spring.actuated and (spring.joint.point is None) is sliding
-    ]
+    driven = [(spring, twist) for spring, twist in pairs if spring.actuated and (spring.joint.point is None) is sliding]
     return -_least([-abs(response.load.work(twist)) for spring, twist in driven if not is_zero(spring.stiffness)])
 
 

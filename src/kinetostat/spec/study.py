@@ -34,20 +34,24 @@ class Table(BaseModel):
 class VariableTable(Table):
     """A table [[variables]]: a field of the machine, or several tied together, and what it may be."""
 
-    path: Path | None = Field(None, description="a field of the machine file, e.g. geometry.base_radius")
-    paths: list[Path] | None = Field(None, description="several fields tied together", min_length=1, max_length=100)
-    ratios: list[float] | None = Field(None, description="of each of `paths` to the variable; 1 unless given")
-    start: Written | None = Field(None, alias="from", description="least value, with its unit")
-    end: Written | None = Field(None, alias="to", description="greatest value")
+    path: Path | None = Field(default=None, description="a field of the machine file, e.g. geometry.base_radius")
+    paths: list[Path] | None = Field(
+        default=None, description="several fields tied together", min_length=1, max_length=100
+    )
+    ratios: list[float] | None = Field(default=None, description="of each of `paths` to the variable; 1 unless given")
+    start: Written | None = Field(default=None, alias="from", description="least value, with its unit")
+    end: Written | None = Field(default=None, alias="to", description="greatest value")
     choices: list[Written | list[Written]] | None = Field(
-        None,
+        default=None,
         description="instead of bounds: a catalogue, each entry a value, or a list of one for each of `paths`",
         min_length=1,
         max_length=MOST_LISTED,
     )
-    labels: list[str] | None = Field(None, description="what people call the choices")
-    fixed: bool = Field(False, description="held at the machine's value: it is not searched, but has its tolerance")
-    tolerance: Written | None = Field(None, description="how far manufacture may miss it, plus and minus")
+    labels: list[str] | None = Field(default=None, description="what people call the choices")
+    fixed: bool = Field(
+        default=False, description="held at the machine's value: it is not searched, but has its tolerance"
+    )
+    tolerance: Written | None = Field(default=None, description="how far manufacture may miss it, plus and minus")
 
     @property
     def fields(self) -> list[str]:
@@ -59,78 +63,91 @@ class TermTable(Table):
     """What objectives and constraints have in common: a quantity, and how it is taken over the poses."""
 
     quantity: Path = Field(description="e.g. compliance_sum, stiffness_z, condition; docs/design.md lists all")
-    weights: list[float] | None = Field(None, description="of a weighted sum, one for each of rx ry rz x y z")
+    weights: list[float] | None = Field(default=None, description="of a weighted sum, one for each of rx ry rz x y z")
     direction: Annotated[list[float], Field(min_length=3, max_length=3)] | None = Field(
-        None, description="of a quantity along a direction: x, y, z in base axes"
+        default=None, description="of a quantity along a direction: x, y, z in base axes"
     )
-    over: str = Field("worst", description=f"how it is taken over the poses: {OVER}")
+    over: str = Field(default="worst", description=f"how it is taken over the poses: {OVER}")
 
 
 class ObjectiveTable(TermTable):
     """A table [[objectives]]."""
 
     goal: Literal["minimize", "maximize"] | None = Field(
-        None, description="stiffness and regularity are maximized unless this says otherwise, all else is minimized"
+        default=None,
+        description="stiffness and regularity are maximized unless this says otherwise, all else is minimized",
     )
 
 
 class ConstraintTable(TermTable):
     """A table [[constraints]]."""
 
-    at_least: Written | None = Field(None, description="lower bound, with its unit")
-    at_most: Written | None = Field(None, description="upper bound")
+    at_least: Written | None = Field(default=None, description="lower bound, with its unit")
+    at_most: Written | None = Field(default=None, description="upper bound")
 
 
 class PosesTable(Table):
     """Table [poses]: where the machine is judged; its own pose unless more is said."""
 
     listed: list[dict[str, Written]] | None = Field(
-        None, alias="list", description="poses, each with the fields in which it differs", max_length=MOST_LISTED
+        default=None,
+        alias="list",
+        description="poses, each with the fields in which it differs",
+        max_length=MOST_LISTED,
     )
     over: list[str] | None = Field(
-        None, description='a grid: ranges as "x=-2 cm:2 cm:21", all combinations', min_length=1, max_length=6
+        default=None, description='a grid: ranges as "x=-2 cm:2 cm:21", all combinations', min_length=1, max_length=6
     )
     within: Literal["workspace"] | None = Field(
-        None, description="only those nodes of the grid that lie in the workspace of the machine as its file says"
+        default=None,
+        description="only those nodes of the grid that lie in the workspace of the machine as its file says",
     )
-    where: list[str] = Field([], description='conditions of that workspace, e.g. "stiffness_z > 50 N/um"')
-    required: float = Field(1.0, description="share of the poses that a design must reach", ge=0.0, le=1.0)
+    where: list[str] = Field(default=[], description='conditions of that workspace, e.g. "stiffness_z > 50 N/um"')
+    required: float = Field(default=1.0, description="share of the poses that a design must reach", ge=0.0, le=1.0)
 
 
 class OptimizerTable(Table):
     """Table [optimizer]: how the best design is looked for."""
 
-    method: Method | None = Field(None, description="genetic, gradient, hybrid (genetic, then gradient) or nsga2")
-    population: int = Field(80, description="designs of a generation", ge=4, le=MOST_POPULATION)
-    generations: int = Field(100, description="generations, the first random one included", ge=1, le=MOST_GENERATIONS)
-    starts: int = Field(16, description="of the gradient method: from how many designs", ge=1, le=MOST_STARTS)
-    seed: int = Field(1, description="of the random numbers", ge=0, lt=2**32)
+    method: Method | None = Field(
+        default=None, description="genetic, gradient, hybrid (genetic, then gradient) or nsga2"
+    )
+    population: int = Field(default=80, description="designs of a generation", ge=4, le=MOST_POPULATION)
+    generations: int = Field(
+        default=100, description="generations, the first random one included", ge=1, le=MOST_GENERATIONS
+    )
+    starts: int = Field(default=16, description="of the gradient method: from how many designs", ge=1, le=MOST_STARTS)
+    seed: int = Field(default=1, description="of the random numbers", ge=0, lt=2**32)
 
 
 class RobustnessTable(Table):
     """Table [robustness]: how manufacture within the tolerances is taken into account."""
 
-    samples: int = Field(1000, description="random machines around the best design", ge=1, le=MOST_SAMPLES)
+    samples: int = Field(default=1000, description="random machines around the best design", ge=1, le=MOST_SAMPLES)
     distribution: Literal["uniform", "normal"] = Field(
-        "uniform", description="within the tolerance; normal: the tolerance is three standard deviations"
+        default="uniform", description="within the tolerance; normal: the tolerance is three standard deviations"
     )
-    objective: str = Field("nominal", description=f"what is optimised: nominal, or {OVER} of what manufacture makes")
-    search_samples: int = Field(16, description="machines around each design during the search", ge=1, le=1000)
+    objective: str = Field(
+        default="nominal", description=f"what is optimised: nominal, or {OVER} of what manufacture makes"
+    )
+    search_samples: int = Field(default=16, description="machines around each design during the search", ge=1, le=1000)
 
 
 class StudyFile(Table):
     """A study file."""
 
-    schema_version: Literal[1] = Field(1, alias="schema", description="version of the file format")
+    schema_version: Literal[1] = Field(default=1, alias="schema", description="version of the file format")
     name: str = Field(description="what people call the study", min_length=1, max_length=80)
     machine: str = Field(description="a bundled machine, or the path of a machine file from this file", min_length=1)
-    changes: dict[str, Any] = Field({}, alias="set", description="fields of the machine that differ from its file")
+    changes: dict[str, Any] = Field(
+        default={}, alias="set", description="fields of the machine that differ from its file"
+    )
     variables: list[VariableTable] = Field(description="what may change", min_length=1, max_length=200)
     objectives: list[ObjectiveTable] = Field(description="what is wanted", min_length=1, max_length=6)
-    constraints: list[ConstraintTable] = Field([], description="what must hold", max_length=50)
-    poses: PosesTable = Field(PosesTable(), description="where the machine is judged")
-    optimizer: OptimizerTable = Field(OptimizerTable(), description="how to search")
-    robustness: RobustnessTable = Field(RobustnessTable(), description="tolerances of manufacture")
+    constraints: list[ConstraintTable] = Field(default=[], description="what must hold", max_length=50)
+    poses: PosesTable = Field(default=PosesTable(), description="where the machine is judged")
+    optimizer: OptimizerTable = Field(default=OptimizerTable(), description="how to search")
+    robustness: RobustnessTable = Field(default=RobustnessTable(), description="tolerances of manufacture")
 
 
 def read_study(document: Document, origin: str, settings: Sequence[str] = ()) -> StudyFile:

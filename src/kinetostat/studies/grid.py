@@ -177,7 +177,9 @@ def refuse_absent(machine: Machine, names: Sequence[str]) -> None:
         InputError: names the quantity and what the machine lacks.
     """
     wanted = [name for name in names if name in PARTS]
-    response = respond(machine) if wanted else None
+    if not wanted:
+        return
+    response = respond(machine)
     for name in wanted:
         if np.isnan(QUANTITIES[name].value(response)) and response.status == Status.OK:
             raise InputError(f'"{name}" has no meaning here: {machine.name} lacks {PARTS[name]}; leave it out.')

@@ -1,4 +1,4 @@
-"""Rows of numbers in a file that grows: float64, little-endian, one row after the other. What they mean is elsewhere."""
+"""Rows of numbers in a file that grows: float64, little-endian, row after row. What they mean is elsewhere."""
 
 from pathlib import Path
 from types import TracebackType

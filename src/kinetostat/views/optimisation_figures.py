@@ -127,8 +127,8 @@ def front(found: Result) -> Figure:
         for panel, (i, j) in zip(panels, pairs, strict=False):
             x, y = (_scaled(problem.objectives[k], best[:, k]) for k in (i, j))
             panel.scatter(
-                feasible[:, i] * x.factor, feasible[:, j] * y.factor, s=3, color="#c8c8c8", linewidths=0, rasterized=True,
-                label="designs that were judged",
+                feasible[:, i] * x.factor, feasible[:, j] * y.factor, s=3, color="#c8c8c8", linewidths=0,
+                rasterized=True, label="designs that were judged",
             )  # fmt: skip
             panel.plot(best[:, i] * x.factor, best[:, j] * y.factor, "o", markersize=3, color=COLOURS[0], label="front")
             knee = best[found.knee, [i, j]] * (x.factor, y.factor)

@@ -92,7 +92,9 @@ def _print_front(console: Console, found: Result) -> None:
     shown = {round(k * (len(found.front) - 1) / (MOST_ROWS - 1)) for k in range(MOST_ROWS)} | {found.knee}
     names = [f"{one.term.label}\n{one.term.unit}".replace(" (", "\n(") for one in problem.objectives]
     variables = [variable.name.split(".", 1)[1].replace("_", "\n") for variable in problem.space.searched]
-    title = f"Pareto front: {len(found.front)} designs" + (f", {len(shown)} shown" if len(found.front) > len(shown) else "")
+    title = f"Pareto front: {len(found.front)} designs" + (
+        f", {len(shown)} shown" if len(found.front) > len(shown) else ""
+    )
     table = numeric_table(title, "", [*names, *variables])
     for k in sorted(k for k in shown if k < len(found.front)):
         genes = found.log.genes(found.front[k : k + 1])[0]
@@ -111,7 +113,7 @@ def _remarks(found: Result) -> Iterator[str]:
     lost = [one for one in found.directions if one.gain < MUCH]
     for one in lost:
         name = one.name.removeprefix("compliance_")
-        yield f"The best design gives up {name}: only {one.gain:.2g} of its stiffness is left; add a constraint to keep it."
+        yield f"The best design gives up {name}: {one.gain:.2g} of its stiffness is left; add a constraint to keep it."
     if len(found.problem.objectives) == 1:
         yield from told(found.ridges, found.problem) or ([found.no_ridges] if found.no_ridges else ["No ridges."])
 

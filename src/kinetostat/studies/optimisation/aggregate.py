@@ -45,7 +45,7 @@ class Aggregate:
             high_is_bad: whether great values are the bad ones.
 
         Returns:
-            [...]; NaN where none counts, or one that counts is NaN.
+            [...]; NaN where none counts.
         """
         count = there.sum(axis=-1)
         if self.share is None:
@@ -76,7 +76,7 @@ class Aggregate:
 
     def _between(self, count: npt.NDArray[Any], size: int) -> tuple[Any, Any, Any]:
         """Places of the two neighbours in increasing order, those that do not count first, and the way between."""
-        rank = (size - count) + (self.share or 0.0) * np.maximum(count - 1, 0)
+        rank = np.minimum((size - count) + (self.share or 0.0) * np.maximum(count - 1, 0), size - 1)
         low = np.floor(rank).astype(int)
         return low, np.minimum(low + 1, size - 1), rank - low
 
@@ -92,5 +92,7 @@ def parse_aggregate(text: str, where: str) -> Aggregate:
         return Aggregate(words, 1.0 if words == WORST else None)
     match = _FORM.fullmatch(words)
     if match is None:
-        raise InputError(f'{where} is {shorten(text)}; write "worst", "mean", or "percentile 95" (that share is better).')
+        raise InputError(
+            f'{where} is {shorten(text)}; write "worst", "mean", or "percentile 95" (that share is better).'
+        )
     return Aggregate(words, float(match[1]) / 100.0)

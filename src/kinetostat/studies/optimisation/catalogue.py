@@ -75,7 +75,9 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
 
 def _volume(poses: PoseSet, where: str) -> Term:
     if poses.box is None:
-        raise InputError(f"{where}: {VOLUME} needs a grid of poses; add over = [...] to [poses], ranges of coordinates.")
+        raise InputError(
+            f"{where}: {VOLUME} needs a grid of poses; add over = [...] to [poses], ranges of coordinates."
+        )
     return VolumeTerm(*poses.box)
 
 
@@ -108,5 +110,3 @@ def _direction_weights(
             if weight:
                 found["_".join([matrix, *parts])] = weight
     return found
-
-

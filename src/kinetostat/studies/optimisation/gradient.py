@@ -24,15 +24,16 @@ from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.slopes import Local, Surveyor
 from kinetostat.studies.optimisation.terms import PoseTerm
 
-ITERATIONS = 200
+ITERATIONS = 100
 """Of one descent."""
-PRECISION = 1e-13
-"""Relative change of the objective at which a descent ends."""
+PRECISION = {False: 1e-13, True: 1e-9}
+"""Relative change of the objective at which a descent ends, without and with kinks: along the bottom of a curved one
+it would creep for thousands of steps."""
 WORST_POSES = 24
 """Conditions that stand for the worst of all poses; more than a design has variables at nearly all kinks."""
-ROUNDS = 8
+ROUNDS = 5
 """Descents with newly chosen worst poses, until nothing is gained."""
-GAIN = 1e-9
+GAIN = 1e-7
 """Relative gain below which a round has gained nothing."""
 BLOCKED = 1e6
 """What counts as the objective, in units of its size at the start, where a design cannot be judged: no step ends
@@ -157,17 +158,16 @@ class _Descent:
             value, slope = self._objective(here)
             return value / scale, slope / scale
 
+        worst = self._at(genes).worst(self._term, WORST_POSES) if kinked else np.empty(0, dtype=np.int64)
+
         def pieces(x: Array) -> tuple[Array, Array]:
-            here = self._at(x[:count])
-            if not here.sound:
-                return np.full(WORST_POSES, x[count] - BLOCKED), np.eye(1, count + 1, count).repeat(WORST_POSES, axis=0)
-            values, slopes = here.pieces(self._term, WORST_POSES)
-            numbers, rows = np.full(WORST_POSES, np.inf), np.zeros((WORST_POSES, count + 1))
+            here, rows = self._at(x[:count]), np.zeros((len(worst), count + 1))
             rows[:, count] = 1.0
-            numbers[: len(values)] = x[count] - sign * values / scale
-            rows[: len(values), :count] = -sign * slopes / scale
-            numbers[len(values) :], rows[len(values) :] = numbers[0], rows[0]
-            return numbers, rows
+            if not here.sound:
+                return np.full(len(worst), x[count] - BLOCKED), rows
+            values, slopes = here.pieces(self._term, worst)
+            rows[:, :count] = -sign * slopes / scale
+            return x[count] - sign * values / scale, rows
 
         unknowns, bounds, function = genes, [(0.0, 1.0)] * count, plain
         if kinked:
@@ -182,7 +182,7 @@ class _Descent:
             bounds=bounds,
             constraints=conditions,
             method="SLSQP",
-            options={"maxiter": ITERATIONS, "ftol": PRECISION},
+            options={"maxiter": ITERATIONS, "ftol": PRECISION[kinked]},
         )
         return np.clip(found.x[:count], 0.0, 1.0)
 

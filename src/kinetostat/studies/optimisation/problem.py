@@ -83,7 +83,7 @@ class Problem:
     @property
     def terms(self) -> tuple[Term, ...]:
         """Of all objectives, then of all constraints."""
-        return tuple(one.term for one in (*self.objectives, *self.constraints))
+        return *(one.term for one in self.objectives), *(one.term for one in self.constraints)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -210,4 +210,3 @@ def _check(problem: Problem) -> None:
             f"{settings.population:,} designs in {settings.generations:,} generations are more than the "
             f"{MOST_EVALUATIONS:,} that are kept; lower optimizer.population or optimizer.generations."
         )
-

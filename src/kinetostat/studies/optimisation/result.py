@@ -128,9 +128,7 @@ def designed(problem: Problem, genes: Array) -> Machine:
     return replace(machine, name=f"{problem.machine.name}, optimised"[:LONGEST_NAME])
 
 
-def optimize(
-    problem: Problem, folder: Path | None = None, watch: Watch = unwatched, resume: bool = False
-) -> Result:
+def optimize(problem: Problem, folder: Path | None = None, watch: Watch = unwatched, resume: bool = False) -> Result:
     """Solve a problem.
 
     Args:
@@ -168,7 +166,8 @@ def _explained(assess: Assessor, found: Result) -> Result:
     survey = None
     if all(one.term.differentiable for one in problem.objectives) and (problem.space.catalogue == 0).any():
         survey = Surveyor(problem)
-    ridges, reason = [], "The objective has no derivatives; ridges are not looked for."
+    ridges: list[Ridge] = []
+    reason = "The objective has no derivatives; ridges are not looked for."
     if survey is not None and len(problem.objectives) == 1:
         ridges, reason = find_ridges(problem, survey, found.genes)
     return replace(

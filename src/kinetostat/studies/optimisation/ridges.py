@@ -197,5 +197,7 @@ def told(ridges: Sequence[Ridge], problem: Problem) -> list[str]:
             for name, start, end in zip(ridge.names, ridge.start, ridge.end, strict=True)
         ]
         how = f", together with {', '.join(ways[1:])}" if ways[1:] else ""
-        said.append(f"Ridge: {ways[0]}{how} leaves the objective as it is (to {ridge.change:.0e}); choose freely there.")
+        said.append(
+            f"Ridge: {ways[0]}{how} leaves the objective as it is (to {ridge.change:.0e}); choose freely there."
+        )
     return said

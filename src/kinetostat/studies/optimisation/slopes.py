@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from kinetostat.engine.points import Array
 from kinetostat.engine.population import Differentiator, Population
@@ -12,6 +13,8 @@ from kinetostat.studies.optimisation.aggregate import Mask
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.terms import PoseTerm, Term
 from kinetostat.studies.optimisation.tolerance import deviations
+
+Rows = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -53,15 +56,17 @@ class Local:
         shares = self.problem.robust.weights(made, every, high_is_bad)
         return float(shares @ made), shares @ np.array(slopes)
 
-    def pieces(self, term: PoseTerm, most: int) -> tuple[Array, Array]:
-        """A term at its worst machines and poses, and its derivatives there by the genes [pieces], [pieces x genes]."""
-        values = np.where(self.there, term.at_poses(self.found), np.nan)
+    def worst(self, term: PoseTerm, most: int) -> Rows:
+        """Numbers of the worst machines and poses of a term, counted through all of them."""
+        values = term.at_poses(self.found)
         badness = np.where(self.there, values if term.high_is_bad else -values, -np.inf)
-        worst = np.argsort(-badness, axis=None, kind="stable")[:most]
-        worst = worst[np.isfinite(badness.flat[worst])]
-        total = sum(weight * self.slopes[name] for name, weight in term.weights)
-        slopes = np.asarray(total).reshape(len(total), -1)[:, worst].T
-        chosen = values.flat[worst]
+        return np.argsort(-badness, axis=None, kind="stable")[: min(most, int(self.there.sum()))]
+
+    def pieces(self, term: PoseTerm, numbers: Rows) -> tuple[Array, Array]:
+        """A term at some machines and poses, and its derivatives there by the genes [pieces], [pieces x genes]."""
+        total = np.sum([weight * self.slopes[name] for name, weight in term.weights], axis=0)
+        slopes = total.reshape(len(total), -1)[:, numbers].T
+        chosen = term.at_poses(self.found).flat[numbers]
         return chosen, -slopes * (chosen * chosen)[:, None] if term.inverse else slopes
 
 
@@ -79,7 +84,7 @@ class Surveyor:
         self._made = deviations(problem, problem.study.robustness.search_samples, 0) if robust else {}
 
     @property
-    def free(self) -> Array:
+    def free(self) -> Rows:
         """Numbers of the searched variables that are continuous."""
         return self._free
 
@@ -87,7 +92,11 @@ class Surveyor:
         """Of each continuous gene, how fast it moves which leaves."""
         searched = self.problem.space.searched
         return [
-            {leaf: ratio * (searched[k].high - searched[k].low) for field, ratio in zip(searched[k].fields, searched[k].ratios, strict=True) for leaf in field.leaves}
+            {
+                leaf: ratio * (searched[k].high - searched[k].low)
+                for field, ratio in zip(searched[k].fields, searched[k].ratios, strict=True)
+                for leaf in field.leaves
+            }
             for k in self._free
         ]
 

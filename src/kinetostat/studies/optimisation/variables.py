@@ -203,7 +203,10 @@ def _catalogue(machine: Machine, table: VariableTable, fields: tuple[Parameter, 
     for k, row in enumerate(rows):
         if len(row) != len(fields):
             raise InputError(f"{name}.choices.{k} has {len(row)} values; give one for each of {len(fields)} fields.")
-    read = [[_value(v, f.quantity, f"{name}.choices.{k}") for v, f in zip(r, fields, strict=True)] for k, r in enumerate(rows)]
+    read = [
+        [_value(v, f.quantity, f"{name}.choices.{k}") for v, f in zip(r, fields, strict=True)]
+        for k, r in enumerate(rows)
+    ]
     labels = table.labels or [", ".join(str(value) for value in row) for row in rows]
     if len(labels) != len(rows):
         raise InputError(f"{name}.labels has {len(labels)} entries; give one for each of {len(rows)} choices.")
