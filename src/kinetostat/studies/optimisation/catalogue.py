@@ -1,5 +1,6 @@
 """The catalogue of terms by name: what people may ask for, in which unit, and which way is better."""
 
+import difflib
 import math
 from collections.abc import Mapping, Sequence
 
@@ -50,7 +51,7 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
     Raises:
         InputError: an unknown quantity, weights or a direction that do not belong to it, no aggregate.
     """
-    name = choice(table.quantity, known_terms(machine), f"{where}.quantity")
+    name = _known(machine, table.quantity, f"{where}.quantity")
     if table.weights is not None and name not in SUMS:
         raise InputError(f"{where}: {name} takes no weights; leave them out, or ask for {' or '.join(SUMS)}.")
     if table.direction is not None and name not in ALONG:
@@ -71,6 +72,15 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
         return PoseTerm(label, unit, tuple(weights.items()), inverse, over, high_is_bad)
     refuse_absent(machine, [name])
     return PoseTerm(label, QUANTITIES[name].unit, ((name, 1.0),), False, over, high_is_bad)
+
+
+def _known(machine: Machine, name: str, where: str) -> str:
+    """The name, if it is one of the catalogue; otherwise what was meant, or all but the single entries of C and K."""
+    known = known_terms(machine)
+    entries = [entry for entry in known if entry in QUANTITIES and QUANTITIES[entry].components]
+    if name in known or difflib.get_close_matches(name, known, 1):
+        return choice(name, known, where)
+    return choice(name, [*(one for one in known if one not in entries), entries[0], entries[-1]], where)
 
 
 def _volume(poses: PoseSet, where: str) -> Term:
