@@ -36,6 +36,12 @@ def test_every_claim_with_limits_says_which(found):
     assert all(claim.limits for claim in found.claims if claim.finding is Finding.PARTLY)
 
 
+def test_the_papers_optimisation_holds(found):
+    assert [claim.finding for claim in found.search_claims] == [Finding.HOLDS, Finding.HOLDS]
+    assert "1.0178894" in found.search_claims[0].measured
+    assert "geometry.passive_links.0" in found.search_claims[0].limits, "links on a ridge"
+
+
 @pytest.mark.parametrize(
     ("computed", "text", "equal"),
     [
@@ -66,10 +72,12 @@ def test_the_command_writes_tables_figures_and_one_page_that_stands_alone(tmp_pa
     names = {path.name for path in folder.iterdir()}
     assert {"index.html", "reproduction.json", "numbers.csv", "equations.csv", "statements.csv"} <= names
     assert {
-        f"{figure}.{kind}" for figure in ("machine", "figure-4", "figure-5") for kind in ("png", "svg", "pdf")
+        f"{figure}.{kind}"
+        for figure in ("machine", "figure-4", "figure-5", "figure-6")
+        for kind in ("png", "svg", "pdf")
     } <= names
     page = (folder / "index.html").read_text(encoding="utf-8")
-    assert page.count("<svg") == 3
+    assert page.count("<svg") == 4
     assert "<script" not in page
     assert not re.search(r'(src|href)="(?!#)', page)
     rows = list(csv.DictReader((folder / "numbers.csv").read_text(encoding="utf-8").splitlines()))

@@ -12,6 +12,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from kinetostat.kinetostatics.quantities import GROUPS
+from kinetostat.studies.optimisation.result_data import as_dataset
 from kinetostat.studies.paper.claims import Claim
 from kinetostat.studies.paper.comparison import Comparison, Verdict
 from kinetostat.studies.paper.derivation import Check
@@ -19,11 +20,13 @@ from kinetostat.studies.paper.reproduction import Reproduction
 from kinetostat.studies.storage import write_dataset, write_text
 from kinetostat.views.drawing import three_views
 from kinetostat.views.figures import contour_maps, curves, save
+from kinetostat.views.optimisation_figures import convergence
 from kinetostat.views.paper_page import page
 from kinetostat.views.tables import terminal, text_table
 
 FIGURE_4 = "Fig. 4: stiffness against the stiffness of the passive links"
 FIGURE_5 = "Fig. 5: compliance at z = 68 cm, theta5 = -60 deg, theta6 = 120 deg"
+FIGURE_6 = "Fig. 6: the best design and the mean of the population"
 MACHINE = "The machine at its reference pose"
 
 
@@ -38,9 +41,16 @@ def write_all(found: Reproduction, folder: Path) -> list[Path]:
     write_text(written[0], page(found, drawn))
     written.append(folder / "reproduction.json")
     write_text(written[-1], json.dumps(found.as_json(), ensure_ascii=False, allow_nan=False, indent=1) + "\n")
-    for name, rows in (("numbers", found.comparisons), ("equations", found.checks), ("statements", found.claims)):
+    for name, rows in (
+        ("numbers", found.comparisons),
+        ("equations", found.checks),
+        ("statements", found.claims),
+        ("search", found.search_claims),
+    ):
         written.append(folder / f"{name}.csv")
         write_text(written[-1], _csv(rows))
+    written.append(folder / "figure-6.nc")
+    write_dataset(written[-1], as_dataset(found.search))
     for name, dataset in (("figure-4", found.curves), ("figure-5", found.maps)):
         written.append(folder / f"{name}.nc")
         write_dataset(written[-1], dataset)
@@ -56,6 +66,7 @@ def figures(found: Reproduction) -> dict[str, Figure]:
         "machine": three_views(found.machine.configure(), MACHINE),
         "figure-4": curves(found.curves, GROUPS["stiffness"], FIGURE_4),
         "figure-5": contour_maps(section, GROUPS["compliance"], FIGURE_5),
+        "figure-6": convergence(found.search.log, FIGURE_6),
     }
 
 
@@ -69,7 +80,7 @@ def print_summary(found: Reproduction, written: Sequence[Path]) -> None:
             check.equation, check.statement, f"{check.residual:.1e}", "holds" if check.holds else "[red]FAILS"
         )
     console.print(equations)
-    for claim in found.claims:
+    for claim in (*found.claims, *found.search_claims):
         console.print(f"[bold]{claim.place}[/bold]  {claim.finding.value}", highlight=False)
         console.print(f"  {claim.statement}", highlight=False)
         console.print(f"  {claim.measured} {claim.limits}", highlight=False, style="dim")
@@ -81,12 +92,13 @@ def print_summary(found: Reproduction, written: Sequence[Path]) -> None:
 def verdict(found: Reproduction) -> str:
     """One sentence that counts."""
     numbers = Counter(one.verdict for one in found.comparisons)
-    statements = Counter(claim.finding.value for claim in found.claims)
+    claims = (*found.claims, *found.search_claims)
+    statements = Counter(claim.finding.value for claim in claims)
     holding = sum(check.holds for check in found.checks)
     return (
         f"{len(found.comparisons)} numbers: {numbers[Verdict.EQUAL]} equal to print, {numbers[Verdict.MISPRINT]} known "
         f"misprints, {numbers[Verdict.DIFFERS]} differ. {len(found.checks)} groups of equations: {holding} hold. "
-        f"{len(found.claims)} statements: {', '.join(f'{count} {word}' for word, count in statements.items())}."
+        f"{len(claims)} statements: {', '.join(f'{count} {word}' for word, count in statements.items())}."
     )
 
 

@@ -8,7 +8,7 @@ from itertools import groupby
 from matplotlib.figure import Figure
 
 from kinetostat.studies.paper import printed
-from kinetostat.studies.paper.claims import Finding
+from kinetostat.studies.paper.claims import Claim, Finding
 from kinetostat.studies.paper.comparison import Comparison, Verdict
 from kinetostat.studies.paper.reproduction import Reproduction
 from kinetostat.views.figures import as_svg
@@ -57,6 +57,8 @@ CAPTIONS = {
     "figure-4": "K_rz and K_y grow with the passive links, the other four do not depend on them at this pose.",
     "figure-5": "The paper's section of the workspace. The machine itself cannot move along y: there, y shifts the "
     "plane of its passive leg, and the platform with it.",
+    "figure-6": "The paper's search again, with random numbers of our own. On the right, how far "
+    "best and mean still are from the last best.",
 }
 
 
@@ -88,7 +90,10 @@ def page(found: Reproduction, figures: Mapping[str, Figure]) -> str:
         "<h2>Compliance over the workspace</h2>",
         pictures["figure-5"],
         "<h2>Design guidelines and further facts, tested</h2>",
-        _statements(found),
+        _statements(found.claims),
+        "<h2>Optimisation</h2>",
+        _statements(found.search_claims),
+        pictures["figure-6"],
         "<h2>Slips of typography</h2>",
         f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in printed.TYPOGRAPHY)}</ul>",
     ]
@@ -105,8 +110,9 @@ def _tiles(found: Reproduction) -> str:
     misprints = sum(one.verdict is Verdict.MISPRINT for one in found.comparisons)
     differing = len(found.comparisons) - equal - misprints
     equations = f"{sum(check.holds for check in found.checks)} of {len(found.checks)}"
-    holding = sum(claim.finding is Finding.HOLDS for claim in found.claims)
-    limited = sum(claim.finding is Finding.PARTLY for claim in found.claims)
+    claims = (*found.claims, *found.search_claims)
+    holding = sum(claim.finding is Finding.HOLDS for claim in claims)
+    limited = sum(claim.finding is Finding.PARTLY for claim in claims)
     tiles = [
         (equal, "numbers equal to print"),
         (misprints, "known misprints"),
@@ -152,11 +158,11 @@ def _equations(found: Reproduction) -> str:
     return _table("The paper's own matrices A, B, J and J' against legs as (W, G)", heads, rows, 2)
 
 
-def _statements(found: Reproduction) -> str:
+def _statements(claims: Sequence[Claim]) -> str:
     entries = [
         f"<dt>{escape(claim.place)} {_mark(claim.finding)}</dt><dd>{escape(claim.statement)}</dd>"
         f'<dd class="soft">{escape(claim.measured)} {escape(claim.limits)}</dd>'
-        for claim in found.claims
+        for claim in claims
     ]
     return f"<dl>{''.join(entries)}</dl>"
 
