@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.stats import qmc
 
 from kinetostat.engine.points import Array
 from kinetostat.studies.optimisation.assessment import Assessor
@@ -69,12 +68,13 @@ class Gradient:
         return self.descend(self._start(number), log)
 
     def _start(self, number: int) -> Array:
-        """The machine as it is, if that is allowed, then points of a scrambled Sobol' sequence."""
+        """The machine as it is, if that is allowed, then designs spread evenly along every variable."""
         space, settings = self.problem.space, self.problem.study.optimizer
         if number == 0 and space.holds(space.initial):
             return space.initial
-        sequence = qmc.Sobol(space.size, rng=np.random.default_rng([settings.seed, 2]))
-        genes = sequence.random(1 << max(1, (settings.starts - 1).bit_length()))[number]
+        source = np.random.default_rng([settings.seed, 2])
+        cells = np.stack([source.permutation(settings.starts) for _ in range(space.size)], axis=1)
+        genes = (cells + source.random(cells.shape))[number] / settings.starts
         return np.where(space.catalogue > 0, np.floor(genes * np.maximum(space.catalogue, 1)), genes)
 
     def descend(self, start: Array, log: Log) -> Step:
