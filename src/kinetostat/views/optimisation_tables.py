@@ -45,7 +45,7 @@ def _print_worth(console: Console, found: Result) -> None:
         table.add_row(name, _exact(before), _exact(after), _times(gain), objective.term.unit)
     for k, one in enumerate(found.problem.constraints):
         before, after = found.initial.constraints[0, k], found.outcome.constraints[0, k]
-        table.add_row(one.label, number(before), number(after), "", one.term.unit)
+        table.add_row(one.label, number(before), number(after), "", "" if one.term.unit == "1" else one.term.unit)
     console.print(table)
 
 

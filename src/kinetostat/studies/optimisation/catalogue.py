@@ -4,8 +4,10 @@ import difflib
 import math
 from collections.abc import Mapping, Sequence
 
+from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.mass import moving_mass
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.study import TermTable
 from kinetostat.studies.grid import refuse_absent
@@ -23,6 +25,7 @@ ALONG = {
 }
 """Along (force) and about (moment) a direction, all else free to follow: matrix, first row, whether its reciprocal."""
 STROKE, VOLUME = "leg_stroke", "workspace_volume"
+MASS = "mass"
 AXES = "xyz"
 
 
@@ -71,6 +74,8 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
         weights = _direction_weights(machine, matrix, first, table.direction, where)
         return PoseTerm(label, unit, tuple(weights.items()), inverse, over, high_is_bad)
     refuse_absent(machine, [name])
+    if name == MASS and moving_mass(machine, machine.configure(solve_joints(machine).coordinates)) == 0.0:
+        raise InputError(f"{where}: nothing says what {machine.name} weighs; give a density or tool.mass.")
     return PoseTerm(label, QUANTITIES[name].unit, ((name, 1.0),), False, over, high_is_bad)
 
 

@@ -49,7 +49,8 @@ class Constraint:
     @property
     def label(self) -> str:
         """As people read it."""
-        return f"{self.term.label} {'<=' if self.sign > 0 else '>='} {self.bound:.6g} {self.term.unit}"
+        unit = "" if self.term.unit == "1" else f" {self.term.unit}"
+        return f"{self.term.label} {'<=' if self.sign > 0 else '>='} {self.bound:.6g}{unit}"
 
     @property
     def scale(self) -> float:

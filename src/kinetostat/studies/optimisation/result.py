@@ -68,7 +68,7 @@ class Result:
     Attributes:
         problem: that was solved.
         log: of all designs.
-        initial: what the machine is worth as its file says.
+        initial: what the machine is worth as its file says, by the same measure.
         front: numbers of the Pareto-optimal designs, by the first objective; of one objective the best design alone.
         knee: place in `front` of the design that is called the best.
         directions: before and after.
@@ -142,7 +142,7 @@ def optimize(problem: Problem, folder: Path | None = None, watch: Watch = unwatc
     """
     assess = Assessor(problem)
     log = search(assess, watch) if folder is None else search_into(assess, folder, watch, resume)
-    initial = assess.nominal(_as_it_is(problem))
+    initial = assess(_as_it_is(problem))
     several = len(problem.objectives) > 1
     front = front_of(log) if several else _single(log)
     found = Result(problem, log, initial, front, knee_of(log, front) if several and len(front) else 0)
