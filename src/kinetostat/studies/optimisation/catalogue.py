@@ -4,10 +4,9 @@ import difflib
 import math
 from collections.abc import Mapping, Sequence
 
-from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.mass import moving_mass
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.study import TermTable
 from kinetostat.studies.grid import refuse_absent
@@ -74,7 +73,7 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
         weights = _direction_weights(machine, matrix, first, table.direction, where)
         return PoseTerm(label, unit, tuple(weights.items()), inverse, over, high_is_bad)
     refuse_absent(machine, [name])
-    if name == MASS and moving_mass(machine, machine.configure(solve_joints(machine).coordinates)) == 0.0:
+    if name == MASS and respond(machine).mass == 0.0:
         raise InputError(f"{where}: nothing says what {machine.name} weighs; give a density or tool.mass.")
     return PoseTerm(label, QUANTITIES[name].unit, ((name, 1.0),), False, over, high_is_bad)
 
