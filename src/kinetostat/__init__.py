@@ -14,11 +14,13 @@ _HOMES = {
     "bundled": "kinetostat.machine.loading",
     "analyze": "kinetostat.studies.analysis",
     "evaluate_grid": "kinetostat.studies.grid",
+    "load_problem": "kinetostat.studies.optimisation.problem",
+    "optimize": "kinetostat.studies.optimisation.result",
     "reproduce": "kinetostat.studies.paper.reproduction",
     "InputError": "kinetostat.spec.errors",
 }
 
-__all__ = ["InputError", "analyze", "bundled", "evaluate_grid", "load", "reproduce"]
+__all__ = ["InputError", "analyze", "bundled", "evaluate_grid", "load", "load_problem", "optimize", "reproduce"]
 
 
 def __getattr__(name: str) -> Any:

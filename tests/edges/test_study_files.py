@@ -82,6 +82,7 @@ MISTAKES = {
     "optimizer.method=ga": "optimizer.method",
     "optimizer.method=nsga2": "take genetic, gradient or hybrid",
     "optimizer.population=100000": "lower optimizer.population",
+    'poses.over=["x=-2 cm:2 cm:2000", "z=66 cm:70 cm:2000"]': "at most 1,000,000",
     "optimizer.seed=-1": "greater than or equal to 0",
     "robustness.objective=worst": "needs tolerances",
     "optimiser.seed=1": "optimiser is not known; did you mean optimizer",
@@ -116,6 +117,16 @@ def test_a_volume_has_no_gradient():
             'poses.over=["x=-2 cm:2 cm:3", "z=66 cm:70 cm:3"]',
             "optimizer.method=gradient",
         )
+
+
+def test_what_memory_cannot_hold_is_refused():
+    grid = 'poses.over=["x=-2 cm:2 cm:300", "z=66 cm:70 cm:300"]'
+    assert written(SMALL, grid).poses.count == 90_000
+    with pytest.raises(InputError, match="lower the counts"):
+        written(SMALL, grid, "optimizer.method=hybrid")
+    robust = ("variables.0.tolerance=1e-4", "robustness.objective=worst", "robustness.search_samples=100")
+    with pytest.raises(InputError, match=r"robustness\.search_samples"):
+        written(SMALL, grid, *robust)
 
 
 def test_an_unknown_study_is_refused_with_what_was_meant(capsys):

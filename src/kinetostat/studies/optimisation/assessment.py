@@ -19,6 +19,9 @@ from kinetostat.studies.optimisation.tolerance import deviations
 AT_ONCE = 1 << 20
 """Points that are evaluated before they are summed up: a few quantities of them fit in a hundred megabytes."""
 
+MET = 1e-9
+"""Relative excess up to which a constraint counts as met: whoever ends at its bound is not refused by rounding."""
+
 Codes = npt.NDArray[np.int8]
 
 
@@ -124,7 +127,8 @@ def _verdicts(problem: Problem, objectives: Array, constraints: Array, status: C
     most = len(problem.constraints)
     excess = np.zeros(constraints.shape)
     for k, one in enumerate(problem.constraints):
-        over = np.maximum(one.sign * (constraints[:, k] - one.bound) / one.scale, 0.0)
+        over = one.sign * (constraints[:, k] - one.bound) / one.scale
+        over = np.where(over <= MET, 0.0, over)
         with np.errstate(invalid="ignore"):
             excess[:, k] = np.where(np.isfinite(over), over / (1.0 + over), 1.0)
     violation = excess.sum(axis=1)

@@ -24,6 +24,11 @@ NOMINAL = "nominal"
 MOST_EVALUATIONS = 5_000_000
 """Designs of one study: their table then fits in half a gigabyte."""
 
+MOST_POINTS = 2_000_000
+"""Poses of one design: a few quantities of them fit in some hundred megabytes."""
+MOST_DIFFERENTIATED = 50_000
+"""Likewise with derivatives by a dozen variables."""
+
 
 @dataclass(frozen=True)
 class Objective:
@@ -85,6 +90,17 @@ class Problem:
     def terms(self) -> tuple[Term, ...]:
         """Of all objectives, then of all constraints."""
         return *(one.term for one in self.objectives), *(one.term for one in self.constraints)
+
+    @property
+    def points(self) -> int:
+        """Poses at which one design is evaluated: of every machine that manufacture makes of it."""
+        return self.poses.count * (self.study.robustness.search_samples if self.robust else 1)
+
+    @property
+    def differentiable(self) -> bool:
+        """Whether there are derivatives, and few enough of them to be kept."""
+        smooth = all(one.term.differentiable for one in self.objectives)
+        return smooth and bool((self.space.catalogue == 0).any()) and self.points <= MOST_DIFFERENTIATED
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -200,7 +216,17 @@ def _check(problem: Problem) -> None:
             f"optimizer.method is {problem.method}, but the study has {len(problem.objectives)} objectives: "
             f"take {advice}{'' if several else ', or add an objective'}."
         )
+    if problem.points > MOST_POINTS:
+        raise InputError(
+            f"one design has {problem.poses.count:,} poses of {problem.study.robustness.search_samples:,} machines; at "
+            f"most {MOST_POINTS:,} in all: lower the counts of [poses] or robustness.search_samples."
+        )
     if problem.method in ("gradient", "hybrid"):
+        if problem.points > MOST_DIFFERENTIATED:
+            raise InputError(
+                f"one design has {problem.points:,} poses, of which derivatives are not kept beyond "
+                f"{MOST_DIFFERENTIATED:,}; lower the counts of [poses], or take optimizer.method = genetic."
+            )
         stepped = [term.label for term in problem.terms if not term.differentiable]
         if stepped:
             raise InputError(f"{stepped[0]} changes in steps and has no gradient; take optimizer.method = genetic.")

@@ -72,7 +72,7 @@ class Result:
         front: numbers of the Pareto-optimal designs, by the first objective; of one objective the best design alone.
         knee: place in `front` of the design that is called the best.
         directions: before and after.
-        influences: of the continuous variables; empty where an objective has no derivatives.
+        influences: of the continuous variables; empty where there are no derivatives.
         ridges: ways that leave the objective as it is.
         no_ridges: why none were looked for.
         robustness: of the best design; None without tolerances.
@@ -163,11 +163,9 @@ def _single(log: Log) -> Rows:
 def _explained(assess: Assessor, found: Result) -> Result:
     """The result with everything that is asked of its best design."""
     problem = assess.problem
-    survey = None
-    if all(one.term.differentiable for one in problem.objectives) and (problem.space.catalogue == 0).any():
-        survey = Surveyor(problem)
+    survey = Surveyor(problem) if problem.differentiable else None
     ridges: list[Ridge] = []
-    reason = "The objective has no derivatives; ridges are not looked for."
+    reason = "The objective has no derivatives, or too many poses for them; ridges are not looked for."
     if survey is not None and len(problem.objectives) == 1:
         ridges, reason = find_ridges(problem, survey, found.genes)
     return replace(

@@ -161,7 +161,7 @@ class _Ground:
             whole[numbers] = point
             ends.append(self.problem.space.values(whole)[numbers][taking_part])
         names = tuple(self.problem.space.searched[numbers[k]].name for k in taking_part)
-        return Ridge(names, tuple(ends[0].tolist()), tuple(ends[1].tolist()), max(first, second))
+        return Ridge(names, tuple(ends[0].tolist()), tuple(ends[1].tolist()), float(max(first, second)))
 
     def _followed(self, at: Array, way: Array, level: float) -> tuple[Array, float]:
         """The last point of the ridge to one side, and the greatest relative change up to there."""
