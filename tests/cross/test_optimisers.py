@@ -62,6 +62,19 @@ def test_derivatives_over_poses_are_those_of_differences(quantity, over):
     np.testing.assert_allclose(slope, (found[0] - found[1]) / (2.0 * step), rtol=1e-5, atol=1e-7 * np.abs(slope).max())
 
 
+@pytest.mark.parametrize("over", ["worst", "mean", "percentile 70"])
+@pytest.mark.parametrize("robust", ["worst", "mean", "percentile 80"])
+def test_derivatives_under_tolerances_are_those_of_differences(robust, over):
+    settings = (f"robustness.objective={robust}", "robustness.search_samples=7", f"objectives.0.over={over}")
+    study = problem(REGION, *FEW, *settings, 'variables.0.tolerance="3 mm"')
+    assess, survey = Assessor(study), Surveyor(study)
+    genes, step = np.array([0.31, 0.62, 0.41, 0.27, 0.53, 0.74]), 1e-5
+    value, slope = survey(genes).term(study.objectives[0].term, True)
+    assert value == pytest.approx(assess(genes[None]).objectives[0, 0], rel=1e-12)
+    found = assess(np.concatenate([genes + step * np.eye(6), genes - step * np.eye(6)])).objectives.reshape(2, 6)
+    np.testing.assert_allclose(slope, (found[0] - found[1]) / (2.0 * step), rtol=1e-5, atol=1e-7 * np.abs(slope).max())
+
+
 def hypervolume(points, reference):
     return float(HV(ref_point=np.asarray(reference))(np.asarray(points)))
 

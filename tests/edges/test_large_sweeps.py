@@ -275,17 +275,17 @@ def test_a_full_disk_is_seen_before_anything_is_made(question, tmp_path, monkeyp
 
 
 def test_a_disk_that_fills_up_is_said_and_nothing_is_lost(question, undisturbed, tmp_path, monkeypatch):
-    settle, calls = result_file._settle, iter(range(100))
+    settle, calls = result_file.settle, iter(range(100))
 
     def failing(stream):
         if next(calls) == 2:
             raise OSError(28, "No space left on device")
         settle(stream)
 
-    monkeypatch.setattr(result_file, "_settle", failing)
+    monkeypatch.setattr(result_file, "settle", failing)
     with pytest.raises(InputError, match="No space left on device; what was written"):
         answer_into(question, tmp_path, "map")
-    monkeypatch.setattr(result_file, "_settle", settle)
+    monkeypatch.setattr(result_file, "settle", settle)
     assert history(tmp_path) == [0]
     answer_into(question, tmp_path, "map")
     assert_same_study(tmp_path, undisturbed)

@@ -43,7 +43,7 @@ class RowFile:
         return np.frombuffer(data, dtype=KIND).reshape(count, self._width).astype(float)
 
     def write(self, start: int, rows: Array) -> None:
-        """Put rows at number `start` and drop what followed; when this returns they are on the disk.
+        """Put rows at number `start`; when this returns they are on the disk.
 
         Raises:
             InputError: the disk is full or failing.
@@ -51,5 +51,4 @@ class RowFile:
         with writing(self._path):
             self._stream.seek(start * self._width * KIND.itemsize)
             self._stream.write(np.ascontiguousarray(rows, dtype=KIND).data)
-            self._stream.truncate()
             settle(self._stream)
