@@ -28,10 +28,12 @@ def timed(name: str, *settings: str) -> tuple[Log, float, float]:
 
 
 def best(log: Log) -> float:
+    """The objective of the best design."""
     return float(log.outcome(log.kept[:1]).objectives[0, 0])
 
 
 def rows() -> Iterator[tuple[str, str]]:
+    """What was measured, line by line."""
     load_problem(PAPER)
     found = [timed(PAPER, f"optimizer.seed={seed}") for seed in range(1, 11)]
     sums, works = [best(log) for log, _, _ in found], [work for _, work, _ in found]
@@ -52,6 +54,7 @@ def rows() -> Iterator[tuple[str, str]]:
 
 
 def least_random(least: float) -> str:
+    """How near the best of many random designs comes to the minimum."""
     millions = int(sys.argv[1]) if len(sys.argv) > 1 else 10
     assess, source = Assessor(load_problem(PAPER, [RIGID])), np.random.default_rng(0)
     clock, found = time.perf_counter(), np.inf

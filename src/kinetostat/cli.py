@@ -23,6 +23,7 @@ from kinetostat.commands.common import (
 )
 from kinetostat.commands.compare import add_compare_command
 from kinetostat.commands.grid import add_grid_commands
+from kinetostat.commands.guidelines import add_guidelines_command
 from kinetostat.commands.optimize import add_optimize_commands
 from kinetostat.commands.sensitivity import add_sensitivity_command
 from kinetostat.commands.workspace import add_workspace_command
@@ -115,6 +116,8 @@ def _parser() -> Parser:
     add_grid_commands(commands)
     add_workspace_command(commands)
     add_sensitivity_command(commands)
+    add_guidelines_command(commands)
+    add_compare_command(commands)
     add_optimize_commands(commands)
     reproduce = add_command(
         commands, "reproduce", _reproduce, "every table, equation and figure of the paper, printed beside computed",

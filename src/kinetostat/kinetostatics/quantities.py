@@ -105,7 +105,7 @@ QUANTITIES = {
         MapQuantity("actuator_moment", "N·m", "greatest actuator moment", partial(actuator_load, sliding=False)),
     )
 }
-"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., regularity, condition, ..."""
+"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., regularity, mass, condition, ..."""
 
 GROUPS = {
     "compliance": tuple(f"compliance_{name}" for name in COMPONENTS),

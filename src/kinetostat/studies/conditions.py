@@ -23,7 +23,7 @@ _FORM = re.compile(r"\s*([a-z_]+)\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")
 _BY_UNIT = {
     kind.unit: kind.name
     for kind in KINDS.values()
-    if kind.name.endswith(("stiffness", "compliance")) or kind.name in ("length", "force", "moment")
+    if kind.name.endswith(("stiffness", "compliance")) or kind.name in ("length", "force", "moment", "mass")
 }
 
 

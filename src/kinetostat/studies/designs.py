@@ -13,7 +13,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.elements import element_share, elements, without_rounding
-from kinetostat.kinetostatics.quantities import ROTATIONS
+from kinetostat.kinetostatics.extremes import ROTATIONS, TRANSLATIONS
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
@@ -167,7 +167,7 @@ def _softest(design: Design) -> tuple[Blame, ...]:
     response, components = respond(design.machine), design.machine.family.components
     whole = without_rounding(response.compliance.diagonal(), response)[:, 0]
     found = []
-    for block in (range(ROTATIONS), range(ROTATIONS, len(COMPONENTS))):
+    for block in (ROTATIONS, TRANSLATIONS):
         own = [i for i in components if i in block and 0.0 < whole[i] < math.inf]
         if own:
             i = max(own, key=lambda i: whole[i])
