@@ -129,6 +129,18 @@ def test_what_memory_cannot_hold_is_refused():
         written(SMALL, grid, *robust)
 
 
+@pytest.mark.parametrize("text", ["{", "[]", '{"study": 1}'])
+def test_a_folder_that_is_no_optimisation_is_refused(text, tmp_path, capsys):
+    (tmp_path / "study.json").write_text(text)
+    assert main(["optimize", str(tmp_path)]) == BAD_INPUT
+    assert "not the folder of an optimisation" in capsys.readouterr().err
+
+
+def test_a_name_that_no_file_can_have_is_refused(capsys):
+    assert main(["optimize", "x" * 5000]) == BAD_INPUT
+    assert "neither a file nor a bundled study" in capsys.readouterr().err
+
+
 def test_an_unknown_study_is_refused_with_what_was_meant(capsys):
     assert main(["optimize", "zhang-gosselin-2003"]) == BAD_INPUT
     assert 'did you mean "zhang-gosselin-2002"' in capsys.readouterr().err

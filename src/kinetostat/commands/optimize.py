@@ -60,6 +60,7 @@ def _pareto(options: argparse.Namespace) -> int:
 
 def _found(options: argparse.Namespace, least: int = 1) -> "Result":
     """Search, with a bar, into the folder if there is one."""
+    from kinetostat.spec.document import exists
     from kinetostat.spec.errors import InputError
     from kinetostat.studies.optimisation.problem import load_problem
     from kinetostat.studies.optimisation.result import optimize
@@ -68,7 +69,7 @@ def _found(options: argparse.Namespace, least: int = 1) -> "Result":
     from kinetostat.views.progress import telling_bar
 
     given = Path(options.study)
-    if holds_study(given):
+    if exists(given) and holds_study(given):
         if options.settings or options.output:
             raise InputError(f'"{given}" holds a study with settings of its own; leave out --set and -o.')
         problem, options.output = stored_problem(given), given

@@ -119,8 +119,11 @@ def stored_problem(folder: Path) -> Problem:
     Raises:
         InputError: it is not the folder of an optimisation.
     """
-    held = json.loads((folder / QUESTION).read_text("utf-8")) if holds_study(folder) else {}
-    if "optimisation" not in held:
+    try:
+        held = json.loads((folder / QUESTION).read_text("utf-8"))
+    except (OSError, ValueError):
+        held = None
+    if not isinstance(held, dict) or not {"optimisation", "machine"} <= held.keys():
         raise InputError(f'"{folder}" is not the folder of an optimisation; give a study file, or such a folder.')
     machine = build(documents.parse(held["machine"], str(folder)), str(folder))
     return problem_of(read_study(held["optimisation"], str(folder)), machine)
