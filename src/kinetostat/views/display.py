@@ -1,10 +1,13 @@
 """SI numbers in the units people read: prefixes for axes and colour bars, degrees for angles. Computes nothing else."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+
+from kinetostat.kinetostatics.quantities import GROUPS
 
 PREFIXES = {1e-9: "n", 1e-6: "µ", 1e-3: "m", 1.0: "", 1e3: "k", 1e6: "M", 1e9: "G"}
 """By factor."""
@@ -20,6 +23,16 @@ class Scale:
     def label(self, what: str) -> str:
         """An axis label: what it is and its unit."""
         return f"{what} ({self.unit})" if self.unit != "1" else what
+
+
+def family_of_names(names: Sequence[str]) -> str:
+    """What quantities have in common: "compliance" or "stiffness" where all are entries of C or of K, else nothing."""
+    return next((group for group in GROUPS if all(name.startswith(f"{group}_") for name in names)), "")
+
+
+def spoken(name: str) -> str:
+    """The name of a quantity as people say it."""
+    return name.replace("_", " ")
 
 
 def coordinate_scale(kind: str, unit: str, values: npt.NDArray[np.float64]) -> Scale:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from kinetostat.studies.grid import failures
 from kinetostat.studies.storage import replacing
-from kinetostat.views.display import Scale, coordinate_scale, prefixed_scale
+from kinetostat.views.display import Scale, coordinate_scale, family_of_names, prefixed_scale, spoken
 
 STYLE: Any = {
     "font.family": "DejaVu Sans",
@@ -188,6 +188,6 @@ def _curve_panel(panel: Axes, dataset: xr.Dataset, across: str, names: Sequence[
         panel.plot(x, dataset[name].values * scale.factor, dash, color=colour, label=dataset[name].attrs["symbol"])
     if logarithmic:
         panel.set(xscale="log", yscale="log" if np.nanmin(values) > 0 else "linear")
-    panel.set(xlabel=x_label, ylabel=scale.label(names[0].split("_")[0]))
+    panel.set(xlabel=x_label, ylabel=scale.label(family_of_names(names) or spoken(names[0])))
     panel.margins(x=0.0)
     panel.legend(loc="best")

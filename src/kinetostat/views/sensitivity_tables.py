@@ -4,19 +4,21 @@ from rich.console import Console
 
 from kinetostat.studies.sensitivity import Sensitivity, notes
 from kinetostat.units import KINDS
+from kinetostat.views.display import family_of_names, spoken
 from kinetostat.views.tables import number, numeric_table
 
 MOST_ROWS = 40
 """Parameters that are printed; `--json` has all."""
+MEASURE = "percent per percent"
 LEAST = 0.0005
 """Percent per percent below which a 0 is printed."""
 
 
 def print_sensitivity(console: Console, answer: Sensitivity) -> None:
     """The parameters that matter most, and what the numbers mean."""
-    heads = [name.split("_", 1)[-1] for name in answer.quantities]
-    groups = ", ".join(dict.fromkeys(name.split("_", 1)[0] for name in answer.quantities))
-    title = f"{answer.machine.name}: {groups}, percent per percent"
+    group = family_of_names(answer.quantities)
+    heads = [spoken(name.removeprefix(f"{group}_")) for name in answer.quantities]
+    title = f"{answer.machine.name}: {group}, {MEASURE}" if group else f"{answer.machine.name}: {MEASURE}"
     table = numeric_table(title, "parameter", ["value", *heads])
     for one in answer.influences[:MOST_ROWS]:
         value = f"{number(one.value)} {KINDS[one.kind].unit}".rstrip()
