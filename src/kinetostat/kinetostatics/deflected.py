@@ -1,0 +1,108 @@
+"""The deflected shape: where every joint and link of a loaded machine goes, to first order. One pose."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinetostat.algebra.scalar import times
+from kinetostat.algebra.screw import Twist, Wrench
+from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.kinetostatics.loading import deflection, spring_loads
+from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.leg import Element, Joint, Leg, Spring
+
+
+@dataclass(frozen=True)
+class DeflectedLink:
+    """A link of a leg with the small motions of its ends.
+
+    Attributes:
+        leg: its name.
+        start, end: before the load, base frame, m.
+        start_motion, end_motion: rotation (rad) and displacement (m) of each end, at that end, base axes.
+    """
+
+    leg: str
+    start: Vector
+    end: Vector
+    start_motion: Twist
+    end_motion: Twist
+
+    def point(self, share: float, factor: float) -> Vector:
+        """The point at a share of the link once it has bent, displacements times `factor`; base frame, m.
+
+        Cubic between its ends, as a beam without load between them bends.
+        """
+        span, s = self.end - self.start, share
+        turned = [motion.rotational.cross(span) for motion in (self.start_motion, self.end_motion)]
+        shift = (
+            self.start_motion.translational * (2 * s**3 - 3 * s**2 + 1)
+            + turned[0] * (s**3 - 2 * s**2 + s)
+            + self.end_motion.translational * (3 * s**2 - 2 * s**3)
+            + turned[1] * (s**3 - s**2)
+        )
+        return self.start + span * s + shift * factor
+
+
+def deflected_links(response: Response, load: Wrench) -> list[DeflectedLink]:
+    """All links of a machine under a wrench at its tool point (N·m; N, base axes).
+
+    Springs give as they are loaded; passive joints turn so that each leg's end follows the platform (least squares of
+    J_p q = t - J_e d, which has a solution because the statics hold).
+    """
+    platform = deflection(response.compliance, load)
+    loads = iter(spring_loads(response, load))
+    found: list[DeflectedLink] = []
+    for leg, screws in zip(response.configuration.legs, response.legs, strict=True):
+        gives = [times(next(loads), compliance) for compliance in screws.compliance]
+        elastic = [twist * give for twist, give in zip(screws.elastic, gives, strict=True)]
+        passive = [joint.twist(response.reference) for joint in leg.passive]
+        turned = _following(passive, platform - _sum(elastic), float(response.configuration.length))
+        found += _links(leg, response.reference, iter(turned), iter(elastic))
+    return found
+
+
+def _following(passive: Sequence[Twist], left: Twist, length: float) -> list[Twist]:
+    """What each passive joint contributes, rows made comparable by `length` (m)."""
+    if not passive:
+        return []
+    scale = np.repeat([length, 1.0], 3)
+    columns = np.array([twist.components() for twist in passive], dtype=float).T * scale[:, None]
+    amounts = np.linalg.lstsq(columns, np.array(left.components(), dtype=float) * scale, rcond=1e-9)[0]
+    return [twist * float(amount) for twist, amount in zip(passive, amounts, strict=True)]
+
+
+def _links(leg: Leg, reference: Vector, turned: Iterator[Twist], given: Iterator[Twist]) -> Iterator[DeflectedLink]:
+    """The links between the points of a chain, motions added up from the base."""
+    motion = Twist(ZERO, ZERO)
+    at: Vector | None = None
+    leaving = motion
+    for element in leg.chain:
+        points = _points(element)
+        for n, point in enumerate(points):
+            if n == 1:
+                motion = motion + _sum(
+                    [next(turned) for _ in element.freedoms] + [next(given) for _ in element.springs]
+                )
+            if at is not None and (point - at).norm() > 0.0:
+                yield DeflectedLink(leg.name, at, point, leaving.moved(at - reference), motion.moved(point - reference))
+            at, leaving = point, motion
+        if len(points) < 2:
+            motion = motion + _sum([next(turned) for _ in element.freedoms] + [next(given) for _ in element.springs])
+            leaving = motion if points else leaving
+
+
+def _points(element: Element) -> tuple[Vector, ...]:
+    """The points of the chain at which an element lies: none for a slide."""
+    if isinstance(element, Joint | Spring):
+        point = element.mover.point
+        return () if point is None else (point,)
+    return element.path
+
+
+def _sum(twists: Sequence[Twist]) -> Twist:
+    result = Twist(ZERO, ZERO)
+    for twist in twists:
+        result = result + twist
+    return result

@@ -1,0 +1,292 @@
+// Draws scenes of solids: light, materials, camera and labels live here; what there is to see does not.
+import { CSS2DObject, CSS2DRenderer, OrbitControls, THREE } from "nicegui-scene";
+import { geometryOf } from "kinetostat-studio/solid_geometry.js";
+
+const LOOKS = {
+  base: { color: 0x8b929c, metalness: 0.15, roughness: 0.6 },
+  platform: { color: 0xc3c9d1, metalness: 0.3, roughness: 0.42 },
+  actuated: { color: 0x1f6fb4, metalness: 0.2, roughness: 0.38 },
+  passive: { color: 0xd9721f, metalness: 0.15, roughness: 0.42 },
+  removed: { color: 0x9aa3ad, metalness: 0.0, roughness: 0.8, opacity: 0.25 },
+  steel: { color: 0xd3d8de, metalness: 0.85, roughness: 0.24 },
+  joint: { color: 0x4a525d, metalness: 0.55, roughness: 0.42 },
+  motor: { color: 0x2b3440, metalness: 0.35, roughness: 0.5 },
+  tool: { color: 0xb9a76a, metalness: 0.8, roughness: 0.3 },
+  spring: { color: 0x17a673, metalness: 0.3, roughness: 0.35 },
+  load: { color: 0xc81e4a, metalness: 0.0, roughness: 0.5 },
+  ghost: { color: 0xc81e4a, metalness: 0.0, roughness: 0.9, opacity: 0.3 },
+  translation: { color: 0x2f9fe0, metalness: 0.0, roughness: 0.35, opacity: 0.38 },
+  rotation: { color: 0xa855c7, metalness: 0.1, roughness: 0.4 },
+  "soft translation": { color: 0x0b7fc7, metalness: 0.1, roughness: 0.4 },
+  "soft rotation": { color: 0x8a2fb0, metalness: 0.1, roughness: 0.4 },
+  "x axis": { color: 0xd23b3b, metalness: 0.0, roughness: 0.5 },
+  "y axis": { color: 0x2c9c4a, metalness: 0.0, roughness: 0.5 },
+  "z axis": { color: 0x2d62d3, metalness: 0.0, roughness: 0.5 },
+};
+const THEMES = {
+  light: { sky: 0xf7f9fb, ground: 0xe3e7ec, grid: 0x9aa6b4, gridOpacity: 0.32, shadow: 0.26, light: 1.0 },
+  dark: { sky: 0x1b222c, ground: 0x11161d, grid: 0x6b7a8c, gridOpacity: 0.28, shadow: 0.5, light: 0.85 },
+};
+const VIEWS = { iso: [1.0, -1.35, 0.75], front: [0, -1, 0.02], side: [1, 0, 0.02], top: [0.001, -0.02, 1] };
+const UNLIT = new Set(["frames", "directions", "ellipsoids", "deflection"]);
+
+export default {
+  template: `<div class="machine-view"><canvas tabindex="0" role="img" :aria-label="label"
+      @keydown="turn"></canvas><div class="machine-labels"></div></div>`,
+  props: { label: String, dark: Boolean, hidden: Array },
+  mounted() {
+    const canvas = this.$el.querySelector("canvas");
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: false });
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = THREE.PCFSoftShadowMap;
+    this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
+    this.renderer.toneMappingExposure = 1.05;
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    this.labelRenderer = new CSS2DRenderer({ element: this.$el.querySelector(".machine-labels") });
+    this.world = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(32, 1, 0.01, 100);
+    this.camera.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.addEventListener("change", () => this.draw());
+    this.controls.maxPolarAngle = Math.PI * 0.96;
+    this.materials = {};
+    for (const [name, look] of Object.entries(LOOKS)) {
+      const { opacity, ...rest } = look;
+      this.materials[name] = new THREE.MeshStandardMaterial({
+        ...rest,
+        transparent: opacity !== undefined,
+        opacity: opacity ?? 1,
+        depthWrite: opacity === undefined,
+        side: opacity === undefined ? THREE.DoubleSide : THREE.FrontSide,
+      });
+    }
+    this.geometries = new Map();
+    this.groups = {};
+    this.light();
+    this.theme();
+    this.observer = new ResizeObserver(() => this.resize());
+    this.observer.observe(this.$el);
+    this.resize();
+    canvas.addEventListener("webglcontextrestored", () => this.draw());
+  },
+  beforeUnmount() {
+    this.observer.disconnect();
+    this.controls.dispose();
+    this.renderer.dispose();
+  },
+  watch: {
+    dark() {
+      this.theme();
+    },
+    hidden() {
+      this.hide();
+      this.draw();
+    },
+  },
+  methods: {
+    light() {
+      const room = new THREE.Scene();
+      const panel = (x, y, z, w, h, power) => {
+        const lamp = new THREE.Mesh(
+          new THREE.PlaneGeometry(w, h),
+          new THREE.MeshBasicMaterial({ color: new THREE.Color(power, power, power), side: THREE.DoubleSide }),
+        );
+        lamp.position.set(x, y, z);
+        lamp.lookAt(0, 0, 0);
+        room.add(lamp);
+      };
+      const walls = new THREE.Mesh(
+        new THREE.BoxGeometry(20, 20, 20),
+        new THREE.MeshBasicMaterial({ color: 0x6f757d, side: THREE.BackSide }),
+      );
+      room.add(walls);
+      panel(0, 0, 9, 9, 9, 5.5);
+      panel(-8, -6, 4, 6, 5, 4);
+      panel(8, -4, 3, 5, 6, 2.6);
+      panel(0, 9, 3, 8, 4, 1.6);
+      const generator = new THREE.PMREMGenerator(this.renderer);
+      this.world.environment = generator.fromScene(room, 0.03).texture;
+      generator.dispose();
+      this.sun = new THREE.DirectionalLight(0xffffff, 1.7);
+      this.sun.castShadow = true;
+      this.sun.shadow.mapSize.set(2048, 2048);
+      this.sun.shadow.radius = 5;
+      this.sun.shadow.bias = -0.0004;
+      this.sun.shadow.normalBias = 0.01;
+      this.world.add(this.sun, this.sun.target);
+      const plane = new THREE.CircleGeometry(1, 96);
+      this.floor = new THREE.Mesh(plane, new THREE.ShadowMaterial({ opacity: 0.25 }));
+      this.floor.receiveShadow = true;
+      this.world.add(this.floor);
+    },
+    theme() {
+      const look = THEMES[this.dark ? "dark" : "light"];
+      this.world.background = new THREE.Color(look.sky);
+      this.world.fog = null;
+      this.world.environmentIntensity = look.light;
+      this.sun.intensity = 1.9 * look.light;
+      this.floor.material.opacity = look.shadow;
+      this.makeGrid();
+      this.draw();
+    },
+    makeGrid() {
+      if (this.grid) {
+        this.world.remove(this.grid);
+        this.grid.geometry.dispose();
+      }
+      const size = this.size;
+      if (!size) return;
+      const look = THEMES[this.dark ? "dark" : "light"];
+      const step = 10 ** Math.round(Math.log10(size / 8));
+      const count = Math.ceil((1.6 * size) / step);
+      const reach = count * step;
+      const corners = [];
+      const colours = [];
+      const ink = new THREE.Color(look.grid);
+      const paper = new THREE.Color(look.sky);
+      const fade = (x, y) => {
+        const near = Math.max(0, 1 - Math.hypot(x, y) / reach);
+        return ink.clone().lerp(paper, 1 - look.gridOpacity * near * 2.2);
+      };
+      for (let i = -count; i <= count; i++) {
+        for (let j = -count; j < count; j++) {
+          for (const [ax, ay, bx, by] of [
+            [i * step, j * step, i * step, (j + 1) * step],
+            [j * step, i * step, (j + 1) * step, i * step],
+          ]) {
+            corners.push(ax, ay, 0, bx, by, 0);
+            colours.push(...fade(ax, ay).toArray(), ...fade(bx, by).toArray());
+          }
+        }
+      }
+      const lines = new THREE.BufferGeometry();
+      lines.setAttribute("position", new THREE.Float32BufferAttribute(corners, 3));
+      lines.setAttribute("color", new THREE.Float32BufferAttribute(colours, 3));
+      this.grid = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ vertexColors: true, toneMapped: false }));
+      this.grid.position.copy(this.floor.position);
+      this.world.add(this.grid);
+    },
+    show(scene) {
+      this.put("machine", scene.solids, scene.labels);
+      const first = this.size !== scene.size && (!this.size || Math.abs(this.size / scene.size - 1) > 0.6);
+      const centre = new THREE.Vector3(...scene.centre);
+      if (first || scene.fit) {
+        this.size = scene.size;
+        this.centre = centre;
+        this.look("iso");
+        this.makeGrid();
+      }
+      this.floor.position.set(this.centre.x, this.centre.y, scene.floor);
+      this.floor.scale.setScalar(3 * this.size);
+      if (this.grid) this.grid.position.set(this.centre.x, this.centre.y, scene.floor - 0.0005 * this.size);
+      const reach = 0.9 * this.size;
+      this.sun.position.copy(this.centre).add(new THREE.Vector3(-0.55, -0.75, 1.5).multiplyScalar(this.size * 1.6));
+      this.sun.target.position.copy(this.centre);
+      Object.assign(this.sun.shadow.camera, {
+        left: -reach, right: reach, top: reach, bottom: -reach, near: 0.1 * this.size, far: 6 * this.size,
+      });
+      this.sun.shadow.normalBias = 0.004 * this.size;
+      this.sun.shadow.camera.updateProjectionMatrix();
+      this.draw();
+    },
+    overlay(solids, labels) {
+      this.put("overlay", solids, labels);
+      this.draw();
+    },
+    put(name, solids, labels) {
+      const group = (this.groups[name] ??= { root: new THREE.Group(), meshes: new Map() });
+      if (!group.root.parent) this.world.add(group.root);
+      const old = group.meshes;
+      group.meshes = new Map();
+      for (const solid of solids) {
+        let mesh = old.get(solid.name);
+        old.delete(solid.name);
+        if (!mesh) {
+          mesh = new THREE.Mesh();
+          mesh.matrixAutoUpdate = false;
+          group.root.add(mesh);
+        }
+        mesh.geometry = geometryOf(this.geometries, solid.shape);
+        mesh.material = this.materials[solid.material];
+        const unlit = UNLIT.has(solid.layer);
+        mesh.castShadow = !unlit && !mesh.material.transparent;
+        mesh.receiveShadow = !unlit;
+        mesh.renderOrder = mesh.material.transparent ? 2 : 0;
+        mesh.userData.layer = solid.layer;
+        const p = solid.place;
+        mesh.matrix.set(p[0], p[3], p[6], p[9], p[1], p[4], p[7], p[10], p[2], p[5], p[8], p[11], 0, 0, 0, 1);
+        group.meshes.set(solid.name, mesh);
+      }
+      for (const mesh of old.values()) group.root.remove(mesh);
+      for (const label of group.labels ?? []) group.root.remove(label);
+      group.labels = labels.map((label) => {
+        const text = document.createElement("span");
+        text.textContent = label.text;
+        text.className = `machine-label machine-label-${label.layer}`;
+        const object = new CSS2DObject(text);
+        object.position.set(...label.point);
+        object.userData.layer = label.layer;
+        group.root.add(object);
+        return object;
+      });
+      this.hide();
+    },
+    hide() {
+      const hidden = new Set(this.hidden ?? []);
+      for (const group of Object.values(this.groups)) {
+        for (const object of [...group.meshes.values(), ...group.labels]) {
+          object.visible = !hidden.has(object.userData.layer);
+        }
+      }
+    },
+    look(view) {
+      if (!this.centre) return;
+      const direction = new THREE.Vector3(...VIEWS[view]).normalize();
+      const narrow = Math.min(1, this.camera.aspect);
+      const distance = (0.5 * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / narrow;
+      this.camera.position.copy(this.centre).addScaledVector(direction, distance);
+      this.camera.near = distance / 100;
+      this.camera.far = distance * 20;
+      this.camera.updateProjectionMatrix();
+      this.controls.target.copy(this.centre);
+      this.controls.update();
+      this.draw();
+    },
+    turn(event) {
+      const step = Math.PI / 24;
+      const moves = { ArrowLeft: [-step, 0, 1], ArrowRight: [step, 0, 1], ArrowUp: [0, -step, 1], ArrowDown: [0, step, 1] };
+      const move = { ...moves, "+": [0, 0, 0.9], "-": [0, 0, 1.1] }[event.key];
+      if (!move) return;
+      event.preventDefault();
+      const arm = this.camera.position.clone().sub(this.controls.target);
+      const polar = new THREE.Spherical().setFromVector3(new THREE.Vector3(arm.x, arm.z, -arm.y));
+      polar.theta += move[0];
+      polar.phi = Math.min(Math.max(polar.phi + move[1], 0.02), Math.PI - 0.05);
+      polar.radius *= move[2];
+      const turned = new THREE.Vector3().setFromSpherical(polar);
+      this.camera.position.copy(this.controls.target).add(new THREE.Vector3(turned.x, -turned.z, turned.y));
+      this.controls.update();
+      this.draw();
+    },
+    resize() {
+      const { clientWidth: width, clientHeight: height } = this.$el;
+      if (!width || !height) return;
+      this.renderer.setSize(width, height, false);
+      this.labelRenderer.setSize(width, height);
+      this.camera.aspect = width / height;
+      this.camera.updateProjectionMatrix();
+      this.draw();
+    },
+    draw() {
+      if (this.pending) return;
+      this.pending = true;
+      requestAnimationFrame(() => {
+        this.pending = false;
+        this.renderer.render(this.world, this.camera);
+        this.labelRenderer.render(this.world, this.camera);
+        this.$el.dataset.drawn = Number(this.$el.dataset.drawn ?? 0) + 1;
+        this.$el.dataset.solids = this.groups.machine?.meshes.size ?? 0;
+      });
+    },
+  },
+};

@@ -1,0 +1,254 @@
+"""A leg's chain of elements as the parts that one sees: joints by kind, links, rails and springs. Draws nothing."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+from kinetostat.algebra.scalar import is_zero
+from kinetostat.algebra.vector import AXES, ZERO, Vector
+from kinetostat.machine.leg import Element, Joint, Leg, Spring
+from kinetostat.machine.link import Beam, Parallelogram
+from kinetostat.machine.parts import Arm
+from kinetostat.views.scene.solids import unit
+
+JointKind: TypeAlias = Literal["revolute", "universal", "spherical", "helical", "flexure", "motor"]
+LinkKind: TypeAlias = Literal["bar", "telescope", "bars"]
+
+APART = 1e-6
+"""Distance of two points, m, and sine of an angle, below which they are the same to the eye."""
+
+
+@dataclass(frozen=True)
+class JointPart:
+    """A joint one sees: its kind, centre (base frame, m) and axes (unit vectors)."""
+
+    name: str
+    kind: JointKind
+    point: Vector
+    axes: tuple[Vector, ...]
+
+
+@dataclass(frozen=True)
+class LinkPart:
+    """A link between two points, base frame, m.
+
+    Attributes:
+        name: of the link, where it has one; unique within the leg.
+        kind: a bar, two parallel bars, or a telescope along which a slide runs.
+        start, end: of its axis.
+        driven: whether it holds an actuated slide.
+        up: in which the section's z axis lies, if that matters.
+        side: from the middle to either bar, of two bars.
+        pinned: of two bars, whether they turn on pins instead of balls.
+    """
+
+    name: str
+    kind: LinkKind
+    start: Vector
+    end: Vector
+    driven: bool = False
+    up: Vector | None = None
+    side: Vector | None = None
+    pinned: bool = False
+
+    @property
+    def span(self) -> Vector:
+        """From start to end."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True)
+class RailPart:
+    """A guide along `axis` with its carriage at `point`; `driven` if an actuator moves it."""
+
+    name: str
+    point: Vector
+    axis: Vector
+    driven: bool
+
+
+@dataclass(frozen=True)
+class SpringPart:
+    """A virtual spring: torsional about, or linear along, `axis` at `point`."""
+
+    name: str
+    point: Vector
+    axis: Vector
+    torsional: bool
+    stiffness: float
+
+
+@dataclass(frozen=True)
+class Anatomy:
+    """The parts of one leg from base to platform.
+
+    Attributes:
+        leg: name.
+        actuated: whether it has an actuator; `removed` if all of those are without stiffness.
+        joints, links, rails, springs: in order.
+        foot, head: where it stands on the base and holds the platform, base frame, m.
+    """
+
+    leg: str
+    actuated: bool
+    removed: bool
+    joints: tuple[JointPart, ...]
+    links: tuple[LinkPart, ...]
+    rails: tuple[RailPart, ...]
+    springs: tuple[SpringPart, ...]
+    foot: Vector
+    head: Vector
+
+    @property
+    def on_rail(self) -> bool:
+        """Whether it begins with a slide along the base."""
+        return any(together(rail.point, self.foot) for rail in self.rails)
+
+
+def anatomy(leg: Leg) -> Anatomy:
+    """The visible parts of a leg at its pose."""
+    reading = _Reading(leg)
+    for element in leg.chain:
+        reading.take(element)
+    drives = [spring for spring in leg.springs if spring.actuated]
+    return Anatomy(
+        leg.name,
+        bool(drives),
+        bool(drives) and all(is_zero(spring.stiffness) for spring in drives),
+        tuple(joint for joint in reading.joints if not _within_bars(joint, reading.links)),
+        tuple(reading.links),
+        tuple(reading.finished_rails()),
+        tuple(reading.springs),
+        reading.first or ZERO,
+        reading.at or ZERO,
+    )
+
+
+class _Reading:
+    """What has been read of a chain so far: parts, the point it has come to, and the slide that led away from there."""
+
+    def __init__(self, leg: Leg) -> None:
+        self.leg = leg
+        self.joints: list[JointPart] = []
+        self.links: list[LinkPart] = []
+        self.rails: list[RailPart] = []
+        self.springs: list[SpringPart] = []
+        self.first: Vector | None = None
+        self.at: Vector | None = None
+        self.slide: tuple[str, Vector, bool] | None = None
+        self.waiting: list[Spring] = []
+
+    def take(self, element: Element) -> None:
+        """Read the next element."""
+        match element:
+            case Joint(point=None):
+                self.slide = (element.name, element.axis, False)
+            case Joint():
+                self.reach(_point(element))
+                self._turning(element)
+            case Spring(actuated=True) if element.joint.point is None:
+                self.slide = (element.name, element.joint.axis, True)
+            case Spring():
+                self._elastic(element)
+            case Parallelogram():
+                self.reach(element.near)
+                half = element.side * (0.5 * element.width)
+                pinned = not self.leg.lines
+                self.links.append(LinkPart(element.name, "bars", element.near, element.far, side=half, pinned=pinned))
+                self.reach(element.far, linked=True)
+            case Arm() | Beam():
+                self.reach(element.start)
+                self.links.append(LinkPart(self._named(element.name), "bar", element.start, element.end, up=element.up))
+                self.reach(element.end, linked=True)
+
+    def reach(self, point: Vector, linked: bool = False) -> None:
+        """Come to a point: what lies before it is a link, unless there is one already, or a slide along a rail."""
+        start, slide = self.at, self.slide
+        apart = start is not None and not linked and not together(start, point)
+        if apart and slide is not None and _along(slide[1], point - (start or point)):
+            self.links.append(LinkPart(slide[0], "telescope", start or point, point, slide[2]))
+        elif slide is not None:
+            self.rails.append(RailPart(slide[0], start or point, slide[1], slide[2]))
+        if apart and (slide is None or not _along(slide[1], point - (start or point))):
+            self.links.append(LinkPart(self._named(""), "bar", start or point, point))
+        middle = (start or point) * 0.35 + point * 0.65
+        self.springs += [_spring_part(spring, middle) for spring in self.waiting]
+        self.waiting, self.slide, self.at = [], None, point
+        self.first = self.first or point
+
+    def finished_rails(self) -> list[RailPart]:
+        """All rails; a slide at the end of the chain runs along the platform."""
+        if self.slide is None or self.at is None:
+            return self.rails
+        return [*self.rails, RailPart(self.slide[0], self.at, self.slide[1], self.slide[2])]
+
+    def _named(self, name: str) -> str:
+        return name or f"{self.leg.name} link {len(self.links) + 1}"
+
+    def _turning(self, joint: Joint) -> None:
+        last = self.joints[-1] if self.joints else None
+        if last is not None and last.name == joint.name and together(last.point, _point(joint)):
+            self.joints[-1] = _kind_of(replace(last, axes=(*last.axes, joint.axis)), self.leg)
+        else:
+            kind: JointKind = "revolute" if is_zero(joint.pitch) else "helical"
+            self.joints.append(JointPart(joint.name, kind, _point(joint), (joint.axis,)))
+
+    def _elastic(self, spring: Spring) -> None:
+        """A motor, a flexure, or a virtual joint of a link."""
+        if spring.joint.point is None:
+            self.waiting.append(spring)
+            return
+        self.reach(_point(spring.joint))
+        if spring.actuated or spring.hinge:
+            kind: JointKind = "motor" if spring.actuated else "flexure"
+            self.joints.append(JointPart(spring.name, kind, _point(spring.joint), (spring.joint.axis,)))
+        else:
+            self.springs.append(_spring_part(spring, _point(spring.joint)))
+
+
+def _point(joint: Joint) -> Vector:
+    return joint.point or ZERO
+
+
+def _kind_of(joint: JointPart, leg: Leg) -> JointPart:
+    """A joint with one axis more; of a strut's two spherical joints the lower one is a Hooke joint, free of spin."""
+    if len(joint.axes) == 2:
+        return replace(joint, kind="universal")
+    if len(leg.lines) == 1 and together(joint.point, _lower_end(leg)):
+        strut = leg.lines[0].direction
+        across = unit(strut.cross(_far_from(strut)))
+        return replace(joint, kind="universal", axes=(across, unit(strut.cross(across))))
+    return replace(joint, kind="spherical")
+
+
+def _lower_end(leg: Leg) -> Vector:
+    """The first point of a leg with several axes."""
+    points = [joint.point for joint in leg.passive if joint.point is not None]
+    return points[0]
+
+
+def _far_from(direction: Vector) -> Vector:
+    return min(AXES[::-1], key=lambda axis: round(abs(axis.dot(direction)), 2))
+
+
+def _spring_part(spring: Spring, point: Vector) -> SpringPart:
+    return SpringPart(spring.name, point, spring.joint.axis, spring.joint.point is not None, float(spring.stiffness))
+
+
+def _within_bars(joint: JointPart, links: Sequence[LinkPart]) -> bool:
+    """Whether a joint stands for the balls of a pair of bars."""
+    return any(
+        link.kind == "bars"
+        and not link.pinned
+        and (together(joint.point, link.start) or together(joint.point, link.end))
+        for link in links
+    )
+
+
+def together(one: Vector, other: Vector) -> bool:
+    """Whether two points are the same to the eye."""
+    return (one - other).norm() < APART
+
+
+def _along(axis: Vector, span: Vector) -> bool:
+    return span.cross(axis).norm() < APART * span.norm()

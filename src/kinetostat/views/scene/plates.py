@@ -1,0 +1,110 @@
+"""Base and platform as solid plates behind the joints of the legs, with pedestals between."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinetostat.algebra.vector import Displacement, Vector
+from kinetostat.views.scene import shapes
+from kinetostat.views.scene.solids import Extruded, Solid, unit, upright
+
+CLEARANCE = 2.3
+"""Distance of a plate from the joint centres, in radii of a leg: what a fork needs."""
+COINCIDENT = 1.0
+"""Spread of joints below which a hub takes the place of a plate, in radii of a leg."""
+MARGIN = {"base": 3.6, "platform": 2.9}
+"""Width of a plate beyond its joints, in radii of a leg."""
+THICKNESS = {"base": 1.7, "platform": 1.3}
+"""In radii of a leg."""
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A plate behind some joints.
+
+    Attributes:
+        name: base or platform.
+        place: z towards the joints, origin amid them in their mean plane, base frame.
+        joints: their centres, base frame, m.
+        radius: of a leg, m.
+        hub: whether the joints are so near to each other that it is a block around them.
+    """
+
+    name: str
+    place: Displacement
+    joints: tuple[Vector, ...]
+    radius: float
+    hub: bool
+
+    @property
+    def normal(self) -> Vector:
+        """From the plate to the joints."""
+        return self.place.rotation.z
+
+    @property
+    def surface(self) -> float:
+        """Height of the plate's face below the joints' mean plane, along its z, m: below every joint."""
+        lowest = min((joint - self.place.translation).dot(self.normal) for joint in self.joints)
+        return lowest - CLEARANCE * self.radius
+
+    def solids(self) -> list[Solid]:
+        """The plate and its pedestals."""
+        if self.hub:
+            return [self._hub()]
+        thick = THICKNESS[self.name] * self.radius
+        outline = shapes.rounded_hull(self._flat(), MARGIN[self.name] * self.radius)
+        origin = self.place.apply(Vector(0.0, 0.0, self.surface - thick))
+        plate = Solid(
+            f"{self.name}/plate",
+            Extruded(outline, thick, 0.22 * thick),
+            self.name,
+            Displacement(self.place.rotation, origin),
+        )
+        return [plate, *(self._pedestal(n, joint) for n, joint in enumerate(self.joints, 1))]
+
+    def _hub(self) -> Solid:
+        size = 3.4 * self.radius
+        down = Displacement(self.place.rotation, self.place.apply(Vector(0.0, 0.0, -0.5 * size)))
+        return Solid(f"{self.name}/hub", shapes.block(size, size, size, 0.12 * size), self.name, down)
+
+    def _flat(self) -> list[tuple[float, float]]:
+        axes, origin = self.place.rotation, self.place.translation
+        return [(_cut((j - origin).dot(axes.x)), _cut((j - origin).dot(axes.y))) for j in self.joints]
+
+    def _pedestal(self, number: int, joint: Vector) -> Solid:
+        height = (joint - self.place.translation).dot(self.normal) - self.surface
+        shape = shapes.cone(1.9 * self.radius, 1.25 * self.radius, max(height - 1.5 * self.radius, 0.4 * self.radius))
+        foot = joint - self.normal * height
+        return Solid(f"{self.name}/pedestal {number}", shape, "joint", upright(foot, self.normal))
+
+
+def _cut(number: float) -> float:
+    """Without the rounding that would make corners of points that coincide."""
+    return round(number, 9)
+
+
+def plate_behind(
+    name: str, joints: Sequence[Vector], links: Sequence[Vector], radius: float, frame: Displacement, side: Vector
+) -> Plate:
+    """The plate behind joints, on the side from which their links do not come.
+
+    Args:
+        name: base or platform.
+        joints: their centres, base frame, m.
+        links: from each joint into its leg, base axes.
+        radius: of a leg, m.
+        frame: of the body, base frame: gives the plane where the joints do not.
+        side: towards the joints where the links lie in their plane.
+    """
+    points = np.array([joint.components() for joint in joints], dtype=float)
+    centre = Vector(*points.mean(axis=0).tolist())
+    spread = points - points.mean(axis=0)
+    sizes, axes = np.linalg.svd(spread)[1:]
+    flat = len(points) > 2 and sizes[1] > COINCIDENT * radius
+    normal = Vector(*axes[2].tolist()) if flat else frame.rotation.z
+    inward = unit(Vector(*np.sum([unit(link).components() for link in links], axis=0).tolist()))
+    lean = inward.dot(normal)
+    normal = normal if (lean if abs(lean) > 0.05 else side.dot(normal)) > 0.0 else -normal
+    hub = float(sizes[0]) < COINCIDENT * radius and len(points) > 1
+    return Plate(name, upright(centre, normal, frame.rotation.x), tuple(joints), radius, hub)

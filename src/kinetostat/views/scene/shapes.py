@@ -1,0 +1,184 @@
+"""Shapes that machines are made of: shafts, balls, forks, plates, coils, arrows. Each in its own axes, m."""
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+
+from kinetostat.views.scene.solids import Extruded, Point2, Swept, Turned
+
+ROUND = 24
+"""Points of a half circle in an outline or a coil turn."""
+CORNER = 8
+"""Points of a rounded corner."""
+
+kept = lru_cache(512)
+"""Of a shape that does not change while a machine moves, the same object is used again."""
+
+
+@kept
+def shaft(radius: float, length: float, chamfer: float = 0.0, start: float = 0.0) -> Turned:
+    """A cylinder about z from height `start`, its ends chamfered."""
+    c = min(chamfer, 0.5 * radius, 0.45 * length)
+    end = start + length
+    return Turned(
+        ((0.0, start), (radius - c, start), (radius, start + c), (radius, end - c), (radius - c, end), (0.0, end))
+    )
+
+
+@kept
+def pin(radius: float, length: float) -> Turned:
+    """A shaft about z through the origin, centred there."""
+    return shaft(radius, length, 0.18 * radius, -0.5 * length)
+
+
+@kept
+def ball(radius: float) -> Turned:
+    """A ball about the origin."""
+    angles = [math.pi * (i / ROUND - 0.5) for i in range(ROUND + 1)]
+    return Turned(tuple((abs(radius * math.cos(a)), radius * math.sin(a)) for a in angles))
+
+
+@kept
+def ring(inner: float, outer: float, width: float) -> Turned:
+    """A bush about z, centred at the origin."""
+    low, high = -0.5 * width, 0.5 * width
+    return Turned(((inner, low), (outer, low), (outer, high), (inner, high), (inner, low)))
+
+
+@kept
+def cone(bottom: float, top: float, length: float) -> Turned:
+    """A frustum about z from the origin."""
+    return Turned(((0.0, 0.0), (bottom, 0.0), (top, length), (0.0, length)))
+
+
+@kept
+def waist(radius: float, neck: float, length: float) -> Turned:
+    """A shaft with a thin neck in its middle, centred at the origin: a flexure."""
+    half = 0.5 * length
+    heights = [half * (i / CORNER - 1.0) for i in range(2 * CORNER + 1)]
+    sides = [(neck + (radius - neck) * (h / half) ** 2, h) for h in heights]
+    return Turned(((0.0, -half), *sides, (0.0, half)))
+
+
+@kept
+def socket(radius: float) -> Turned:
+    """A cup that holds a ball of this radius from below, with its stem towards -z."""
+    angles = [math.radians(a) for a in range(-60, 21, 10)]
+    outer = [(1.22 * radius * math.cos(a), 1.22 * radius * math.sin(a)) for a in angles]
+    rim = (1.02 * radius * math.cos(angles[-1]), 1.02 * radius * math.sin(angles[-1]))
+    return Turned(((0.0, outer[0][1]), *outer, rim))
+
+
+@kept
+def block(width: float, depth: float, height: float, chamfer: float = 0.0) -> Extruded:
+    """A box on the x-y plane, centred on z."""
+    w, d = 0.5 * width, 0.5 * depth
+    return Extruded(((-w, -d), (w, -d), (w, d), (-w, d)), height, chamfer)
+
+
+@kept
+def fork(gap: float, arm: float, reach: float, foot: float) -> tuple[Point2, ...]:
+    """Outline of a fork: arms `arm` wide left and right of a `gap` centred at the origin, closed at y = -`reach`.
+
+    The arms end round above the origin; the bridge is `foot` thick.
+    """
+    inner, outer = 0.5 * gap, 0.5 * gap + arm
+    bridge = -reach + foot
+
+    def tip(middle: float) -> list[Point2]:
+        angles = [math.pi * i / CORNER for i in range(CORNER + 1)]
+        return [(middle + 0.5 * arm * math.cos(a), arm * 0.9 + 0.5 * arm * math.sin(a)) for a in angles]
+
+    right, left = tip(inner + 0.5 * arm), tip(-inner - 0.5 * arm)
+    return (
+        (-outer + 0.4 * arm, -reach), (outer - 0.4 * arm, -reach), (outer, -reach + 0.6 * arm),
+        *right, (inner, bridge), (-inner, bridge), *left, (-outer, -reach + 0.6 * arm),
+    )  # fmt: skip
+
+
+def rounded_hull(points: Sequence[Point2], margin: float) -> tuple[Point2, ...]:
+    """The convex hull of points, widened by `margin` with round corners, counter-clockwise; of one point a disc."""
+    hull = convex_hull(points)
+    if len(hull) == 1:
+        angles = [math.tau * i / (4 * ROUND) for i in range(4 * ROUND)]
+        return tuple((hull[0][0] + margin * math.cos(a), hull[0][1] + margin * math.sin(a)) for a in angles)
+    found: list[Point2] = []
+    for i, (x, y) in enumerate(hull):
+        (px, py), (nx, ny) = hull[i - 1], hull[(i + 1) % len(hull)]
+        first = math.atan2(y - py, x - px) - 0.5 * math.pi
+        turn = (math.atan2(ny - y, nx - x) - 0.5 * math.pi - first) % math.tau
+        count = max(2, math.ceil(2 * CORNER * turn / math.pi))
+        angles = [first + turn * k / count for k in range(count + 1)]
+        found += [(x + margin * math.cos(a), y + margin * math.sin(a)) for a in angles]
+    return tuple(found)
+
+
+def convex_hull(points: Sequence[Point2]) -> list[Point2]:
+    """Corners of the convex hull, counter-clockwise (Andrew's monotone chain)."""
+    ordered = sorted(set(points))
+    if len(ordered) < 3:
+        return ordered
+
+    def half(along: Sequence[Point2]) -> list[Point2]:
+        kept: list[Point2] = []
+        for x, y in along:
+            while len(kept) > 1 and _turns_right(kept[-2], kept[-1], (x, y)):
+                kept.pop()
+            kept.append((x, y))
+        return kept[:-1]
+
+    return half(ordered) + half(ordered[::-1])
+
+
+def _turns_right(a: Point2, b: Point2, c: Point2) -> bool:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) <= 0.0
+
+
+@kept
+def spiral(inner: float, outer: float, turns: float, wire: float) -> Swept:
+    """A flat spiral in the x-y plane with a straight end: the sign of a torsional spring about z."""
+    count = round(2 * ROUND * turns)
+    steps = [i / count for i in range(count + 1)]
+    curve = [((inner + (outer - inner) * t), math.tau * turns * t) for t in steps]
+    path = [(r * math.cos(a), r * math.sin(a), 0.0) for r, a in curve]
+    x, y, _ = path[-1]
+    return Swept((*path, (x * 1.12, y * 1.12, 0.0)), wire)
+
+
+@kept
+def helix(radius: float, length: float, turns: float, wire: float) -> Swept:
+    """A coil about z, centred at the origin: the sign of a linear spring."""
+    count = round(ROUND * turns)
+    angles = [math.tau * turns * i / count for i in range(count + 1)]
+    path = [(radius * math.cos(a), radius * math.sin(a), length * (i / count - 0.5)) for i, a in enumerate(angles)]
+    return Swept(tuple(path), wire)
+
+
+@kept
+def circle(radius: float, wire: float) -> Swept:
+    """A wire circle in the x-y plane."""
+    angles = [math.tau * i / (2 * ROUND) for i in range(2 * ROUND)]
+    return Swept(tuple((radius * math.cos(a), radius * math.sin(a), 0.0) for a in angles), wire, closed=True)
+
+
+@kept
+def arc(radius: float, turn: float, wire: float) -> Swept:
+    """A wire arc in the x-y plane, from x over the angle `turn` (rad)."""
+    angles = [turn * i / (2 * ROUND) for i in range(2 * ROUND + 1)]
+    return Swept(tuple((radius * math.cos(a), radius * math.sin(a), 0.0) for a in angles), wire)
+
+
+@kept
+def arrow(length: float, radius: float) -> Turned:
+    """An arrow along z from the origin."""
+    head = min(0.4 * length, 6.0 * radius)
+    neck = length - head
+    return Turned(((0.0, 0.0), (radius, 0.0), (radius, neck), (2.6 * radius, neck), (0.0, length)))
+
+
+@kept
+def double_arrow(length: float, radius: float) -> Turned:
+    """An arrow along z with a head at either end, centred at the origin."""
+    half, head = 0.5 * length, min(0.2 * length, 6.0 * radius)
+    neck, wide = half - head, 2.6 * radius
+    return Turned(((0.0, -half), (wide, -neck), (radius, -neck), (radius, neck), (wide, neck), (0.0, half)))
