@@ -26,6 +26,7 @@ from kinetostat.commands.grid import add_grid_commands
 from kinetostat.commands.guidelines import add_guidelines_command
 from kinetostat.commands.optimize import add_optimize_commands
 from kinetostat.commands.sensitivity import add_sensitivity_command
+from kinetostat.commands.studio import add_studio_command
 from kinetostat.commands.workspace import add_workspace_command
 
 EXAMPLES = """examples:
@@ -119,6 +120,7 @@ def _parser() -> Parser:
     add_guidelines_command(commands)
     add_compare_command(commands)
     add_optimize_commands(commands)
+    add_studio_command(commands)
     reproduce = add_command(
         commands, "reproduce", _reproduce, "every table, equation and figure of the paper, printed beside computed",
         "kinetostat reproduce -o reproduce",

@@ -63,6 +63,7 @@ def evaluate(
     part: range | None = None,
     threads: int | None = None,
     device: Device = Device.CPU,
+    repeated: bool = False,
 ) -> Evaluation:
     """Quantities and status of a machine at many points.
 
@@ -75,6 +76,8 @@ def evaluate(
             bit for bit, because the size of the whole decides the arithmetic, and slabs are the same.
         threads: slabs under way at once; all processors unless given.
         device: a GPU gives the same results to rounding, for large batches many times as fast.
+        repeated: whether the same will be asked of other numbers again and again, as by a slider: then compiling pays
+            for few points as well, once; a thousand poses take a millisecond from then on.
 
     Raises:
         InputError: there is no GPU, or it fails.
@@ -82,7 +85,7 @@ def evaluate(
     method: Method
     if device is Device.GPU:
         slab, most, method = GPU_SLAB, 1, partial(_program_fill, device=device)
-    elif points.size >= NATIVE_FROM:
+    elif repeated or points.size >= NATIVE_FROM:
         slab, most, method = NATIVE_SLAB, threads or available_cores(), _program_fill
     else:
         slab, most, method = NUMPY_SLAB, 1, _numpy_fill

@@ -1,6 +1,7 @@
 // Draws scenes of solids: light, materials, camera and labels live here; what there is to see does not.
 import { CSS2DObject, CSS2DRenderer, OrbitControls, THREE } from "nicegui-scene";
 import { geometryOf } from "kinetostat-studio/solid_geometry.js";
+import { isDark, onTheme } from "kinetostat-studio/theme.js";
 
 const LOOKS = {
   base: { color: 0x8b929c, metalness: 0.15, roughness: 0.6 },
@@ -14,7 +15,7 @@ const LOOKS = {
   tool: { color: 0xb9a76a, metalness: 0.8, roughness: 0.3 },
   spring: { color: 0x17a673, metalness: 0.3, roughness: 0.35 },
   load: { color: 0xc81e4a, metalness: 0.0, roughness: 0.5 },
-  ghost: { color: 0xc81e4a, metalness: 0.0, roughness: 0.9, opacity: 0.3 },
+  ghost: { color: 0xd01f50, metalness: 0.0, roughness: 0.9, opacity: 0.4 },
   translation: { color: 0x2f9fe0, metalness: 0.0, roughness: 0.35, opacity: 0.38 },
   rotation: { color: 0xa855c7, metalness: 0.1, roughness: 0.4 },
   "soft translation": { color: 0x0b7fc7, metalness: 0.1, roughness: 0.4 },
@@ -33,7 +34,7 @@ const UNLIT = new Set(["frames", "directions", "ellipsoids", "deflection"]);
 export default {
   template: `<div class="machine-view"><canvas tabindex="0" role="img" :aria-label="label"
       @keydown="turn"></canvas><div class="machine-labels"></div></div>`,
-  props: { label: String, dark: Boolean, hidden: Array },
+  props: { label: String, hidden: Array },
   mounted() {
     const canvas = this.$el.querySelector("canvas");
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: false });
@@ -64,6 +65,7 @@ export default {
     this.groups = {};
     this.light();
     this.theme();
+    this.themes = onTheme(() => this.theme());
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.$el);
     this.resize();
@@ -71,13 +73,11 @@ export default {
   },
   beforeUnmount() {
     this.observer.disconnect();
+    this.themes.disconnect();
     this.controls.dispose();
     this.renderer.dispose();
   },
   watch: {
-    dark() {
-      this.theme();
-    },
     hidden() {
       this.hide();
       this.draw();
@@ -120,7 +120,7 @@ export default {
       this.world.add(this.floor);
     },
     theme() {
-      const look = THEMES[this.dark ? "dark" : "light"];
+      const look = THEMES[isDark() ? "dark" : "light"];
       this.world.background = new THREE.Color(look.sky);
       this.world.fog = null;
       this.world.environmentIntensity = look.light;
@@ -136,7 +136,7 @@ export default {
       }
       const size = this.size;
       if (!size) return;
-      const look = THEMES[this.dark ? "dark" : "light"];
+      const look = THEMES[isDark() ? "dark" : "light"];
       const step = 10 ** Math.round(Math.log10(size / 8));
       const count = Math.ceil((1.6 * size) / step);
       const reach = count * step;
@@ -275,18 +275,21 @@ export default {
       this.labelRenderer.setSize(width, height);
       this.camera.aspect = width / height;
       this.camera.updateProjectionMatrix();
-      this.draw();
+      this.render(); // at once: a canvas is empty after its size has changed
     },
     draw() {
       if (this.pending) return;
       this.pending = true;
       requestAnimationFrame(() => {
         this.pending = false;
-        this.renderer.render(this.world, this.camera);
-        this.labelRenderer.render(this.world, this.camera);
-        this.$el.dataset.drawn = Number(this.$el.dataset.drawn ?? 0) + 1;
-        this.$el.dataset.solids = this.groups.machine?.meshes.size ?? 0;
+        this.render();
       });
+    },
+    render() {
+      this.renderer.render(this.world, this.camera);
+      this.labelRenderer.render(this.world, this.camera);
+      this.$el.dataset.drawn = Number(this.$el.dataset.drawn ?? 0) + 1;
+      this.$el.dataset.solids = this.groups.machine?.meshes.size ?? 0;
     },
   },
 };

@@ -192,8 +192,10 @@ def deflection_overlays(
     moved = [*found.motion.components(), *(c for link in found.links for c in link.end_motion.components())]
     if not all(math.isfinite(c) for c in moved):
         return loads, 1.0
-    _, platform = plates(configuration, [anatomy(leg) for leg in configuration.legs], sizes.leg)
+    legs = [anatomy(leg) for leg in configuration.legs]
+    _, platform = plates(configuration, legs, sizes.leg)
+    radii = {leg.leg: _radius(leg, sizes) for leg in legs}
     reach = max((joint - point).norm() for joint in platform.joints)
     chosen = factor or overlays.exaggeration(found.links, found.motion, reach, sizes.diagonal)
     body = [*platform.solids(), *_tool(machine, configuration, platform, sizes.leg)]
-    return [*loads, *overlays.ghost_solids(found.links, body, found.motion, point, chosen, sizes.leg)], chosen
+    return [*loads, *overlays.ghost_solids(found.links, body, found.motion, point, chosen, radii)], chosen

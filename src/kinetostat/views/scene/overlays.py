@@ -1,7 +1,7 @@
 """What a machine does, drawn into its scene: load, deflected shape, compliance ellipsoids, soft directions, frames."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import cos, sin
@@ -16,8 +16,10 @@ LARGEST_ELLIPSOID = {"translation": 0.16, "rotation": 0.11}
 """Longest semi-axis of an ellipsoid as a share of the machine's diagonal."""
 THINNEST = 0.012
 """Least semi-axis in units of the longest: what does not yield is still seen as a disc or a needle."""
-SHOWN_DEFLECTION = 0.07
+SHOWN_DEFLECTION = 0.09
 """Greatest displacement of an exaggerated shape as a share of the machine's diagonal."""
+GHOST_WIDTH = 0.7
+"""Radius of a deflected link, in radii of its leg."""
 GHOST_POINTS = 12
 """Points along a deflected link."""
 LEAST_LOAD = 1e-12
@@ -188,7 +190,7 @@ def ghost_solids(
     motion: Twist,
     point: Vector,
     factor: float,
-    radius: float,
+    radii: Mapping[str, float],
 ) -> list[Solid]:
     """The deflected machine: its links as bent wires and its platform, displacements times `factor`.
 
@@ -198,13 +200,13 @@ def ghost_solids(
         motion: of the platform at `point`, base frame.
         point: the tool point, m.
         factor: of exaggeration.
-        radius: of a leg, m.
+        radii: from which each leg is drawn, m, by its name.
     """
     found = []
     for n, link in enumerate(links):
         points = [link.point(i / GHOST_POINTS, factor) for i in range(GHOST_POINTS + 1)]
         path = tuple((p.x, p.y, p.z) for p in points)
-        found.append(Solid(f"ghost/link {n}", Swept(path, 0.55 * radius), "ghost", layer="deflection"))
+        found.append(Solid(f"ghost/link {n}", Swept(path, GHOST_WIDTH * radii[link.leg]), "ghost", layer="deflection"))
     moved = _exaggerated(motion, point, factor)
     return [
         *found,

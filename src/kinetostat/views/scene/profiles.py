@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from kinetostat.algebra.vector import Vector
+from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Configuration, Machine
 
@@ -41,10 +41,11 @@ class Proportions:
 
 
 def diagonal(configuration: Configuration) -> float:
-    """Diagonal of the box around all joints and P, m."""
+    """Diagonal of the box around P and all joints that the pose places, m."""
     points = [p for leg in configuration.legs for p in leg.path] + [configuration.platform.translation]
-    spans = [max(values) - min(values) for values in zip(*(p.components() for p in points), strict=True)]
-    return math.hypot(*spans) or float(configuration.length)
+    placed = [p for p in points if all(math.isfinite(c) for c in p.components())]
+    low, high = bounds(placed) if placed else (ZERO, ZERO)
+    return math.hypot(*(high - low).components()) or float(configuration.length)
 
 
 def leg_radius(machine: Machine, size: float) -> float:

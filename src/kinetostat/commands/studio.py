@@ -1,0 +1,65 @@
+"""The command `studio`: a page in the browser on which to see and move a machine."""
+
+import argparse
+import sys
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+from kinetostat.commands.common import DONE, MACHINE, add_command
+
+if TYPE_CHECKING:
+    from kinetostat.commands.common import Commands
+
+FIRST = "zhang-gosselin-4dof"
+"""The machine that is shown where none is named."""
+PORT = 8000
+LOCAL = ("127.0.0.1", "localhost", "::1")
+EXTRA = "nicegui"
+"""What the studio needs beside kinetostat itself."""
+
+
+def add_studio_command(commands: "Commands") -> None:
+    """Add the command."""
+    studio = add_command(
+        commands, "studio", _studio, "see a machine, move it, and see where it is stiff, in a browser",
+        "kinetostat studio tripteron --port 8010",
+    )  # fmt: skip
+    studio.add_argument("machine", metavar="MACHINE", nargs="?", default=FIRST, help=f"{MACHINE}; default: {FIRST}")
+    studio.add_argument(
+        "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",
+        help='override a field, e.g. --set geometry.base_radius="26 cm"; repeatable',
+    )  # fmt: skip
+    studio.add_argument("--port", type=_port, default=PORT, help=f"port to listen at (default: {PORT})")
+    studio.add_argument(
+        "--host", default=LOCAL[0],
+        help="address to listen at (default: 127.0.0.1, which only this computer can reach)",
+    )  # fmt: skip
+    studio.add_argument("--no-browser", action="store_true", help="do not open a browser")
+
+
+def _port(text: str) -> int:
+    if not text.isdecimal() or not 0 < int(text[:6]) < 65536:
+        raise argparse.ArgumentTypeError(f"{text} is no port; give a number from 1 to 65535")
+    return int(text)
+
+
+def _studio(options: argparse.Namespace) -> int:
+    from kinetostat.machine.loading import bundled, load
+    from kinetostat.spec.errors import InputError
+
+    machine = load(options.machine, options.settings)
+    if find_spec(EXTRA) is None:
+        raise InputError("the studio is not installed; install it with `pip install 'kinetostat[studio]'`.")
+    from kinetostat.studio.serving import serve
+
+    shown = f"[{options.host}]" if ":" in options.host else options.host
+    print(f"Studio: http://{shown}:{options.port}   stop with Ctrl-C", file=sys.stderr)
+    if options.host not in LOCAL:
+        print(
+            f"kinetostat: --host {options.host} lets everyone who can reach this computer open the studio, without "
+            "password or encryption: use it in a network that you trust.",
+            file=sys.stderr,
+        )
+    name = options.machine if options.machine in bundled() and not options.settings else ""
+    serve(machine, name, options.host, options.port, not options.no_browser)
+    return DONE

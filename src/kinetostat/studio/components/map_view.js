@@ -1,0 +1,222 @@
+// A map of one quantity over two coordinates; a click or an arrow key asks the machine to go there.
+import { colour, onTheme } from "kinetostat-studio/theme.js";
+import { frame, niceTicks, prepare, short } from "kinetostat-studio/plot_axes.js";
+
+const VIRIDIS = [
+  [68, 1, 84], [72, 36, 117], [65, 68, 135], [53, 95, 141], [42, 120, 142], [33, 145, 140],
+  [34, 168, 132], [68, 191, 112], [122, 209, 81], [189, 223, 38], [253, 231, 37],
+];
+const BANDS = 16;
+const WIDE_RANGE = 50; // ratio of the extremes from which colours follow the logarithm
+
+function viridis(share) {
+  const at = Math.min(Math.max(share, 0), 1) * (VIRIDIS.length - 1);
+  const i = Math.min(Math.floor(at), VIRIDIS.length - 2);
+  return VIRIDIS[i].map((c, k) => c + (VIRIDIS[i + 1][k] - c) * (at - i));
+}
+
+export default {
+  template: `<div class="plot"><canvas tabindex="0" role="img" :aria-label="label" @pointerdown="press"
+      @pointermove="hover" @pointerup="release" @pointerleave="leave" @keydown="step"></canvas>
+      <div class="plot-tip" aria-hidden="true"></div></div>`,
+  props: { label: String },
+  emits: ["pick", "settle"],
+  mounted() {
+    this.canvas = this.$el.querySelector("canvas");
+    this.tip = this.$el.querySelector(".plot-tip");
+    this.observer = new ResizeObserver(() => this.draw());
+    this.observer.observe(this.$el);
+    this.themes = onTheme(() => this.draw());
+  },
+  beforeUnmount() {
+    this.observer.disconnect();
+    this.themes.disconnect();
+  },
+  methods: {
+    show(map) {
+      this.map = map;
+      const known = map.values.filter((value) => value !== null);
+      const low = Math.min(...known);
+      const high = Math.max(...known);
+      this.range = { low, high, log: low > 0 && high / low > WIDE_RANGE, none: known.length === 0 };
+      this.draw();
+      this.$el.dataset.shown = Number(this.$el.dataset.shown ?? 0) + 1;
+    },
+    mark(here) {
+      if (!this.map) return;
+      this.map.here = here;
+      this.draw();
+    },
+    share(value) {
+      const { low, high, log } = this.range;
+      if (!(high - low > 1e-9 * Math.abs(high))) return 0.5;
+      return log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+    },
+    inverse(share) {
+      const { low, high, log } = this.range;
+      return log ? low * (high / low) ** share : low + (high - low) * share;
+    },
+    draw() {
+      if (!this.map) return;
+      const sheet = prepare(this.canvas, this.$el);
+      if (!sheet) return;
+      const { pen, width, height } = sheet;
+      const box = { left: 0, bottom: height, x: 58, y: 8, width: width - 58 - 78, height: height - 8 - 40 };
+      this.box = box;
+      if (box.width < 20 || box.height < 20) return;
+      this.paint(pen, box, sheet.ratio);
+      const { x, y } = this.map;
+      const across = niceTicks(x.low, x.high, Math.max(2, box.width / 62));
+      const up = niceTicks(y.low, y.high, Math.max(2, box.height / 42));
+      frame(pen, box, {
+        x: across.map((t) => [this.toX(t), short(t)]),
+        y: up.map((t) => [this.toY(t), short(t)]),
+      }, { x: x.label, y: y.label });
+      this.bar(pen, box);
+      this.cross(pen, box);
+    },
+    paint(pen, box, ratio) {
+      const { nx, ny, values } = this.map;
+      const [w, h] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
+      const image = pen.createImageData(w, h);
+      const bands = new Int16Array(w * h);
+      const shares = values.map((value) => (value === null ? null : this.share(value)));
+      const empty = colour("surface-sunk");
+      const [er, eg, eb] = [1, 3, 5].map((i) => parseInt(empty.slice(i, i + 2), 16));
+      for (let j = 0; j < h; j++) {
+        const v = (1 - (j + 0.5) / h) * (ny - 1);
+        const j0 = Math.min(Math.floor(v), ny - 2);
+        for (let i = 0; i < w; i++) {
+          const u = ((i + 0.5) / w) * (nx - 1);
+          const i0 = Math.min(Math.floor(u), nx - 2);
+          const [fu, fv] = [u - i0, v - j0];
+          const k = i0 * ny + j0;
+          const corners = [shares[k], shares[k + ny], shares[k + 1], shares[k + ny + 1]];
+          const at = 4 * (j * w + i);
+          image.data[at + 3] = 255;
+          const nearest = corners[(fu > 0.5 ? 1 : 0) + (fv > 0.5 ? 2 : 0)];
+          if (nearest === null) {
+            bands[j * w + i] = -1;
+            const stripe = (i + j) % Math.round(7 * ratio) < ratio ? 0.86 : 1;
+            [image.data[at], image.data[at + 1], image.data[at + 2]] = [er * stripe, eg * stripe, eb * stripe];
+            continue;
+          }
+          const whole = corners.map((corner) => (corner === null ? nearest : corner));
+          const share = (1 - fv) * ((1 - fu) * whole[0] + fu * whole[1]) + fv * ((1 - fu) * whole[2] + fu * whole[3]);
+          const band = Math.min(Math.floor(share * BANDS), BANDS - 1);
+          bands[j * w + i] = band;
+          const left = i > 0 ? bands[j * w + i - 1] : band;
+          const above = j > 0 ? bands[(j - 1) * w + i] : band;
+          const edge = (left >= 0 && left !== band) || (above >= 0 && above !== band);
+          const rgb = viridis((band + 0.5) / BANDS);
+          for (let c = 0; c < 3; c++) image.data[at + c] = edge ? rgb[c] * 0.55 + 255 * 0.45 : rgb[c];
+        }
+      }
+      pen.putImageData(image, Math.round(box.x * ratio), Math.round(box.y * ratio));
+      if (this.range.none) {
+        pen.fillStyle = colour("ink");
+        pen.textAlign = "center";
+        pen.fillText("no pose can be reached here", box.x + box.width / 2, box.y + box.height / 2);
+      }
+    },
+    bar(pen, box) {
+      if (this.range.none) return;
+      const x = box.x + box.width + 12;
+      for (let band = 0; band < BANDS; band++) {
+        const rgb = viridis((band + 0.5) / BANDS);
+        pen.fillStyle = `rgb(${rgb.map(Math.round).join(",")})`;
+        const top = box.y + box.height * (1 - (band + 1) / BANDS);
+        pen.fillRect(x, top, 11, box.height / BANDS + 0.6);
+      }
+      pen.fillStyle = colour("ink-soft");
+      pen.textAlign = "left";
+      pen.textBaseline = "middle";
+      const constant = this.range.high - this.range.low <= 1e-9 * Math.abs(this.range.high);
+      for (const share of constant ? [0.5] : [0, 0.25, 0.5, 0.75, 1]) {
+        const at = Math.min(Math.max(box.y + box.height * (1 - share), box.y + 5), box.y + box.height - 5);
+        pen.fillText(short(constant ? this.range.high : this.inverse(share)), x + 15, at);
+      }
+    },
+    cross(pen, box) {
+      const { here } = this.map;
+      if (!here) return;
+      const [x, y] = [this.toX(here[0]), this.toY(here[1])];
+      if (x < box.x - 1 || x > box.x + box.width + 1 || y < box.y - 1 || y > box.y + box.height + 1) return;
+      for (const [width, style] of [[4, "rgba(0,0,0,.55)"], [2, "#fff"]]) {
+        pen.lineWidth = width;
+        pen.strokeStyle = style;
+        pen.beginPath();
+        pen.arc(x, y, 7, 0, 7);
+        for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+          pen.moveTo(x + 7 * dx, y + 7 * dy);
+          pen.lineTo(x + 13 * dx, y + 13 * dy);
+        }
+        pen.stroke();
+      }
+    },
+    toX(value) {
+      const { low, high } = this.map.x;
+      return this.box.x + (this.box.width * (value - low)) / (high - low);
+    },
+    toY(value) {
+      const { low, high } = this.map.y;
+      return this.box.y + this.box.height * (1 - (value - low) / (high - low));
+    },
+    where(event) {
+      const frame = this.canvas.getBoundingClientRect();
+      const u = (event.clientX - frame.left - this.box.x) / this.box.width;
+      const v = 1 - (event.clientY - frame.top - this.box.y) / this.box.height;
+      const inside = u >= 0 && u <= 1 && v >= 0 && v <= 1;
+      const clip = (share) => Math.min(Math.max(share, 0), 1);
+      return { u: clip(u), v: clip(v), inside };
+    },
+    pick({ u, v }) {
+      const { x, y } = this.map;
+      const here = [x.low + (x.high - x.low) * u, y.low + (y.high - y.low) * v];
+      this.mark(here);
+      this.$emit("pick", { x: here[0], y: here[1] });
+    },
+    press(event) {
+      if (!this.map || event.button !== 0) return;
+      const at = this.where(event);
+      if (!at.inside) return;
+      this.dragging = true;
+      this.canvas.setPointerCapture(event.pointerId);
+      this.pick(at);
+    },
+    hover(event) {
+      if (!this.map || !this.box) return;
+      const at = this.where(event);
+      if (this.dragging) this.pick(at);
+      if (!at.inside) return this.leave();
+      const { nx, ny, values, x, y, unit } = this.map;
+      const value = values[Math.round(at.u * (nx - 1)) * ny + Math.round(at.v * (ny - 1))];
+      const place = `${short(x.low + (x.high - x.low) * at.u)}, ${short(y.low + (y.high - y.low) * at.v)}`;
+      this.tip.textContent = value === null ? `${place}: no answer` : `${place}: ${short(value)} ${unit}`;
+      const frame = this.canvas.getBoundingClientRect();
+      this.tip.style.left = `${Math.min(event.clientX - frame.left + 12, frame.width - 150)}px`;
+      this.tip.style.top = `${event.clientY - frame.top + 14}px`;
+      this.tip.style.display = "block";
+    },
+    release() {
+      if (this.dragging) this.$emit("settle");
+      this.dragging = false;
+    },
+    leave() {
+      this.tip.style.display = "none";
+    },
+    step(event) {
+      const moves = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+      const move = moves[event.key];
+      if (!move || !this.map?.here) return;
+      event.preventDefault();
+      const { x, y, here } = this.map;
+      const clip = (share) => Math.min(Math.max(share, 0), 1);
+      this.pick({
+        u: clip((here[0] - x.low) / (x.high - x.low) + 0.02 * move[0]),
+        v: clip((here[1] - y.low) / (y.high - y.low) + 0.02 * move[1]),
+      });
+      this.$emit("settle");
+    },
+  },
+};

@@ -1,0 +1,53 @@
+"""Work off the event loop, the latest wish first: what was asked for in between is never computed."""
+
+import logging
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+from nicegui import background_tasks, run
+
+Wish = TypeVar("Wish")
+Result = TypeVar("Result")
+
+log = logging.getLogger("kinetostat")
+
+
+class Lane(Generic[Wish, Result]):
+    """One kind of work of one page: at most one under way, at most one waiting."""
+
+    def __init__(self, work: Callable[[Wish], Result], deliver: Callable[[Wish, Result], None]) -> None:
+        """A lane.
+
+        Args:
+            work: from a wish to its result, in a thread; touches no page.
+            deliver: shows the result, on the event loop.
+        """
+        self._work, self._deliver = work, deliver
+        self._waiting: list[Wish] = []
+        self._busy = False
+        self._open = True
+
+    def ask(self, wish: Wish) -> None:
+        """Compute this next, instead of what else is waiting."""
+        self._waiting = [wish]
+        if not self._busy and self._open:
+            self._busy = True
+            background_tasks.create(self._run(), name="studio lane")
+
+    def close(self) -> None:
+        """Finish what is under way and deliver nothing any more: the page is gone."""
+        self._open = False
+        self._waiting.clear()
+
+    async def _run(self) -> None:
+        try:
+            while self._waiting:
+                wish = self._waiting.pop()
+                result = await run.io_bound(self._work, wish)
+                if self._open and result is not None:
+                    self._deliver(wish, result)
+        except Exception:
+            log.exception("the studio could not compute or show something")
+            raise
+        finally:
+            self._busy = False

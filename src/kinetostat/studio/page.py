@@ -1,0 +1,196 @@
+"""One designer's page: session, panels, and what follows when the machine changes. No formula here."""
+
+import time
+from collections.abc import Callable
+
+from nicegui import events, ui
+
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.loading import bundled
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.document import LARGEST_FILE
+from kinetostat.spec.errors import InputError
+from kinetostat.studio.answers import Picture, PictureWish, Report, ReportWish, picture, report
+from kinetostat.studio.lanes import Lane
+from kinetostat.studio.map_panel import MapPanel
+from kinetostat.studio.panels.blame import BlamePanel
+from kinetostat.studio.panels.indices import IndicesPanel
+from kinetostat.studio.panels.link_stiffness import LinkPanel
+from kinetostat.studio.panels.matrices import MatricesPanel
+from kinetostat.studio.panels.panel import Panel
+from kinetostat.studio.panels.sensitivity import SensitivityPanel
+from kinetostat.studio.panels.under_load import UnderLoadPanel
+from kinetostat.studio.parameters_panel import ParametersPanel
+from kinetostat.studio.scene_panel import ScenePanel
+from kinetostat.studio.session import Session
+from kinetostat.views.scene.machine_scene import proportions_of
+
+PANELS: tuple[Callable[[], Panel], ...] = (
+    BlamePanel, MatricesPanel, IndicesPanel, SensitivityPanel, LinkPanel, UnderLoadPanel,
+)  # fmt: skip
+"""The linked views, in the order of their tabs."""
+ACCENT = "#0b5ea8"
+"""Colour of what can be pressed; style.css has it by name."""
+OTHER = "own"
+"""Key of a machine that is not bundled in the list of machines."""
+
+
+class StudioPage:
+    """A page with its own session; another tab has another."""
+
+    def __init__(self, machine: Machine, name: str = "") -> None:
+        """Build the page around a machine and start to compute; `name` is that of a bundled one."""
+        self.session, self._name = Session(machine), name
+        self._pictures = Lane(picture, self._show_picture)
+        self._reports = Lane(report, self._show_report)
+        self._latest: Report | None = None
+        self.dark = ui.dark_mode(value=False)
+        ui.colors(primary=ACCENT)
+        self._header()
+        with ui.element("main").classes("studio"):
+            with ui.element("section").classes("left").props('aria-label="parameters"'):
+                self.parameters = ParametersPanel(self.session, self.changed)
+            with ui.element("section").classes("middle").props('aria-label="machine"'):
+                self.scene = ScenePanel()
+            with ui.element("section").classes("right").props('aria-label="linked views"'):
+                with ui.element("div").classes("card map-card"):
+                    self.map = MapPanel(self.session, self.changed, self._refuse)
+                with ui.element("div").classes("card views-card"):
+                    self._views()
+        ui.context.client.on_delete(self._close)
+        ui.keyboard(on_key=self._key, ignore=["input", "select", "textarea"])
+        self._loaded()
+
+    def _header(self) -> None:
+        with ui.element("header").classes("top"):
+            ui.html("kineto<b>stat</b> studio", sanitize=False).classes("wordmark")
+            self.machines = ui.select({}, on_change=self._choose).mark("machines")
+            self.machines.props('dense options-dense outlined aria-label="machine"').classes("field machine-choice")
+            self.undo = self._button("undo", "Undo (Ctrl+Z)", self._undo)
+            self.redo = self._button("redo", "Redo (Ctrl+Y)", self._redo)
+            self.reset = self._button("restart_alt", "Back to the machine as it was loaded", self._reset)
+            ui.space()
+            self.upload = ui.upload(
+                on_upload=self._open_upload, on_rejected=lambda: self._refuse(TOO_LARGE), auto_upload=True,
+                max_file_size=LARGEST_FILE, max_files=1,
+            ).props('accept=".toml" aria-hidden="true"').classes("unseen").mark("upload")  # fmt: skip
+            self._button("folder_open", "Open a machine file", lambda: self.upload.run_method("pickFiles"), "open")
+            self._button("download", "Save the machine as a file", self._save, "save")
+            self._button("contrast", "Light or dark", self.dark.toggle, "theme")
+
+    @staticmethod
+    def _button(icon: str, text: str, action: Callable[[], object], name: str = "") -> ui.button:
+        button = ui.button(icon=icon, on_click=action).props(f'flat round dense aria-label="{text}"')
+        return button.tooltip(text).mark(name or icon)
+
+    def _views(self) -> None:
+        self.panels: dict[str, Panel] = {}
+        made = [panel() for panel in PANELS]
+        with ui.tabs(on_change=self._show_front).classes("panel-tabs").props("dense no-caps") as self.tabs:
+            for panel in made:
+                ui.tab(panel.name).mark(f"tab-{panel.name}")
+        with ui.tab_panels(self.tabs, value=made[0].name, animated=False).classes("panel-body").props("keep-alive"):
+            for panel in made:
+                with ui.tab_panel(panel.name):
+                    panel.build()
+                self.panels[panel.name] = panel
+
+    def changed(self) -> None:
+        """The machine has other numbers: compute and show what follows from them."""
+        since = time.perf_counter()
+        self._pictures.ask(PictureWish(self.session.machine, self._sizes, since))
+        self.parameters.refresh()
+        self._offer_history()
+
+    def _loaded(self) -> None:
+        """Another machine has been loaded: everything is made anew."""
+        machine = self.session.machine
+        names = {name: name for name in bundled()}
+        options = names if self._name else {OTHER: machine.name, **names}
+        self._listening = False
+        self.machines.set_options(options, value=self._name or OTHER)
+        self._listening = True
+        ui.page_title(f"{machine.name} · kinetostat studio")
+        self._sizes = proportions_of(machine, respond(machine).configuration)
+        self.parameters.fill()
+        self.map.fill()
+        self._offer_history()
+        self._pictures.ask(PictureWish(machine, self._sizes, time.perf_counter(), fit=True))
+
+    def _offer_history(self) -> None:
+        self.undo.set_enabled(self.session.can_undo)
+        self.redo.set_enabled(self.session.can_redo)
+        self.reset.set_enabled(self.session.machine is not self.session.origin)
+
+    def _show_picture(self, wish: PictureWish, found: Picture) -> None:
+        """What the eye follows comes first; then the map, and everything else."""
+        self.scene.draw(found)
+        self.map.refresh(wish.since)
+        self._reports.ask(ReportWish(self.session.machine, self._sizes, None))
+
+    def _show_report(self, _wish: ReportWish, found: Report) -> None:
+        self.scene.explain(found)
+        if found.analysis.status is Status.OK:
+            self._latest = found
+            self._show_front()
+
+    def _show_front(self) -> None:
+        if self._latest is not None and self.tabs.value in self.panels:
+            self.panels[str(self.tabs.value)].show(self._latest, self.session)
+
+    def _choose(self) -> None:
+        if self._listening and self.machines.value != OTHER:
+            name = str(self.machines.value)
+            self._attempt(lambda: self.session.open(name), name)
+
+    async def _open_upload(self, event: events.UploadEventArguments) -> None:
+        data = await event.file.read()
+        name = event.file.name
+        self._attempt(lambda: self.session.open_bytes(data, name), "")
+        self.upload.reset()
+
+    def _attempt(self, opening: Callable[[], None], name: str) -> None:
+        try:
+            opening()
+        except InputError as error:
+            self._refuse(str(error))
+            return
+        self._name = name
+        self._loaded()
+
+    def _save(self) -> None:
+        name, content = self.session.as_file()
+        ui.download(content, name, "application/toml")
+
+    def _undo(self) -> None:
+        self.session.undo()
+        self.changed()
+
+    def _redo(self) -> None:
+        self.session.redo()
+        self.changed()
+
+    def _reset(self) -> None:
+        self.session.reset()
+        self.changed()
+
+    def _key(self, event: events.KeyEventArguments) -> None:
+        if event.action.keydown and event.modifiers.ctrl:
+            if event.key.name.lower() == "z" and not event.modifiers.shift:
+                self._undo()
+            elif event.key.name.lower() in ("y", "z"):
+                self._redo()
+
+    @staticmethod
+    def _refuse(message: str) -> None:
+        ui.notify(message, type="negative", multi_line=True, close_button="close", timeout=0, position="top")
+
+    def _close(self) -> None:
+        for part in (self._pictures, self._reports, self.map):
+            part.close()
+        for panel in self.panels.values():
+            panel.close()
+
+
+TOO_LARGE = f"The file is larger than {LARGEST_FILE >> 20} MiB; a machine file is a short TOML text."

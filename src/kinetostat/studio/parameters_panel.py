@@ -1,0 +1,105 @@
+"""The left side of the page: every number of the machine as a slider and as text, in four panels."""
+
+from collections.abc import Callable
+from functools import partial
+from itertools import groupby
+from typing import Any
+
+from nicegui import ui
+from nicegui.events import GenericEventArguments
+
+from kinetostat.spec.errors import InputError
+from kinetostat.studio.controls import PANELS, STEPS, Control
+from kinetostat.studio.elements import QuantityRow
+from kinetostat.studio.session import Session
+from kinetostat.studio.wording import shown
+
+THROTTLE = 0.03
+"""Seconds between two positions of a slider that a browser sends; the last one is always sent."""
+OPEN = 12
+"""Controls of a group up to which it is open from the start."""
+
+
+class ParametersPanel:
+    """Tabs of controls; rows of a group are made when it is first opened."""
+
+    def __init__(self, session: Session, on_change: Callable[[], None]) -> None:
+        """A panel for a session; `on_change` is called after every change of the machine."""
+        self._session, self._on_change = session, on_change
+        self._rows: dict[str, QuantityRow] = {}
+        with ui.tabs().classes("panel-tabs").props("dense no-caps") as tabs:
+            for panel in PANELS:
+                ui.tab(panel).mark(f"tab-{panel}")
+        with ui.tab_panels(tabs, value=PANELS[0], animated=False).classes("panel-body").props("keep-alive"):
+            self._places = {panel: self._place(panel) for panel in PANELS}
+        self.fill()
+
+    @staticmethod
+    def _place(panel: str) -> ui.element:
+        with ui.tab_panel(panel):
+            return ui.element("div").classes("controls")
+
+    def fill(self) -> None:
+        """Make the controls of a machine that has just been loaded."""
+        self._rows.clear()
+        for panel, place in self._places.items():
+            place.clear()
+            chosen = [control for control in self._session.controls.values() if control.panel == panel]
+            with place:
+                for group, members in groupby(chosen, key=lambda control: control.group):
+                    self._group(group, list(members), len(chosen))
+
+    def _group(self, group: str, members: list[Control], total: int) -> None:
+        if total <= OPEN or len(members) == total:
+            self._make(members)
+            return
+        with ui.expansion(group, value=total <= 2 * OPEN).classes("group").props("dense") as expansion:
+            place = ui.element("div")
+        if expansion.value:
+            with place:
+                self._make(members)
+        else:
+            expansion.on_value_change(lambda: self._make_within(place, members))
+
+    def _make_within(self, place: ui.element, members: list[Control]) -> None:
+        if members[0].path not in self._rows:
+            with place:
+                self._make(members)
+
+    def _make(self, members: list[Control]) -> None:
+        held = self._session.values()
+        for control in members:
+            row = QuantityRow(control.label, control.parameter.quantity.meaning, STEPS, control.slides)
+            row.mark(f"control {control.path}")
+            row.on("slide", partial(self._slide, control.path), throttle=THROTTLE)
+            row.on("settle", partial(self._settle, control.path))
+            row.on("write", partial(self._write, control.path))
+            self._rows[control.path] = row
+            self._put(control, held[control.path])
+
+    def refresh(self) -> None:
+        """Show the machine's present numbers."""
+        held = self._session.values()
+        for path in self._rows:
+            self._put(self._session.controls[path], held[path])
+
+    def _put(self, control: Control, value: float) -> None:
+        self._rows[control.path].put(shown(control.parameter.quantity, value), control.position_of(value))
+
+    def _slide(self, path: str, event: GenericEventArguments) -> None:
+        self._try(path, lambda: self._session.slide(path, int(event.args)))
+
+    def _settle(self, path: str, _event: GenericEventArguments) -> None:
+        self._try(path, self._session.settle)
+
+    def _write(self, path: str, event: GenericEventArguments) -> None:
+        self._try(path, lambda: self._session.write(path, str(event.args)))
+
+    def _try(self, path: str, change: Callable[[], Any]) -> None:
+        try:
+            change()
+        except InputError as error:
+            self._on_change()
+            self._rows[path].complain(str(error))
+            return
+        self._on_change()

@@ -1,0 +1,87 @@
+"""The studio as a web server on this computer: who may reach it, how much may be sent, what is served."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from nicegui import app, ui
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.document import LARGEST_FILE
+from kinetostat.studio.page import StudioPage
+
+STYLE = Path(__file__).parent / "style.css"
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+"""Names under which only this computer can be reached."""
+LARGEST_BODY = LARGEST_FILE + (64 << 10)
+"""Bytes of a request: a machine file and what a form adds to it."""
+MARK = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 32"><rect width="32" height="32" rx="7" fill="#0b5ea8"/>'
+    '<path d="M7 25h18M10 25l3-14h6l3 14M11 9h10" stroke="#fff" stroke-width="2.4" fill="none" stroke-linecap="round"/>'
+    "</svg>"
+)
+"""The icon of the page."""
+
+
+class BoundedBody:
+    """Refuses requests that are larger than a machine file can be, while they arrive."""
+
+    def __init__(self, served: ASGIApp, largest: int = LARGEST_BODY) -> None:
+        """Serve `served`, requests up to `largest` bytes."""
+        self._served, self._largest = served, largest
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, cut off where it is too large."""
+        if scope["type"] != "http":
+            await self._served(scope, receive, send)
+            return
+        said = next((value for name, value in scope["headers"] if name == b"content-length"), b"0")
+        if said.isdigit() and int(said) > self._largest:
+            await send({"type": "http.response.start", "status": 413, "headers": [(b"content-length", b"0")]})
+            await send({"type": "http.response.body", "body": b""})
+            return
+        seen = 0
+
+        async def counted() -> Message:
+            nonlocal seen
+            message = await receive()
+            seen += len(message.get("body", b""))
+            return message if seen <= self._largest else {"type": "http.disconnect"}
+
+        await self._served(scope, counted, send)
+
+
+def serve(machine: Machine, name: str, host: str, port: int, browser: bool) -> None:
+    """Serve the studio until it is stopped; every page starts with this machine.
+
+    Args:
+        machine: what a new page shows.
+        name: of it, if it is bundled; otherwise empty.
+        host: address to listen at.
+        port: to listen at.
+        browser: whether to open a browser.
+    """
+    prepare(machine, name, LOOPBACK if host in LOOPBACK else ())
+    ui.run(
+        host=host, port=port, title="kinetostat studio", favicon=MARK, show=browser, reload=False, tailwind=False,
+        show_welcome_message=False, reconnect_timeout=30.0, message_history_length=50,
+    )  # fmt: skip
+
+
+def prepare(machine: Machine, name: str = "", hosts: Sequence[str] = ()) -> None:
+    """Make the page known to the server.
+
+    Args:
+        machine: what a new page shows.
+        name: of it, if it is bundled; otherwise empty.
+        hosts: names by which a browser may call this server: a page of another site cannot reach it under its own name.
+    """
+    app.add_middleware(BoundedBody)
+    if hosts:
+        app.add_middleware(TrustedHostMiddleware, allowed_hosts=[*hosts, "[::1]"])
+
+    @ui.page("/")
+    def studio() -> None:
+        ui.add_css(STYLE)
+        StudioPage(machine, name)
