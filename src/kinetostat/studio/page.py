@@ -8,7 +8,6 @@ from nicegui import events, ui
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled
-from kinetostat.machine.machine import Machine
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, PictureWish, Report, ReportWish, picture, report
@@ -23,7 +22,7 @@ from kinetostat.studio.panels.sensitivity import SensitivityPanel
 from kinetostat.studio.panels.under_load import UnderLoadPanel
 from kinetostat.studio.parameters_panel import ParametersPanel
 from kinetostat.studio.scene_panel import ScenePanel
-from kinetostat.studio.session import Session
+from kinetostat.studio.session import Memory, Session
 from kinetostat.views.scene.machine_scene import proportions_of
 
 PANELS: tuple[Callable[[], Panel], ...] = (
@@ -39,9 +38,14 @@ OTHER = "own"
 class StudioPage:
     """A page with its own session; another tab has another."""
 
-    def __init__(self, machine: Machine, name: str = "") -> None:
-        """Build the page around a machine and start to compute; `name` is that of a bundled one."""
-        self.session, self._name = Session(machine), name
+    def __init__(self, memory: Memory, remember: Callable[[Memory], None]) -> None:
+        """Build the page around what is remembered, and start to compute.
+
+        Args:
+            memory: of this tab, or a new one.
+            remember: called with what is to be remembered of it, whenever that changes.
+        """
+        self.session, self._remember = Session(memory), remember
         self._pictures = Lane(picture, self._show_picture)
         self._reports = Lane(report, self._show_report)
         self._latest: Report | None = None
@@ -107,12 +111,12 @@ class StudioPage:
         """Another machine has been loaded: everything is made anew."""
         machine = self.session.machine
         names = {name: name for name in bundled()}
-        options = names if self._name else {OTHER: machine.name, **names}
+        options = names if self.session.name else {OTHER: machine.name, **names}
         self._listening = False
-        self.machines.set_options(options, value=self._name or OTHER)
+        self.machines.set_options(options, value=self.session.name or OTHER)
         self._listening = True
         ui.page_title(f"{machine.name} · kinetostat studio")
-        self._sizes = proportions_of(machine, respond(machine).configuration)
+        self._sizes = proportions_of(machine, respond(self.session.origin).configuration)
         self.parameters.fill()
         self.map.fill()
         self._offer_history()
@@ -122,6 +126,7 @@ class StudioPage:
         self.undo.set_enabled(self.session.can_undo)
         self.redo.set_enabled(self.session.can_redo)
         self.reset.set_enabled(self.session.machine is not self.session.origin)
+        self._remember(self.session.memory)
 
     def _show_picture(self, wish: PictureWish, found: Picture) -> None:
         """What the eye follows comes first; then the map, and everything else."""
@@ -142,21 +147,20 @@ class StudioPage:
     def _choose(self) -> None:
         if self._listening and self.machines.value != OTHER:
             name = str(self.machines.value)
-            self._attempt(lambda: self.session.open(name), name)
+            self._attempt(lambda: self.session.open(name))
 
     async def _open_upload(self, event: events.UploadEventArguments) -> None:
         data = await event.file.read()
         name = event.file.name
-        self._attempt(lambda: self.session.open_bytes(data, name), "")
+        self._attempt(lambda: self.session.open_bytes(data, name))
         self.upload.reset()
 
-    def _attempt(self, opening: Callable[[], None], name: str) -> None:
+    def _attempt(self, opening: Callable[[], None]) -> None:
         try:
             opening()
         except InputError as error:
             self._refuse(str(error))
             return
-        self._name = name
         self._loaded()
 
     def _save(self) -> None:

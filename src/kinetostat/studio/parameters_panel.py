@@ -101,5 +101,5 @@ class ParametersPanel:
         except InputError as error:
             self._on_change()
             self._rows[path].complain(str(error))
-            return
-        self._on_change()
+        else:
+            self._on_change()

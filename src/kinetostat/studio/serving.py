@@ -10,10 +10,13 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.studio.page import StudioPage
+from kinetostat.studio.session import Memory
 
 STYLE = Path(__file__).parent / "style.css"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 """Names under which only this computer can be reached."""
+KEPT = "machine"
+"""Under which a tab's work is remembered while the server runs."""
 LARGEST_BODY = LARGEST_FILE + (64 << 10)
 """Bytes of a request: a machine file and what a form adds to it."""
 MARK = (
@@ -65,7 +68,7 @@ def serve(machine: Machine, name: str, host: str, port: int, browser: bool) -> N
     prepare(machine, name, LOOPBACK if host in LOOPBACK else ())
     ui.run(
         host=host, port=port, title="kinetostat studio", favicon=MARK, show=browser, reload=False, tailwind=False,
-        show_welcome_message=False, reconnect_timeout=30.0, message_history_length=50,
+        show_welcome_message=False, reconnect_timeout=30.0, message_history_length=200,
     )  # fmt: skip
 
 
@@ -82,6 +85,19 @@ def prepare(machine: Machine, name: str = "", hosts: Sequence[str] = ()) -> None
         app.add_middleware(TrustedHostMiddleware, allowed_hosts=[*hosts, "[::1]"])
 
     @ui.page("/")
-    def studio() -> None:
-        ui.add_css(STYLE)
-        StudioPage(machine, name)
+    async def studio() -> None:
+        await show(machine, name)
+
+
+async def show(machine: Machine, name: str = "") -> None:
+    """Build the page of one browser tab; a tab that is loaded again goes on where it was.
+
+    Args:
+        machine: what a new tab shows.
+        name: of it, if it is bundled; otherwise empty.
+    """
+    ui.add_css(STYLE)
+    await ui.context.client.connected()
+    remembered = app.storage.tab
+    kept = remembered.get(KEPT) or Memory(machine, name)
+    StudioPage(kept, lambda memory: remembered.update({KEPT: memory}))

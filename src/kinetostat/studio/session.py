@@ -1,53 +1,75 @@
 """One designer's machine: what it is now, what it was, how it changes. Knows no page."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.changing import changed, read_value, rebuilt, related
-from kinetostat.machine.loading import as_toml, build, load
+from kinetostat.machine.loading import as_toml, build, bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.document import LARGEST_FILE, parse
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studio.controls import Control, controls
 
 REMEMBERED = 200
 """Steps that can be undone."""
 
 
-@dataclass
+@dataclass(frozen=True)
+class Memory:
+    """What a session remembers of a machine: nothing in it changes, so that it may be kept and shared.
+
+    Attributes:
+        origin: as it was loaded.
+        name: of a bundled machine; empty for any other.
+        now: as it is; `origin` if None.
+        past: what it was, the latest last.
+    """
+
+    origin: Machine
+    name: str = ""
+    now: Machine | None = None
+    past: tuple[Machine, ...] = ()
+
+
 class Session:
     """A machine and its history.
 
     Attributes:
         machine: as it is now; it need not be able to reach its pose.
-        origin: as it was loaded.
+        origin: as it was loaded; `name` if it is a bundled one.
         controls: its numbers with their ranges, fixed when it was loaded.
     """
 
-    machine: Machine
-    origin: Machine = field(init=False)
-    controls: dict[str, Control] = field(init=False)
+    def __init__(self, memory: Memory) -> None:
+        """A session that goes on from what is remembered."""
+        self._start(memory)
 
-    def __post_init__(self) -> None:
-        self._start(self.machine)
-
-    def _start(self, machine: Machine) -> None:
-        self.machine = self.origin = machine
+    def _start(self, memory: Memory) -> None:
+        machine, self.name = memory.origin, memory.name
+        self.origin = machine
+        self.machine = memory.now or machine
         length = float(respond(machine).configuration.length)
-        self.controls = {control.path: control for control in controls(machine, length)}
-        self._past: list[Machine] = []
+        self.controls: dict[str, Control] = {one.path: one for one in controls(machine, length)}
+        self._past = [*memory.past]
         self._future: list[Machine] = []
         self._dragged: tuple[str, ...] = ()
 
+    @property
+    def memory(self) -> Memory:
+        """All that is needed to go on later."""
+        return Memory(self.origin, self.name, self.machine, tuple(self._past))
+
     def open(self, name: str) -> None:
-        """Take a bundled machine, or a file on this computer.
+        """Take a bundled machine.
 
         Raises:
-            InputError: no such machine, or a mistake in its file; the session stays as it was.
+            InputError: no such machine; the session stays as it was.
         """
-        self._start(load(name))
+        if name not in bundled():
+            raise InputError(f"{shorten(name)} is not a bundled machine; choose one of {', '.join(bundled())}.")
+        self._start(Memory(load(name), name))
 
     def open_bytes(self, data: bytes, name: str) -> None:
         """Take a machine file that was sent: data only, of bounded size.
@@ -61,7 +83,7 @@ class Session:
             text = data.decode("utf-8")
         except UnicodeDecodeError:
             raise InputError(f'"{name}" is not text; a machine file is TOML, saved as UTF-8.') from None
-        self._start(build(parse(text, name), name))
+        self._start(Memory(build(parse(text, name), name)))
 
     def value(self, path: str) -> float:
         """The SI value of a control; of one for several entries the first."""

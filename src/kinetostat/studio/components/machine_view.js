@@ -31,24 +31,38 @@ const THEMES = {
 const VIEWS = { iso: [1.0, -1.35, 0.75], front: [0, -1, 0.02], side: [1, 0, 0.02], top: [0.001, -0.02, 1] };
 const UNLIT = new Set(["frames", "directions", "ellipsoids", "deflection"]);
 
+const SLOW = 120; // ms of a frame from which pictures are coarse while something moves, and fine at rest
+const COARSE = 0.5; // share of the pixels across
+const AT_REST = 500; // ms without movement
+
+function drawsInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const about = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = about ? gl.getParameter(about.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
 export default {
   template: `<div class="machine-view"><canvas tabindex="0" role="img" :aria-label="label"
       @keydown="turn"></canvas><div class="machine-labels"></div></div>`,
   props: { label: String, hidden: Array },
   mounted() {
     const canvas = this.$el.querySelector("canvas");
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: false });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawsInSoftware(), alpha: false });
     this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.autoUpdate = false;
     this.renderer.shadowMap.type = THREE.PCFSoftShadowMap;
     this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
     this.renderer.toneMappingExposure = 1.05;
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.labelRenderer = new CSS2DRenderer({ element: this.$el.querySelector(".machine-labels") });
     this.world = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(32, 1, 0.01, 100);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener("change", () => this.draw());
+    this.slow = drawsInSoftware();
+    this.sharpness(this.slow ? COARSE : 1);
     this.controls.maxPolarAngle = Math.PI * 0.96;
     this.materials = {};
     for (const [name, look] of Object.entries(LOOKS)) {
@@ -72,6 +86,7 @@ export default {
     canvas.addEventListener("webglcontextrestored", () => this.draw());
   },
   beforeUnmount() {
+    clearTimeout(this.resting);
     this.observer.disconnect();
     this.themes.disconnect();
     this.controls.dispose();
@@ -187,6 +202,7 @@ export default {
       });
       this.sun.shadow.normalBias = 0.004 * this.size;
       this.sun.shadow.camera.updateProjectionMatrix();
+      this.renderer.shadowMap.needsUpdate = true;
       this.draw();
     },
     overlay(solids, labels) {
@@ -238,6 +254,7 @@ export default {
           object.visible = !hidden.has(object.userData.layer);
         }
       }
+      this.renderer.shadowMap.needsUpdate = true;
     },
     look(view) {
       if (!this.centre) return;
@@ -278,12 +295,42 @@ export default {
       this.render(); // at once: a canvas is empty after its size has changed
     },
     draw() {
-      if (this.pending) return;
-      this.pending = true;
-      requestAnimationFrame(() => {
-        this.pending = false;
-        this.render();
-      });
+      this.wanted = true;
+      clearTimeout(this.resting);
+      if (this.drawing) return;
+      this.drawing = true;
+      requestAnimationFrame(() => this.frame(this.slow ? COARSE : 1));
+    },
+    frame(sharpness) {
+      this.wanted = false;
+      const started = performance.now();
+      this.sharpness(sharpness);
+      this.render();
+      const gl = this.renderer.getContext();
+      const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+      gl.flush();
+      const look = () => {
+        if (gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED && !gl.isContextLost()) return setTimeout(look, 10);
+        gl.deleteSync(fence);
+        const took = performance.now() - started;
+        if (sharpness < 1 || took > SLOW) this.slow = took > SLOW * 0.5;
+        setTimeout(() => this.rest(sharpness), this.slow ? took / 2 : 0); // leave the page time for itself
+      };
+      look();
+    },
+    rest(sharpness) {
+      this.drawing = false;
+      if (this.wanted) return this.draw();
+      if (sharpness < 1) {
+        this.resting = setTimeout(() => {
+          this.drawing = true;
+          this.frame(1);
+        }, AT_REST);
+      }
+    },
+    sharpness(share) {
+      const ratio = Math.min(window.devicePixelRatio || 1, 2) * share;
+      if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
     },
     render() {
       this.renderer.render(this.world, this.camera);

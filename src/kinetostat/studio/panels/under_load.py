@@ -14,7 +14,7 @@ ROTATIONS = ("rx", "ry", "rz")
 class UnderLoadPanel:
     """Tables of a load case."""
 
-    name = "Under load"
+    name = "Loads"
 
     def build(self) -> None:
         """The tables, empty."""
