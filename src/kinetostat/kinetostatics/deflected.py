@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import isinf
 
 import numpy as np
 
@@ -48,18 +49,22 @@ class DeflectedLink:
 def deflected_links(response: Response, load: Wrench) -> list[DeflectedLink]:
     """All links of a machine under a wrench at its tool point (N·m; N, base axes).
 
-    Springs give as they are loaded; passive joints turn so that each leg's end follows the platform (least squares of
-    J_p q = t - J_e d, which has a solution because the statics hold).
+    Springs give as they are loaded; passive joints and free springs move so that each leg's end follows the platform
+    (least squares of J_p q = t - J_e d, which has a solution because the statics hold).
     """
     platform = deflection(response.compliance, load)
     loads = iter(spring_loads(response, load))
     found: list[DeflectedLink] = []
     for leg, screws in zip(response.configuration.legs, response.legs, strict=True):
-        gives = [times(next(loads), compliance) for compliance in screws.compliance]
-        elastic = [twist * give for twist, give in zip(screws.elastic, gives, strict=True)]
+        pairs = [(twist, soft, next(loads)) for twist, soft in zip(screws.elastic, screws.compliance, strict=True)]
+        elastic = [None if isinf(soft) else twist * times(load, soft) for twist, soft, load in pairs]
+        free = [twist for twist, soft, _ in pairs if isinf(soft)]
         passive = [joint.twist(response.reference) for joint in leg.passive]
-        turned = _following(passive, platform - _sum(elastic), float(response.configuration.length))
-        found += _links(leg, response.reference, iter(turned), iter(elastic))
+        left = platform - _sum([twist for twist in elastic if twist is not None])
+        turned = _following([*passive, *free], left, float(response.configuration.length))
+        freed = iter(turned[len(passive) :])
+        given = [next(freed) if twist is None else twist for twist in elastic]
+        found += _links(leg, response.reference, iter(turned[: len(passive)]), iter(given))
     return found
 
 

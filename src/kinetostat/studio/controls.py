@@ -31,7 +31,8 @@ class Control:
         panel: one of `PANELS`.
         group: heading within the panel.
         low, high: ends of its slider, SI; equal where there is none.
-        logarithmic: whether positions are spaced by a constant factor; the last is then "rigid".
+        logarithmic: whether positions are spaced by a constant factor; of a stiffness the
+            first is 0 and the last is "rigid".
     """
 
     parameter: Parameter
@@ -61,18 +62,21 @@ class Control:
         share = min(max(position, 0), STEPS) / STEPS
         if not self.logarithmic:
             return self.low + (self.high - self.low) * share
-        if position >= STEPS and self.parameter.quantity.stiff:
-            return math.inf
+        if self.parameter.quantity.stiff and share in (0.0, 1.0):
+            return math.inf if share else 0.0
         return float(f"{self.low * (self.high / self.low) ** share:.4g}")
 
     def position_of(self, value: float) -> int:
         """The position nearest to a value."""
         if not self.slides:
             return 0
-        if self.logarithmic:
-            share = 0.0 if value <= 0.0 else 1.0 if math.isinf(value) else math.log(value / self.low)
-            return round(STEPS * min(max(share / math.log(self.high / self.low) if share != 1.0 else 1.0, 0.0), 1.0))
-        return round(STEPS * min(max((value - self.low) / (self.high - self.low), 0.0), 1.0))
+        if not self.logarithmic:
+            share = (value - self.low) / (self.high - self.low)
+        elif 0.0 < value < math.inf:
+            share = math.log(value / self.low) / math.log(self.high / self.low)
+        else:
+            share = float(value > 0.0)
+        return round(STEPS * min(max(share, 0.0), 1.0))
 
 
 def controls(machine: Machine, length: float) -> tuple[Control, ...]:

@@ -10,14 +10,13 @@ from kinetostat.kinetostatics.indices import PrincipalStiffness
 from kinetostat.studies.analysis import Analysis, Rows, SpringShare
 from kinetostat.studies.indices import Along
 from kinetostat.studies.loads import LoadCase
+from kinetostat.views.display import ROUNDING, without_rounding
 from kinetostat.views.tables import number, numeric_table
 
 UNITS_OF_K = "N·m/rad, N/rad, N/m"
 UNITS_OF_C = "rad/(N·m), rad/N, m/N"
 MOST_NAMED = 4
 """Parts of unknown mass that are named."""
-ROUNDING = 1e-12
-"""Share of the geometric mean of its diagonal entries below which an entry is shown as zero."""
 
 
 def print_analysis(console: Console, analysis: Analysis, along: Sequence[Along] = (), full: bool = False) -> None:
@@ -51,10 +50,8 @@ def _print_matrix(
     if rows is None:
         table.add_row("diagonal", *(number(value, endless) for value in diagonal))
     else:
-        for i, (name, row) in enumerate(zip(names, rows, strict=True)):
-            sizes = [math.sqrt(abs(rows[i][i] * rows[j][j])) for j in range(len(names))]
-            shown = [0.0 if abs(c) < ROUNDING * size else c for c, size in zip(row, sizes, strict=True)]
-            table.add_row(name, *(number(value) for value in shown))
+        for name, row in zip(names, without_rounding(rows), strict=True):
+            table.add_row(name, *(number(value) for value in row))
     console.print(table)
 
 

@@ -26,7 +26,7 @@ const LOOKS = {
 };
 const THEMES = {
   light: { sky: 0xf7f9fb, ground: 0xe3e7ec, grid: 0x9aa6b4, gridOpacity: 0.32, shadow: 0.26, light: 1.0 },
-  dark: { sky: 0x1b222c, ground: 0x11161d, grid: 0x6b7a8c, gridOpacity: 0.28, shadow: 0.5, light: 0.85 },
+  dark: { sky: 0x1b222c, ground: 0x11161d, grid: 0x6b7a8c, gridOpacity: 0.28, shadow: 0.5, light: 0.72 },
 };
 const VIEWS = { iso: [1.0, -1.35, 0.75], front: [0, -1, 0.02], side: [1, 0, 0.02], top: [0.001, -0.02, 1] };
 const UNLIT = new Set(["frames", "directions", "ellipsoids", "deflection"]);

@@ -1,0 +1,127 @@
+"""A studio page without a browser: opened, worked with, and waited for until nothing is being computed any more."""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not installed")
+
+import httpx
+from nicegui import background_tasks, core, ui
+from nicegui.elements.upload_files import SmallFileUpload
+from nicegui.events import GenericEventArguments, handle_event
+from nicegui.testing import User
+from nicegui.testing.user_simulation import user_simulation
+
+from kinetostat.machine.loading import bundled, load
+from kinetostat.studio import elements
+from kinetostat.studio.serving import show
+
+
+class Page:
+    """What a test does on a page, and what it sees there."""
+
+    def __init__(self, user: User, calls: list[tuple[str, str, Any]]) -> None:
+        self.user, self.calls = user, calls
+
+    def one(self, mark: str) -> Any:
+        """The element with this mark."""
+        (element,) = [e for e in self.user.client.elements.values() if mark in (" ".join(e._markers), *e._markers)]
+        return element
+
+    async def settled(self) -> None:
+        """Until nothing is computed any more."""
+        while tasks := [t for t in background_tasks.running_tasks if "studio" in t.get_name()]:
+            await asyncio.wait(tasks)
+
+    async def send(self, mark: str, event: str, args: Any = None) -> None:
+        """An event of an element, as a browser sends it, and all that follows from it."""
+        element = self.one(mark)
+        with self.user.client:
+            for listener in [one for one in element._event_listeners.values() if one.type == event]:
+                handle_event(
+                    listener.handler, GenericEventArguments(sender=element, client=self.user.client, args=args)
+                )
+        await self.settled()
+
+    async def front(self, tab: str) -> None:
+        """Bring a linked view to the front."""
+        with self.user.client:
+            self.one(f"tab-{tab}").tabs.value = tab
+        await self.settled()
+
+    async def upload(self, name: str, content: bytes) -> None:
+        """Send a machine file."""
+        with self.user.client:
+            await self.one("upload").handle_uploads([SmallFileUpload(name, "application/toml", content)])
+        await self.settled()
+
+    async def choose(self, mark: str, value: Any) -> None:
+        """Choose a value in a list, a toggle or a box."""
+        with self.user.client:
+            self.one(mark).value = value
+        await self.settled()
+
+    async def another(self) -> "Page":
+        """Another tab of the same browser, on the same server."""
+        client = httpx.AsyncClient(transport=httpx.ASGITransport(core.app), base_url="http://test")
+        return await opened(User(client), self.calls)
+
+    async def again(self) -> None:
+        """Load the page of this tab again."""
+        await self.user.open("/")
+        await self.user.should_see(marker="status")
+        await self.settled()
+
+    @property
+    def dark(self) -> bool:
+        """Whether it is dark."""
+        (mode,) = [e for e in self.user.client.elements.values() if isinstance(e, ui.dark_mode)]
+        return bool(mode.value)
+
+    def shown(self, what: str, method: str) -> Any:
+        """The last argument that a drawing was given."""
+        return next(args for name, called, args in reversed(self.calls) if (name, called) == (what, method))[0]
+
+
+async def opened(user: User, calls: list[tuple[str, str, Any]]) -> Page:
+    """The page in a new tab, once everything is computed."""
+    page = Page(user, calls)
+    await page.again()
+    return page
+
+
+@contextmanager
+def recorded(calls: list[tuple[str, str, Any]]) -> Iterator[None]:
+    """Note what the page tells its drawings."""
+    original = {kind: kind.run_method for kind in (elements.MachineView, elements.MapView, elements.CurveView)}
+
+    def noting(kind: type) -> Callable[..., Any]:
+        def run_method(self: Any, name: str, *args: Any, **options: Any) -> Any:
+            calls.append((kind.__name__, name, args))
+            return original[kind](self, name, *args, **options)
+
+        return run_method
+
+    with pytest.MonkeyPatch.context() as patch:
+        for kind in original:
+            patch.setattr(kind, "run_method", noting(kind))
+        yield
+
+
+def on_page(steps: Callable[[Page], Awaitable[None]], machine: str = "zhang-gosselin-4dof", settings: Any = ()) -> None:
+    """Open a page with a machine and do something on it."""
+
+    async def root() -> None:
+        await show(load(machine, settings), machine if machine in bundled() and not settings else "")
+
+    async def run() -> None:
+        calls: list[tuple[str, str, Any]] = []
+        with recorded(calls):
+            async with user_simulation(root=root) as user:
+                await steps(await opened(user, calls))
+
+    asyncio.run(run())

@@ -1,0 +1,64 @@
+"""The command `studio`: what it asks for, what it says, what it refuses."""
+
+import sys
+
+import pytest
+
+from kinetostat.cli import main
+from kinetostat.commands.common import BAD_INPUT, DONE
+
+
+@pytest.fixture
+def served(monkeypatch):
+    """What would be served, instead of serving it."""
+    pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not installed")
+    import kinetostat.studio.serving as serving
+
+    calls = []
+    monkeypatch.setattr(serving, "serve", lambda *given: calls.append(given))
+    return calls
+
+
+def test_it_listens_to_this_computer_only(served, capsys):
+    assert main(["studio"]) == DONE
+    ((machine, name, host, port, browser),) = served
+    assert (name, host, port, browser) == ("zhang-gosselin-4dof", "127.0.0.1", 8000, True)
+    assert machine.family.name == "passive-leg-4dof"
+    assert "http://127.0.0.1:8000" in capsys.readouterr().err
+
+
+def test_another_host_is_explained(served, capsys):
+    assert main(["studio", "hexapod", "--host", "0.0.0.0", "--port", "8010", "--no-browser"]) == DONE
+    assert served[0][2:] == ("0.0.0.0", 8010, False)
+    told = capsys.readouterr().err
+    assert "without password or encryption" in told
+
+
+def test_a_changed_machine_is_no_longer_the_bundled_one(served):
+    main(["studio", "hexapod", "--set", "pose.z=0.14"])
+    machine, name, *_ = served[0]
+    assert name == ""
+    assert machine.sections["pose"].z == 0.14
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["nonesuch"], "neither a file nor a bundled machine"),
+        (["--port", "0"], "no port"),
+        (["--port", "http"], "no port"),
+    ],
+)
+def test_bad_input_is_one_paragraph(words, said, capsys):
+    try:
+        code = main(["studio", *words])
+    except SystemExit as stop:
+        code = stop.code
+    assert code == BAD_INPUT
+    assert said in capsys.readouterr().err
+
+
+def test_without_the_extra_it_says_how_to_install_it(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "nicegui", None)
+    assert main(["studio", "hexapod"]) == BAD_INPUT
+    assert "pip install 'kinetostat[studio]'" in capsys.readouterr().err

@@ -1,0 +1,346 @@
+"""Every control of the studio's page, driven without a browser: numbers as `analyze` has them, refusals, history."""
+
+import asyncio
+import json
+import math
+
+import httpx
+import pytest
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import PlainTextResponse
+from studio_page import on_page
+
+from kinetostat.cli import main
+from kinetostat.machine.loading import bundled, load
+from kinetostat.studies.analysis import analyze
+from kinetostat.studio.panels.matrices import matrix_text
+from kinetostat.studio.serving import LOOPBACK, BoundedBody
+from machines import KINDS
+
+MACHINE = "zhang-gosselin-4dof"
+
+
+def analysed(capsys, *settings):
+    """What `kinetostat analyze --json` says."""
+    main(["analyze", MACHINE, "--json", *(word for setting in settings for word in ("--set", setting))])
+    return json.loads(capsys.readouterr().out)
+
+
+def test_the_page_shows_what_analyze_says(capsys):
+    found = analysed(capsys)
+
+    async def steps(page):
+        assert page.one("status").text == "ok"
+        headline = page.one("headline").content
+        assert "945.2 <small>mm/N</small>" in headline
+        await page.choose("matrix-kind", "C")
+        await page.front("Matrices")
+        table = page.one("matrix-table").content
+        assert f"<td>{found['compliance'][3][3]:.3e}".replace("e-01", "e\u22121") in table
+        copied = matrix_text(analyze(load(MACHINE)), "C")
+        assert [[float(cell) for cell in line.split("\t")] for line in copied.splitlines()] == found["compliance"]
+
+    on_page(steps)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_kind_of_machine_opens(name):
+    async def steps(page):
+        assert page.one("status").text == "ok"
+        assert len(page.shown("MachineView", "show")["solids"]) > 20
+        assert any(value is not None for value in page.shown("MapView", "show")["values"])
+        assert "<li>" in page.one("blame-bars").content
+
+    on_page(steps, name)
+
+
+def test_a_slider_moves_everything(capsys):
+    async def steps(page):
+        before = page.shown("MachineView", "show")
+        await page.send("control pose.z", "slide", 700)
+        await page.send("control pose.z", "settle")
+        z = page.one("control pose.z")._props
+        assert z["text"] == f"{680 + 0.8 * 170 * 0.4:.6g} mm"
+        assert page.shown("MachineView", "show")["solids"] != before["solids"]
+        here = page.shown("MapView", "show")["here"]
+        assert here[1] == pytest.approx(680 + 0.8 * 170 * 0.4)
+        assert "poses in" in page.one("map-time").text
+        found = analysed(capsys, f"pose.z={0.68 + 0.8 * 0.17 * 0.4!r}")
+        assert f"{found['compliance_diagonal'][3]:.4g}" in page.one("headline").content
+
+    on_page(steps)
+
+
+def test_values_can_be_typed_in_any_unit():
+    async def steps(page):
+        await page.send("control pose.x", "write", "1.5 cm")
+        assert page.one("control pose.x")._props["text"] == "15 mm"
+        await page.send("control stiffness.passive_links.0", "write", "rigid")
+        assert page.one("control stiffness.passive_links.0")._props["text"] == "rigid"
+        await page.send("control stiffness.actuator", "write", "3 N/mm")
+        assert page.one("control stiffness.actuator.2")._props["text"] == "3000 N/m"
+
+    on_page(steps)
+
+
+def test_what_is_no_value_is_refused_at_its_place():
+    async def steps(page):
+        await page.send("control geometry.base_radius", "write", "5 parsnips")
+        row = page.one("control geometry.base_radius")._props
+        assert "parsnips" in row["problem"]
+        assert row["text"] == "220 mm"
+        await page.send("control geometry.base_radius", "write", "23 cm")
+        assert page.one("control geometry.base_radius")._props["problem"] == ""
+
+    on_page(steps)
+
+
+def test_an_impossible_pose_says_why_and_keeps_the_last_picture():
+    async def steps(page):
+        drawn = page.shown("MachineView", "show")
+        figures = page.one("headline").content
+        await page.send("control pose.z", "write", "2 m")
+        assert page.one("status").text == "out of reach"
+        assert "at most 1.36 m" in page.one("message").text
+        assert page.shown("MachineView", "show") is drawn
+        assert page.one("headline").content == figures
+        assert page.one("control pose.z")._props["text"] == "2000 mm"
+        await page.send("undo", "click")
+        assert page.one("status").text == "ok"
+
+    on_page(steps)
+
+
+def test_a_singular_pose_is_drawn_with_the_motion_it_leaves_free():
+    async def steps(page):
+        await page.send("control pose.yaw", "write", "90 deg")
+        assert page.one("status").text == "singular"
+        assert "rz -1 rad" in page.one("message").text
+        drawn = page.shown("MachineView", "show")["solids"]
+        assert {solid["material"] for solid in drawn if solid["name"].startswith("free twist")} == {"soft rotation"}
+
+    on_page(steps, "hexapod")
+
+
+def test_history_by_buttons():
+    async def steps(page):
+        assert not page.one("undo").enabled
+        await page.send("control pose.x", "write", "2 cm")
+        assert page.one("undo").enabled
+        await page.send("undo", "click")
+        assert page.one("control pose.x")._props["text"] == "0 mm"
+        await page.send("redo", "click")
+        assert page.one("control pose.x")._props["text"] == "20 mm"
+        await page.send("restart_alt", "click")
+        assert page.one("control pose.x")._props["text"] == "0 mm"
+
+    on_page(steps)
+
+
+def test_a_place_on_the_map_moves_the_machine():
+    async def steps(page):
+        await page.send("map", "pick", {"x": 30.0, "y": 700.0})
+        await page.send("map", "settle")
+        assert page.one("control pose.x")._props["text"] == "30 mm"
+        assert page.one("control pose.z")._props["text"] == "700 mm"
+        await page.send("undo", "click")
+        assert page.one("control pose.z")._props["text"] == "680 mm"
+
+    on_page(steps)
+
+
+def test_the_map_shows_any_quantity_over_any_two_coordinates():
+    async def steps(page):
+        await page.choose("map-quantity", "stiffness_z")
+        assert page.shown("MapView", "show")["unit"] == "N/m"
+        await page.choose("map-across", "geometry.base_radius")
+        shown = page.shown("MapView", "show")
+        assert shown["x"]["label"] == "base radius (mm)"
+        assert shown["here"][0] == pytest.approx(220.0)
+        middle = shown["values"][20 * 41 + 20]
+        assert middle == pytest.approx(analyze(load(MACHINE)).stiffness_diagonal[5])
+        await page.choose("map-up", "geometry.base_radius")
+        assert "two different" in page.one("map-time").text
+
+    on_page(steps)
+
+
+def test_blame_is_attribution():
+    async def steps(page):
+        await page.choose("blame-direction", "y")
+        shares = {share.name: share.compliance[4] for share in analyze(load(MACHINE)).shares}
+        assert f"{100 * shares['passive link 1']:.1f} %" in page.one("blame-bars").content
+        assert "leg 1 actuator" not in page.one("blame-bars").content
+
+    on_page(steps)
+
+
+def test_every_view_follows():
+    async def steps(page):
+        for tab, mark, words in (
+            ("Indices", "indices", "condition of W"),
+            ("Sensitivity", "sensitivity-bars", "stiffness.actuator"),
+            ("Loads", "under-load", "no load on the tool"),
+        ):
+            await page.front(tab)
+            assert words in page.one(mark).content
+        await page.send("control load.force.2", "write", "-500 N")
+        assert "-500 N" in page.one("under-load").content
+        assert "deflection ×" in page.one("scene-key").content
+        names = [solid["name"] for solid in page.shown("MachineView", "overlay")]
+        assert "load/force" in names
+        assert "ghost/platform/plate" in names
+
+    on_page(steps)
+
+
+def test_sensitivity_of_another_index():
+    async def steps(page):
+        await page.front("Sensitivity")
+        before = page.one("sensitivity-bars").content
+        await page.choose("sensitivity-quantity", "stiffness_y")
+        assert page.one("sensitivity-bars").content != before
+        assert "stiffness.passive_links" in page.one("sensitivity-bars").content
+
+    on_page(steps)
+
+
+def test_stiffness_over_a_link():
+    async def steps(page):
+        await page.front("Links")
+        await page.choose("link-block", "K, translation")
+        shown = page.shown("CurveView", "show")
+        assert [line["name"] for line in shown["lines"]] == ["x", "y", "z"]
+        assert shown["here"] == 1000.0
+        y = shown["lines"][1]["values"]
+        nearest = min(range(len(y)), key=lambda i: abs(math.log(shown["x"][i] / 1000.0)))
+        assert y[nearest] == pytest.approx(analyze(load(MACHINE)).stiffness_diagonal[4], rel=0.01)
+
+    on_page(steps)
+
+
+def test_layers_can_be_hidden_and_views_chosen():
+    async def steps(page):
+        await page.choose("layer-ellipsoids", False)
+        assert page.one("machine")._props["hidden"] == ["ellipsoids"]
+        await page.send("view-top", "click")
+        assert page.shown("MachineView", "look") == "top"
+        await page.send("theme", "click")
+        assert page.dark
+
+    on_page(steps)
+
+
+def test_another_machine_replaces_all_controls():
+    async def steps(page):
+        await page.choose("machines", "planar-3rpr")
+        assert page.one("status").text == "ok"
+        assert page.one("control pose.angle")._props["text"].endswith("deg")
+        assert len(page.one("blame-direction").options) == 3
+        assert page.one("map-across").value.startswith("pose.")
+
+    on_page(steps)
+
+
+def test_a_file_of_ones_own_opens_and_saves():
+    async def steps(page):
+        assert page.one("upload")._props["max-file-size"] == 1 << 20
+        await page.upload("mine.toml", bundled()["hexapod"].replace("6-UPS hexapod", "Mine").encode())
+        assert page.one("machines").value == "own"
+        assert page.one("status").text == "ok"
+        await page.send("control pose.x", "write", "1 mm")
+        saved = asyncio.ensure_future(page.user.download.next())
+        await page.send("save", "click")
+        assert 'family = "hexapod"' in (await saved).text
+        assert 'x = "0.001 m"' in saved.result().text
+
+    on_page(steps)
+
+
+def test_a_bad_file_is_refused_and_nothing_changes():
+    async def steps(page):
+        await page.upload("bad.toml", b"name = ")
+        assert any("not valid TOML" in message for message in page.user.notify.messages)
+        assert page.one("machines").value == MACHINE
+
+    on_page(steps)
+
+
+def test_names_from_files_are_never_markup():
+    async def steps(page):
+        text = bundled()["tripteron"].replace('name = "z"', 'name = "<img src=x>"').encode()
+        await page.upload("mine.toml", text)
+        assert page.one("machines").value == "own"
+        await page.choose("blame-direction", "z")
+        assert "&lt;img" in page.one("blame-bars").content
+        assert "<img" not in page.one("blame-bars").content
+
+    on_page(steps)
+
+
+def test_two_tabs_do_not_disturb_each_other():
+    async def steps(page):
+        other = await page.another()
+        await page.send("control pose.x", "write", "2 cm")
+        assert other.one("control pose.x")._props["text"] == "0 mm"
+
+    on_page(steps)
+
+
+def test_a_tab_that_is_loaded_again_goes_on_where_it_was():
+    async def steps(page):
+        await page.send("control pose.x", "write", "2 cm")
+        await page.again()
+        assert page.one("control pose.x")._props["text"] == "20 mm"
+        assert page.one("undo").enabled
+
+    on_page(steps)
+
+
+def test_a_page_that_is_gone_computes_nothing_more():
+    async def steps(page):
+        count = len(page.calls)
+        with page.user.client as client:
+            page.one("control pose.x")
+            client.delete()
+        await page.settled()
+        assert len(page.calls) == count
+
+    on_page(steps)
+
+
+@pytest.mark.parametrize(("host", "code"), [("127.0.0.1", 200), ("evil.example", 400)])
+def test_only_this_computer_is_answered(host, code):
+    """Against a page of another site whose name is made to point to this computer."""
+    served = TrustedHostMiddleware(PlainTextResponse("page"), allowed_hosts=list(LOOPBACK))
+    assert asyncio.run(asked(served, headers={"Host": host})).status_code == code
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+def test_a_request_that_is_too_large_is_cut_off(chunked):
+    seen = []
+
+    async def taking(scope, receive, send):
+        request = Request(scope, receive)
+        seen.append(len(await request.body()))
+        await PlainTextResponse("taken")(scope, receive, send)
+
+    async def parts():
+        for _ in range(20):
+            yield b"x" * 1000
+
+    served = BoundedBody(taking, largest=10_000)
+    content = parts() if chunked else b"x" * 20_000
+    if chunked:
+        with pytest.raises(ClientDisconnect):
+            asyncio.run(asked(served, content=content))
+    else:
+        assert asyncio.run(asked(served, content=content)).status_code == 413
+    assert not seen
+    assert asyncio.run(asked(served, content=b"x" * 9000)).text == "taken"
+
+
+async def asked(served, **what):
+    async with httpx.AsyncClient(transport=httpx.ASGITransport(served), base_url="http://127.0.0.1") as client:
+        return await client.post("/", **what)

@@ -1,0 +1,60 @@
+"""A machine with other numbers: checked as its file would be, and the same as `--set` makes it."""
+
+import math
+
+import pytest
+
+from kinetostat.machine.changing import changed, read_value, rebuilt, related
+from kinetostat.machine.loading import load
+from kinetostat.machine.parameters import values
+from kinetostat.spec.errors import InputError
+
+MACHINE = "zhang-gosselin-4dof"
+
+
+def test_a_change_is_what_set_makes():
+    machine = changed(
+        load(MACHINE), {"pose.z": 0.7, "stiffness.actuator": 2000.0, "stiffness.passive_links.1": math.inf}
+    )
+    expected = load(MACHINE, ["pose.z=70 cm", "stiffness.actuator=2000", "stiffness.passive_links.1=rigid"])
+    assert values(machine) == pytest.approx(values(expected))
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "value"),
+    [("pose.x", "2 cm", 0.02), ("pose.theta5", "-60 deg", -math.pi / 3), ("stiffness.actuator", "20 N/um", 2e7),
+     ("stiffness.passive_links.0", "rigid", math.inf), ("limits.longest_leg", "none", math.inf)],
+)  # fmt: skip
+def test_values_are_read_with_any_unit(path, text, value):
+    assert read_value(load(MACHINE), path, text) == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "words"),
+    [("pose.x", "2 deg", "length"), ("geometry.base_radius", "-2 cm", "greater than 0"),
+     ("stiffness.actuator", "-1 N/m", "negative"), ("pose.w", "1", "not a field")],
+)  # fmt: skip
+def test_what_a_file_may_not_say_is_refused(path, text, words):
+    with pytest.raises(InputError, match=words):
+        read_value(load(MACHINE), path, text)
+
+
+def test_out_of_bounds_is_refused():
+    with pytest.raises(InputError, match=r"base_radius is -0\.1 m"):
+        changed(load(MACHINE), {"geometry.base_radius": -0.1})
+
+
+def test_only_what_depends_on_other_numbers_is_checked_again():
+    family, written = load(MACHINE), load("tripteron")
+    assert not related(family, "geometry.base_radius")
+    assert related(family, "limits.longest_leg")
+    assert related(written, "legs.z.elbow.axis.0")
+    assert not related(written, "legs.z.slide.stiffness")
+    assert not related(written, "pose.x")
+
+
+def test_a_rebuilt_machine_is_the_same_or_refused():
+    machine = changed(load(MACHINE), {"limits.shortest_leg": 0.9, "limits.longest_leg": 0.5})
+    with pytest.raises(InputError, match="nothing lies between them"):
+        rebuilt(machine)
+    assert values(rebuilt(load("tripteron"))) == values(load("tripteron"))

@@ -1,0 +1,154 @@
+"""A designer's session apart from any page: changes, their history, files."""
+
+import math
+
+import pytest
+
+from kinetostat.machine.loading import load
+from kinetostat.spec.errors import InputError
+from machines import every_machine
+
+pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not installed")
+
+from kinetostat.studio.controls import PANELS, STEPS
+from kinetostat.studio.session import Memory, Session
+from kinetostat.studio.wording import shown
+
+MACHINE = "zhang-gosselin-4dof"
+
+
+@pytest.fixture
+def session():
+    return Session(Memory(load(MACHINE), MACHINE))
+
+
+def test_a_drag_is_one_step_of_the_history(session):
+    for position in (510, 560, 700):
+        session.slide("pose.x", position)
+    session.settle()
+    assert session.value("pose.x") == pytest.approx(session.controls["pose.x"].value_at(700))
+    session.undo()
+    assert session.value("pose.x") == 0.0
+    assert not session.can_undo
+    session.redo()
+    assert session.value("pose.x") > 0.0
+
+
+def test_each_drag_is_a_step_of_its_own(session):
+    session.slide("pose.x", 600)
+    session.settle()
+    session.slide("pose.x", 700)
+    session.settle()
+    session.slide("pose.z", 600)
+    session.undo()
+    session.undo()
+    assert session.value("pose.x") == pytest.approx(session.controls["pose.x"].value_at(600))
+
+
+def test_a_change_ends_what_could_be_redone(session):
+    session.write("pose.x", "1 cm")
+    session.undo()
+    session.write("pose.z", "70 cm")
+    assert not session.can_redo
+
+
+def test_reset_can_be_undone(session):
+    session.write("pose.x", "1 cm")
+    session.reset()
+    assert session.machine is session.origin
+    session.undo()
+    assert session.value("pose.x") == 0.01
+
+
+def test_what_is_refused_changes_nothing(session):
+    with pytest.raises(InputError):
+        session.write("geometry.base_radius", "-3 cm")
+    assert session.machine is session.origin
+    assert not session.can_undo
+
+
+def test_contradictions_are_found_when_the_hand_lets_go(session):
+    session.write("limits.shortest_leg", "90 cm")
+    with pytest.raises(InputError, match="nothing lies between them"):
+        session.write("limits.longest_leg", "50 cm")
+    assert math.isinf(session.value("limits.longest_leg"))
+    assert session.value("limits.shortest_leg") == 0.9
+
+
+def test_a_field_of_several_entries_moves_them_together(session):
+    session.write("stiffness.actuator", "5000 N/m")
+    assert [session.value(f"stiffness.actuator.{i}") for i in range(4)] == [5000.0] * 4
+
+
+def test_a_file_opens_as_it_was_saved(session):
+    session.write("pose.x", "12 mm")
+    name, content = session.as_file()
+    assert name == "zhang---gosselin-4-dof.toml"
+    other = Session(Memory(load("hexapod"), "hexapod"))
+    other.open_bytes(content, name)
+    assert other.machine == session.machine
+    assert other.name == ""
+    assert not other.can_undo
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"x" * ((1 << 20) + 1), "larger than 1 MiB"),
+        (b"\xff\xfe", "not text"),
+        (b"name = ", "not valid TOML"),
+        (b'schema = 1\nname = "x"\nfamily = "octopod"', "octopod"),
+    ],
+)
+def test_bad_files_are_refused_and_the_machine_stays(session, content, words):
+    with pytest.raises(InputError, match=words):
+        session.open_bytes(content, "mine.toml")
+    assert session.machine is session.origin
+    assert session.name == MACHINE
+
+
+def test_only_bundled_machines_open_by_name(session, tmp_path):
+    """A page must not read the files of the computer that serves it."""
+    file = tmp_path / "secret.toml"
+    file.write_text("schema = 1")
+    with pytest.raises(InputError, match="not a bundled machine"):
+        session.open(str(file))
+
+
+def test_a_session_goes_on_from_its_memory(session):
+    session.write("pose.x", "12 mm")
+    again = Session(session.memory)
+    assert again.machine is session.machine
+    assert again.origin is session.origin
+    assert again.name == MACHINE
+    again.undo()
+    assert again.machine is again.origin
+
+
+@every_machine
+def test_every_number_has_a_control_and_text_that_can_be_typed(case):
+    session = Session(Memory(case.machine))
+    assert {path for path in case.ranges if not path.startswith("tool.")} <= set(session.controls)
+    held = session.values()
+    for path, control in session.controls.items():
+        assert control.panel in PANELS
+        text = shown(control.parameter.quantity, held[path])
+        session.write(path, text)
+        assert session.value(path) == pytest.approx(held[path], rel=1e-5, abs=1e-12)
+
+
+@every_machine
+def test_sliders_contain_the_value_and_go_both_ways(case):
+    session = Session(Memory(case.machine))
+    held = session.values()
+    for path, control in session.controls.items():
+        if not control.slides:
+            continue
+        assert control.value_at(control.position_of(held[path])) == pytest.approx(held[path], rel=0.02, abs=0.02)
+        assert control.value_at(0) < control.value_at(STEPS // 2) < control.value_at(STEPS)
+
+
+def test_the_last_position_of_a_stiffness_is_rigid(session):
+    session.slide("stiffness.passive_links", STEPS)
+    assert math.isinf(session.value("stiffness.passive_links.0"))
+    assert session.controls["stiffness.passive_links"].position_of(math.inf) == STEPS
