@@ -1,5 +1,6 @@
 """The command `studio`: what it asks for, what it says, what it refuses."""
 
+import socket
 import sys
 
 import pytest
@@ -24,7 +25,7 @@ def test_it_listens_to_this_computer_only(served, capsys):
     ((machine, name, host, port, browser),) = served
     assert (name, host, port, browser) == ("zhang-gosselin-4dof", "127.0.0.1", 8000, True)
     assert machine.family.name == "passive-leg-4dof"
-    assert "http://127.0.0.1:8000" in capsys.readouterr().err
+    assert capsys.readouterr().err == ""
 
 
 def test_another_host_is_explained(served, capsys):
@@ -56,6 +57,16 @@ def test_bad_input_is_one_paragraph(words, said, capsys):
         code = stop.code
     assert code == BAD_INPUT
     assert said in capsys.readouterr().err
+
+
+def test_a_port_in_use_is_bad_input(capsys):
+    pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not installed")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        assert main(["studio", "hexapod", "--no-browser", "--port", str(port)]) == BAD_INPUT
+    assert f"port {port}" in capsys.readouterr().err
 
 
 def test_without_the_extra_it_says_how_to_install_it(monkeypatch, capsys):

@@ -52,8 +52,6 @@ def _studio(options: argparse.Namespace) -> int:
         raise InputError("the studio is not installed; install it with `pip install 'kinetostat[studio]'`.")
     from kinetostat.studio.serving import serve
 
-    shown = f"[{options.host}]" if ":" in options.host else options.host
-    print(f"Studio: http://{shown}:{options.port}   stop with Ctrl-C", file=sys.stderr)
     if options.host not in LOCAL:
         print(
             f"kinetostat: --host {options.host} lets everyone who can reach this computer open the studio, without "

@@ -1,14 +1,19 @@
 """The studio as a web server on this computer: who may reach it, how much may be sent, what is served."""
 
+import asyncio
+import socket
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from nicegui import app, ui
+from nicegui import app, background_tasks, ui
+from nicegui.server import Server
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.document import LARGEST_FILE
+from kinetostat.spec.errors import InputError
 from kinetostat.studio.page import StudioPage
 from kinetostat.studio.session import Memory
 
@@ -64,12 +69,39 @@ def serve(machine: Machine, name: str, host: str, port: int, browser: bool) -> N
         host: address to listen at.
         port: to listen at.
         browser: whether to open a browser.
+
+    Raises:
+        InputError: nothing can listen there.
     """
+    _check_free(host, port)
+    app.on_startup(lambda: background_tasks.create(_announce(host, port)))
     prepare(machine, name, LOOPBACK if host in LOOPBACK else ())
     ui.run(
         host=host, port=port, title="kinetostat studio", favicon=MARK, show=browser, reload=False, tailwind=False,
         show_welcome_message=False, reconnect_timeout=30.0, message_history_length=200,
     )  # fmt: skip
+
+
+def _check_free(host: str, port: int) -> None:
+    """Refuse an address that this computer does not have, or a port that is in use."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        with socket.socket(family) as trial:
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            trial.bind((host, port))
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(
+            f"the studio cannot listen at {host}, port {port}: {reason}; choose another with --port or --host."
+        ) from None
+
+
+async def _announce(host: str, port: int) -> None:
+    """Say where the studio is, once it listens."""
+    while not Server.instance.started:
+        await asyncio.sleep(0.02)
+    shown = f"[{host}]" if ":" in host else host
+    print(f"Studio: http://{shown}:{port}   stop with Ctrl-C", file=sys.stderr, flush=True)
 
 
 def prepare(machine: Machine, name: str = "", hosts: Sequence[str] = ()) -> None:

@@ -1,0 +1,131 @@
+"""The studio in a real browser: a machine is drawn, sliders and map move it, numbers agree, nothing leaves the house."""
+
+import io
+from urllib.parse import urlparse
+
+import httpx
+import pytest
+from browser import browser, needs_chromium, served
+
+from kinetostat.machine.loading import load
+from kinetostat.studies.analysis import analyze
+
+pytestmark = needs_chromium
+MACHINE = "zhang-gosselin-4dof"
+
+
+@pytest.fixture(scope="module")
+def address():
+    with served(MACHINE) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def page(address):
+    with browser() as new_tab:
+        watched = new_tab()
+        watched.open(address)
+        yield watched
+        assert not watched.complaints
+        assert {host for host in watched.hosts if host} == {urlparse(address).netloc}
+
+
+def coloured(page):
+    """How many points of the picture are blue as actuated legs are, and orange as the passive one."""
+    matplotlib_image = pytest.importorskip("matplotlib.image")
+    picture = matplotlib_image.imread(io.BytesIO(page.tab.locator(".machine-view canvas").screenshot()))
+    red, green, blue = (picture[:, :, channel] for channel in range(3))
+    return int(((blue > 0.45) & (red < 0.35)).sum()), int(((red > 0.6) & (blue < 0.35) & (green < 0.65)).sum())
+
+
+def test_the_machine_is_there_to_be_seen(page):
+    blue, orange = coloured(page)
+    assert blue > 1500
+    assert orange > 800
+    assert page.text(".pose-status") == "ok"
+
+
+def test_a_slider_moves_the_machine_by_the_keyboard(page):
+    before, drawn = page.text(".headline"), page.tab.locator(".machine-view").get_attribute("data-drawn")
+    slider = page.tab.get_by_role("slider", name="z", exact=True)
+    slider.focus()
+    for _ in range(40):
+        page.tab.keyboard.press("ArrowRight")
+    page.until_changed(".headline", before)
+    page.tab.wait_for_function(
+        "before => Number(document.querySelector('.machine-view').dataset.drawn) > before", arg=int(drawn)
+    )
+    page.tab.wait_for_function("document.querySelectorAll('.quantity-text')[1].value !== '680 mm'")
+    assert "poses in" in page.text(".server-time")
+
+
+def test_a_click_on_the_map_moves_the_machine(page):
+    values = page.tab.locator(".quantity-text")
+    before = values.nth(0).input_value()
+    box = page.tab.locator(".map-card .plot canvas").bounding_box()
+    page.tab.mouse.click(box["x"] + 0.3 * box["width"], box["y"] + 0.4 * box["height"])
+    page.tab.wait_for_function("before => document.querySelector('.quantity-text').value !== before", arg=before)
+    assert float(values.nth(0).input_value().removesuffix(" mm")) < 0.0
+    assert page.text(".pose-status") == "ok"
+
+
+def test_the_numbers_are_those_of_analyze(page):
+    for place, text in ((0, "12 mm"), (1, "70 cm")):
+        box = page.tab.locator(".quantity-text").nth(place)
+        before = page.text(".headline")
+        box.fill(text)
+        box.press("Enter")
+        page.until_changed(".headline", before)
+    page.tab.get_by_role("tab", name="Matrices").click()
+    found = analyze(load(MACHINE, ["pose.x=12 mm", "pose.z=70 cm"]))
+    page.tab.wait_for_function(
+        "wanted => document.querySelector('.figures.matrix')?.innerText.includes(wanted)",
+        arg=shown(found.compliance[3][3]),
+    )
+    cells = [cell.split("\t")[1:] for cell in page.text(".figures.matrix tbody").splitlines()]
+    expected = [[shown(entry) for entry in row] for row in found.compliance]
+    written = [[cell.strip() for cell in row] for row in cells]
+    rounding = 1e-12 * max(abs(entry) for row in found.compliance for entry in row)
+    for own, other, row in zip(written, expected, found.compliance, strict=True):
+        assert [c for c, e in zip(own, row, strict=True) if abs(e) > rounding] == [
+            c for c, e in zip(other, row, strict=True) if abs(e) > rounding
+        ]
+
+
+def shown(entry):
+    digits, _, power = f"{entry:.3e}".partition("e")
+    return f"{digits}e{int(power)}".replace("-", "\u2212")
+
+
+def test_an_impossible_pose_keeps_the_picture(page):
+    box = page.tab.locator(".quantity-text").nth(1)
+    box.fill("2 m")
+    box.press("Enter")
+    page.until_changed(".pose-status", "ok")
+    assert page.text(".pose-status") == "out of reach"
+    assert "at most 1.36 m" in page.text(".pose-message")
+    assert coloured(page)[0] > 1000
+    page.tab.keyboard.press("Escape")
+    page.tab.get_by_role("button", name="Undo (Ctrl+Z)").click()
+    page.until_changed(".pose-status", "out of reach")
+
+
+def test_light_and_dark(page):
+    page.tab.get_by_role("button", name="Light or dark").click()
+    page.tab.wait_for_function("document.body.classList.contains('body--dark')")
+    ground = page.tab.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert sum(int(part) for part in ground.removeprefix("rgb(").removesuffix(")").split(",")) < 120
+
+
+def test_a_machine_chosen_from_the_list_is_drawn(page):
+    page.tab.get_by_role("combobox", name="machine").click()
+    page.tab.get_by_role("option", name="hexapod", exact=True).click()
+    page.tab.wait_for_function("document.querySelectorAll('.quantity-name').length > 4")
+    page.tab.wait_for_function("document.title.startsWith('6-UPS hexapod')")
+    assert page.text(".pose-status") == "ok"
+
+
+def test_under_another_name_there_is_no_page(address):
+    """A site whose name is made to point to this computer gets nothing from it."""
+    assert httpx.get(address).status_code == 200
+    assert httpx.get(address, headers={"Host": "evil.example"}).status_code == 400
