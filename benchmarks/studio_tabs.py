@@ -171,7 +171,9 @@ async def many_tabs(address: str, process: int, count: int, seconds: float) -> b
     pictures = sum(tab.scenes for tab in tabs)
     least = min(len(tab.times) for tab in tabs)
     print(f"\n{count} tabs, {seconds:.0f} s: {len(times)} maps and {pictures} drawings, at least {least} maps a tab")
-    print(f"slider to map: median {statistics.median(times):.0f} ms, 95 % within {times[int(0.95 * len(times))]:.0f} ms")
+    print(
+        f"slider to map: median {statistics.median(times):.0f} ms, 95 % within {times[int(0.95 * len(times))]:.0f} ms"
+    )
     print(f"memory: {memory[0]:.0f} MiB after a second, {settled:.0f} settled, {memory[-1]:.0f} at the end")
     print(f"errors: {len(problems)}")
     for tab in tabs:

@@ -1,4 +1,4 @@
-"""The studio in a real browser: a machine is drawn, sliders and map move it, numbers agree, nothing leaves the house."""
+"""The studio in a real browser: a machine is drawn, sliders and map move it, numbers agree, nothing is fetched."""
 
 import io
 from urllib.parse import urlparse
@@ -10,7 +10,7 @@ from browser import browser, needs_chromium, served
 from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import analyze
 
-pytestmark = needs_chromium
+pytestmark = [needs_chromium, pytest.mark.xdist_group("browser")]
 MACHINE = "zhang-gosselin-4dof"
 
 

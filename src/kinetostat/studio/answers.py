@@ -37,13 +37,11 @@ class PictureWish:
 
     Attributes:
         machine, sizes: of it.
-        since: when the designer asked, s.
         fit: whether the camera is to move so that all of it is seen.
     """
 
     machine: Machine
     sizes: Proportions
-    since: float
     fit: bool = False
 
 

@@ -102,8 +102,8 @@ class StudioPage:
 
     def changed(self) -> None:
         """The machine has other numbers: compute and show what follows from them."""
-        since = time.perf_counter()
-        self._pictures.ask(PictureWish(self.session.machine, self._sizes, since))
+        self.map.refresh(time.perf_counter())
+        self._pictures.ask(PictureWish(self.session.machine, self._sizes))
         self.parameters.refresh()
         self._offer_history()
 
@@ -120,7 +120,8 @@ class StudioPage:
         self.parameters.fill()
         self.map.fill()
         self._offer_history()
-        self._pictures.ask(PictureWish(machine, self._sizes, time.perf_counter(), fit=True))
+        self.map.refresh()
+        self._pictures.ask(PictureWish(machine, self._sizes, fit=True))
 
     def _offer_history(self) -> None:
         self.undo.set_enabled(self.session.can_undo)
@@ -128,10 +129,9 @@ class StudioPage:
         self.reset.set_enabled(self.session.machine is not self.session.origin)
         self._remember(self.session.memory)
 
-    def _show_picture(self, wish: PictureWish, found: Picture) -> None:
-        """What the eye follows comes first; then the map, and everything else."""
+    def _show_picture(self, _wish: PictureWish, found: Picture) -> None:
+        """What the eye follows comes first, the figures after it."""
         self.scene.draw(found)
-        self.map.refresh(wish.since)
         self._reports.ask(ReportWish(self.session.machine, self._sizes, None))
 
     def _show_report(self, _wish: ReportWish, found: Report) -> None:

@@ -7,7 +7,9 @@ from functools import lru_cache
 from kinetostat.views.scene.solids import Extruded, Point2, Swept, Turned
 
 ROUND = 24
-"""Points of a half circle in an outline or a coil turn."""
+"""Points of a half circle."""
+TURN = 18
+"""Points of a turn of a coil."""
 CORNER = 8
 """Points of a rounded corner."""
 
@@ -137,7 +139,7 @@ def _turns_right(a: Point2, b: Point2, c: Point2) -> bool:
 @kept
 def spiral(inner: float, outer: float, turns: float, wire: float) -> Swept:
     """A flat spiral in the x-y plane with a straight end: the sign of a torsional spring about z."""
-    count = round(2 * ROUND * turns)
+    count = round(TURN * turns)
     steps = [i / count for i in range(count + 1)]
     curve = [((inner + (outer - inner) * t), math.tau * turns * t) for t in steps]
     path = [(r * math.cos(a), r * math.sin(a), 0.0) for r, a in curve]
@@ -148,7 +150,7 @@ def spiral(inner: float, outer: float, turns: float, wire: float) -> Swept:
 @kept
 def helix(radius: float, length: float, turns: float, wire: float) -> Swept:
     """A coil about z, centred at the origin: the sign of a linear spring."""
-    count = round(ROUND * turns)
+    count = round(TURN * turns)
     angles = [math.tau * turns * i / count for i in range(count + 1)]
     path = [(radius * math.cos(a), radius * math.sin(a), length * (i / count - 0.5)) for i, a in enumerate(angles)]
     return Swept(tuple(path), wire)

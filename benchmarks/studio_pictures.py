@@ -1,0 +1,103 @@
+"""The pictures of docs/studio.md: the studio's main views as a headless Chromium shows them.
+
+Run `python benchmarks/studio_pictures.py`; writes docs/images/*.png. Needs what the browser tests need.
+"""
+
+import sys
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+
+ROOT = Path(__file__).parent.parent
+sys.path.append(str(ROOT / "tests" / "edges"))
+from browser import Watched, browser, served  # noqa: E402  (of the tests)
+
+IMAGES = ROOT / "docs" / "images"
+COLOURS = 224
+"""Of a picture: enough for a page, a third of the size."""
+
+
+def still(page: Watched) -> None:
+    """Wait until the machine is drawn as finely as it will be."""
+    page.tab.wait_for_function(
+        """() => {
+          const view = document.querySelector('.machine-view'), seen = view.dataset.drawn;
+          if (window.studioSeen !== seen) { window.studioSeen = seen; window.studioSince = performance.now(); }
+          return performance.now() - window.studioSince > 4000;
+        }""",
+        polling=250,
+    )
+
+
+def keep(page: Watched, name: str, part: str = "") -> None:
+    """Write the page, or a part of it, as a small PNG."""
+    still(page)
+    shot = page.tab.locator(part).first.screenshot() if part else page.tab.screenshot()
+    IMAGES.mkdir(parents=True, exist_ok=True)
+    picture = Image.open(BytesIO(shot)).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    picture.save(IMAGES / f"{name}.png", optimize=True)
+    print(f"docs/images/{name}.png  {(IMAGES / f'{name}.png').stat().st_size >> 10} KiB")
+
+
+def write(page: Watched, label: str, text: str) -> None:
+    """Type a value."""
+    box = page.tab.get_by_label(f"{label}, value with unit").locator("visible=true").first
+    box.fill(text)
+    box.press("Enter")
+
+
+def front(page: Watched, tab: str) -> None:
+    """Bring a view to the front."""
+    page.tab.get_by_role("tab", name=tab, exact=True).last.click()
+
+
+def paper_machine(new_tab: Any) -> None:
+    """The whole page, and a pose that cannot be reached."""
+    with served("zhang-gosselin-4dof") as address:
+        page = new_tab()
+        page.open(address)
+        keep(page, "studio")
+        for tab, name in (("Sensitivity", "sensitivity"), ("Links", "links")):
+            front(page, tab)
+            keep(page, f"studio-{name}", ".views-card")
+        write(page, "z", "1.5 m")
+        page.until_changed(".pose-status", "ok")
+        keep(page, "studio-out-of-reach", ".middle")
+
+
+def tripteron(new_tab: Any) -> None:
+    """Beams that bend, in the dark."""
+    with served("tripteron") as address:
+        page = new_tab()
+        page.open(address)
+        page.tab.get_by_role("button", name="Light or dark").click()
+        front(page, "Load")
+        page.tab.get_by_role("tab", name="Load", exact=True).first.click()
+        write(page, "force y", "400 N")
+        page.tab.wait_for_function("document.querySelector('.scene-key').innerText.includes('deflection')")
+        front(page, "Loads")
+        keep(page, "studio-dark")
+
+
+def gallery(new_tab: Any) -> None:
+    """Other machines, the middle of the page."""
+    for machine in ("hexapod", "delta", "tricept", "passive-leg-5dof-rus"):
+        with served(machine) as address:
+            page = new_tab(1180, 720)
+            page.open(address)
+            keep(page, f"studio-{machine}", ".machine-view")
+            page.tab.close()
+
+
+def main() -> None:
+    """Make all pictures."""
+    with browser() as new_tab:
+        paper_machine(new_tab)
+        tripteron(new_tab)
+        gallery(new_tab)
+
+
+if __name__ == "__main__":
+    main()
