@@ -61,12 +61,12 @@ def test_a_slider_moves_everything(capsys):
         await page.send("control pose.z", "slide", 700)
         await page.send("control pose.z", "settle")
         z = page.one("control pose.z")._props
-        assert z["text"] == f"{680 + 0.8 * 170 * 0.4:.6g} mm"
+        assert z["text"] == f"{680 + 0.75 * 170 * 0.4:.6g} mm"
         assert page.shown("MachineView", "show")["solids"] != before["solids"]
         here = page.shown("MapView", "show")["here"]
-        assert here[1] == pytest.approx(680 + 0.8 * 170 * 0.4)
+        assert here[1] == pytest.approx(680 + 0.75 * 170 * 0.4)
         assert "poses in" in page.one("map-time").text
-        found = analysed(capsys, f"pose.z={0.68 + 0.8 * 0.17 * 0.4!r}")
+        found = analysed(capsys, f"pose.z={0.68 + 0.75 * 0.17 * 0.4!r}")
         assert f"{found['compliance_diagonal'][3]:.4g}" in page.one("headline").content
 
     on_page(steps)

@@ -11,8 +11,8 @@ from kinetostat.studio.wording import VECTORS, label
 PANELS = ("Pose", "Geometry", "Stiffness", "Load")
 STEPS = 1000
 """Positions of a slider."""
-AROUND = {"pose": 0.8, "geometry": 0.8}
-"""How far a length varies about its value, in units of the machine's length."""
+AROUND = 0.75
+"""How far a length varies about its value: in units of the machine's length in the pose, of itself elsewhere."""
 TURN = {"pose": math.radians(40.0), "geometry": math.radians(30.0)}
 FACTOR = 1e3
 """How far a stiffness varies about its value, up and down."""
@@ -123,8 +123,7 @@ def _range(kind: str, stiff: bool, value: float, section: str, length: float) ->
         around = TURN.get(section, TURN["geometry"])
         return value - around, value + around, False
     if kind == "length":
-        around = max(AROUND.get(section, 0.8) * length, 0.0)
-        around = around if section == "pose" or value == 0.0 else 0.8 * abs(value)
+        around = AROUND * (length if section == "pose" or value == 0.0 else abs(value))
         return value - around, value + around, False
     if kind in LARGEST_LOAD:
         most = max(LARGEST_LOAD[kind], 2.0 * abs(value))
