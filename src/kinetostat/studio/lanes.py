@@ -24,14 +24,14 @@ class Lane(Generic[Wish, Result]):
         """
         self._work, self._deliver = work, deliver
         self._waiting: list[Wish] = []
-        self._busy = False
+        self.busy = False
         self._open = True
 
     def ask(self, wish: Wish) -> None:
         """Compute this next, instead of what else is waiting."""
         self._waiting = [wish]
-        if not self._busy and self._open:
-            self._busy = True
+        if not self.busy and self._open:
+            self.busy = True
             background_tasks.create(self._run(), name="studio lane")
 
     def close(self) -> None:
@@ -50,4 +50,4 @@ class Lane(Generic[Wish, Result]):
             log.exception("the studio could not compute or show something")
             raise
         finally:
-            self._busy = False
+            self.busy = False

@@ -54,7 +54,7 @@ class StudioPage:
         self._header()
         with ui.element("main").classes("studio"):
             with ui.element("section").classes("left").props('aria-label="parameters"'):
-                self.parameters = ParametersPanel(self.session, self.changed)
+                self.parameters = ParametersPanel(self.session, self.changed, lambda: self._pictures.busy)
             with ui.element("section").classes("middle").props('aria-label="machine"'):
                 self.scene = ScenePanel()
             with ui.element("section").classes("right").props('aria-label="linked views"'):
@@ -132,6 +132,7 @@ class StudioPage:
     def _show_picture(self, _wish: PictureWish, found: Picture) -> None:
         """What the eye follows comes first, the figures after it."""
         self.scene.draw(found)
+        self.parameters.go_on()
         self._reports.ask(ReportWish(self.session.machine, self._sizes, None))
 
     def _show_report(self, _wish: ReportWish, found: Report) -> None:

@@ -23,9 +23,16 @@ OPEN = 12
 class ParametersPanel:
     """Tabs of controls; rows of a group are made when it is first opened."""
 
-    def __init__(self, session: Session, on_change: Callable[[], None]) -> None:
-        """A panel for a session; `on_change` is called after every change of the machine."""
-        self._session, self._on_change = session, on_change
+    def __init__(self, session: Session, on_change: Callable[[], None], is_busy: Callable[[], bool]) -> None:
+        """A panel for a session.
+
+        Args:
+            session: whose numbers it shows and changes.
+            on_change: called after every change of the machine.
+            is_busy: whether the last change has not been drawn yet: then a slider's next position waits for `go_on`.
+        """
+        self._session, self._on_change, self._is_busy = session, on_change, is_busy
+        self._held: tuple[str, int] | None = None
         self._rows: dict[str, QuantityRow] = {}
         with ui.tabs().classes("panel-tabs").props("dense no-caps") as tabs:
             for panel in PANELS:
@@ -41,6 +48,7 @@ class ParametersPanel:
 
     def fill(self) -> None:
         """Make the controls of a machine that has just been loaded."""
+        self._held = None
         self._rows.clear()
         for panel, place in self._places.items():
             place.clear()
@@ -86,10 +94,19 @@ class ParametersPanel:
     def _put(self, control: Control, value: float) -> None:
         self._rows[control.path].put(shown(control.parameter.quantity, value), control.position_of(value))
 
+    def go_on(self) -> None:
+        """Take the last position of a slider that had to wait."""
+        if self._held is not None:
+            (path, position), self._held = self._held, None
+            self._try(path, lambda: self._session.slide(path, position))
+
     def _slide(self, path: str, event: GenericEventArguments) -> None:
-        self._try(path, lambda: self._session.slide(path, int(event.args)))
+        self._held = path, int(event.args)
+        if not self._is_busy():
+            self.go_on()
 
     def _settle(self, path: str, _event: GenericEventArguments) -> None:
+        self.go_on()
         self._try(path, self._session.settle)
 
     def _write(self, path: str, event: GenericEventArguments) -> None:

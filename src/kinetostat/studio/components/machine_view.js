@@ -34,6 +34,7 @@ const UNLIT = new Set(["frames", "directions", "ellipsoids", "deflection"]);
 const SLOW = 120; // ms of a frame from which pictures are coarse while something moves, and fine at rest
 const COARSE = 0.5; // share of the pixels across
 const AT_REST = 500; // ms without movement
+const FINE = 1.5; // where edges are not smoothed otherwise
 
 function drawsInSoftware() {
   const gl = document.createElement("canvas").getContext("webgl2");
@@ -62,6 +63,7 @@ export default {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener("change", () => this.draw());
     this.slow = drawsInSoftware();
+    this.finest = this.slow ? FINE : 1;
     this.sharpness(this.slow ? COARSE : 1);
     this.controls.maxPolarAngle = Math.PI * 0.96;
     this.materials = {};
@@ -296,10 +298,11 @@ export default {
     },
     draw() {
       this.wanted = true;
+      this.$el.dataset.rest = "";
       clearTimeout(this.resting);
       if (this.drawing) return;
       this.drawing = true;
-      requestAnimationFrame(() => this.frame(this.slow ? COARSE : 1));
+      requestAnimationFrame(() => this.frame(this.slow ? COARSE : this.finest));
     },
     frame(sharpness) {
       this.wanted = false;
@@ -313,7 +316,7 @@ export default {
         if (gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED && !gl.isContextLost()) return setTimeout(look, 10);
         gl.deleteSync(fence);
         const took = performance.now() - started;
-        if (sharpness < 1 || took > SLOW) this.slow = took > SLOW * 0.5;
+        if (sharpness < this.finest || took > SLOW) this.slow = took > SLOW * 0.5;
         setTimeout(() => this.rest(sharpness), this.slow ? took / 2 : 0); // leave the page time for itself
       };
       look();
@@ -321,12 +324,11 @@ export default {
     rest(sharpness) {
       this.drawing = false;
       if (this.wanted) return this.draw();
-      if (sharpness < 1) {
-        this.resting = setTimeout(() => {
-          this.drawing = true;
-          this.frame(1);
-        }, AT_REST);
-      }
+      if (sharpness === this.finest) return (this.$el.dataset.rest = "fine");
+      this.resting = setTimeout(() => {
+        this.drawing = true;
+        this.frame(this.finest);
+      }, AT_REST);
     },
     sharpness(share) {
       const ratio = Math.min(window.devicePixelRatio || 1, 2) * share;

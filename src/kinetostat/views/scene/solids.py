@@ -15,7 +15,7 @@ Point3: TypeAlias = tuple[float, float, float]
 
 DIGITS = 7
 """Significant digits of a number in a scene: a renderer has float32."""
-KEPT = 4096
+KEPT = 1024
 """Shapes whose data is kept: a machine has about a hundred, few of which change while it moves."""
 DECIMALS = 8
 """Decimals of a place: 10 nm."""
