@@ -7,13 +7,13 @@ that the figures are the server's alone. Exits with 1 if anything failed or memo
 import argparse
 import asyncio
 import json
-import os
 import random
 import re
 import socket
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 import uuid
 from collections.abc import Iterator
@@ -45,17 +45,19 @@ def served(machine: str, cores: str | None) -> Iterator[tuple[str, int]]:
     pinned = ["taskset", "-c", cores] if cores else []
     words = ["studio", machine, "--no-browser", "--port", str(port)]
     code = f"import sys; from kinetostat.cli import main; sys.exit(main({words!r}))"
-    log = open(os.devnull, "w")  # noqa: SIM115  (the process keeps it)
-    process = subprocess.Popen([*pinned, sys.executable, "-c", code], stderr=subprocess.PIPE, stdout=log, text=True)
-    assert process.stderr is not None
-    for line in process.stderr:
-        if "Studio:" in line:
-            break
-    try:
-        yield f"http://127.0.0.1:{port}", process.pid
-    finally:
-        process.terminate()
-        process.wait()
+    with tempfile.NamedTemporaryFile("r", encoding="utf-8") as said:
+        with open(said.name, "w", encoding="utf-8") as log:
+            process = subprocess.Popen([*pinned, sys.executable, "-c", code], stderr=log, stdout=log)
+        while "Studio:" not in Path(said.name).read_text("utf-8") and process.poll() is None:
+            time.sleep(0.1)
+        try:
+            yield f"http://127.0.0.1:{port}", process.pid
+        finally:
+            process.terminate()
+            process.wait()
+            complaints = said.read().splitlines()[1:]
+            if complaints:
+                print(f"the server said {len(complaints)} lines, the last of them:", *complaints[-12:], sep="\n")
 
 
 def resident(process: int) -> float:

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from threading import Event, Thread
 from typing import Any
 from urllib.parse import urlparse
 
@@ -40,18 +41,29 @@ def served(machine: str) -> Iterator[str]:
     code = f"import sys; from kinetostat.cli import main; sys.exit(main({words!r}))"
     outside = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}
     process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, env=outside)
-    said = []
-    try:
+    said: list[str] = []
+    ready = Event()
+
+    def listen() -> None:
+        """Read all that it says, so that it never waits for a reader."""
         for line in process.stderr:
             said.append(line)
             if "Studio:" in line:
-                break
+                ready.set()
+        ready.set()
+
+    listener = Thread(target=listen)
+    listener.start()
+    try:
+        ready.wait()
         assert process.poll() is None, "".join(said)
         yield f"http://127.0.0.1:{port}/"
     finally:
         process.terminate()
         process.wait()
+        listener.join()
         process.stderr.close()
+    assert len(said) == 1, "".join(said)
 
 
 @dataclass

@@ -1,6 +1,7 @@
 """A studio page without a browser: opened, worked with, and waited for until nothing is being computed any more."""
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -87,6 +88,21 @@ class Page:
         return next(args for name, called, args in reversed(self.calls) if (name, called) == (what, method))[0]
 
 
+@contextmanager
+def nothing_fails() -> Iterator[None]:
+    """No work of the page may fail, in whatever thread: it would only be logged."""
+    failed: list[logging.LogRecord] = []
+    noting = logging.Handler(logging.ERROR)
+    noting.emit = failed.append  # type: ignore[method-assign]
+    log = logging.getLogger("kinetostat")
+    log.addHandler(noting)
+    try:
+        yield
+    finally:
+        log.removeHandler(noting)
+    assert not failed, failed[0].exc_text or failed[0].getMessage()
+
+
 async def opened(user: User, calls: list[tuple[str, str, Any]]) -> Page:
     """The page in a new tab, once everything is computed."""
     page = Page(user, calls)
@@ -120,7 +136,7 @@ def on_page(steps: Callable[[Page], Awaitable[None]], machine: str = "zhang-goss
 
     async def run() -> None:
         calls: list[tuple[str, str, Any]] = []
-        with recorded(calls):
+        with recorded(calls), nothing_fails():
             async with user_simulation(root=root) as user:
                 await steps(await opened(user, calls))
 
