@@ -1,13 +1,19 @@
 """Work off the event loop, the latest wish first: what was asked for in between is never computed."""
 
+import asyncio
 import logging
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import Generic, TypeVar
 
-from nicegui import background_tasks, run
+from nicegui import background_tasks
 
 Wish = TypeVar("Wish")
 Result = TypeVar("Result")
+
+WORKERS = 2
+"""Threads of all pages: Python computes one thing at a time, and more would only keep the event loop waiting."""
 
 log = logging.getLogger("kinetostat")
 
@@ -43,7 +49,7 @@ class Lane(Generic[Wish, Result]):
         try:
             while self._waiting:
                 wish = self._waiting.pop()
-                result = await run.io_bound(self._work, wish)
+                result = await asyncio.get_running_loop().run_in_executor(_workers(), self._work, wish)
                 if self._open and result is not None:
                     self._deliver(wish, result)
         except Exception:
@@ -51,3 +57,8 @@ class Lane(Generic[Wish, Result]):
             raise
         finally:
             self.busy = False
+
+
+@cache
+def _workers() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(WORKERS, "studio")

@@ -20,6 +20,9 @@ from kinetostat.studio.session import Memory
 STYLE = Path(__file__).parent / "style.css"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 """Names under which only this computer can be reached."""
+SWITCH = 0.0005
+"""Seconds after which a thread that computes lets the event loop have its turn; ten times as often as is usual, so that
+messages of many tabs do not pile up and are not taken for silence."""
 KEPT = "machine"
 """Under which a tab's work is remembered while the server runs."""
 LARGEST_BODY = LARGEST_FILE + (64 << 10)
@@ -74,6 +77,7 @@ def serve(machine: Machine, name: str, host: str, port: int, browser: bool) -> N
         InputError: nothing can listen there.
     """
     _check_free(host, port)
+    sys.setswitchinterval(SWITCH)
     app.on_startup(lambda: background_tasks.create(_announce(host, port)))
     prepare(machine, name, LOOPBACK if host in LOOPBACK else ())
     ui.run(
