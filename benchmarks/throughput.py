@@ -48,14 +48,14 @@ def print_routes(case: Case, count: int, turns: int, folder: Path) -> None:
     numpy_rate = next(route.rate for route in routes if "NumPy" in route.name)
     print(f"\n## {case.title}\n")
     print(f"{count:,} random poses, a status for each.\n")
-    print("| route | computes | million poses/s | times NumPy | of the fastest C++ | ready after | difference |")
+    print("| route | computes | poses/s | times NumPy | of the fastest C++ | ready after | difference |")
     print("|---|---|---|---|---|---|---|")
     for route in routes:
         rivals = [other.rate for other in routes if other.name.startswith("C++") and other.task == route.task]
         share = f"{route.rate / max(rivals):.2f}" if rivals else ""
         prepared = f"{route.prepared:.2f} s" if route.prepared else ""
         print(
-            f"| {route.name} | {route.task} | {route.rate / 1e6:.3g} | {route.rate / numpy_rate:.3g} | {share} "
+            f"| {route.name} | {route.task} | {_rate(route.rate)} | {route.rate / numpy_rate:.3g} | {share} "
             f"| {prepared} | {difference(route, ours)} |"
         )
 
@@ -86,6 +86,10 @@ def print_sizes(title: str, name: str, sizes: Sequence[int]) -> None:
             f"| {size:,} | {_time(told['first'])} | {_time(told['later'])} | {_time(told['later'] / size)} "
             f"| {told['peak'] / 1e6:,.0f} MB |"
         )
+
+
+def _rate(rate: float) -> str:
+    return f"{rate / 1e6:.3g} million" if rate >= 1e4 else f"{rate:.2g}"
 
 
 def _time(seconds: float) -> str:

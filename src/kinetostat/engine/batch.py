@@ -22,8 +22,8 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, with_values
 
-NATIVE_FROM = 50_000
-"""Points from which loading LLVM and compiling (0.2 s) pays: NumPy does some 0.4 million poses/s."""
+NATIVE_FROM = 20_000
+"""Points from which loading LLVM and compiling (0.1 to 0.3 s) pays: NumPy does 30 to 200 thousand poses/s."""
 NUMPY_SLAB = 4096
 """Points per NumPy call: intermediates stay in the second cache level."""
 NATIVE_SLAB = 32768
