@@ -6,6 +6,7 @@ import sys
 from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from typing import TypeAlias
 
     from kinetostat.machine.machine import Machine
@@ -67,6 +68,23 @@ def load_machine(options: argparse.Namespace) -> "Machine":
 def print_json(data: object) -> None:
     """Print plain data."""
     print(json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1))
+
+
+def give(
+    options: argparse.Namespace,
+    answered: bool,
+    message: str,
+    as_data: "Callable[[], object]",
+    show: "Callable[[], None]",
+) -> int:
+    """Give an answer, as data with `--json`, else as `show` prints it, or why there is none; returns the exit code."""
+    if options.json:
+        print_json(as_data())
+        return DONE if answered else NO_ANSWER
+    if not answered:
+        return no_answer(message)
+    show()
+    return DONE
 
 
 def no_answer(message: str) -> int:

@@ -2,19 +2,11 @@
 
 import argparse
 import json
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinetostat.commands.common import (
-    DONE,
-    NO_ANSWER,
-    add_command,
-    load_machine,
-    no_answer,
-    print_json,
-    takes_json,
-    takes_machine,
-)
+from kinetostat.commands.common import add_command, give, load_machine, takes_json, takes_machine
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
@@ -44,6 +36,7 @@ def add_guidelines_command(commands: "Commands") -> None:
 def _guidelines(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
     from kinetostat.studies.guidelines import guidelines
+    from kinetostat.studies.guidelines_data import as_json
     from kinetostat.views.progress import progress_bar
 
     machine = load_machine(options)
@@ -51,21 +44,18 @@ def _guidelines(options: argparse.Namespace) -> int:
         found = guidelines(machine, options.ranges, progress)
     answered = found.status is Status.OK
     written = _write(found, options.output) if options.output and answered else []
-    if options.json:
-        from kinetostat.studies.guidelines_data import as_json
+    shown = partial(_show, found, options.full, written)
+    return give(options, answered, found.message, lambda: as_json(found), shown)
 
-        print_json(as_json(found))
-        return DONE if answered else NO_ANSWER
-    if not answered:
-        return no_answer(found.message)
+
+def _show(found: "Guidelines", full: bool, written: list[Path]) -> None:
     from kinetostat.views.grid_tables import print_written
     from kinetostat.views.guideline_tables import print_guidelines
     from kinetostat.views.tables import terminal
 
     console = terminal()
-    print_guidelines(console, found, options.full)
+    print_guidelines(console, found, full)
     print_written(console, written)
-    return DONE
 
 
 def _write(found: "Guidelines", folder: Path) -> list[Path]:

@@ -5,16 +5,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinetostat.commands.common import (
-    DONE,
-    NO_ANSWER,
-    add_command,
-    load_machine,
-    no_answer,
-    print_json,
-    takes_json,
-    takes_machine,
-)
+from kinetostat.commands.common import add_command, give, load_machine, takes_json, takes_machine
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
@@ -43,11 +34,10 @@ def _sensitivity(options: argparse.Namespace) -> int:
     answer = sensitivity(load_machine(options), options.quantities or ["compliance"])
     answered = answer.status is Status.OK
     written = _write(answer, options.output) if options.output and answered else []
-    if options.json:
-        print_json(as_json(answer))
-        return DONE if answered else NO_ANSWER
-    if not answered:
-        return no_answer(answer.message)
+    return give(options, answered, answer.message, lambda: as_json(answer), lambda: _show(answer, written))
+
+
+def _show(answer: "Sensitivity", written: list[Path]) -> None:
     from kinetostat.views.grid_tables import print_written
     from kinetostat.views.sensitivity_tables import print_sensitivity
     from kinetostat.views.tables import terminal
@@ -55,7 +45,6 @@ def _sensitivity(options: argparse.Namespace) -> int:
     console = terminal()
     print_sensitivity(console, answer)
     print_written(console, written)
-    return DONE
 
 
 def _write(answer: "Sensitivity", folder: Path) -> list[Path]:
