@@ -11,7 +11,7 @@ import llvmlite.binding as llvm
 import numpy as np
 import pytest
 
-from kinetostat.engine import cuda, cuda_driver
+from kinetostat.engine import batch, cuda, cuda_driver, kernel
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.cuda_driver import Gpu
 from kinetostat.engine.device import Device
@@ -80,7 +80,8 @@ def poses(case, count):
 def test_a_gpu_program_gives_what_the_processor_gives(case, monkeypatch):
     device = HostDevice()
     monkeypatch.setattr(cuda, "ptx", lambda text: text)
-    monkeypatch.setattr(cuda_driver, "gpu", lambda: device)
+    for module in (cuda_driver, kernel):
+        monkeypatch.setattr(module, "gpu", lambda: device)
     points = poses(case, 150)
     found = evaluate(case.machine, points, (*TWELVE, "regularity"), device=Device.GPU)
     expected = evaluate(case.machine, points, (*TWELVE, "regularity"))
@@ -89,6 +90,47 @@ def test_a_gpu_program_gives_what_the_processor_gives(case, monkeypatch):
     for name in found.values:
         np.testing.assert_allclose(found.values[name], expected.values[name], rtol=1e-9, atol=1e-300, err_msg=name)
     assert device.rooms == 0, "what is taken is given back"
+
+
+class Wrong(HostDevice):
+    """A device whose arithmetic is off by one part in a million."""
+
+    def take(self, place, arrays):
+        super().take(place, arrays)
+        for array in arrays:
+            if array.dtype == float:
+                array *= 1.0 + 1e-6
+
+
+class Full(HostDevice):
+    """A device without memory."""
+
+    def room(self, _size):
+        raise InputError("out of memory")
+
+
+@pytest.mark.parametrize("make", [HostDevice, Wrong, Full])
+def test_the_engine_takes_a_gpu_that_it_can_trust(make, monkeypatch):
+    device, machine = make(), load("hexapod")
+    points = Table({"pose.z": np.linspace(0.12, 0.15, 90)})
+    expected = evaluate(machine, points, TWELVE)
+    launched = []
+    monkeypatch.setattr(HostDevice, "launch", lambda *given: (launched.append(given[-1]), LAUNCH(*given)))
+    monkeypatch.setattr(cuda, "ptx", lambda text: text)
+    for module in (cuda_driver, kernel):
+        monkeypatch.setattr(module, "gpu", lambda: device)
+    monkeypatch.setattr(batch, "GPU_FROM", 50)
+    monkeypatch.setattr(batch, "TRIED", 20)
+    found = evaluate(machine, points, TWELVE)
+    assert launched == {HostDevice: [20, 90], Wrong: [20], Full: []}[make]
+    for name in TWELVE:
+        np.testing.assert_allclose(found.values[name], expected.values[name], rtol=1e-12)
+    launched.clear()
+    evaluate(machine, points, TWELVE, part=range(90))
+    assert not launched, "a part is the same with and without a GPU"
+
+
+LAUNCH = HostDevice.launch
 
 
 @pytest.mark.parametrize("name", ["zhang-gosselin-4dof", "hexapod", "tripteron"])
@@ -100,7 +142,7 @@ def test_ptx_is_made(name, monkeypatch):
             made.append((text, entry))
             raise InputError("seen")
 
-    monkeypatch.setattr(cuda_driver, "gpu", Maker)
+    monkeypatch.setattr(kernel, "gpu", Maker)
     machine = load(name)
     with pytest.raises(InputError, match="seen"):
         evaluate(machine, Table({"pose.z": np.array([values(machine)["pose.z"]])}), TWELVE, device=Device.GPU)

@@ -15,6 +15,8 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.engine.body import Array, Body, Codes, Runnable
+from kinetostat.engine.cuda import GpuProgram
+from kinetostat.engine.cuda_driver import Gpu, gpu
 from kinetostat.engine.device import Device
 from kinetostat.engine.form import Form, Kind, angles, form_of, reduced, traced
 from kinetostat.engine.native import Program
@@ -104,7 +106,7 @@ def slab_kernel(
         iterated = needs_iteration(machine)
     form, numbers = form_of(machine, varying)
     names = tuple(quantities)
-    program = _program(Kind(machine), form, names, iterated, device)
+    program = _program(Kind(machine), form, names, iterated, gpu() if device is Device.GPU else None)
     return Kernel(program, numbers, form.varying, angles(machine), machine, names, iterated, device)
 
 
@@ -117,7 +119,7 @@ def needs_iteration(machine: Machine) -> bool:
 
 
 @lru_cache(KEPT)
-def _program(kind: Kind, form: Form, quantities: tuple[str, ...], iterated: bool, device: Device) -> Runnable:
+def _program(kind: Kind, form: Form, quantities: tuple[str, ...], iterated: bool, device: Gpu | None) -> Runnable:
     given = traced(kind, form)
     joints = [given.graph.input() for _ in range(kind.machine.chains().size + 1)] if iterated else []
     response = respond(given.machine, _joints(given.machine, joints))
@@ -125,12 +127,7 @@ def _program(kind: Kind, form: Form, quantities: tuple[str, ...], iterated: bool
     results = [where(accepted, QUANTITIES[name].value(response), math.nan) for name in quantities]
     numbers = [_number(result) for result in results]
     body = Body(given.fixed, [*given.columns.values(), *joints], numbers, _number(response.status))
-    if device is Device.CPU:
-        return Program(body)
-    from kinetostat.engine.cuda import GpuProgram
-    from kinetostat.engine.cuda_driver import gpu
-
-    return GpuProgram(body, gpu())
+    return Program(body) if device is None else GpuProgram(body, device)
 
 
 def _joints(machine: Machine, columns: Sequence[Traced]) -> Joints | None:
