@@ -32,12 +32,12 @@ needs_chromium = pytest.mark.skipif(chromium() is None, reason="there is no Chro
 
 
 @contextmanager
-def served(machine: str) -> Iterator[str]:
-    """The address of a studio in a process of its own."""
+def served(machine: str, state: str | None = None) -> Iterator[str]:
+    """The address of a studio in a process of its own; searches and favourites live in `state`."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    words = ["studio", machine, "--no-browser", "--port", str(port)]
+    words = ["studio", machine, "--no-browser", "--port", str(port), *(["--state", state] if state else [])]
     code = f"import sys; from kinetostat.cli import main; sys.exit(main({words!r}))"
     outside = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}
     process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, env=outside)

@@ -4,6 +4,8 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -19,7 +21,11 @@ from nicegui.testing.user_simulation import user_simulation
 
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studio import elements
+from kinetostat.studio.design.workshop import Workshop
 from kinetostat.studio.serving import show
+
+KINDS = (elements.MachineView, elements.MapView, elements.CurveView, elements.FrontView)
+"""What is drawn in the browser."""
 
 
 class Page:
@@ -54,10 +60,10 @@ class Page:
             self.one(f"tab-{tab}").tabs.value = tab
         await self.settled()
 
-    async def upload(self, name: str, content: bytes) -> None:
-        """Send a machine file."""
+    async def upload(self, name: str, content: bytes, mark: str = "upload") -> None:
+        """Send a machine file, or a file to another place."""
         with self.user.client:
-            await self.one("upload").handle_uploads([SmallFileUpload(name, "application/toml", content)])
+            await self.one(mark).handle_uploads([SmallFileUpload(name, "application/toml", content)])
         await self.settled()
 
     async def choose(self, mark: str, value: Any) -> None:
@@ -113,7 +119,7 @@ async def opened(user: User, calls: list[tuple[str, str, Any]]) -> Page:
 @contextmanager
 def recorded(calls: list[tuple[str, str, Any]]) -> Iterator[None]:
     """Note what the page tells its drawings."""
-    original = {kind: kind.run_method for kind in (elements.MachineView, elements.MapView, elements.CurveView)}
+    original = {kind: kind.run_method for kind in KINDS}
 
     def noting(kind: type) -> Callable[..., Any]:
         def run_method(self: Any, name: str, *args: Any, **options: Any) -> Any:
@@ -128,16 +134,23 @@ def recorded(calls: list[tuple[str, str, Any]]) -> Iterator[None]:
         yield
 
 
-def on_page(steps: Callable[[Page], Awaitable[None]], machine: str = "zhang-gosselin-4dof", settings: Any = ()) -> None:
-    """Open a page with a machine and do something on it."""
+def on_page(
+    steps: Callable[[Page], Awaitable[None]],
+    machine: str = "zhang-gosselin-4dof",
+    settings: Any = (),
+    state: Path | None = None,
+) -> None:
+    """Open a page with a machine and do something on it; searches and favourites live in `state`."""
 
-    async def root() -> None:
-        await show(load(machine, settings), machine if machine in bundled() and not settings else "")
+    async def run(workshop: Workshop) -> None:
+        async def root() -> None:
+            await show(load(machine, settings), machine if machine in bundled() and not settings else "", workshop)
 
-    async def run() -> None:
         calls: list[tuple[str, str, Any]] = []
         with recorded(calls), nothing_fails():
             async with user_simulation(root=root) as user:
                 await steps(await opened(user, calls))
+        workshop.close()
 
-    asyncio.run(run())
+    with TemporaryDirectory() as own:
+        asyncio.run(run(Workshop(state or Path(own))))

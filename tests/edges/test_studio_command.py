@@ -2,6 +2,7 @@
 
 import socket
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -22,15 +23,16 @@ def served(monkeypatch):
 
 def test_it_listens_to_this_computer_only(served, capsys):
     assert main(["studio"]) == DONE
-    ((machine, name, host, port, browser),) = served
+    ((machine, name, host, port, browser, state),) = served
     assert (name, host, port, browser) == ("zhang-gosselin-4dof", "127.0.0.1", 8000, True)
     assert machine.family.name == "passive-leg-4dof"
+    assert state.parts[-2:] == ("kinetostat", "studio")
     assert capsys.readouterr().err == ""
 
 
 def test_another_host_is_explained(served, capsys):
-    assert main(["studio", "hexapod", "--host", "0.0.0.0", "--port", "8010", "--no-browser"]) == DONE
-    assert served[0][2:] == ("0.0.0.0", 8010, False)
+    assert main(["studio", "hexapod", "--host", "0.0.0.0", "--port", "8010", "--no-browser", "--state", "here"]) == DONE
+    assert served[0][2:] == ("0.0.0.0", 8010, False, Path("here"))
     told = capsys.readouterr().err
     assert "without password or encryption" in told
 

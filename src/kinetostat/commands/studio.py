@@ -3,6 +3,7 @@
 import argparse
 import sys
 from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import DONE, MACHINE, add_command
@@ -34,6 +35,10 @@ def add_studio_command(commands: "Commands") -> None:
         "--host", default=LOCAL[0],
         help="address to listen at (default: 127.0.0.1, which only this computer can reach)",
     )  # fmt: skip
+    studio.add_argument(
+        "--state", metavar="FOLDER", type=Path,
+        help="folder for searches and favourites of the design tab (default: among your own data)",
+    )  # fmt: skip
     studio.add_argument("--no-browser", action="store_true", help="do not open a browser")
 
 
@@ -50,6 +55,7 @@ def _studio(options: argparse.Namespace) -> int:
     machine = load(options.machine, options.settings)
     if find_spec(EXTRA) is None:
         raise InputError("the studio is not installed; install it with `pip install 'kinetostat[studio]'`.")
+    from kinetostat.studio.design.place import usual_state
     from kinetostat.studio.serving import serve
 
     if options.host not in LOCAL:
@@ -59,5 +65,5 @@ def _studio(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     name = options.machine if options.machine in bundled() and not options.settings else ""
-    serve(machine, name, options.host, options.port, not options.no_browser)
+    serve(machine, name, options.host, options.port, not options.no_browser, options.state or usual_state())
     return DONE

@@ -26,6 +26,35 @@ def holds_study(folder: Path) -> bool:
     return (folder / QUESTION).exists()
 
 
+def in_use(folder: Path) -> bool:
+    """Whether a process is at work in the folder of a study."""
+    try:
+        with (folder / HISTORY).open("r+b") as stream:
+            _lock(stream)
+    except FileNotFoundError:
+        return False
+    except OSError:
+        return True
+    return False
+
+
+def noted(folder: Path, start: int = 0) -> tuple[list[Record], int]:
+    """What was noted from a place in the history on, in whole lines, and the place after it; waits for nobody.
+
+    Args:
+        folder: of a study, in which another process may be at work.
+        start: byte of the history where a line begins.
+    """
+    try:
+        with (folder / HISTORY).open("rb") as stream:
+            stream.seek(start)
+            text = stream.read()
+    except FileNotFoundError:
+        return [], start
+    whole = text[: text.rfind(b"\n") + 1]
+    return [json.loads(line) for line in whole.splitlines()], start + len(whole)
+
+
 class StudyFolder:
     """A folder in which this process alone is at work."""
 

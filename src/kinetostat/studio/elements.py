@@ -42,6 +42,15 @@ class CurveView(Element, component=COMPONENTS / "curve_view.js"):
         self._props["label"] = label
 
 
+class FrontView(Element, component=COMPONENTS / "front_view.js"):
+    """Designs as points over two objectives; method `show`; event `pick` with the number of a point."""
+
+    def __init__(self, label: str) -> None:
+        """No points yet."""
+        super().__init__()
+        self._props["label"] = label
+
+
 class QuantityRow(Element, component=COMPONENTS / "quantity_row.js"):
     """A number with its name and unit, and a slider; events `slide`, `settle`, `write`."""
 

@@ -8,9 +8,12 @@ from nicegui import events, ui
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled
+from kinetostat.machine.machine import Machine
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, PictureWish, Report, ReportWish, picture, report
+from kinetostat.studio.design.design_tab import DesignTab
+from kinetostat.studio.design.workshop import Workshop
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.map_panel import MapPanel
 from kinetostat.studio.panels.blame import BlamePanel
@@ -31,6 +34,8 @@ PANELS: tuple[Callable[[], Panel], ...] = (
 """The linked views, in the order of their tabs."""
 ACCENT = "#0b5ea8"
 """Colour of what can be pressed; style.css has it by name."""
+MODES = ("Explore", "Design")
+"""What stands beside the machine: its numbers and linked views, or the design tab."""
 OTHER = "own"
 """Key of a machine that is not bundled in the list of machines."""
 
@@ -38,12 +43,13 @@ OTHER = "own"
 class StudioPage:
     """A page with its own session; another tab has another."""
 
-    def __init__(self, memory: Memory, remember: Callable[[Memory], None]) -> None:
+    def __init__(self, memory: Memory, remember: Callable[[Memory], None], workshop: Workshop) -> None:
         """Build the page around what is remembered, and start to compute.
 
         Args:
             memory: of this tab, or a new one.
             remember: called with what is to be remembered of it, whenever that changes.
+            workshop: searches and favourites of the server.
         """
         self.session, self._remember = Session(memory), remember
         self._pictures = Lane(picture, self._show_picture)
@@ -52,7 +58,7 @@ class StudioPage:
         self.dark = ui.dark_mode(value=False)
         ui.colors(primary=ACCENT)
         self._header()
-        with ui.element("main").classes("studio"):
+        with ui.element("main").classes("studio") as self.main:
             with ui.element("section").classes("left").props('aria-label="parameters"'):
                 self.parameters = ParametersPanel(self.session, self.changed, lambda: self._pictures.busy)
             with ui.element("section").classes("middle").props('aria-label="machine"'):
@@ -62,6 +68,7 @@ class StudioPage:
                     self.map = MapPanel(self.session, self.changed, self._refuse)
                 with ui.element("div").classes("card views-card"):
                     self._views()
+            self.design = DesignTab(self.session, workshop, self._take, self._refuse)
         ui.context.client.on_delete(self._close)
         ui.keyboard(on_key=self._key, ignore=["input", "select", "textarea"])
         self._loaded()
@@ -74,6 +81,8 @@ class StudioPage:
             self.undo = self._button("undo", "Undo (Ctrl+Z)", self._undo)
             self.redo = self._button("redo", "Redo (Ctrl+Y)", self._redo)
             self.reset = self._button("restart_alt", "Back to the machine as it was loaded", self._reset)
+            mode = ui.toggle(list(MODES), value=MODES[0], on_change=lambda event: self._to_front(str(event.value)))
+            mode.props("dense no-caps unelevated").classes("choice mode").mark("mode")
             ui.space()
             self.upload = ui.upload(
                 on_upload=self._open_upload, on_rejected=lambda: self._refuse(TOO_LARGE), auto_upload=True,
@@ -119,6 +128,7 @@ class StudioPage:
         self._sizes = proportions_of(machine, respond(self.session.origin).configuration)
         self.parameters.fill()
         self.map.fill()
+        self.design.renew()
         self._offer_history()
         self.map.refresh()
         self._pictures.ask(PictureWish(machine, self._sizes, fit=True))
@@ -164,6 +174,17 @@ class StudioPage:
             return
         self._loaded()
 
+    def _to_front(self, mode: str) -> None:
+        self.main.classes(replace="studio designing" if mode == MODES[1] else "studio")
+        self.design.front(mode == MODES[1])
+
+    def _take(self, machine: Machine) -> None:
+        """A design has been found or was kept: make it the machine of this page."""
+        if self.session.take(machine):
+            self.changed()
+        else:
+            self._loaded()
+
     def _save(self) -> None:
         name, content = self.session.as_file()
         ui.download(content, name, "application/toml")
@@ -192,7 +213,7 @@ class StudioPage:
         ui.notify(message, type="negative", multi_line=True, close_button="close", timeout=0, position="top")
 
     def _close(self) -> None:
-        for part in (self._pictures, self._reports, self.map):
+        for part in (self._pictures, self._reports, self.map, self.design):
             part.close()
         for panel in self.panels.values():
             panel.close()

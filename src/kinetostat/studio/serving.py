@@ -14,6 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError
+from kinetostat.studio.design.workshop import Workshop
 from kinetostat.studio.page import StudioPage
 from kinetostat.studio.session import Memory
 
@@ -63,7 +64,7 @@ class BoundedBody:
         await self._served(scope, counted, send)
 
 
-def serve(machine: Machine, name: str, host: str, port: int, browser: bool) -> None:
+def serve(machine: Machine, name: str, host: str, port: int, browser: bool, state: Path) -> None:
     """Serve the studio until it is stopped; every page starts with this machine.
 
     Args:
@@ -72,6 +73,7 @@ def serve(machine: Machine, name: str, host: str, port: int, browser: bool) -> N
         host: address to listen at.
         port: to listen at.
         browser: whether to open a browser.
+        state: folder of searches and favourites.
 
     Raises:
         InputError: nothing can listen there.
@@ -79,7 +81,7 @@ def serve(machine: Machine, name: str, host: str, port: int, browser: bool) -> N
     _check_free(host, port)
     sys.setswitchinterval(SWITCH)
     app.on_startup(lambda: background_tasks.create(_announce(host, port)))
-    prepare(machine, name, LOOPBACK if host in LOOPBACK else ())
+    prepare(machine, name, Workshop(state), LOOPBACK if host in LOOPBACK else ())
     ui.run(
         host=host, port=port, title="kinetostat studio", favicon=MARK, show=browser, reload=False, tailwind=False,
         show_welcome_message=False, reconnect_timeout=30.0, message_history_length=200,
@@ -108,32 +110,35 @@ async def _announce(host: str, port: int) -> None:
     print(f"Studio: http://{shown}:{port}   stop with Ctrl-C", file=sys.stderr, flush=True)
 
 
-def prepare(machine: Machine, name: str = "", hosts: Sequence[str] = ()) -> None:
+def prepare(machine: Machine, name: str, workshop: Workshop, hosts: Sequence[str] = ()) -> None:
     """Make the page known to the server.
 
     Args:
         machine: what a new page shows.
         name: of it, if it is bundled; otherwise empty.
+        workshop: what all pages share.
         hosts: names by which a browser may call this server: a page of another site cannot reach it under its own name.
     """
     app.add_middleware(BoundedBody)
+    app.on_shutdown(workshop.close)
     if hosts:
         app.add_middleware(TrustedHostMiddleware, allowed_hosts=[*hosts, "[::1]"])
 
     @ui.page("/")
     async def studio() -> None:
-        await show(machine, name)
+        await show(machine, name, workshop)
 
 
-async def show(machine: Machine, name: str = "") -> None:
+async def show(machine: Machine, name: str, workshop: Workshop) -> None:
     """Build the page of one browser tab; a tab that is loaded again goes on where it was.
 
     Args:
         machine: what a new tab shows.
         name: of it, if it is bundled; otherwise empty.
+        workshop: what all pages share.
     """
     ui.add_css(STYLE)
     await ui.context.client.connected()
     remembered = app.storage.tab
     kept = remembered.get(KEPT) or Memory(machine, name)
-    StudioPage(kept, lambda memory: remembered.update({KEPT: memory}))
+    StudioPage(kept, lambda memory: remembered.update({KEPT: memory}), workshop)

@@ -85,6 +85,22 @@ class Session:
             raise InputError(f'"{name}" is not text; a machine file is TOML, saved as UTF-8.') from None
         self._start(Memory(build(parse(text, name), name)))
 
+    def take(self, machine: Machine) -> bool:
+        """Take another design; returns whether it is one step of the history, as any of a machine of the same kind is.
+
+        A machine of another kind is taken as one that was loaded.
+        """
+        alike = (
+            machine.family.name == self.machine.family.name and values(machine).keys() == values(self.machine).keys()
+        )
+        if alike:
+            self._past = [*self._past[-REMEMBERED + 1 :], self.machine]
+            self._future.clear()
+            self.machine, self._dragged = machine, ()
+        else:
+            self._start(Memory(machine))
+        return alike
+
     def value(self, path: str) -> float:
         """The SI value of a control; of one for several entries the first."""
         return float(values(self.machine)[self.controls[path].parameter.leaves[0]])

@@ -141,7 +141,7 @@ def build_problem(study: StudyFile, folder: Path = Path()) -> Problem:
         InputError: a field, quantity, bound or value that does not fit the machine.
     """
     named = study.machine in bundled()
-    machine = load(study.machine if named else folder / study.machine, list(_settings(study.changes)))
+    machine = load(study.machine if named else folder / study.machine, list(settings_of(study.changes)))
     return problem_of(study, machine)
 
 
@@ -168,12 +168,12 @@ def problem_of(study: StudyFile, machine: Machine) -> Problem:
     return found
 
 
-def _settings(changes: Mapping[str, Any], above: str = "") -> Iterator[str]:
+def settings_of(changes: Mapping[str, Any], above: str = "") -> Iterator[str]:
     """Overrides of the machine from a table, whose keys may be dotted or tables in tables."""
     for key, value in changes.items():
         path = f"{above}.{key}" if above else key
         if isinstance(value, dict):
-            yield from _settings(value, path)
+            yield from settings_of(value, path)
         else:
             yield f"{path}={json.dumps(value)}"
 

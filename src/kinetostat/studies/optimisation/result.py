@@ -21,7 +21,7 @@ from kinetostat.studies.optimisation.log import Log, Rows
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.ridges import Ridge, at_bounds, find_ridges
 from kinetostat.studies.optimisation.robustness import Robustness, robustness_of
-from kinetostat.studies.optimisation.search import Watch, search, search_into, unwatched
+from kinetostat.studies.optimisation.search import Stop, Watch, never, search, search_into, unwatched
 from kinetostat.studies.optimisation.slopes import Surveyor
 
 LONGEST_NAME = 80
@@ -128,7 +128,13 @@ def designed(problem: Problem, genes: Array) -> Machine:
     return replace(machine, name=f"{problem.machine.name}, optimised"[:LONGEST_NAME])
 
 
-def optimize(problem: Problem, folder: Path | None = None, watch: Watch = unwatched, resume: bool = False) -> Result:
+def optimize(
+    problem: Problem,
+    folder: Path | None = None,
+    watch: Watch = unwatched,
+    resume: bool = False,
+    stop: Stop = never,
+) -> Result:
     """Solve a problem.
 
     Args:
@@ -136,12 +142,13 @@ def optimize(problem: Problem, folder: Path | None = None, watch: Watch = unwatc
         folder: where every step is kept, so that a search that was stopped goes on; None to keep nothing.
         watch: told how far the search is, and the best objective.
         resume: insist that the folder holds a part of the search.
+        stop: asked after each step of a search with a folder; the result is then that of the steps so far.
 
     Raises:
         InputError: see `search.search_into`.
     """
     assess = Assessor(problem)
-    log = search(assess, watch) if folder is None else search_into(assess, folder, watch, resume)
+    log = search(assess, watch) if folder is None else search_into(assess, folder, watch, resume, stop)
     initial = assess(_as_it_is(problem))
     several = len(problem.objectives) > 1
     front = front_of(log) if several else _single(log)

@@ -6,6 +6,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
+
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError
@@ -16,7 +18,7 @@ from kinetostat.studies.optimisation.gradient import Gradient
 from kinetostat.studies.optimisation.hybrid import Hybrid
 from kinetostat.studies.optimisation.log import Log, Step, record_of
 from kinetostat.studies.optimisation.problem import Problem, problem_of
-from kinetostat.studies.row_file import RowFile
+from kinetostat.studies.row_file import KIND, RowFile
 from kinetostat.studies.study_folder import QUESTION, Record, StudyFolder, holds_study, study_folder
 
 ROWS = "designs.bin"
@@ -24,6 +26,15 @@ STUDY_VERSION = 1
 
 Watch = Callable[[int, int, float | None], None]
 """Told (steps done, steps in all, best objective so far) after each step."""
+
+
+Stop = Callable[[], bool]
+"""Asked after each step whether to leave the rest for later."""
+
+
+def never() -> bool:
+    """A search that nobody stops."""
+    return False
 
 
 def unwatched(_done: int, _total: int, _best: float | None) -> None:
@@ -63,7 +74,9 @@ def search(assess: Assessor, watch: Watch = unwatched) -> Log:
     return log
 
 
-def search_into(assess: Assessor, folder: Path, watch: Watch = unwatched, resume: bool = False) -> Log:
+def search_into(
+    assess: Assessor, folder: Path, watch: Watch = unwatched, resume: bool = False, stop: Stop = never
+) -> Log:
     """Search into a folder; go on with what it holds of the same study.
 
     Args:
@@ -71,6 +84,7 @@ def search_into(assess: Assessor, folder: Path, watch: Watch = unwatched, resume
         folder: of this study alone.
         watch: told how far the search is.
         resume: insist that the folder holds a part of it.
+        stop: asked after each step.
 
     Raises:
         InputError: another study or another process in the folder, nothing to resume, a full disk.
@@ -89,12 +103,14 @@ def search_into(assess: Assessor, folder: Path, watch: Watch = unwatched, resume
                 file.write(start, log.rows[start:])
                 study.note(log.steps[-1])
                 watch(len(log.steps), method.steps, log.steps[-1].get("best"))
+                if stop():
+                    break
         return log
 
 
 def _take(method: Method, log: Log) -> None:
     step = method.step(len(log.steps), log)
-    record = record_of(log, step)
+    record = {**record_of(log, step), "of": method.steps}
     log.add(log.as_rows(step), record)
 
 
@@ -127,6 +143,31 @@ def stored_problem(folder: Path) -> Problem:
         raise InputError(f'"{folder}" is not the folder of an optimisation; give a study file, or such a folder.')
     machine = build(documents.parse(held["machine"], str(folder)), str(folder))
     return problem_of(read_study(held["optimisation"], str(folder)), machine)
+
+
+def begin_search(problem: Problem, folder: Path) -> None:
+    """Make the folder of a search that is still to be made; `stored_problem` reads it.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    with study_folder(folder) as study:
+        study.begin(question_of(problem, Log(problem).width))
+
+
+def kept_log(problem: Problem, folder: Path, record: Record) -> Log:
+    """What a step kept, as a log of its own; another process may be at work in the folder.
+
+    Args:
+        problem: of the folder.
+        folder: of the search.
+        record: what was noted about the step.
+    """
+    log = Log(problem)
+    known = (folder / ROWS).stat().st_size // (log.width * KIND.itemsize)
+    rows = np.memmap(folder / ROWS, KIND, "r", shape=(known, log.width))[record["kept"]].astype(float)
+    log.add(rows, {**record, "kept": list(range(len(rows)))})
+    return log
 
 
 def question_of(problem: Problem, width: int) -> Record:

@@ -30,9 +30,10 @@ export default {
       const sheet = prepare(this.canvas, this.$el);
       if (!sheet) return;
       const { pen, width, height } = sheet;
-      const { x, lines, label, here, log } = this.curves;
+      const { x, lines, label, here, log, signed } = this.curves;
+      const drawable = (value) => value !== null && (signed || value > 0);
       const box = { left: 0, bottom: height, x: 66, y: 8, width: width - 66 - 62, height: height - 8 - 40 };
-      const known = lines.flatMap((line) => line.values).filter((value) => value !== null && value > 0);
+      const known = lines.flatMap((line) => line.values).filter(drawable);
       if (box.width < 20 || box.height < 20) return;
       if (!known.length) {
         pen.fillStyle = colour("ink");
@@ -40,7 +41,7 @@ export default {
         return;
       }
       let [low, high] = [Math.min(...known), Math.max(...known)];
-      const steep = high / low > 20;
+      const steep = low > 0 && high / low > 20;
       if (!steep) [low, high] = [low - 0.06 * (high - low || high), high + 0.06 * (high - low || high)];
       const share = (value, a, b, asLog) => (asLog ? Math.log(value / a) / Math.log(b / a) : (value - a) / (b - a));
       this.toX = (value) => box.x + box.width * share(value, x[0], x[x.length - 1], log);
@@ -69,7 +70,7 @@ export default {
         pen.beginPath();
         let drawing = false;
         line.values.forEach((value, i) => {
-          if (value === null || !(value > 0)) return (drawing = false);
+          if (!drawable(value)) return (drawing = false);
           pen[drawing ? "lineTo" : "moveTo"](this.toX(x[i]), this.toY(value));
           drawing = true;
         });

@@ -1,0 +1,45 @@
+"""A study as the text of a file that `read_study` reads back as the same study. Nothing is looked up or solved."""
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from kinetostat.spec.study import StudyFile
+
+TABLES = ("set", "poses", "optimizer", "robustness")
+LISTS = ("variables", "objectives", "constraints")
+
+
+def study_toml(study: StudyFile) -> str:
+    """The TOML text of a study; what is as it would be without being written is left out."""
+    held = study.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+    lines = ["schema = 1", *_pairs({key: held[key] for key in ("name", "machine")})]
+    lines += _table("[set]", held.get("set", {}))
+    for name in LISTS:
+        for table in held.get(name, []):
+            lines += _table(f"[[{name}]]", table)
+    for name in TABLES[1:]:
+        lines += _table(f"[{name}]", held.get(name, {}))
+    return "\n".join(lines) + "\n"
+
+
+def _table(head: str, table: Mapping[str, Any]) -> list[str]:
+    return ["", head, *_pairs(table)] if table else []
+
+
+def _pairs(table: Mapping[str, Any]) -> Iterator[str]:
+    for key, value in table.items():
+        yield f"{_key(key)} = {_value(value)}"
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, dict):
+        return f"{{ {', '.join(_pairs(value))} }}"
+    if isinstance(value, list):
+        return f"[{', '.join(_value(one) for one in value)}]"
+    return json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,83 @@
+"""The design tab: a study on the left, the search and its answer on the right; the machine stays between them."""
+
+from collections.abc import Callable
+
+from nicegui import ui
+
+from kinetostat.machine.machine import Machine
+from kinetostat.studio.design.draft import Draft
+from kinetostat.studio.design.favourites_panel import FavouritesPanel
+from kinetostat.studio.design.run_panel import RunPanel
+from kinetostat.studio.design.study_form import StudyForm
+from kinetostat.studio.design.workshop import Workshop
+from kinetostat.studio.session import Session
+
+RESULT, FAVOURITES = "Result", "Favourites"
+
+
+class DesignTab:
+    """Everything of the tab on one page; what it shows outlives the page in the workshop."""
+
+    def __init__(
+        self, session: Session, workshop: Workshop, load: Callable[[Machine], None], refuse: Callable[[str], None]
+    ) -> None:
+        """Build it, to the left and to the right of the machine.
+
+        Args:
+            session: whose machine is designed.
+            workshop: of the server.
+            load: takes a machine into the session.
+            refuse: told what could not be done.
+        """
+        self._session, self._workshop = session, workshop
+        with ui.element("section").classes("design left").props('aria-label="study"'):
+            self.form = StudyForm(session, self._start)
+        with ui.element("section").classes("design right").props('aria-label="search and result"'):
+            with ui.element("div").classes("card run-card"):
+                self.runs = RunPanel(workshop.runs, load, refuse, _confirm)
+            with ui.element("div").classes("card answer-card"):
+                with ui.tabs().classes("panel-tabs").props("dense no-caps") as self.tabs:
+                    for name in (RESULT, FAVOURITES):
+                        ui.tab(name).mark(f"tab-{name}")
+                panels = ui.tab_panels(self.tabs, value=RESULT, animated=False)
+                with panels.classes("panel-body").props("keep-alive"):
+                    with ui.tab_panel(RESULT):
+                        self.runs.answer()
+                    with ui.tab_panel(FAVOURITES):
+                        self.favourites = FavouritesPanel(session, workshop.favourites, load, refuse, _confirm)
+
+    def front(self, on: bool) -> None:
+        """Whether the tab is in front: only then are searches looked at."""
+        self.runs.timer.active = on
+        if on:
+            self.favourites.fill()
+            self.runs.refresh()
+
+    def renew(self) -> None:
+        """Another machine has been loaded."""
+        self.form.renew()
+
+    def close(self) -> None:
+        """The page is gone; the searches go on."""
+        self.runs.close()
+        self.favourites.close()
+
+    def _start(self, draft: Draft) -> None:
+        run = self._workshop.runs.start(draft.problem(self._session.machine))
+        self.tabs.set_value(RESULT)
+        self.runs.follow(run)
+
+
+def _confirm(question: str, action: Callable[[], None]) -> None:
+    """Ask before something is lost."""
+    with ui.dialog(value=True) as window, ui.element("div").classes("confirm-window"):
+        ui.label(question)
+        with ui.element("div").classes("confirm-buttons"):
+            ui.button("Keep it", on_click=window.close).props("flat no-caps").mark("confirm-no")
+
+            def agreed() -> None:
+                window.close()
+                action()
+
+            ui.button("Delete", on_click=agreed).props("unelevated no-caps color=negative").mark("confirm-yes")
+    window.on("hide", window.delete)

@@ -1,0 +1,240 @@
+"""Searches on the page: which there are, how far one is, its plot and its answer, stop and go on."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from nicegui import ui
+from nicegui.events import GenericEventArguments
+
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.errors import InputError
+from kinetostat.studio.design.progress import Follower, Progress, failure
+from kinetostat.studio.design.result_text import result_text
+from kinetostat.studio.design.runs import Run, Runs, Stage
+from kinetostat.studio.elements import CurveView, FrontView
+from kinetostat.studio.lanes import Lane
+from kinetostat.studio.markup import paragraph
+
+GLANCE = 0.5
+"""Seconds between two looks at a search."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a page wants to know: the searches there are, and how far one of them is (0 for none).
+
+    `follower` is of the search that was looked at last.
+    """
+
+    number: int
+    follower: Follower | None
+
+
+@dataclass(frozen=True)
+class Seen:
+    """All searches; progress of one, or why it cannot be shown."""
+
+    runs: list[Run]
+    follower: Follower | None = None
+    progress: Progress | None = None
+    problem: str = ""
+
+
+class RunPanel:
+    """A list of searches with the one in front: progress, plot, answer."""
+
+    def __init__(
+        self,
+        runs: Runs,
+        load: Callable[[Machine], None],
+        refuse: Callable[[str], None],
+        confirm: Callable[[str, Callable[[], None]], None],
+    ) -> None:
+        """A panel.
+
+        Args:
+            runs: of the server.
+            load: takes a machine into the session.
+            refuse: told what could not be done.
+            confirm: asks before something is deleted.
+        """
+        self._runs, self._load, self._refuse, self._confirm = runs, load, refuse, confirm
+        self._lane = Lane(self._look, self._deliver)
+        self._follower: Follower | None = None
+        self._progress: Progress | None = None
+        self._shown: object = None
+        self._place: int | None = None
+        with ui.element("div").classes("design-head"):
+            self.choice = ui.select({}, label="search", on_change=self._chosen).mark("run-choice")
+            self.choice.props("dense options-dense outlined").classes("field grow")
+            self.stop = self._button("stop", "Stop after this step; all that was found is kept", self._stop)
+            self.go_on = self._button("play_arrow", "Go on where it was stopped", self._go_on)
+            self.delete = self._button("delete", "Delete this search", self._delete)
+        self.bar = ui.linear_progress(0.0, show_value=False, size="4px").props('aria-label="progress"').mark("run-bar")
+        self.line = ui.label("").classes("run-line").props('role="status"').mark("run-line")
+        self.curve = CurveView("objective of the best design and mean over the steps").mark("run-curve")
+        self.front = FrontView("designs that no other beats; arrow keys and Enter, or a click, load one")
+        self.front.mark("run-front").on("pick", self._pick)
+        self.timer = ui.timer(GLANCE, self.refresh, active=False)
+
+    def answer(self) -> None:
+        """Put the place of the answer on the page."""
+        with ui.element("div").classes("design-head"):
+            self.best = ui.button("Load the best design", icon="input", on_click=self._load_best)
+            self.best.props("unelevated no-caps dense").mark("run-load")
+        self.text = ui.html(paragraph("Nothing has been searched yet."), sanitize=False).mark("run-result")
+        self._offer(None)
+
+    @staticmethod
+    def _button(icon: str, text: str, action: Callable[[], None]) -> ui.button:
+        button = ui.button(icon=icon, on_click=action).props(f'flat round dense aria-label="{text}"')
+        return button.tooltip(text).mark(f"run-{icon}")
+
+    def refresh(self) -> None:
+        """Look how far the search is."""
+        self._lane.ask(Look(int(self.choice.value or 0), self._follower))
+
+    def follow(self, run: Run) -> None:
+        """Bring a search to the front that has just been started."""
+        self._list([run, *(one for one in self._runs.every() if one.number != run.number)], run.number)
+        self.refresh()
+
+    def close(self) -> None:
+        """Look no longer; the searches go on."""
+        self.timer.deactivate()
+        self._lane.close()
+
+    def _look(self, wish: Look) -> Seen:
+        runs = self._runs.every()
+        number = wish.number or (runs[0].number if runs else 0)
+        run = next((one for one in runs if one.number == number), None)
+        if run is None:
+            return Seen(runs)
+        try:
+            known = wish.follower
+            follower = known if known is not None and known.number == number else Follower(run)
+            return Seen(runs, follower, follower.progress(run), failure(run))
+        except InputError as error:
+            return Seen(runs, problem=str(error))
+        except OSError:
+            return Seen(runs)
+
+    def _deliver(self, wish: Look, seen: Seen) -> None:
+        if wish.number != int(self.choice.value or 0):
+            self.refresh()
+            return
+        progress = seen.progress
+        self._list(seen.runs, progress.run.number if progress else wish.number)
+        self._follower, self._progress = seen.follower, progress
+        key = progress and (progress.run, progress.steps, progress.result is None, seen.problem)
+        if key == self._shown and key is not None:
+            return
+        self._shown = key
+        self._offer(progress)
+        if progress is None:
+            self.line.set_text(seen.problem)
+            self.bar.set_value(0.0)
+            self.text.set_content(paragraph(seen.problem or "Nothing has been searched yet."))
+            return
+        self.bar.set_value(progress.steps / progress.total if progress.total else 0.0)
+        self.line.set_text(_line(progress))
+        self._draw(progress)
+        self.text.set_content(paragraph(seen.problem, "lead") if seen.problem else result_text(progress))
+
+    def _list(self, runs: list[Run], number: int) -> None:
+        options = {run.number: f"{run.number} · {run.name} · {run.stage}" for run in runs}
+        chosen = number if number in options else next(iter(options), None)
+        if options != self.choice.options or chosen != self.choice.value:
+            self.choice.set_options(options, value=chosen)
+
+    def _offer(self, progress: Progress | None) -> None:
+        """Enable what can be done."""
+        stage = progress.run.stage if progress else None
+        several = progress is not None and len(progress.problem.objectives) > 1
+        self.stop.set_enabled(stage is Stage.RUNNING)
+        self.go_on.set_enabled(stage in (Stage.STOPPED, Stage.FAILED))
+        self.delete.set_enabled(stage is not None and not stage.active)
+        self.best.set_enabled(progress is not None and bool(progress.objectives))
+        self.best.set_text("Load the knee" if several else "Load the best design")
+        self.curve.set_visibility(progress is not None and not several)
+        self.front.set_visibility(several)
+
+    def _draw(self, progress: Progress) -> None:
+        labels = [_axis(one.term.label, one.term.unit) for one in progress.problem.objectives]
+        if len(labels) == 1:
+            if progress.steps > 1:
+                self.curve.run_method("show", _curve(progress, labels[0]))
+            return
+        initial = progress.result and list(progress.result["initial"]["objectives"].values())
+        self.front.run_method(
+            "show",
+            {
+                "points": [point[:2] for point in progress.objectives],
+                "knee": progress.knee,
+                "initial": initial[:2] if initial and None not in initial[:2] else None,
+                "chosen": self._place,
+                "label": {"x": labels[0], "y": labels[1]},
+            },
+        )
+
+    def _chosen(self) -> None:
+        self._place = None
+        self.refresh()
+
+    def _pick(self, event: GenericEventArguments) -> None:
+        self._take(int(event.args))
+
+    def _load_best(self) -> None:
+        if self._progress is not None:
+            self._take(self._progress.knee)
+
+    def _take(self, place: int) -> None:
+        if self._progress is not None and 0 <= place < len(self._progress.objectives):
+            self._place = place
+            self._load(self._progress.design(place))
+            if len(self._progress.problem.objectives) > 1:
+                self._draw(self._progress)
+
+    def _stop(self) -> None:
+        self._attempt(self._runs.stop)
+
+    def _go_on(self) -> None:
+        self._attempt(self._runs.go_on)
+
+    def _delete(self) -> None:
+        self._confirm(f"Delete search {self.choice.value} and all its designs?", lambda: self._attempt(self._forget))
+
+    def _forget(self, number: int) -> None:
+        self._runs.delete(number)
+        self._follower = None
+        self.choice.set_value(None)
+
+    def _attempt(self, action: Callable[[int], None]) -> None:
+        try:
+            action(int(self.choice.value or 0))
+        except InputError as error:
+            self._refuse(str(error))
+        self.refresh()
+
+
+def _axis(label: str, unit: str) -> str:
+    return label if unit == "1" else f"{label} ({unit})"
+
+
+def _curve(progress: Progress, label: str) -> dict[str, object]:
+    return {
+        "x": list(range(1, progress.steps + 1)),
+        "lines": [{"name": "best", "values": progress.best}, {"name": "mean", "values": progress.mean}],
+        "label": {"x": "step", "y": label},
+        "unit": "",
+        "here": None,
+        "log": False,
+        "signed": True,
+    }
+
+
+def _line(progress: Progress) -> str:
+    total = f" of {progress.total}" if progress.total else ""
+    said = f"{progress.run.stage}: {progress.steps}{total} steps, {progress.designs:,} designs"
+    best = progress.best[-1] if progress.best else None
+    return said if best is None else f"{said}, best {best:.9g}"

@@ -1,0 +1,188 @@
+"""Searches in processes of their own, each in a folder that outlives page and server: start, stop, go on, list."""
+
+import json
+import shutil
+import subprocess
+import sys
+import threading
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.optimisation.problem import Problem
+from kinetostat.studies.optimisation.search import begin_search
+from kinetostat.studies.study_folder import QUESTION, in_use, noted
+from kinetostat.studio.design.place import numbered, slug
+from kinetostat.studio.design.worker import FAILURE
+
+MOST_RUNNING = 2
+"""Searches at a time; each takes what the machine has."""
+MOST_RUNS = 60
+"""Searches that are kept."""
+WORKER = "kinetostat.studio.design.worker"
+RESULT = "result.json"
+
+
+class Stage(StrEnum):
+    """Where a search is."""
+
+    RUNNING = "running"
+    STOPPING = "stopping"
+    STOPPED = "stopped"
+    DONE = "done"
+    FAILED = "failed"
+
+    @property
+    def active(self) -> bool:
+        """Whether a process is at work."""
+        return self in (Stage.RUNNING, Stage.STOPPING)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A search that is kept.
+
+    Attributes:
+        number: of it.
+        folder: of it.
+        name: of its study.
+        stage: where it is.
+    """
+
+    number: int
+    folder: Path
+    name: str
+    stage: Stage
+
+
+class Runs:
+    """All searches of a state folder; one object of a server."""
+
+    def __init__(self, state: Path) -> None:
+        """Searches below `state`; nothing is written before the first one."""
+        self._place = state / "runs"
+        self._mine: dict[Path, subprocess.Popen[bytes]] = {}
+        self._names: dict[Path, str] = {}
+        self._turn = threading.Lock()
+
+    def every(self) -> list[Run]:
+        """All of them, the latest first."""
+        held = numbered(self._place).items()
+        return [Run(n, path, self._name(path), self._stage(path)) for n, path in held if (path / QUESTION).exists()]
+
+    def of(self, number: int) -> Run:
+        """The one of that number.
+
+        Raises:
+            InputError: it has been deleted.
+        """
+        path = numbered(self._place).get(number)
+        if path is None or not (path / QUESTION).exists():
+            raise InputError(f"search {number} is no longer kept; choose another one.")
+        return Run(number, path, self._name(path), self._stage(path))
+
+    def start(self, problem: Problem) -> Run:
+        """Begin a search; returns at once.
+
+        Raises:
+            InputError: too many run, or are kept, or the folder cannot be written.
+        """
+        with self._turn:
+            self._check_free()
+            held = numbered(self._place)
+            if len(held) >= MOST_RUNS:
+                raise InputError(f"{MOST_RUNS} searches are kept already; delete one that is no longer needed.")
+            number = max(held, default=0) + 1
+            folder = self._place / f"{number:04d}-{slug(problem.study.name, 'study')}"
+            begin_search(problem, folder)
+            self._work(folder)
+        return self.of(number)
+
+    def go_on(self, number: int) -> None:
+        """Go on with a search that was stopped.
+
+        Raises:
+            InputError: too many run, or it runs already or is done.
+        """
+        with self._turn:
+            run = self.of(number)
+            if run.stage not in (Stage.STOPPED, Stage.FAILED):
+                raise InputError(f"search {number} is {run.stage}; only one that was stopped can go on.")
+            self._check_free()
+            self._work(run.folder)
+
+    def stop(self, number: int) -> None:
+        """Let a search end after its step; all that was found is kept.
+
+        Raises:
+            InputError: it is the search of another studio.
+        """
+        run = self.of(number)
+        process = self._mine.get(run.folder)
+        if run.stage.active and (process is None or process.stdin is None):
+            raise InputError(f"search {number} was started by another studio that still runs; stop it there.")
+        if process is not None and process.stdin is not None:
+            process.stdin.close()
+
+    def delete(self, number: int) -> None:
+        """Forget a search that is not running.
+
+        Raises:
+            InputError: it is running.
+        """
+        with self._turn:
+            run = self.of(number)
+            if run.stage.active:
+                raise InputError(f"search {number} is {run.stage}; stop it before it is deleted.")
+            shutil.rmtree(run.folder, ignore_errors=True)
+
+    def close(self) -> None:
+        """Let all searches of this server end after their step."""
+        for process in self._mine.values():
+            if process.stdin is not None:
+                process.stdin.close()
+
+    def wait(self, number: int) -> None:
+        """Until the process of a search of this server has ended."""
+        process = self._mine.get(self.of(number).folder)
+        if process is not None:
+            process.wait()
+
+    def _check_free(self) -> None:
+        active = [run for run in self.every() if run.stage.active]
+        if len(active) >= MOST_RUNNING:
+            names = " and ".join(f"{run.number} ({run.name})" for run in active)
+            raise InputError(f"searches {names} are running; wait until one is done, or stop one.")
+
+    def _work(self, folder: Path) -> None:
+        (folder / FAILURE).unlink(missing_ok=True)
+        words = [sys.executable, "-m", WORKER, str(folder)]
+        self._mine[folder] = subprocess.Popen(
+            words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+
+    def _stage(self, folder: Path) -> Stage:
+        process = self._mine.get(folder)
+        if process is not None and process.poll() is None:
+            return Stage.STOPPING if process.stdin is None or process.stdin.closed else Stage.RUNNING
+        if process is None and in_use(folder):
+            return Stage.RUNNING
+        if (folder / FAILURE).exists():
+            return Stage.FAILED
+        return Stage.DONE if _complete(folder) else Stage.STOPPED
+
+    def _name(self, folder: Path) -> str:
+        if folder not in self._names:
+            try:
+                held = json.loads((folder / QUESTION).read_text("utf-8"))
+                self._names[folder] = str(held["optimisation"]["name"])
+            except (OSError, ValueError, KeyError, TypeError):
+                return folder.name
+        return self._names[folder]
+
+
+def _complete(folder: Path) -> bool:
+    """Whether all steps are made and the answer is written."""
+    steps, _ = noted(folder)
+    return bool(steps) and len(steps) >= steps[-1].get("of", len(steps)) and (folder / RESULT).exists()

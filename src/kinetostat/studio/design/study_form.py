@@ -1,0 +1,283 @@
+"""The left side of the design tab: a study as a form, from a bundled or uploaded study or from nothing."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TypeAlias
+
+from nicegui import events, ui
+
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import find, values
+from kinetostat.spec.document import LARGEST_FILE
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.bundled import bundled_studies
+from kinetostat.studies.optimisation.catalogue import known_terms, more_is_better
+from kinetostat.studio.controls import Control, controls
+from kinetostat.studio.design.draft import (
+    MOST_AIMS,
+    Draft,
+    bundled_draft,
+    needs_direction,
+    sent_draft,
+    usual_bounds,
+)
+from kinetostat.studio.session import Session
+from kinetostat.studio.wording import full_label
+
+Change: TypeAlias = events.ValueChangeEventArguments[Any]
+
+NEW, SENT = "new", "sent"
+METHODS = {1: ["genetic", "gradient", "hybrid"], 2: ["nsga2"]}
+"""Ways to search, by the number of objectives, the usual one first."""
+GOALS = {"minimize": "least", "maximize": "greatest"}
+TOO_LARGE = f"The file is larger than {LARGEST_FILE >> 20} MiB; a study file is a short TOML text."
+
+
+class StudyForm:
+    """Variables with bounds, objectives, and how to search; what else a study has is carried along."""
+
+    def __init__(self, session: Session, start: Callable[[Draft], None]) -> None:
+        """A form for the machine of a session.
+
+        Args:
+            session: whose machine a new study is about.
+            start: called with the study that is to be run; raises InputError where it cannot be.
+        """
+        self._session, self._start = session, start
+        self.draft = self._blank()
+        self._filling = False
+        with ui.element("div").classes("design-head"):
+            self.source = ui.select({}, label="study", on_change=self._chosen).mark("study-source")
+            self.source.props("dense options-dense outlined").classes("field grow")
+            self._button("upload_file", "Open a study file", lambda: self.upload.run_method("pickFiles"), "study-open")
+            self._button("download", "Save the study as a file", self._save, "study-save")
+            self.upload = ui.upload(
+                on_upload=self._sent, on_rejected=lambda: self._refuse(TOO_LARGE), auto_upload=True,
+                max_file_size=LARGEST_FILE, max_files=1,
+            ).props('accept=".toml" aria-hidden="true"').classes("unseen").mark("study-upload")  # fmt: skip
+        self._body = ui.element("div").classes("design-form")
+        with ui.element("div").classes("design-foot"):
+            self.problem = ui.label("").classes("form-problem").props('role="alert"').mark("study-problem")
+            ui.button("Start", icon="play_arrow", on_click=self._begin).props("unelevated no-caps").mark("study-start")
+        self._offer(NEW)
+        self._fill()
+
+    @staticmethod
+    def _button(icon: str, text: str, action: Callable[[], object], mark: str) -> ui.button:
+        button = ui.button(icon=icon, on_click=action).props(f'flat round dense aria-label="{text}"')
+        return button.tooltip(text).mark(mark)
+
+    @property
+    def _machine(self) -> Machine:
+        return self.draft.machine or self._session.machine
+
+    def _blank(self) -> Draft:
+        return Draft(f"{self._session.machine.name}"[:60] + ", stiffer")
+
+    def renew(self) -> None:
+        """Another machine has been loaded: a study about the machine at hand begins again."""
+        if self.draft.machine is None:
+            self.draft = self._blank()
+            self._offer(NEW)
+            self._fill()
+
+    def _offer(self, chosen: str) -> None:
+        self._filling = True
+        named = {NEW: "new, for this machine", **{name: name for name in bundled_studies()}}
+        self.source.set_options(named | ({SENT: self.draft.name} if chosen == SENT else {}), value=chosen)
+        self._filling = False
+
+    def _chosen(self) -> None:
+        if not self._filling and self.source.value != SENT:
+            name = str(self.source.value)
+            self.draft = self._blank() if name == NEW else bundled_draft(name)
+            self._offer(name)
+            self._fill()
+
+    async def _sent(self, event: events.UploadEventArguments) -> None:
+        data = await event.file.read()
+        try:
+            self.draft = sent_draft(data, event.file.name, self._session.machine)
+        except InputError as error:
+            self._refuse(str(error))
+        else:
+            self._offer(SENT)
+            self._fill()
+        self.upload.reset()
+
+    def _save(self) -> None:
+        try:
+            name, content = self.draft.as_file(self._session.machine)
+        except InputError as error:
+            self._refuse(str(error))
+            return
+        self._refuse("")
+        ui.download(content, name, "application/toml")
+
+    def _begin(self) -> None:
+        try:
+            self._start(self.draft)
+        except InputError as error:
+            self._refuse(str(error))
+        else:
+            self._refuse("")
+
+    def _refuse(self, message: str) -> None:
+        self.problem.set_text(message)
+
+    def _fill(self) -> None:
+        """Make the form anew from the draft."""
+        self._refuse("")
+        self._body.clear()
+        with self._body:
+            ui.label(f"About {self._machine.name}").classes("form-about").mark("study-about")
+            ui.html("<h3>May change</h3>", sanitize=False)
+            known = self._controls()
+            for place, table in enumerate(self.draft.variables):
+                self._variable(place, table, known)
+            self._more_variables(known)
+            ui.html("<h3>Is wanted</h3>", sanitize=False)
+            for place, table in enumerate(self.draft.objectives):
+                self._objective(place, table)
+            if len(self.draft.objectives) < MOST_AIMS:
+                self._add("add objective", "study-add-objective", self._add_objective)
+            ui.html("<h3>Search</h3>", sanitize=False)
+            self._search()
+            if unseen := self.draft.unseen():
+                ui.label(f"Also from the study file: {', '.join(unseen)}.").classes("note").mark("study-unseen")
+
+    @staticmethod
+    def _add(text: str, mark: str, action: Callable[[], None]) -> None:
+        ui.button(text, icon="add", on_click=action).props("flat dense no-caps").classes("form-add").mark(mark)
+
+    def _controls(self) -> dict[str, Control]:
+        """The numbers of the machine that the study is about."""
+        machine = self.draft.machine
+        if machine is None:
+            return self._session.controls
+        return {one.path: one for one in controls(machine, float(respond(machine).configuration.length))}
+
+    def _variable(self, place: int, table: dict[str, Any], known: dict[str, Control]) -> None:
+        fields = [str(one) for one in table.get("paths") or [table["path"]]]
+        own = known.get(find(self._machine.family, fields[0]).path)
+        title = (full_label(own.parameter) if own else fields[0]) + (" and others" if fields[1:] else "")
+        with ui.element("div").classes("form-row"):
+            ui.label(title).classes("form-name").tooltip(", ".join(fields))
+            if "choices" in table:
+                ui.label(", ".join(table.get("labels", [f"{len(table['choices'])} choices"]))).classes("form-fixed")
+            elif table.get("fixed"):
+                ui.label("fixed, with a tolerance").classes("form-fixed")
+            else:
+                for key in ("from", "to"):
+                    self._text(table, key, f"{title}, {key}", f"variable {place} {key}")
+            self._remove(partial(self._drop, self.draft.variables, place), f"Hold {title}", f"variable {place} remove")
+
+    def _text(self, table: dict[str, Any], key: str, label: str, mark: str) -> None:
+        def write(event: Change) -> None:
+            table[key] = event.value
+
+        box = ui.input(value=str(table.get(key, "")), on_change=write).props(f'dense borderless aria-label="{label}"')
+        box.classes("form-text").mark(mark)
+
+    def _remove(self, action: Callable[[], None], text: str, mark: str) -> None:
+        button = ui.button(icon="close", on_click=action).props(f'flat round dense size="sm" aria-label="{text}"')
+        button.classes("form-remove").mark(mark)
+
+    def _drop(self, tables: list[dict[str, Any]], place: int) -> None:
+        del tables[place]
+        self._method_fits()
+        self._fill()
+
+    def _more_variables(self, known: dict[str, Control]) -> None:
+        """Offer what may change still; loads and limits are no design."""
+        taken = {str(table.get("path")) for table in self.draft.variables}
+        free = {path: one for path, one in known.items() if one.slides and one.panel != "Load" and path not in taken}
+        if free:
+            offered = {path: full_label(one.parameter) for path, one in free.items()}
+            choice = ui.select(offered, label="add a variable", with_input=True, on_change=self._add_variable)
+            choice.props("dense options-dense outlined").classes("field form-more").mark("study-add-variable")
+
+    def _add_variable(self, event: Change) -> None:
+        control = self._controls().get(str(event.value))
+        if control is not None:
+            value = float(values(self._machine)[control.parameter.leaves[0]])
+            low, high = usual_bounds(control, value)
+            self.draft.variables.append({"path": control.path, "from": low, "to": high})
+            self._fill()
+
+    def _objective(self, place: int, table: dict[str, Any]) -> None:
+        name = str(table["quantity"])
+        terms = known_terms(self._machine)
+        with ui.element("div").classes("form-aim"):
+            usual = "maximize" if more_is_better(name) else "minimize"
+            goal = ui.select(GOALS, value=table.get("goal") or usual, on_change=partial(self._aim, table, "goal"))
+            goal.props('dense options-dense outlined aria-label="goal"').classes("field").mark(
+                f"objective {place} goal"
+            )
+            what = ui.select(terms, value=name, with_input=True, on_change=partial(self._aim, table, "quantity"))
+            what.props('dense options-dense outlined aria-label="objective"').classes("field grow")
+            what.mark(f"objective {place} quantity")
+            if len(self.draft.objectives) > 1:
+                self._remove(partial(self._drop, self.draft.objectives, place), "Remove", f"objective {place} remove")
+        if needs_direction(name):
+            with ui.element("div").classes("form-row"):
+                ui.label("direction x, y, z").classes("form-name")
+                shown = ", ".join(f"{one:g}" for one in table.get("direction") or ())
+                box = ui.input(value=shown, on_change=partial(self._direct, table)).classes("form-text wide")
+                box.props('dense borderless aria-label="direction"').mark(f"objective {place} direction")
+
+    def _aim(self, table: dict[str, Any], key: str, event: Change) -> None:
+        if not event.value:
+            return
+        table[key] = event.value
+        if key == "quantity":
+            for own in ("goal", "weights", "direction"):
+                table.pop(own, None)
+            if needs_direction(str(event.value)):
+                table["direction"] = [0.0, 0.0, 1.0]
+            self._fill()
+
+    @staticmethod
+    def _direct(table: dict[str, Any], event: Change) -> None:
+        parts = [part for part in str(event.value).replace(",", " ").split() if part]
+        table["direction"] = [_number(part) for part in parts]
+
+    def _add_objective(self) -> None:
+        taken = {table["quantity"] for table in self.draft.objectives}
+        usual = (name for name in ("compliance_z", "compliance_sum", *known_terms(self._machine)) if name not in taken)
+        self.draft.objectives.append({"quantity": next(usual)})
+        self._method_fits()
+        self._fill()
+
+    def _methods(self) -> list[str]:
+        return METHODS[min(len(self.draft.objectives), 2)]
+
+    def _method_fits(self) -> None:
+        if self.draft.optimizer.get("method") not in self._methods():
+            self.draft.optimizer.pop("method", None)
+
+    def _search(self) -> None:
+        search, methods = self.draft.optimizer, self._methods()
+        with ui.element("div").classes("form-search"):
+            kind = ui.select(
+                methods, label="method", value=search.get("method") or methods[0],
+                on_change=lambda event: search.update(method=event.value),
+            )  # fmt: skip
+            kind.props("dense options-dense outlined").classes("field").mark("study-method")
+            for key in ("population", "generations", "seed"):
+                box = ui.input(key, value=str(search[key]), on_change=partial(self._count, key))
+                box.props("dense outlined").classes("field").mark(f"study-{key}")
+
+    def _count(self, key: str, event: Change) -> None:
+        self.draft.optimizer[key] = _number(str(event.value))
+
+
+def _number(text: str) -> int | float | str:
+    """What was typed as a number where it is one; otherwise as it is, for the message that it gets."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
