@@ -54,6 +54,13 @@ class Page:
                 )
         await self.settled()
 
+    async def glance(self) -> None:
+        """Let the page look at its searches, as its timer does."""
+        with self.user.client:
+            timer = next(e for e in self.user.client.elements.values() if isinstance(e, ui.timer) and e.active)
+            timer.callback()
+        await self.settled()
+
     async def front(self, tab: str) -> None:
         """Bring a linked view to the front."""
         with self.user.client:

@@ -7,6 +7,7 @@ the history belongs to the process and ends with it, however it ends.
 import json
 import os
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +17,9 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.storage import write_text
 
 QUESTION, HISTORY = "study.json", "history.jsonl"
+
+ATTEMPTS, PAUSE = 20, 0.01
+"""How often a lock is tried before it counts as taken, and seconds between: to ask takes it for some microseconds."""
 
 Record = dict[str, Any]
 """What is noted about a chunk; "chunk" is its number."""
@@ -110,12 +114,24 @@ def study_folder(path: Path) -> Iterator[StudyFolder]:
         raise InputError(f'"{path}" cannot be written: {error.strerror}; choose another place with -o.') from None
     with stream:
         try:
-            _lock(stream)
+            _lock_soon(stream)
         except OSError:
             raise InputError(
                 f'another kinetostat is at work in "{path}"; wait for it, or choose another folder with -o.'
             ) from None
         yield StudyFolder(path, stream)
+
+
+def _lock_soon(stream: BinaryIO) -> None:
+    """Take the lock of a file, also where somebody is just asking whether it is `in_use`; or fail."""
+    for _ in range(ATTEMPTS):
+        try:
+            _lock(stream)
+        except OSError:
+            time.sleep(PAUSE)
+        else:
+            return
+    _lock(stream)
 
 
 def _lock(stream: BinaryIO) -> None:

@@ -1,9 +1,12 @@
 """Tables and bars as HTML text; whatever comes from a file is escaped here."""
 
+import math
 from collections.abc import Sequence
 from html import escape
 
 BAR_CLASSES = ("", "negative")
+LEAST_GAIN = 1e-3
+"""Logarithm of a gain that is worth a whole bar where none is greater."""
 
 
 def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "") -> str:
@@ -29,6 +32,13 @@ def bars(caption: str, rows: Sequence[tuple[str, float, str]]) -> str:
         for name, share, text in rows
     )
     return f'<ol class="bars" aria-label="{escape(caption)}">{items}</ol>'
+
+
+def gains(caption: str, rows: Sequence[tuple[str, float]]) -> str:
+    """How many times better something has become, as bars of its logarithm; worse ones in another colour."""
+    sizes = {name: math.log(gain) if 0.0 < gain < math.inf else 0.0 for name, gain in rows}
+    longest = max([LEAST_GAIN, *map(abs, sizes.values())])
+    return bars(caption, [(name, sizes[name] / longest, f"× {gain:.4g}") for name, gain in rows])
 
 
 def heading(text: str) -> str:

@@ -6,7 +6,7 @@ from html import escape
 
 from kinetostat.studies.design_rows import Better, Row
 from kinetostat.studies.designs import Blame, Comparison
-from kinetostat.studio.markup import bars, heading, paragraph, table
+from kinetostat.studio.markup import gains, heading, paragraph, table
 from kinetostat.studio.wording import DASH, engineering
 from kinetostat.views.tables import readable
 
@@ -18,7 +18,11 @@ MOST_SHARES = 3
 def comparison_text(found: Comparison) -> str:
     """Everything that the comparison has to say."""
     letters = string.ascii_uppercase[: len(found.designs)]
-    parts = [_legend(found, letters), heading("Times stiffer than A, per direction"), _gains(found, letters)]
+    parts = [
+        _legend(found, letters),
+        heading("Times stiffer than A; softer in orange; bars are logarithmic"),
+        _gains(found, letters),
+    ]
     parts += [heading("At the pose of each design"), _rows(found, letters)]
     parts += [heading("Where they differ"), _differences(found, letters)]
     if any(found.softest):
@@ -39,12 +43,10 @@ def _legend(found: Comparison, letters: str) -> str:
 def _gains(found: Comparison, letters: str) -> str:
     """Compliance of A over that of each other design."""
     own = [row for row in found.rows if row.group == "compliance"]
-    gains = [[_gain(row, k) for row in own] for k in range(1, len(letters))]
-    most = max((gain for column in gains for gain in column if gain is not None), default=1.0)
     columns = []
-    for letter, column in zip(letters[1:], gains, strict=True):
-        known = [(row.name.removeprefix("C_"), gain) for row, gain in zip(own, column, strict=True) if gain is not None]
-        shown = bars(f"{letter} against A", [(name, gain / most, f"× {gain:.4g}") for name, gain in known])
+    for k, letter in enumerate(letters[1:], 1):
+        known = [(row.name.removeprefix("C_"), _gain(row, k)) for row in own]
+        shown = gains(f"{letter} against A", [(name, gain) for name, gain in known if gain is not None])
         columns.append(f"<div><h4>{letter}</h4>{shown}</div>")
     return f'<div class="gains">{"".join(columns)}</div>'
 

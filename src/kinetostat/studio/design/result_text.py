@@ -5,11 +5,13 @@ from typing import Any
 
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studio.design.progress import Progress
-from kinetostat.studio.markup import bars, heading, paragraph, table
+from kinetostat.studio.markup import gains, heading, paragraph, table
 from kinetostat.studio.wording import DASH, engineering, shown
 
 MUCH = 0.01
 """Stiffness that is left, as a share, below which the loss is pointed out."""
+FEW = 1e-4
+"""Percent per percent below which a 0 is shown."""
 EXACT = 9
 """Digits of an objective."""
 
@@ -70,13 +72,9 @@ def _design(problem: Problem, found: dict[str, Any]) -> str:
 
 
 def _directions(found: dict[str, Any]) -> str:
-    gains = [(one["name"].removeprefix("compliance_"), one["gain"]) for one in found["directions"]]
-    known = [gain for _, gain in gains if gain is not None]
-    most = max([1.0, *known])
-    rows = [(name, gain / most, f"× {gain:.4g}") for name, gain in gains if gain is not None]
-    where = found["poses"]["count"]
-    over = "" if where == 1 else ", the worst of all poses"
-    return heading(f"Times stiffer{over}") + bars("times stiffer", rows)
+    rows = [(one["name"].removeprefix("compliance_"), one["gain"]) for one in found["directions"]]
+    over = "" if found["poses"]["count"] == 1 else ", the worst of all poses"
+    return heading(f"Times stiffer{over}") + gains("times stiffer", [row for row in rows if row[1] is not None])
 
 
 def _robustness(found: dict[str, Any]) -> str:
@@ -110,4 +108,4 @@ def _ratio(before: float | None, after: float | None) -> str:
 
 
 def _percent(value: float | None) -> str:
-    return DASH if value is None else f"{value:.3g}"
+    return DASH if value is None else "0" if abs(value) < FEW else f"{value:.3g}"

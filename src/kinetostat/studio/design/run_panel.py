@@ -15,6 +15,7 @@ from kinetostat.studio.elements import CurveView, FrontView
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.markup import paragraph
 
+NOTHING = "Nothing has been searched yet: say on the left what may change and what is wanted, then start."
 GLANCE = 0.5
 """Seconds between two looks at a search."""
 
@@ -82,7 +83,7 @@ class RunPanel:
         with ui.element("div").classes("design-head"):
             self.best = ui.button("Load the best design", icon="input", on_click=self._load_best)
             self.best.props("unelevated no-caps dense").mark("run-load")
-        self.text = ui.html(paragraph("Nothing has been searched yet."), sanitize=False).mark("run-result")
+        self.text = ui.html(paragraph(NOTHING), sanitize=False).mark("run-result")
         self._offer(None)
 
     @staticmethod
@@ -134,7 +135,7 @@ class RunPanel:
         if progress is None:
             self.line.set_text(seen.problem)
             self.bar.set_value(0.0)
-            self.text.set_content(paragraph(seen.problem or "Nothing has been searched yet."))
+            self.text.set_content(paragraph(seen.problem or NOTHING))
             return
         self.bar.set_value(progress.steps / progress.total if progress.total else 0.0)
         self.line.set_text(_line(progress))

@@ -157,6 +157,9 @@ class Runs:
 
     def _work(self, folder: Path) -> None:
         (folder / FAILURE).unlink(missing_ok=True)
+        ended = self._mine.pop(folder, None)
+        if ended is not None and ended.stdin is not None:
+            ended.stdin.close()
         words = [sys.executable, "-m", WORKER, str(folder)]
         self._mine[folder] = subprocess.Popen(
             words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL

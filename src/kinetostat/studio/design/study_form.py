@@ -161,7 +161,7 @@ class StudyForm:
     def _variable(self, place: int, table: dict[str, Any], known: dict[str, Control]) -> None:
         fields = [str(one) for one in table.get("paths") or [table["path"]]]
         own = known.get(find(self._machine.family, fields[0]).path)
-        title = (full_label(own.parameter) if own else fields[0]) + (" and others" if fields[1:] else "")
+        title = (brief(own) if own else fields[0]) + (" and others" if fields[1:] else "")
         with ui.element("div").classes("form-row"):
             ui.label(title).classes("form-name").tooltip(", ".join(fields))
             if "choices" in table:
@@ -194,7 +194,7 @@ class StudyForm:
         taken = {str(table.get("path")) for table in self.draft.variables}
         free = {path: one for path, one in known.items() if one.slides and one.panel != "Load" and path not in taken}
         if free:
-            offered = {path: full_label(one.parameter) for path, one in free.items()}
+            offered = {path: brief(one) for path, one in free.items()}
             choice = ui.select(offered, label="add a variable", with_input=True, on_change=self._add_variable)
             choice.props("dense options-dense outlined").classes("field form-more").mark("study-add-variable")
 
@@ -271,6 +271,11 @@ class StudyForm:
 
     def _count(self, key: str, event: Change) -> None:
         self.draft.optimizer[key] = _number(str(event.value))
+
+
+def brief(control: Control) -> str:
+    """The name of a variable; geometry, which most of them are, goes without saying."""
+    return full_label(control.parameter).removeprefix("geometry: ")
 
 
 def _number(text: str) -> int | float | str:

@@ -13,6 +13,7 @@ from kinetostat.studies.optimisation.result import optimize
 from kinetostat.studies.optimisation.result_data import write_result
 from kinetostat.studies.optimisation.search import stored_problem
 from kinetostat.studies.storage import write_text
+from kinetostat.studies.study_folder import in_use
 
 FAILURE = "failed.txt"
 """File of a search that could not go on: why."""
@@ -25,7 +26,8 @@ def work(folder: Path) -> None:
     try:
         write_result(optimize(stored_problem(folder), folder, stop=stopped.is_set), folder)
     except InputError as error:
-        write_text(folder / FAILURE, str(error))
+        if not in_use(folder):  # another process is at work, and it is well
+            write_text(folder / FAILURE, str(error))
     except Exception as error:
         write_text(folder / FAILURE, f"The search ended with an error of the program: {error!r}")
         raise

@@ -1,0 +1,221 @@
+"""Every control of the design tab, driven without a browser: a study is made, run, stopped, loaded, kept, compared."""
+
+import asyncio
+import json
+
+import pytest
+from studio_page import on_page
+
+from kinetostat.cli import DONE, main
+from kinetostat.machine.loading import as_toml, load
+from kinetostat.spec.document import parse
+from kinetostat.spec.study import read_study
+from kinetostat.studies.bundled import bundled_studies
+from kinetostat.studio.design.favourites import Favourites
+from studies import SMALL
+
+MACHINE = "zhang-gosselin-4dof"
+
+
+async def design(page):
+    await page.choose("mode", "Design")
+
+
+async def small_study(page, generations="4"):
+    """Two variables, few designs."""
+    await design(page)
+    for path in ("geometry.base_radius", "geometry.platform_radius"):
+        await page.choose("study-add-variable", path)
+    await page.choose("study-population", "8")
+    await page.choose("study-generations", generations)
+
+
+async def until(page, word):
+    """Until the search in front says so."""
+    while not page.one("run-line").text.startswith(word):
+        await page.glance()
+
+
+def test_a_study_made_in_the_form_is_what_the_command_solves(tmp_path, capsys):
+    saved = []
+
+    async def steps(page):
+        await small_study(page)
+        assert page.one("variable 0 from").value == "176 mm"
+        await page.choose("variable 0 to", "25 cm")
+        download = asyncio.ensure_future(page.user.download.next())
+        await page.send("study-save", "click")
+        saved.append((await download).text)
+        await page.send("study-start", "click")
+        assert page.one("study-problem").text == ""
+        await until(page, "done")
+        shown = page.shown("CurveView", "show")
+        assert [line["name"] for line in shown["lines"]] == ["best", "mean"]
+        saved.append(shown["lines"][0]["values"])
+        result = page.one("run-result").content
+        assert "geometry.base_radius" in result
+        assert "Times stiffer" in result
+        await page.send("run-load", "click")
+        assert page.one("control geometry.base_radius")._props["text"] == "250 mm"
+        await page.send("undo", "click")
+        assert page.one("control geometry.base_radius")._props["text"] == "220 mm"
+
+    on_page(steps, state=tmp_path)
+    file = tmp_path / "study.toml"
+    file.write_text(saved[0])
+    assert main(["optimize", str(file), "--json"]) == DONE
+    told = json.loads(capsys.readouterr().out)
+    assert told["convergence"]["best"] == saved[1]
+    assert told["variables"]["geometry.base_radius"] == pytest.approx(0.25)
+
+
+def test_a_front_is_shown_and_a_click_loads_a_design(tmp_path):
+    async def steps(page):
+        await small_study(page)
+        await page.send("study-add-objective", "click")
+        assert page.one("study-method").options == ["nsga2"]
+        await page.choose("objective 0 quantity", "compliance_about")
+        await page.choose("objective 0 direction", "0, 1, 0")
+        await page.send("study-start", "click")
+        assert page.one("study-problem").text == ""
+        await until(page, "done")
+        shown = page.shown("FrontView", "show")
+        assert len(shown["points"]) > 1
+        assert shown["initial"] is not None
+        await page.send("run-front", "pick", 0)
+        assert page.shown("FrontView", "show")["chosen"] == 0
+        assert page.one("undo").enabled
+        machine = page.one("control geometry.base_radius")._props["text"]
+        await page.send("run-load", "click")
+        assert page.shown("FrontView", "show")["chosen"] == shown["knee"]
+        await page.send("undo", "click")
+        assert page.one("control geometry.base_radius")._props["text"] == machine
+
+    on_page(steps, state=tmp_path)
+
+
+def test_stopped_reloaded_resumed_and_deleted(tmp_path):
+    async def steps(page):
+        await small_study(page, "100000")
+        await page.send("study-start", "click")
+        while not page.one("run-load").enabled:
+            await page.glance()
+        assert page.one("run-stop").enabled
+        await page.again()
+        await design(page)
+        assert page.one("run-line").text.startswith("running")
+        await page.send("run-stop", "click")
+        await until(page, "stopped")
+        assert "Times stiffer" in page.one("run-result").content
+        await page.send("run-play_arrow", "click")
+        await until(page, "running")
+        await page.send("run-stop", "click")
+        await until(page, "stopped")
+        await page.send("run-delete", "click")
+        await page.send("confirm-yes", "click")
+        assert page.one("run-choice").options == {}
+
+    on_page(steps, state=tmp_path)
+
+
+@pytest.mark.parametrize("name", bundled_studies())
+def test_bundled_studies_fill_the_form(name):
+    async def steps(page):
+        await design(page)
+        await page.choose("study-source", name)
+        assert page.one("objective 0 quantity").value
+        download = asyncio.ensure_future(page.user.download.next())
+        await page.send("study-save", "click")
+        study = read_study(parse((await download).text, name), name)
+        kept = read_study(parse(bundled_studies()[name], name), name)
+        assert study.model_copy(update={"changes": {}}) == kept.model_copy(update={"changes": {}})
+
+    on_page(steps)
+
+
+def test_variables_and_objectives_can_be_taken_out():
+    async def steps(page):
+        await small_study(page)
+        await page.send("variable 0 remove", "click")
+        assert page.one("variable 0 from").value == "96 mm"
+        await page.send("study-add-objective", "click")
+        await page.send("objective 0 remove", "click")
+        assert page.one("objective 0 quantity").value == "compliance_z"
+        assert page.one("study-method").value == "genetic"
+        await page.choose("objective 0 goal", "maximize")
+        await page.choose("study-method", "hybrid")
+        await page.choose("study-seed", "x")
+        await page.send("study-start", "click")
+        assert "optimizer.seed" in page.one("study-problem").text
+        assert page.one("run-choice").options == {}
+
+    on_page(steps)
+
+
+def test_a_study_file_is_taken_or_refused():
+    async def steps(page):
+        await design(page)
+        await page.upload("bad.toml", b"name = ", "study-upload")
+        assert "not valid TOML" in page.one("study-problem").text
+        await page.upload("small.toml", SMALL.encode(), "study-upload")
+        assert page.one("study-problem").text == ""
+        assert page.one("variable 1 to").value == "26 cm"
+        assert page.one("study-source").value == "sent"
+
+    on_page(steps)
+
+
+def test_favourites_are_kept_loaded_compared_and_deleted(tmp_path):
+    async def steps(page):
+        await design(page)
+        await page.send("control geometry.base_radius", "write", "25 cm")
+        await page.choose("favourite-name", "wide <b>")
+        await page.choose("favourite-note", "a note")
+        await page.send("favourite-keep", "click")
+        assert not page.one("favourite-compare").enabled
+        await page.send("undo", "click")
+        for number in (0, 1):
+            await page.choose(f"favourite {number} tick", True)
+        await page.send("favourite-compare", "click")
+        shown = page.one("comparison").content
+        assert "wide &lt;b&gt;" in shown
+        assert "geometry.base_radius" in shown
+        await page.send("comparison-close", "click")
+        await page.send("favourite 1 load", "click")
+        assert page.one("control geometry.base_radius")._props["text"] == "250 mm"
+        assert page.one("undo").enabled
+        await page.again()
+        await design(page)
+        await page.send("favourite 1 delete", "click")
+        await page.send("confirm-no", "click")
+        assert len(Favourites(tmp_path).every()) == 1
+        await page.send("favourite 1 delete", "click")
+        await page.send("confirm-yes", "click")
+        assert not Favourites(tmp_path).every()
+
+    on_page(steps, state=tmp_path)
+
+
+def test_a_favourite_of_another_kind_opens_as_another_machine(tmp_path):
+    Favourites(tmp_path).keep(load("hexapod"), "six legs")
+
+    async def steps(page):
+        await design(page)
+        await page.send("favourite 1 load", "click")
+        assert page.one("machines").value == "own"
+        assert page.one("status").text == "ok"
+        assert page.one("study-about").text == "About six legs"
+
+    on_page(steps, state=tmp_path)
+
+
+def test_a_broken_favourite_is_refused(tmp_path):
+    one = Favourites(tmp_path).keep(load(MACHINE), "mine")
+    one.path.write_text(as_toml(load(MACHINE)).replace("0.22 m", "-1 m"))
+
+    async def steps(page):
+        await design(page)
+        await page.send("favourite 1 load", "click")
+        assert any("base_radius" in message for message in page.user.notify.messages)
+
+    on_page(steps, state=tmp_path)
