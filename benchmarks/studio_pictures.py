@@ -6,6 +6,7 @@ Run `python benchmarks/studio_pictures.py`; writes docs/images/*.png. Needs what
 import sys
 from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from PIL import Image
@@ -77,6 +78,21 @@ def tripteron(new_tab: Any) -> None:
         keep(page, "studio-dark")
 
 
+def design(new_tab: Any) -> None:
+    """A Pareto front, its knee loaded."""
+    with TemporaryDirectory() as state, served("zhang-gosselin-4dof", state) as address:
+        page = new_tab()
+        page.open(address)
+        page.tab.get_by_role("button", name="Design", exact=True).click()
+        page.tab.get_by_role("combobox", name="study", exact=True).click()
+        page.tab.get_by_role("option", name="zhang-gosselin-front", exact=True).click()
+        page.tab.get_by_role("button", name="Start", exact=True).click()
+        page.tab.wait_for_function("document.querySelector('.run-line').innerText.startsWith('done')")
+        page.tab.get_by_role("button", name="Load the knee").click()
+        page.tab.locator(".wordmark").click()
+        keep(page, "studio-design")
+
+
 def gallery(new_tab: Any) -> None:
     """Other machines, the middle of the page."""
     for machine in ("hexapod", "delta", "tricept", "passive-leg-5dof-rus"):
@@ -92,6 +108,7 @@ def main() -> None:
     with browser() as new_tab:
         paper_machine(new_tab)
         tripteron(new_tab)
+        design(new_tab)
         gallery(new_tab)
 
 

@@ -41,7 +41,7 @@ class Page:
 
     async def settled(self) -> None:
         """Until nothing is computed any more."""
-        while tasks := [t for t in background_tasks.running_tasks if "studio" in t.get_name()]:
+        while tasks := [t for t in background_tasks.running_tasks if t.get_name() == "studio lane"]:
             await asyncio.wait(tasks)
 
     async def send(self, mark: str, event: str, args: Any = None) -> None:
