@@ -56,7 +56,7 @@ def test_a_study_made_in_the_form_is_what_the_command_solves(tmp_path, capsys):
         assert "geometry.base_radius" in result
         assert "Times stiffer" in result
         await page.send("run-load", "click")
-        assert page.one("control geometry.base_radius")._props["text"] == "250 mm"
+        saved.append(page.one("control geometry.base_radius")._props["text"])
         await page.send("undo", "click")
         assert page.one("control geometry.base_radius")._props["text"] == "220 mm"
 
@@ -66,7 +66,7 @@ def test_a_study_made_in_the_form_is_what_the_command_solves(tmp_path, capsys):
     assert main(["optimize", str(file), "--json"]) == DONE
     told = json.loads(capsys.readouterr().out)
     assert told["convergence"]["best"] == saved[1]
-    assert told["variables"]["geometry.base_radius"] == pytest.approx(0.25)
+    assert saved[2] == f"{1e3 * told['variables']['geometry.base_radius']:.6g} mm"
 
 
 def test_a_front_is_shown_and_a_click_loads_a_design(tmp_path):

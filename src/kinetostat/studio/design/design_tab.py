@@ -76,8 +76,8 @@ def _confirm(question: str, action: Callable[[], None]) -> None:
             ui.button("Keep it", on_click=window.close).props("flat no-caps").mark("confirm-no")
 
             def agreed() -> None:
-                window.close()
                 action()
+                window.close()
 
             ui.button("Delete", on_click=agreed).props("unelevated no-caps color=negative").mark("confirm-yes")
-    window.on("hide", window.delete)
+    window.on_value_change(lambda change: None if change.value else window.delete())
