@@ -13,9 +13,7 @@ from typing import Any
 from urllib.parse import urlparse
 
 import pytest
-
-pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not installed")
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+from playwright import sync_api
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 SOFTWARE_GRAPHICS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")

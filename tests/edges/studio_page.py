@@ -8,11 +8,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import pytest
-
-pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not installed")
-
 import httpx
+import pytest
 from nicegui import background_tasks, core, ui
 from nicegui.elements.upload_files import SmallFileUpload
 from nicegui.events import GenericEventArguments, handle_event

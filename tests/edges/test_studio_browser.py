@@ -6,6 +6,7 @@ from urllib.parse import urlparse
 import httpx
 import pytest
 from browser import browser, needs_chromium, served
+from matplotlib import image
 
 from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import analyze
@@ -32,8 +33,7 @@ def page(address):
 
 def coloured(page):
     """How many points of the picture are blue as actuated legs are, and orange as the passive one."""
-    matplotlib_image = pytest.importorskip("matplotlib.image")
-    picture = matplotlib_image.imread(io.BytesIO(page.tab.locator(".machine-view canvas").screenshot()))
+    picture = image.imread(io.BytesIO(page.tab.locator(".machine-view canvas").screenshot()))
     red, green, blue = (picture[:, :, channel] for channel in range(3))
     return int(((blue > 0.45) & (red < 0.35)).sum()), int(((red > 0.6) & (blue < 0.35) & (green < 0.65)).sum())
 

@@ -13,7 +13,6 @@ from kinetostat.commands.common import BAD_INPUT, DONE
 @pytest.fixture
 def served(monkeypatch):
     """What would be served, instead of serving it."""
-    pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not installed")
     import kinetostat.studio.serving as serving
 
     calls = []
@@ -62,7 +61,6 @@ def test_bad_input_is_one_paragraph(words, said, capsys):
 
 
 def test_a_port_in_use_is_bad_input(capsys):
-    pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not installed")
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()

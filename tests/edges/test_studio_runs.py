@@ -7,8 +7,6 @@ import sys
 
 import pytest
 
-pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not installed")
-
 from kinetostat.cli import DONE, main
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.machine.parameters import values

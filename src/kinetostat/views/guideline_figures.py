@@ -13,10 +13,8 @@ from kinetostat.studies.guideline_sentences import limit_of
 from kinetostat.studies.guidelines import Guidelines
 from kinetostat.studies.roles import EXCESS, stiffening
 from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout
-from kinetostat.views.sensitivity_figure import draw_cells
+from kinetostat.views.sensitivity_figure import coloured_table
 
-MOST_ROWS = 30
-"""Parameters that are shown."""
 MOST_PANELS = 6
 """Elements that are shown."""
 POINTS = 161
@@ -37,17 +35,9 @@ def guideline_figures(found: Guidelines) -> dict[str, Figure]:
 
 def design_figure(found: Guidelines) -> Figure:
     """Parameters against directions: blue where one percent more makes a direction stiffer, red where softer."""
-    shown = found.moves[:MOST_ROWS]
-    cells = np.array([[math.nan if p is None else p for p in move.percents] for move in shown], dtype=float)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(2.6 + 0.62 * cells.shape[1], 1.1 + 0.2 * len(shown)), layout="constrained")
-        panel = figure.subplots()
-        draw_cells(panel, cells, "RdBu", "percent stiffer per percent more")
-        panel.set_yticks(range(len(shown)), [move.path for move in shown])
-        panel.set_xticks(range(cells.shape[1]), found.components)
-        figure.suptitle(f"{found.machine.name}: what the design does", fontsize=10)
-        fix_layout(figure)
-    return figure
+    rows = {move.path: move.percents for move in found.moves}
+    title, label = f"{found.machine.name}: what the design does", "percent stiffer per percent more"
+    return coloured_table(title, rows, found.components, "RdBu", label)
 
 
 def rigid_figure(found: Guidelines, shown: list[tuple[Element, np.ndarray]]) -> Figure:

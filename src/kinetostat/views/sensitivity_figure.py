@@ -1,5 +1,7 @@
 """Sensitivities as a figure for print: parameters by rank against indices, coloured by sign and size."""
 
+from collections.abc import Mapping, Sequence
+
 import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
@@ -23,28 +25,37 @@ DARK = 0.6
 
 def sensitivity_figure(answer: Sensitivity) -> Figure:
     """A table of coloured cells: red where the index grows with the parameter, blue where it falls."""
-    shown = answer.influences[:MOST_ROWS]
-    cells = np.array([[np.nan if p is None else p for p in one.percents] for one in shown], dtype=float)
+    rows = {one.path: one.percents for one in answer.influences}
+    heads = [QUANTITIES[name].symbol for name in answer.quantities]
+    return coloured_table(answer.machine.name, rows, heads, "RdBu_r", "percent per percent")
+
+
+def coloured_table(
+    title: str, rows: Mapping[str, Sequence[float | None]], heads: Sequence[str], colours: str, label: str
+) -> Figure:
+    """Numbers in cells coloured by sign and size; the first rows, as many as a page takes.
+
+    Args:
+        title: of the figure.
+        rows: percent per percent in each column, by parameter; None is grey.
+        heads: of the columns.
+        colours: name of a diverging colour map.
+        label: of its bar.
+    """
+    shown = list(rows)[:MOST_ROWS]
+    cells = np.array([[np.nan if p is None else p for p in rows[path]] for path in shown], dtype=float)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(2.6 + 0.75 * cells.shape[1], 1.1 + 0.2 * len(shown)), layout="constrained")
+        figure = Figure(figsize=(2.6 + 0.7 * len(heads), 1.1 + 0.2 * len(shown)), layout="constrained")
         panel = figure.subplots()
-        draw_cells(panel, cells, "RdBu_r", "percent per percent")
-        panel.set_yticks(range(len(shown)), [one.path for one in shown])
-        panel.set_xticks(range(cells.shape[1]), [QUANTITIES[name].symbol for name in answer.quantities])
-        figure.suptitle(answer.machine.name, fontsize=10)
+        _draw_cells(panel, cells, colours, label)
+        panel.set_yticks(range(len(shown)), shown)
+        panel.set_xticks(range(len(heads)), heads)
+        figure.suptitle(title, fontsize=10)
         fix_layout(figure)
     return figure
 
 
-def draw_cells(panel: Axes, cells: npt.NDArray[np.float64], colours: str, label: str) -> None:
-    """Numbers in cells [rows x columns], coloured by sign and size; NaN is grey.
-
-    Args:
-        panel: to draw in.
-        cells: percent per percent.
-        colours: name of a diverging colour map.
-        label: of its bar.
-    """
+def _draw_cells(panel: Axes, cells: npt.NDArray[np.float64], colours: str, label: str) -> None:
     most = max(float(np.nanmax(np.abs(cells), initial=0.0)), 10.0 * LINEAR)
     scale = SymLogNorm(LINEAR, vmin=-most, vmax=most)
     image = panel.imshow(np.ma.masked_invalid(cells), cmap=colours, norm=scale, aspect="auto")

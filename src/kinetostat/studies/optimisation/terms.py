@@ -29,7 +29,7 @@ class Term(Protocol):
 
     @property
     def differentiable(self) -> bool:
-        """Whether `slopes` says anything."""
+        """Whether `slopes` shows a search the way: not where a term changes in steps."""
 
     def values(self, found: dict[str, Array], there: Mask) -> Array:
         """The numbers of some designs [designs], from their quantities and which poses count [designs x poses]."""
@@ -134,6 +134,6 @@ class VolumeTerm:
         most = np.maximum((sides > 0.0).sum(-1), (sides < 0.0).sum(-1)) + (sides == 0.0).sum(-1)
         return self.box * most / there.shape[-1]
 
-    def slopes(self, found: dict[str, Array], there: Mask) -> dict[str, Array]:
-        """None: it changes in steps."""
-        raise NotImplementedError("a count of poses has no derivatives")
+    def slopes(self, found: dict[str, Array], _there: Mask) -> dict[str, Array]:
+        """0: it changes in steps, and between them not at all."""
+        return {name: np.zeros_like(found[name]) for name in self.names}

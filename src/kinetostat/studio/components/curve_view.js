@@ -1,29 +1,18 @@
 // Curves over one number, on logarithmic axes where that shows more; the present value is marked.
-import { colour, onTheme } from "kinetostat-studio/theme.js";
-import { frame, logTicks, niceTicks, prepare, short } from "kinetostat-studio/plot_axes.js";
+import { colour } from "kinetostat-studio/theme.js";
+import { frame, logTicks, niceTicks, plot, prepare, short } from "kinetostat-studio/plot_axes.js";
 
 const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3], [4, 2], [1, 2]];
 
 export default {
+  mixins: [plot],
   template: `<div class="plot"><canvas role="img" :aria-label="label" @pointermove="hover" @pointerleave="leave"></canvas>
       <div class="plot-tip" aria-hidden="true"></div></div>`,
-  props: { label: String },
-  mounted() {
-    this.canvas = this.$el.querySelector("canvas");
-    this.tip = this.$el.querySelector(".plot-tip");
-    this.observer = new ResizeObserver(() => this.draw());
-    this.observer.observe(this.$el);
-    this.themes = onTheme(() => this.draw());
-  },
-  beforeUnmount() {
-    this.observer.disconnect();
-    this.themes.disconnect();
-  },
   methods: {
     show(curves) {
       this.curves = curves;
       this.draw();
-      this.$el.dataset.shown = Number(this.$el.dataset.shown ?? 0) + 1;
+      this.tell();
     },
     draw() {
       if (!this.curves) return;

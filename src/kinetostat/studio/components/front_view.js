@@ -1,32 +1,21 @@
 // Designs as points over two objectives: the knee and the machine as it was are marked; a click or Enter picks one.
-import { colour, onTheme } from "kinetostat-studio/theme.js";
-import { frame, niceTicks, prepare, short } from "kinetostat-studio/plot_axes.js";
+import { colour } from "kinetostat-studio/theme.js";
+import { frame, niceTicks, plot, prepare, short } from "kinetostat-studio/plot_axes.js";
 
 const NEAR = 18; // pixels within which a click means a point
 
 export default {
+  mixins: [plot],
   template: `<div class="plot"><canvas tabindex="0" role="img" :aria-label="label" @pointerdown="press"
       @pointermove="hover" @pointerleave="leave" @keydown="step" @blur="leave"></canvas>
       <div class="plot-tip" aria-hidden="true"></div></div>`,
-  props: { label: String },
   emits: ["pick"],
-  mounted() {
-    this.canvas = this.$el.querySelector("canvas");
-    this.tip = this.$el.querySelector(".plot-tip");
-    this.observer = new ResizeObserver(() => this.draw());
-    this.observer.observe(this.$el);
-    this.themes = onTheme(() => this.draw());
-  },
-  beforeUnmount() {
-    this.observer.disconnect();
-    this.themes.disconnect();
-  },
   methods: {
     show(front) {
       this.front = front;
       this.near = null;
       this.draw();
-      this.$el.dataset.shown = Number(this.$el.dataset.shown ?? 0) + 1;
+      this.tell();
       this.$el.dataset.points = front.points.length;
     },
     range(k) {

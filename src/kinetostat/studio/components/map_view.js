@@ -1,6 +1,6 @@
 // A map of one quantity over two coordinates; a click or an arrow key asks the machine to go there.
-import { colour, onTheme } from "kinetostat-studio/theme.js";
-import { frame, niceTicks, prepare, short } from "kinetostat-studio/plot_axes.js";
+import { colour } from "kinetostat-studio/theme.js";
+import { frame, niceTicks, plot, prepare, short } from "kinetostat-studio/plot_axes.js";
 
 const VIRIDIS = [
   [68, 1, 84], [72, 36, 117], [65, 68, 135], [53, 95, 141], [42, 120, 142], [33, 145, 140],
@@ -16,22 +16,11 @@ function viridis(share) {
 }
 
 export default {
+  mixins: [plot],
   template: `<div class="plot"><canvas tabindex="0" role="img" :aria-label="label" @pointerdown="press"
       @pointermove="hover" @pointerup="release" @pointerleave="leave" @keydown="step"></canvas>
       <div class="plot-tip" aria-hidden="true"></div></div>`,
-  props: { label: String },
   emits: ["pick", "settle"],
-  mounted() {
-    this.canvas = this.$el.querySelector("canvas");
-    this.tip = this.$el.querySelector(".plot-tip");
-    this.observer = new ResizeObserver(() => this.draw());
-    this.observer.observe(this.$el);
-    this.themes = onTheme(() => this.draw());
-  },
-  beforeUnmount() {
-    this.observer.disconnect();
-    this.themes.disconnect();
-  },
   methods: {
     show(map) {
       this.map = map;
@@ -40,7 +29,7 @@ export default {
       const high = Math.max(...known);
       this.range = { low, high, log: low > 0 && high / low > WIDE_RANGE, none: known.length === 0 };
       this.draw();
-      this.$el.dataset.shown = Number(this.$el.dataset.shown ?? 0) + 1;
+      this.tell();
     },
     mark(here) {
       if (!this.map) return;

@@ -1,7 +1,27 @@
-// Canvas, ticks and labels that the map and the curves share.
-import { colour } from "kinetostat-studio/theme.js";
+// What plots share: a canvas that is drawn again when its size or the colours of the page change, ticks and labels.
+import { colour, onTheme } from "kinetostat-studio/theme.js";
 
 export const FONT = '11px Roboto, "Segoe UI", sans-serif';
+
+export const plot = {
+  props: { label: String },
+  mounted() {
+    this.canvas = this.$el.querySelector("canvas");
+    this.tip = this.$el.querySelector(".plot-tip");
+    this.observer = new ResizeObserver(() => this.draw());
+    this.observer.observe(this.$el);
+    this.themes = onTheme(() => this.draw());
+  },
+  beforeUnmount() {
+    this.observer.disconnect();
+    this.themes.disconnect();
+  },
+  methods: {
+    tell() {
+      this.$el.dataset.shown = Number(this.$el.dataset.shown ?? 0) + 1;
+    },
+  },
+};
 
 export function prepare(canvas, root) {
   const ratio = Math.min(window.devicePixelRatio || 1, 2);
