@@ -13,7 +13,7 @@ _HOMES = {
     "load": "kinetostat.machine.loading",
     "bundled": "kinetostat.machine.loading",
     "analyze": "kinetostat.studies.analysis",
-    "evaluate_grid": "kinetostat.studies.grid",
+    "evaluate_grid": "kinetostat.studies.grid.grid",
     "load_problem": "kinetostat.studies.optimisation.problem",
     "optimize": "kinetostat.studies.optimisation.result",
     "reproduce": "kinetostat.studies.paper.reproduction",

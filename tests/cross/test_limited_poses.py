@@ -11,7 +11,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import parameters, values, with_values
-from kinetostat.studies.demands import EVERYTHING
+from kinetostat.studies.workspace.demands import EVERYTHING
 
 POSES = 300
 LOAD = ("load.force=[200, -100, 500]", "load.moment=[3, 5, -2]")

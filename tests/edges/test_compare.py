@@ -8,9 +8,9 @@ import pytest
 from kinetostat.cli import main
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.designs import compare, read_design
-from kinetostat.studies.designs_data import as_json
-from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.comparison.designs import compare, read_design
+from kinetostat.studies.comparison.designs_data import as_json
+from kinetostat.studies.grid.grid import evaluate_grid
 
 PAPER = "zhang-gosselin-4dof"
 BEST = (

@@ -15,9 +15,10 @@ from kinetostat.engine import chunks, cluster
 from kinetostat.engine.batch import NATIVE_SLAB
 from kinetostat.machine.loading import load
 from kinetostat.spec.errors import InputError
-from kinetostat.studies import grid, result_file, stored_grid
-from kinetostat.studies.grid import grid_question
-from kinetostat.studies.stored_grid import answer_into
+from kinetostat.studies import result_file
+from kinetostat.studies.grid import grid, stored_grid
+from kinetostat.studies.grid.grid import grid_question
+from kinetostat.studies.grid.stored_grid import answer_into
 
 MACHINE = "zhang-gosselin-4dof"
 RANGES = ["x=-40 cm:40 cm:50", "z=40 cm:140 cm:50", "theta5=-70 deg:-50 deg:50"]
@@ -91,9 +92,9 @@ import os, signal, sys
 from pathlib import Path
 from kinetostat.engine import chunks
 from kinetostat.machine.loading import load
-from kinetostat.studies.grid import grid_question
+from kinetostat.studies.grid.grid import grid_question
 from kinetostat.studies.result_file import ResultFile
-from kinetostat.studies.stored_grid import answer_into
+from kinetostat.studies.grid.stored_grid import answer_into
 from kinetostat.studies.study_folder import StudyFolder
 
 chunks.CHUNK_NUMBERS = {slab}

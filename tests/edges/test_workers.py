@@ -17,7 +17,7 @@ from kinetostat.engine.points import Axis, Grid
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
-from kinetostat.studies import grid
+from kinetostat.studies.grid import grid
 
 MACHINE = "zhang-gosselin-4dof"
 WORDS = ["map", MACHINE, "--over", "x=-40 cm:40 cm:400", "--over", "z=40 cm:140 cm:400", "--quantity", "compliance_x"]

@@ -7,7 +7,7 @@ import pytest
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.conditions import parse_condition
+from kinetostat.studies.workspace.conditions import parse_condition
 
 READ = [
     ("stiffness_z > 20 N/um", "stiffness_z", ">", 2e7),

@@ -15,7 +15,7 @@ from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import quantities
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.grid.grid import evaluate_grid
 from machines import every_machine
 
 TUBE = '{ shape = "tube", outer_diameter = "40 mm", inner_diameter = "30 mm", material = "steel" }'

@@ -8,9 +8,9 @@ import pytest
 
 from kinetostat.engine.points import Axis
 from kinetostat.engine.sampling import Cells
-from kinetostat.studies.connected import connected_to
-from kinetostat.studies.surface import surface
-from kinetostat.studies.volume import estimate_volume
+from kinetostat.studies.workspace.connected import connected_to
+from kinetostat.studies.workspace.surface import surface
+from kinetostat.studies.workspace.volume import estimate_volume
 
 
 def cells(*counts, seed=0, ends=(-1.0, 1.0)):

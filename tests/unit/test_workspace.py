@@ -13,8 +13,8 @@ from kinetostat.machine.loading import build, load
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec import document
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.verdicts import BEYOND, INSIDE
-from kinetostat.studies.workspace import workspace
+from kinetostat.studies.workspace.verdicts import BEYOND, INSIDE
+from kinetostat.studies.workspace.workspace import workspace
 
 ERRORS = 4
 """Standard errors within which an estimate lies all but surely."""

@@ -9,7 +9,7 @@ from kinetostat.commands.common import DONE, NO_ANSWER, add_command, print_json,
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
-    from kinetostat.studies.designs import Comparison
+    from kinetostat.studies.comparison.designs import Comparison
 
 STEM = "compare"
 
@@ -38,7 +38,7 @@ def add_compare_command(commands: "Commands") -> None:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from kinetostat.studies.designs import compare, read_design
+    from kinetostat.studies.comparison.designs import compare, read_design
     from kinetostat.views.progress import progress_bar
 
     designs = [read_design(text, options.settings) for text in options.designs]
@@ -46,7 +46,7 @@ def _compare(options: argparse.Namespace) -> int:
         found = compare(designs, options.ranges, progress)
     written = _write(found, options.output) if options.output else []
     if options.json:
-        from kinetostat.studies.designs_data import as_json
+        from kinetostat.studies.comparison.designs_data import as_json
 
         print_json(as_json(found))
     else:
@@ -61,7 +61,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _write(found: "Comparison", folder: Path) -> list[Path]:
-    from kinetostat.studies.designs_data import as_json
+    from kinetostat.studies.comparison.designs_data import as_json
     from kinetostat.studies.storage import write_text
     from kinetostat.views.design_figure import comparison_figure
     from kinetostat.views.figures import save

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from kinetostat.commands.common import Commands
     from kinetostat.engine.cluster import Crew
-    from kinetostat.studies.grid import GridQuestion
+    from kinetostat.studies.grid.grid import GridQuestion
 
 VARY = "FIELD=from:to:count[:log]"
 MOST_WORKERS = 1024
@@ -84,7 +84,7 @@ def _map(options: argparse.Namespace) -> int:
 
 
 def _grid(options: argparse.Namespace, stem: str) -> int:
-    from kinetostat.studies.grid import grid_question
+    from kinetostat.studies.grid.grid import grid_question
 
     question = grid_question(load_machine(options), options.ranges, options.quantities or [options.default_quantity])
     if options.output and not question.fits_memory:
@@ -100,7 +100,7 @@ def _crew(options: argparse.Namespace) -> "Crew":
 
 def _in_memory(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
     from kinetostat.engine.cluster import hired
-    from kinetostat.studies.grid import answer
+    from kinetostat.studies.grid.grid import answer
     from kinetostat.views.progress import progress_bar
 
     if options.output:
@@ -144,7 +144,7 @@ def _draw(dataset: "xr.Dataset", stem: Path, title: str) -> list[Path]:
 
 def _show(dataset: "xr.Dataset", as_json: bool, written: Sequence[Path]) -> None:
     if as_json:
-        from kinetostat.studies.grid_data import as_plain_data
+        from kinetostat.studies.grid.grid_data import as_plain_data
 
         print_json(as_plain_data(dataset))
         return
@@ -158,7 +158,7 @@ def _show(dataset: "xr.Dataset", as_json: bool, written: Sequence[Path]) -> None
 
 def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
     from kinetostat.engine.cluster import hired
-    from kinetostat.studies.stored_grid import answer_into
+    from kinetostat.studies.grid.stored_grid import answer_into
     from kinetostat.views.progress import progress_bar
 
     try:
@@ -167,7 +167,7 @@ def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) ->
     except KeyboardInterrupt:
         return no_answer(f"stopped; what was computed is in {options.output}: the same command goes on from there.")
     if options.json:
-        from kinetostat.studies.grid_data import as_summary
+        from kinetostat.studies.grid.grid_data import as_summary
 
         print_json(as_summary(found))
     else:

@@ -16,7 +16,7 @@ from kinetostat.commands.common import (
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
-    from kinetostat.studies.workspace import Workspace
+    from kinetostat.studies.workspace.workspace import Workspace
 
 STEM = "workspace"
 
@@ -49,7 +49,7 @@ def _seed(text: str) -> int:
 
 
 def _workspace(options: argparse.Namespace) -> int:
-    from kinetostat.studies.workspace import workspace
+    from kinetostat.studies.workspace.workspace import workspace
     from kinetostat.views.progress import progress_bar
 
     machine = load_machine(options)
@@ -57,7 +57,7 @@ def _workspace(options: argparse.Namespace) -> int:
         found = workspace(machine, options.ranges, options.conditions, progress, options.seed)
     written = _write(found, options.output) if options.output else []
     if options.json:
-        from kinetostat.studies.workspace_data import as_plain_data
+        from kinetostat.studies.workspace.workspace_data import as_plain_data
 
         print_json(as_plain_data(found))
     else:

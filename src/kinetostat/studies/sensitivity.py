@@ -17,7 +17,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, parameters, values
 from kinetostat.studies.analysis import analyze, machine_length
-from kinetostat.studies.grid import resolve_quantities
+from kinetostat.studies.grid.grid import resolve_quantities
 from kinetostat.units import KINDS
 
 WITHOUT_INFLUENCE = ("load", "limits")

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from kinetostat.studies.design_rows import Row
-from kinetostat.studies.designs import Comparison
+from kinetostat.studies.comparison.design_rows import Row
+from kinetostat.studies.comparison.designs import Comparison
 from kinetostat.views.display import prefixed_scale
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout
 

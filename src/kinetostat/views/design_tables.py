@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 
 from rich.console import Console
 
-from kinetostat.studies.design_rows import Better, Row
-from kinetostat.studies.designs import Blame, Comparison
+from kinetostat.studies.comparison.design_rows import Better, Row
+from kinetostat.studies.comparison.designs import Blame, Comparison
 from kinetostat.views.tables import number, numeric_table, readable, text_table
 
 NAMED, CELL = 27, 20

@@ -12,7 +12,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kinetostat.studies.grid import failures
+from kinetostat.studies.grid.grid import failures
 from kinetostat.studies.storage import replacing
 from kinetostat.views.display import Scale, coordinate_scale, family_of_names, prefixed_scale, spoken
 
@@ -50,7 +50,7 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
     """One panel per quantity over the two dimensions of the dataset, contours labelled with their values.
 
     Args:
-        dataset: two-dimensional, from `studies.grid.evaluate_grid`.
+        dataset: two-dimensional, from `studies.grid.grid.evaluate_grid`.
         names: which quantities.
         title: over the whole figure.
     """
@@ -78,7 +78,7 @@ def curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
     """Quantities over the one dimension of the dataset, one panel for each unit; logarithmic where the range is.
 
     Args:
-        dataset: one-dimensional, from `studies.grid.evaluate_grid`.
+        dataset: one-dimensional, from `studies.grid.grid.evaluate_grid`.
         names: which quantities.
         title: over the whole figure.
     """

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from kinetostat.kinetostatics.elements import Element
-from kinetostat.studies.guideline_sentences import limit_of
-from kinetostat.studies.guidelines import Guidelines
-from kinetostat.studies.roles import EXCESS, stiffening
+from kinetostat.studies.guidelines.guidelines import Guidelines
+from kinetostat.studies.guidelines.roles import EXCESS, stiffening
+from kinetostat.studies.guidelines.sentences import limit_of
 from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout
 from kinetostat.views.sensitivity_figure import coloured_table
 

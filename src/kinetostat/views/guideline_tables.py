@@ -5,10 +5,10 @@ import math
 from rich.console import Console
 from rich.padding import Padding
 
-from kinetostat.studies.guideline_sentences import LEAST, MATTERS, statements
-from kinetostat.studies.guidelines import Guidelines
-from kinetostat.studies.moves import Move
-from kinetostat.studies.roles import Roles
+from kinetostat.studies.guidelines.guidelines import Guidelines
+from kinetostat.studies.guidelines.moves import Move
+from kinetostat.studies.guidelines.roles import Roles
+from kinetostat.studies.guidelines.sentences import LEAST, MATTERS, statements
 from kinetostat.views.tables import number, numeric_table
 
 TOPICS = {

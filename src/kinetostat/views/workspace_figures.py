@@ -12,9 +12,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from kinetostat.studies.conditions import Condition
-from kinetostat.studies.surface import surface
-from kinetostat.studies.verdicts import BEYOND, FAILS, INSIDE, LIMIT, PLAIN, phrase
+from kinetostat.studies.workspace.conditions import Condition
+from kinetostat.studies.workspace.surface import surface
+from kinetostat.studies.workspace.verdicts import BEYOND, FAILS, INSIDE, LIMIT, PLAIN, phrase
 from kinetostat.views.display import coordinate_scale
 from kinetostat.views.figures import COLOURS, STYLE, Array, axis_values, fix_layout, set_axis_scales
 
@@ -40,7 +40,7 @@ def pictures(
     held where the file's pose has them.
 
     Args:
-        dataset: of `studies.workspace.Workspace`.
+        dataset: of `studies.workspace.workspace.Workspace`.
         labels: its verdicts.
         conditions: whose contours are drawn.
         title: over each picture.

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 from rich.console import Console
 
-from kinetostat.studies.verdicts import INSIDE, phrase
-from kinetostat.studies.workspace import Workspace
+from kinetostat.studies.workspace.verdicts import INSIDE, phrase
+from kinetostat.studies.workspace.workspace import Workspace
 from kinetostat.views.display import coordinate_scale
 from kinetostat.views.tables import number, numeric_table
 

@@ -11,9 +11,9 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find, values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.study import PosesTable
-from kinetostat.studies.grid import GridQuestion, grid_question
-from kinetostat.studies.volume import unit_product
-from kinetostat.studies.workspace import workspace
+from kinetostat.studies.grid.grid import GridQuestion, grid_question
+from kinetostat.studies.workspace.volume import unit_product
+from kinetostat.studies.workspace.workspace import workspace
 from kinetostat.units import UnitError, parse
 
 MOST_POSES = 1_000_000

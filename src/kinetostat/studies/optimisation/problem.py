@@ -13,12 +13,12 @@ from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, read_study
 from kinetostat.studies.bundled import bundled_studies, study_of
-from kinetostat.studies.conditions import value_of
 from kinetostat.studies.optimisation.aggregate import Aggregate, parse_aggregate
 from kinetostat.studies.optimisation.catalogue import more_is_better, read_term
 from kinetostat.studies.optimisation.poses import PoseSet, read_poses
 from kinetostat.studies.optimisation.terms import Term
 from kinetostat.studies.optimisation.variables import Space, read_space
+from kinetostat.studies.workspace.conditions import value_of
 
 NOMINAL = "nominal"
 MOST_EVALUATIONS = 5_000_000

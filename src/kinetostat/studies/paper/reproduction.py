@@ -9,7 +9,7 @@ import xarray as xr
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
-from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.grid.grid import evaluate_grid
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.claims import Claim, Finding, claims

@@ -8,9 +8,9 @@ from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import Analysis, analyze
+from kinetostat.studies.guidelines.roles import equations_of_k
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.comparison import Comparison, compare, rounds_to
-from kinetostat.studies.roles import equations_of_k
 
 COMPLIANCE_UNITS = [QUANTITIES[name].unit for name in GROUPS["compliance"]]
 STIFFNESS_UNITS = [QUANTITIES[name].unit for name in GROUPS["stiffness"]]

@@ -4,8 +4,8 @@ import math
 import string
 from html import escape
 
-from kinetostat.studies.design_rows import Better, Row
-from kinetostat.studies.designs import Blame, Comparison
+from kinetostat.studies.comparison.design_rows import Better, Row
+from kinetostat.studies.comparison.designs import Blame, Comparison
 from kinetostat.studio.markup import gains, heading, paragraph, table
 from kinetostat.studio.wording import DASH, engineering
 from kinetostat.views.tables import readable

@@ -16,7 +16,7 @@ from kinetostat.kinetostatics.sides import side
 from kinetostat.machine.limits import Limits, is_set
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.fields import quantities
-from kinetostat.studies.conditions import Condition
+from kinetostat.studies.workspace.conditions import Condition
 
 Mask = npt.NDArray[np.bool_]
 Codes = npt.NDArray[np.int8]

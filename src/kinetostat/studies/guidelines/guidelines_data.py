@@ -5,10 +5,10 @@ from dataclasses import asdict
 from typing import Any
 
 from kinetostat.kinetostatics.elements import Element
-from kinetostat.studies.guideline_sentences import limit_of, statements
-from kinetostat.studies.guidelines import Guidelines
-from kinetostat.studies.moves import Move
-from kinetostat.studies.roles import EXCESS, Roles
+from kinetostat.studies.guidelines.guidelines import Guidelines
+from kinetostat.studies.guidelines.moves import Move
+from kinetostat.studies.guidelines.roles import EXCESS, Roles
+from kinetostat.studies.guidelines.sentences import limit_of, statements
 
 
 def as_json(found: Guidelines) -> dict[str, Any]:

@@ -15,12 +15,12 @@ from kinetostat.engine.sampling import Cells
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.conditions import Condition, parse_condition
-from kinetostat.studies.connected import connected_to
-from kinetostat.studies.demands import Demand, demands
-from kinetostat.studies.grid import IN_MEMORY, MOST_DIMENSIONS, GridQuestion, answer, grid_question
-from kinetostat.studies.verdicts import INSIDE, Codes, Judge, Mask, Numbers, Poses
-from kinetostat.studies.volume import METHOD, Volume, estimate_volume
+from kinetostat.studies.grid.grid import IN_MEMORY, MOST_DIMENSIONS, GridQuestion, answer, grid_question
+from kinetostat.studies.workspace.conditions import Condition, parse_condition
+from kinetostat.studies.workspace.connected import connected_to
+from kinetostat.studies.workspace.demands import Demand, demands
+from kinetostat.studies.workspace.verdicts import INSIDE, Codes, Judge, Mask, Numbers, Poses
+from kinetostat.studies.workspace.volume import METHOD, Volume, estimate_volume
 
 MOST_DEMANDS = 200_000
 """Inside nodes of which it is computed what they ask of the machine; of more, evenly chosen ones."""

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.kinetostatics.elements import LINKS_TOGETHER, Element
-from kinetostat.studies.guidelines import Guidelines
-from kinetostat.studies.moves import Move
-from kinetostat.studies.roles import ROUNDING, Array, Roles
+from kinetostat.studies.guidelines.guidelines import Guidelines
+from kinetostat.studies.guidelines.moves import Move
+from kinetostat.studies.guidelines.roles import ROUNDING, Array, Roles
 
 MATTERS = 0.01
 """Share of an entry of C from which an element is named as one that decides it."""

@@ -15,7 +15,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.grid.grid import evaluate_grid
 
 PERCENTILE = 95.0
 """Of the poses of a grid, the share that is at least as good."""

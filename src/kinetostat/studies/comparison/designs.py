@@ -20,7 +20,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, parameters, values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis, analyze
-from kinetostat.studies.design_rows import Row, rows_at_poses, rows_over
+from kinetostat.studies.comparison.design_rows import Row, rows_at_poses, rows_over
 
 MOST_DESIGNS = 12
 SEPARATOR = ";"

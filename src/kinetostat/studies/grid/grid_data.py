@@ -9,8 +9,8 @@ import xarray as xr
 
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.studies.stored_grid import StoredGrid
-from kinetostat.studies.tally import Extremes
+from kinetostat.studies.grid.stored_grid import StoredGrid
+from kinetostat.studies.grid.tally import Extremes
 
 
 def as_plain_data(dataset: xr.Dataset) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from kinetostat.engine.points import Array
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.studies.grid import resolve_quantities
+from kinetostat.studies.grid.grid import resolve_quantities
 from kinetostat.units import KINDS, UnitError, parse
 
 COMPARISONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}

@@ -3,8 +3,8 @@
 import math
 from typing import Any
 
-from kinetostat.studies.design_rows import Row
-from kinetostat.studies.designs import Comparison
+from kinetostat.studies.comparison.design_rows import Row
+from kinetostat.studies.comparison.designs import Comparison
 
 
 def as_json(found: Comparison) -> dict[str, Any]:

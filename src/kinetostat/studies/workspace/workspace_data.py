@@ -3,8 +3,8 @@
 from dataclasses import asdict
 from typing import Any
 
-from kinetostat.studies.volume import METHOD
-from kinetostat.studies.workspace import Workspace
+from kinetostat.studies.workspace.volume import METHOD
+from kinetostat.studies.workspace.workspace import Workspace
 
 
 def as_plain_data(found: Workspace) -> dict[str, Any]:

@@ -21,9 +21,9 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.grid import grid_question
-from kinetostat.studies.moves import Move, axes_left_out, designed, moves_at, with_signs
-from kinetostat.studies.roles import Roles, equations_of_k, roles_at, roles_over
+from kinetostat.studies.grid.grid import grid_question
+from kinetostat.studies.guidelines.moves import Move, axes_left_out, designed, moves_at, with_signs
+from kinetostat.studies.guidelines.roles import Roles, equations_of_k, roles_at, roles_over
 from kinetostat.studies.sensitivity import notes, sensitivity
 
 MOST_POSES = 10_000

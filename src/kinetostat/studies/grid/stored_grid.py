@@ -11,10 +11,10 @@ from kinetostat.engine.batch import Evaluation, Progress, silent
 from kinetostat.engine.chunks import Compute, Work, here, in_chunks
 from kinetostat.kinematics.status import Status
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.grid import ABOUT_STATUS, GridQuestion, about
+from kinetostat.studies.grid.grid import ABOUT_STATUS, GridQuestion, about
+from kinetostat.studies.grid.tally import Tally, combined, tally
 from kinetostat.studies.result_file import STATUS, UNKNOWN, ResultFile, check_space, create
 from kinetostat.studies.study_folder import Record, StudyFolder, holds_study, study_folder
-from kinetostat.studies.tally import Tally, combined, tally
 
 MOST_NUMBERS = 10_000_000_000
 """Points times quantities of one grid: 80 GB."""
