@@ -6,7 +6,7 @@ import pytest
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Table
-from kinetostat.engine.population import Differentiator, Evaluator, Population
+from kinetostat.engine.population import Evaluator, Population, differentiate
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values
 
@@ -55,7 +55,7 @@ def test_derivatives_are_those_of_the_engine(machine):
     shares = np.array([0.95, 1.0, 1.02, 1.05])
     designs = {p: float(values(loaded)[p]) * shares for p in ("geometry.platform_radius", "geometry.base_radius")}
     population, by = Population(designs, {}), tuple(designs)
-    found = Differentiator(loaded, population.paths, ["compliance_x", "regularity"], by)(population)
+    found = differentiate(loaded, population, ["compliance_x", "regularity"], by)
     expected = evaluate_gradient(loaded, Table(designs), ["compliance_x", "regularity"], by)
     np.testing.assert_allclose(found.slopes[:, :, :, 0], expected.gradients, rtol=1e-9)
     np.testing.assert_allclose(found.values["regularity"][:, 0], expected.values[1], rtol=1e-12)
@@ -64,9 +64,9 @@ def test_derivatives_are_those_of_the_engine(machine):
 def test_derivatives_where_joints_are_found_by_iteration():
     machine, path = load("tripteron"), stiff_path("tripteron")
     population = Population({path: float(values(machine)[path]) * np.array([1.0, 1.1])}, {})
-    found = Differentiator(machine, population.paths, ["compliance_x"], [path])(population)
+    found = differentiate(machine, population, ["compliance_x"], [path])
     expected = evaluate_gradient(machine, Table(population.designs), "compliance_x", [path])
-    np.testing.assert_array_equal(found.slopes[0, 0, :, 0], expected.gradients[0, 0])
+    np.testing.assert_allclose(found.slopes[0, 0, :, 0], expected.gradients[0, 0], rtol=1e-12)
 
 
 def test_a_free_spring_among_the_designs():
@@ -74,7 +74,7 @@ def test_a_free_spring_among_the_designs():
     machine = load("zhang-gosselin-4dof", ["stiffness.passive_actuator=1000 N*m/rad"])
     population = Population({"stiffness.passive_actuator": np.array([0.0, 500.0])}, {})
     found = Evaluator(machine, population.paths, ["compliance_x"])(population)
-    sloped = Differentiator(machine, population.paths, ["compliance_x"], population.paths)(population)
+    sloped = differentiate(machine, population, ["compliance_x"], population.paths)
     np.testing.assert_allclose(found.values["compliance_x"], sloped.values["compliance_x"], rtol=1e-9)
     assert np.isfinite(found.values["compliance_x"]).all()
     assert found.values["compliance_x"][0, 0] > found.values["compliance_x"][1, 0]

@@ -64,6 +64,8 @@ def evaluate_gradient(
     objectives: Objective | Sequence[Objective],
     paths: Sequence[str],
     progress: Progress = silent,
+    *,
+    repeated: bool = False,
 ) -> Gradients:
     """Objectives of a machine at many points, and their exact derivatives.
 
@@ -73,18 +75,21 @@ def evaluate_gradient(
         objectives: one or several; names are from `kinetostatics.quantities.QUANTITIES`.
         paths: leaf paths of the parameters to differentiate by, whether they vary over the points or not.
         progress: told how far the work is.
+        repeated: whether the same will be asked at other points again and again, as by a search: then compiling pays
+            for few points as well, once.
     """
     wanted = [objectives] if isinstance(objectives, str | Mapping) else list(objectives)
     weights = tuple(((one, 1.0),) if isinstance(one, str) else tuple(one.items()) for one in wanted)
-    native = points.size >= MACHINE_CODE_FROM
+    native = repeated or points.size >= MACHINE_CODE_FROM
     slab = NATIVE_SLAB if native else SMALL_SLAB
+    threads = available_cores() if native and points.size > slab else 1
 
     def method(one: Machine, varying: Sequence[str], _names: Sequence[str]) -> Fill:
         return _fill(one, varying, weights, tuple(paths), native)
 
     fill = by_free_springs(machine, points.paths, (), method)
     count, rows = len(weights), len(weights) * (1 + len(paths))
-    results, status = in_slabs(points, fill, rows, slab, available_cores() if native else 1, progress)
+    results, status = in_slabs(points, fill, rows, slab, threads, progress)
     values, slopes = results[:count], results[count:].reshape(count, len(paths), points.size)
     for value, own in zip(values, slopes, strict=True):
         own[:, ~np.isfinite(value)] = math.nan

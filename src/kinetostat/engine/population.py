@@ -6,17 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
-from kinetostat.engine.batch import NATIVE_SLAB, Codes, Fill, by_free_springs, in_slabs
+from kinetostat.engine.batch import NATIVE_SLAB, Codes, by_free_springs, in_slabs
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.form import Kind, angles, form_of, reduced
-from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.kernel import slab_kernel
-from kinetostat.engine.native import Program
 from kinetostat.engine.points import Array
-from kinetostat.engine.questions import objectives_of
 from kinetostat.engine.threads import available_cores
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import parameters
 
 
 @dataclass(frozen=True)
@@ -62,7 +57,7 @@ class Answers:
         values: by name [designs x poses]; NaN where the status is not OK.
         status: `Status` codes [designs x poses].
         slopes: derivatives of each quantity in turn by each path [quantities x paths x designs x poses]; only of a
-            `Differentiator`.
+            `differentiate`.
     """
 
     values: dict[str, Array]
@@ -86,51 +81,27 @@ class Evaluator:
 
     def __call__(self, population: Population) -> Answers:
         """Evaluate a population; its size alone decides how it is cut, so that equal ones give equal bits."""
-        results, status = _run(population, self._fill, len(self._names))
-        values = {name: row.reshape(population.shape) for name, row in zip(self._names, results, strict=True)}
-        return Answers(values, status.reshape(population.shape))
+        threads = available_cores() if population.size > NATIVE_SLAB else 1
+        results, status = in_slabs(population, self._fill, len(self._names), NATIVE_SLAB, threads)
+        return _answers(population, self._names, results, status)
 
 
-class Differentiator:
-    """Quantities of a few designs and their exact derivatives by parameters of the design."""
+def differentiate(machine: Machine, population: Population, quantities: Sequence[str], by: Sequence[str]) -> Answers:
+    """Quantities of a few designs and their exact derivatives by parameters of the design; compiled at the first call.
 
-    def __init__(self, machine: Machine, paths: Sequence[str], quantities: Sequence[str], by: Sequence[str]) -> None:
-        """Compile, unless the joints of the machine are found by iteration.
-
-        Args:
-            machine, paths, quantities: as for `Evaluator`.
-            by: leaf paths of what to differentiate by, among `paths`.
-        """
-        self._machine, self._names, self._by = machine, tuple(quantities), tuple(by)
-        self._stiff = [p.path for p in parameters(machine.family) if p.quantity.stiff and p.path in paths]
-        self._fill = _differentiated(machine, paths, self._names, self._by) if machine.family.chains is None else None
-
-    def __call__(self, population: Population) -> Answers:
-        """Evaluate a population."""
-        count, by = len(self._names), len(self._by)
-        if self._fill is None or any((population.designs[path] == 0.0).any() for path in self._stiff):
-            found = evaluate_gradient(self._machine, population, self._names, self._by)
-            results, slopes, status = found.values, found.gradients, found.status
-        else:
-            rows, status = _run(population, self._fill, count * (1 + by))
-            results, slopes = rows[:count], rows[count:]
-        values = {name: row.reshape(population.shape) for name, row in zip(self._names, results, strict=True)}
-        return Answers(values, status.reshape(population.shape), slopes.reshape(count, by, *population.shape))
+    Args:
+        machine: gives all parameters that do not vary.
+        population: designs and poses.
+        quantities: names from `kinetostatics.quantities.QUANTITIES`.
+        by: leaf paths of what to differentiate by.
+    """
+    found = evaluate_gradient(machine, population, quantities, by, repeated=True)
+    slopes = found.gradients.reshape(len(quantities), len(by), *population.shape)
+    return _answers(population, quantities, found.values, found.status, slopes)
 
 
-def _differentiated(machine: Machine, paths: Sequence[str], quantities: Sequence[str], by: Sequence[str]) -> Fill:
-    form, fixed = form_of(machine, paths)
-    asked = objectives_of(Kind(machine), form, [((name, 1.0),) for name in quantities], by)
-    program, turning = Program(with_gradients(asked.body, asked.inputs)), angles(machine)
-
-    def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-        served = {path: np.ascontiguousarray(columns[path], dtype=float) for path in form.varying}
-        given = [reduced(column) if path in turning else column for path, column in served.items()]
-        program.run(fixed, given, results, status)
-
-    return fill
-
-
-def _run(population: Population, fill: Fill, rows: int) -> tuple[Array, Codes]:
-    threads = available_cores() if population.size > NATIVE_SLAB else 1
-    return in_slabs(population, fill, rows, NATIVE_SLAB, threads)
+def _answers(
+    population: Population, names: Sequence[str], results: Array, status: Codes, slopes: Array | None = None
+) -> Answers:
+    values = {name: row.reshape(population.shape) for name, row in zip(names, results, strict=True)}
+    return Answers(values, status.reshape(population.shape), slopes)

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.engine.points import Array
-from kinetostat.engine.population import Differentiator, Population
+from kinetostat.engine.population import Population, differentiate
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.optimisation.aggregate import Mask
 from kinetostat.studies.optimisation.problem import Problem
@@ -78,7 +78,6 @@ class Surveyor:
         self._free = np.flatnonzero(problem.space.catalogue == 0)
         self._rates = self._chain()
         by = tuple(dict.fromkeys(path for rates in self._rates for path in rates))
-        self._differentiate = Differentiator(problem.machine, problem.paths, problem.names, by)
         self._by = {path: k for k, path in enumerate(by)}
         robust = problem.robust is not None
         self._made = deviations(problem, problem.study.robustness.search_samples, 0) if robust else {}
@@ -105,7 +104,8 @@ class Surveyor:
         problem = self.problem
         machines = len(next(iter(self._made.values()), (0.0,)))
         columns = problem.space.columns(np.repeat(genes[None], machines, axis=0), self._made)
-        answers = self._differentiate(Population(columns, problem.poses.columns))
+        population = Population(columns, problem.poses.columns)
+        answers = differentiate(problem.machine, population, problem.names, [*self._by])
         slopes = {}
         with np.errstate(invalid="ignore"):
             for name, own in zip(problem.names, answers.slopes if answers.slopes is not None else (), strict=True):
