@@ -151,6 +151,12 @@ def test_help_imports_no_heavy_library():
         assert f"'{heavy}'" not in loaded
 
 
+def test_the_package_runs_as_the_command(capsys):
+    main(["--version"])
+    ran = subprocess.run([sys.executable, "-m", "kinetostat", "--version"], capture_output=True, text=True, check=True)
+    assert ran.stdout == capsys.readouterr().out
+
+
 def test_one_pose_needs_no_compiler_and_no_datasets():
     script = (
         "import sys, kinetostat.cli\n"
