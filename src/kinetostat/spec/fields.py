@@ -142,13 +142,13 @@ class Field:
     default: Any = None
 
 
-def made_section(name: str, given: Mapping[str, Field]) -> type:
-    """A section class from its fields, those that may be left out last."""
+def made_section(name: str, given: Mapping[str, Field], bases: tuple[type, ...] = ()) -> type:
+    """A section class from its fields, those that may be left out last, and from the sections that it extends."""
     ordered = dict(sorted(given.items(), key=lambda item: item[1].default is not None))
     kinds = {key: float if one.quantity.count is None else tuple[float, ...] for key, one in ordered.items()}
     hints = {key: Annotated[kinds[key], one.quantity] for key, one in ordered.items()}
     defaults = {key: one.default for key, one in ordered.items() if one.default is not None}
-    return section(type(name, (), {"__annotations__": hints, "__module__": __name__, **defaults}))
+    return section(type(name, bases, {"__annotations__": hints, "__module__": __name__, **defaults}))
 
 
 @lru_cache(1024)

@@ -7,9 +7,8 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import Displacement, Vector, rotation_x, rotation_y, rotation_z
-from kinetostat.machine.leg import RIGID, two_force_legs
-from kinetostat.machine.links import LinkKind, straight_legs
-from kinetostat.machine.machine import Configuration, Family
+from kinetostat.machine.between_rings import Placement, with_struts
+from kinetostat.machine.leg import RIGID
 from kinetostat.machine.rings import Rings, ends
 from kinetostat.spec.fields import Quantity, section
 
@@ -49,30 +48,15 @@ class Pose:
     yaw: Annotated[float, Quantity("angle", "rotation about z, last")] = 0.0
 
 
-def placed(geometry: Geometry, pose: Pose) -> tuple[Displacement, tuple[list[Vector], list[Vector]]]:
+def placed(geometry: Geometry, _stiffness: Stiffness, pose: Pose) -> Placement:
     """The platform, and base and platform joints of its legs; every pose can be reached (SI, base frame)."""
     turn = rotation_z(cos(pose.yaw), sin(pose.yaw)) @ rotation_y(cos(pose.pitch), sin(pose.pitch))
     turn = turn @ rotation_x(cos(pose.roll), sin(pose.roll))
     platform = Displacement(turn, Vector(pose.x, pose.y, pose.z))
     heights = geometry.base_height, geometry.platform_height
-    return platform, ends(geometry, geometry.base_angles, geometry.platform_angles, platform, heights)
+    joints = ends(geometry, geometry.base_angles, geometry.platform_angles, platform, heights)
+    return Placement(platform, joints)
 
 
-def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
-    """The machine at a pose, in closed form; every pose can be reached while no leg limits are given.
-
-    Args:
-        geometry, stiffness, pose: SI; base frame.
-    """
-    platform, (base, top) = placed(geometry, pose)
-    legs = two_force_legs(base, top, stiffness.actuator, stiffness.leg_axial)
-    return Configuration(platform, tuple(legs), (), geometry.size)
-
-
-FAMILY = Family(
-    name="hexapod",
-    summary="6 U-P-S legs (Gough-Stewart); freedoms x, y, z, roll, pitch, yaw",
-    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
-    configure=configure,
-    links=(LinkKind("legs", ("leg_axial",), straight_legs),),
-)
+SECTIONS = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
+FAMILY = with_struts("hexapod", "6 U-P-S legs (Gough-Stewart); freedoms x, y, z, roll, pitch, yaw", SECTIONS, placed)

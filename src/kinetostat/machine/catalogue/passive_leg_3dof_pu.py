@@ -7,10 +7,9 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import AXES, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector, rotation_x, rotation_y
-from kinetostat.machine.guide import Guide
-from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes, two_force_legs
-from kinetostat.machine.links import LinkKind, from_origin, straight_legs
-from kinetostat.machine.machine import Configuration, Family
+from kinetostat.machine.between_rings import Placement, with_struts
+from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes
+from kinetostat.machine.links import LinkKind, from_origin
 from kinetostat.machine.parts import in_series, servo
 from kinetostat.machine.rings import Three, ThreeLegs, ends
 from kinetostat.spec.fields import Quantity, section
@@ -50,7 +49,7 @@ class Pose:
     theta2: Annotated[float, Quantity("angle", "angle of the Hooke joint's second axis, about the pitched x")]
 
 
-def guide(stiffness: Stiffness, pose: Pose) -> Guide:
+def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
     """The platform and the ram, in closed form; every pose can be reached (SI, base frame)."""
     pitch = rotation_y(cos(pose.theta1), sin(pose.theta1))
     tip = Vector(0.0, 0.0, pose.z)
@@ -62,27 +61,15 @@ def guide(stiffness: Stiffness, pose: Pose) -> Guide:
         for name, axis, k in zip(("bending x", "bending y", "torsion"), AXES, built_in, strict=True)
     )
     slide = servo(Joint(Z_AXIS, None, "ram slide"), "ram actuator", stiffness.ram_actuator)
-    return Guide(platform, Leg("ram", (*springs, slide, *revolutes(tip, (Y_AXIS, pitch.x), "ram Hooke joint"))))
-
-
-def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
-    """The machine at a pose, in closed form.
-
-    Args:
-        geometry, stiffness, pose: SI; base frame.
-    """
-    ram = guide(stiffness, pose)
-    base, top = ends(geometry, geometry.base_angles, geometry.platform_angles, ram.platform)
-    return ram.moved_by(two_force_legs(base, top, stiffness.actuator, stiffness.leg_axial), geometry.size)
+    leg = Leg("ram", (*springs, slide, *revolutes(tip, (Y_AXIS, pitch.x), "ram Hooke joint")))
+    joints = ends(geometry, geometry.base_angles, geometry.platform_angles, platform)
+    return Placement(platform, joints, (leg,))
 
 
 RAM = LinkKind("ram", ("ram_bending", "ram_torsion"), from_origin("ram"))
 
 
-FAMILY = Family(
-    name="passive-leg-3dof-pu",
-    summary="3 U-P-S legs and a passive P-U ram; freedoms z, theta1, theta2",
-    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
-    configure=configure,
-    links=(LinkKind("legs", ("leg_axial",), straight_legs), RAM),
+SECTIONS = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
+FAMILY = with_struts(
+    "passive-leg-3dof-pu", "3 U-P-S legs and a passive P-U ram; freedoms z, theta1, theta2", SECTIONS, placed, (RAM,)
 )

@@ -9,10 +9,10 @@ from typing import Annotated
 from kinetostat.algebra.scalar import Scalar, cos, sin
 from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import Y_AXIS, Displacement, Rotation, Vector, rotation_x, rotation_y
-from kinetostat.machine.guide import Guide
-from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes, two_force_legs
-from kinetostat.machine.links import LinkKind, listed, straight_legs
-from kinetostat.machine.machine import Closure, Configuration, Family
+from kinetostat.machine.between_rings import Placement, with_struts
+from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes
+from kinetostat.machine.links import LinkKind, listed
+from kinetostat.machine.machine import Closure
 from kinetostat.machine.parts import bent_links, servo
 from kinetostat.machine.rings import Rings, four_joints
 from kinetostat.spec.fields import Quantity, section
@@ -23,27 +23,31 @@ Two = tuple[float, float]
 
 
 @section
-class Geometry(Rings):
-    """Table [geometry]; the base frame has its origin O at the foot of the passive leg, z up."""
+class PassiveLinks(Rings):
+    """Part of a table [geometry]: the rings, and the two links of the passive leg."""
 
-    base_angle: Annotated[float, Quantity("angle", "angle of the first base joint from x, Ta")]
-    platform_angle: Annotated[float, Quantity("angle", "angle of the first platform joint from x, Tb")]
     passive_links: Annotated[
         Two,
         Quantity("length", "lengths of the passive leg's links l51 (base) and l52 (platform)", positive=True, count=2),
     ]
+
+
+@section
+class Geometry(PassiveLinks):
+    """Table [geometry]; the base frame has its origin O at the foot of the passive leg, z up."""
+
+    base_angle: Annotated[float, Quantity("angle", "angle of the first base joint from x, Ta")]
+    platform_angle: Annotated[float, Quantity("angle", "angle of the first platform joint from x, Tb")]
     passive_leg_offset: Annotated[
         float, Quantity("length", "y of the plane in which the passive leg and the platform point P move")
     ] = 0.0
 
 
 @section
-class Stiffness:
-    """Table [stiffness]."""
+class PassiveLegStiffness:
+    """Part of a table [stiffness]: what machines have in common whose passive leg has two links."""
 
-    actuator: Annotated[
-        Four, Quantity("linear stiffness", "stiffness of the four actuators held by their servos, Ka", count=LEGS)
-    ]
+    actuator: tuple[float, ...]
     passive_links: Annotated[
         Two,
         Quantity("torsional stiffness", "out-of-plane bending of the links at their lower ends, k52 and k54", count=2),
@@ -52,6 +56,15 @@ class Stiffness:
     passive_link_bending: Annotated[
         Two, Quantity("bending rigidity", "out-of-plane bending rigidity of the passive leg's links, EI", count=2)
     ] = (RIGID, RIGID)
+
+
+@section
+class Stiffness(PassiveLegStiffness):
+    """Table [stiffness]."""
+
+    actuator: Annotated[
+        Four, Quantity("linear stiffness", "stiffness of the four actuators held by their servos, Ka", count=LEGS)
+    ]
     passive_actuator: Annotated[
         float, Quantity("torsional stiffness", "actuator of the passive leg's first revolute; 0 leaves it passive")
     ] = 0.0
@@ -67,7 +80,7 @@ class Pose:
     theta6: Annotated[float, Quantity("angle", "angle of the Hooke joint's second axis, about the pitched x")]
 
 
-def guide(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Guide:
+def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
     """The platform and the passive leg, in closed form; NaN where the passive leg cannot reach (SI, base frame).
 
     The elbow lies on the +x side of the line from O to P; el2, the elevation of link 2, fixes the pitch:
@@ -80,18 +93,10 @@ def guide(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Guide:
     pitch = platform_pitch((tip - elbow) * (1.0 / second), pose.theta5)
     platform = Displacement(pitch @ rotation_x(cos(pose.theta6), sin(pose.theta6)), tip)
     closure = Closure("passive leg", (tip - foot).norm(), abs(first - second), first + second)
-    return Guide(platform, _passive_leg(foot, elbow, tip, pitch.x, geometry, stiffness), (closure,))
-
-
-def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
-    """The machine at a pose, in closed form: the passive leg and four U-P-S legs; NaN out of reach.
-
-    Args:
-        geometry, stiffness, pose: SI; base frame.
-    """
-    passive = guide(geometry, stiffness, pose)
-    base, top = joints(geometry, passive.platform)
-    return passive.moved_by(two_force_legs(base, top, stiffness.actuator, stiffness.leg_axial), geometry.size)
+    base = four_joints(geometry.base_radius, geometry.base_angle)
+    top = four_joints(geometry.platform_radius, geometry.platform_angle)
+    leg = _passive_leg(foot, elbow, tip, pitch.x, geometry, stiffness)
+    return Placement(platform, (base, [platform.apply(point) for point in top]), (leg,), (closure,))
 
 
 def platform_pitch(link: Vector, theta5: Scalar) -> Rotation:
@@ -117,19 +122,12 @@ def _passive_leg(
     return Leg("passive leg", chain)
 
 
-def joints(geometry: Geometry, platform: Displacement) -> tuple[list[Vector], list[Vector]]:
-    """Base joints and platform joints of the actuated legs in order, base frame, m."""
-    top = four_joints(geometry.platform_radius, geometry.platform_angle)
-    return four_joints(geometry.base_radius, geometry.base_angle), [platform.apply(point) for point in top]
-
-
 PASSIVE_LINKS = LinkKind("passive_links", ("passive_link_bending",), listed("passive link", "passive_links"), count=2)
 
 
-FAMILY = Family(
-    name="passive-leg-4dof",
-    summary="4 U-P-S legs and a passive R-R-Hooke leg (Zhang and Gosselin); freedoms x, z, theta5, theta6",
-    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
-    configure=configure,
-    links=(LinkKind("legs", ("leg_axial",), straight_legs), PASSIVE_LINKS),
-)
+SECTIONS = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
+FAMILY = with_struts(
+    "passive-leg-4dof",
+    "4 U-P-S legs and a passive R-R-Hooke leg (Zhang and Gosselin); freedoms x, z, theta5, theta6",
+    SECTIONS, placed, (PASSIVE_LINKS,),
+)  # fmt: skip

@@ -9,13 +9,17 @@ from typing import Annotated
 from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin, sqrt
 from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import X_AXIS, Y_AXIS, ZERO, Displacement, Rotation, Vector, rotation_x
-from kinetostat.machine.catalogue.passive_leg_4dof import Two, platform_pitch
-from kinetostat.machine.guide import Guide
-from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes, two_force_legs
-from kinetostat.machine.links import LinkKind, listed, straight_legs
-from kinetostat.machine.machine import Closure, Configuration, Family
+from kinetostat.machine.between_rings import Placement, with_struts
+from kinetostat.machine.catalogue.passive_leg_4dof import (
+    PASSIVE_LINKS,
+    PassiveLegStiffness,
+    PassiveLinks,
+    platform_pitch,
+)
+from kinetostat.machine.leg import Joint, Leg, Spring, revolutes
+from kinetostat.machine.machine import Closure
 from kinetostat.machine.parts import bent_links, servo
-from kinetostat.machine.rings import Rings, ends
+from kinetostat.machine.rings import ends
 from kinetostat.spec.fields import Quantity, section
 
 LEGS = 5
@@ -23,30 +27,18 @@ Five = tuple[float, float, float, float, float]
 
 
 @section
-class Geometry(Rings):
+class Geometry(PassiveLinks):
     """Table [geometry]; the base frame has its origin O at the foot of the passive leg, z up."""
 
     base_angles: Annotated[Five, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS)]
     platform_angles: Annotated[Five, Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS)]
-    passive_links: Annotated[
-        Two,
-        Quantity("length", "lengths of the passive leg's links l51 (base) and l52 (platform)", positive=True, count=2),
-    ]
 
 
 @section
-class Stiffness:
+class Stiffness(PassiveLegStiffness):
     """Table [stiffness]."""
 
     actuator: Annotated[Five, Quantity("linear stiffness", "stiffness of the five actuators, Ka", count=LEGS)]
-    passive_links: Annotated[
-        Two,
-        Quantity("torsional stiffness", "out-of-plane bending of the links at their lower ends, k52 and k54", count=2),
-    ]
-    leg_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of the actuated legs, EA")] = RIGID
-    passive_link_bending: Annotated[
-        Two, Quantity("bending rigidity", "out-of-plane bending rigidity of the passive leg's links, EI", count=2)
-    ] = (RIGID, RIGID)
     passive_actuator: Annotated[
         float, Quantity("torsional stiffness", "actuator of the passive leg's first foot axis; 0 leaves it passive")
     ] = 0.0
@@ -63,7 +55,7 @@ class Pose:
     theta6: Annotated[float, Quantity("angle", "angle of the Hooke joint's second axis, about the pitched x")]
 
 
-def guide(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Guide:
+def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
     """The platform and the passive leg: that of the 4-dof machine in a plane tilted about x through O and P.
 
     In closed form; NaN where the passive leg cannot reach (SI, base frame).
@@ -82,18 +74,9 @@ def guide(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Guide:
         for i, (link, low, k) in enumerate(zip(links, (ZERO, elbow), bending, strict=True), 1)
     )
     leg = _passive_leg(tilt, elbow, tip, pitch.x, springs, stiffness.passive_actuator)
-    return Guide(platform, leg, (Closure("passive leg", tip.norm(), abs(first - second), first + second),))
-
-
-def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
-    """The machine at a pose, in closed form: the passive leg and five U-P-S legs; NaN out of reach.
-
-    Args:
-        geometry, stiffness, pose: SI; base frame.
-    """
-    passive = guide(geometry, stiffness, pose)
-    base, top = ends(geometry, geometry.base_angles, geometry.platform_angles, passive.platform)
-    return passive.moved_by(two_force_legs(base, top, stiffness.actuator, stiffness.leg_axial), geometry.size)
+    joints = ends(geometry, geometry.base_angles, geometry.platform_angles, platform)
+    closure = Closure("passive leg", tip.norm(), abs(first - second), first + second)
+    return Placement(platform, joints, (leg,), (closure,))
 
 
 def _passive_leg(
@@ -113,13 +96,8 @@ def _passive_leg(
     return Leg("passive leg", chain)
 
 
-PASSIVE_LINKS = LinkKind("passive_links", ("passive_link_bending",), listed("passive link", "passive_links"), count=2)
-
-
-FAMILY = Family(
-    name="passive-leg-5dof",
-    summary="5 U-P-S legs and a passive U-R-U leg; freedoms x, y, z, theta5, theta6",
-    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
-    configure=configure,
-    links=(LinkKind("legs", ("leg_axial",), straight_legs), PASSIVE_LINKS),
-)
+SECTIONS = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
+FAMILY = with_struts(
+    "passive-leg-5dof", "5 U-P-S legs and a passive U-R-U leg; freedoms x, y, z, theta5, theta6",
+    SECTIONS, placed, (PASSIVE_LINKS,),
+)  # fmt: skip

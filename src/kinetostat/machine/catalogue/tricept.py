@@ -7,10 +7,9 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import Y_AXIS, ZERO, Displacement, rotation_x, rotation_y
-from kinetostat.machine.guide import Guide
-from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes, two_force_legs
-from kinetostat.machine.links import LinkKind, from_origin, straight_legs
-from kinetostat.machine.machine import Configuration, Family
+from kinetostat.machine.between_rings import Placement, with_struts
+from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes
+from kinetostat.machine.links import LinkKind, from_origin
 from kinetostat.machine.parts import in_series, servo
 from kinetostat.machine.rings import Three, ThreeLegs, ends
 from kinetostat.spec.fields import Quantity, section
@@ -49,7 +48,7 @@ class Pose:
     length: Annotated[float, Quantity("length", "from the Hooke joint to the platform point P", positive=True)]
 
 
-def guide(stiffness: Stiffness, pose: Pose) -> Guide:
+def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
     """The platform and the tube, in closed form; every pose can be reached (SI, base frame)."""
     pitch = rotation_y(cos(pose.theta1), sin(pose.theta1))
     turn = pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2))
@@ -61,27 +60,19 @@ def guide(stiffness: Stiffness, pose: Pose) -> Guide:
         for name, axis, k in zip(("bending x", "bending y", "torsion"), (turn.x, turn.y, turn.z), built_in, strict=True)
     )
     slide = servo(Joint(turn.z, None, "tube slide"), "tube actuator", stiffness.tube_actuator)
-    return Guide(platform, Leg("tube", (*revolutes(ZERO, (Y_AXIS, pitch.x), "tube Hooke joint"), slide, *springs)))
-
-
-def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
-    """The machine at a pose, in closed form.
-
-    Args:
-        geometry, stiffness, pose: SI; base frame.
-    """
-    tube = guide(stiffness, pose)
-    base, top = ends(geometry, geometry.base_angles, geometry.platform_angles, tube.platform)
-    return tube.moved_by(two_force_legs(base, top, stiffness.actuator, stiffness.leg_axial), geometry.size)
+    leg = Leg("tube", (*revolutes(ZERO, (Y_AXIS, pitch.x), "tube Hooke joint"), slide, *springs))
+    joints = ends(geometry, geometry.base_angles, geometry.platform_angles, platform)
+    return Placement(platform, joints, (leg,))
 
 
 TUBE = LinkKind("tube", ("tube_bending", "tube_torsion"), from_origin("tube"))
 
 
-FAMILY = Family(
-    name="tricept",
-    summary="3 U-P-S legs and a passive U-P tube (Tricept); freedoms theta1, theta2, length",
-    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
-    configure=configure,
-    links=(LinkKind("legs", ("leg_axial",), straight_legs), TUBE),
+SECTIONS = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
+FAMILY = with_struts(
+    "tricept",
+    "3 U-P-S legs and a passive U-P tube (Tricept); freedoms theta1, theta2, length",
+    SECTIONS,
+    placed,
+    (TUBE,),
 )
