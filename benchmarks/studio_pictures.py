@@ -73,7 +73,7 @@ def tripteron(new_tab: Any) -> None:
         front(page, "Load")
         page.tab.get_by_role("tab", name="Load", exact=True).first.click()
         write(page, "force y", "400 N")
-        page.tab.wait_for_function("document.querySelector('.scene-key').innerText.includes('deflection')")
+        page.tab.get_by_role("slider", name="deflection ×").wait_for()
         front(page, "Loads")
         keep(page, "studio-dark")
 

@@ -187,10 +187,35 @@ def test_every_view_follows():
             assert words in page.one(mark).content
         await page.send("control load.force.2", "write", "-500 N")
         assert "-500 N" in page.one("under-load").content
-        assert "deflection ×" in page.one("scene-key").content
+        assert page.one("exaggeration").visible
         names = [solid["name"] for solid in page.shown("MachineView", "overlay")]
         assert "load/force" in names
         assert "ghost/platform/plate" in names
+
+    on_page(steps)
+
+
+def test_the_deflected_shape_is_exaggerated_as_one_likes():
+    async def steps(page):
+        assert not page.one("exaggeration").visible
+        await page.send("control load.force.2", "write", "-500 N")
+        own = page.shown("MachineView", "overlay")
+        assert page.one("exaggeration")._props["text"].endswith(" (auto)")
+        await page.send("exaggeration", "write", "× 1")
+        row = page.one("exaggeration")._props
+        assert row["text"] == "1"
+        assert page.shown("MachineView", "overlay") != own
+        await page.send("exaggeration", "slide", row["position"] + 1)
+        assert page.one("exaggeration")._props["text"] == "2"
+        await page.send("exaggeration", "write", "much")
+        assert '"much"; it must be a number' in page.one("exaggeration")._props["problem"]
+        await page.again()
+        assert page.one("exaggeration")._props["text"] == "2"
+        await page.send("undo", "click")
+        await page.send("redo", "click")
+        assert page.one("exaggeration")._props["text"] == "2"
+        await page.send("exaggeration", "write", "auto")
+        assert page.shown("MachineView", "overlay") == own
 
     on_page(steps)
 

@@ -62,7 +62,7 @@ class StudioPage:
             with ui.element("section").classes("left").props('aria-label="parameters"'):
                 self.parameters = ParametersPanel(self.session, self.changed, lambda: self._pictures.busy)
             with ui.element("section").classes("middle").props('aria-label="machine"'):
-                self.scene = ScenePanel()
+                self.scene = ScenePanel(self._exaggerate)
             with ui.element("section").classes("right").props('aria-label="linked views"'):
                 with ui.element("div").classes("card map-card"):
                     self.map = MapPanel(self.session, self.changed, self._refuse)
@@ -143,10 +143,19 @@ class StudioPage:
         """What the eye follows comes first, the figures after it."""
         self.scene.draw(found)
         self.parameters.go_on()
-        self._reports.ask(ReportWish(self.session.machine, self._sizes, None))
+        self._report()
 
-    def _show_report(self, _wish: ReportWish, found: Report) -> None:
-        self.scene.explain(found)
+    def _report(self) -> None:
+        self._reports.ask(ReportWish(self.session.machine, self._sizes, self.session.exaggeration))
+
+    def _exaggerate(self, factor: float | None) -> None:
+        """Draw the deflected shape with another factor; None to choose one."""
+        self.session.exaggeration = factor
+        self._remember(self.session.memory)
+        self._report()
+
+    def _show_report(self, wish: ReportWish, found: Report) -> None:
+        self.scene.explain(found, wish.exaggeration is None)
         if found.analysis.status is Status.OK:
             self._latest = found
             self._show_front()

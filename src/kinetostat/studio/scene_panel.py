@@ -1,11 +1,16 @@
 """The middle of the page: the machine, what is drawn over it, whether the pose has an answer, and its six figures."""
 
+from collections.abc import Callable
+
 from nicegui import ui
+from nicegui.events import GenericEventArguments
 
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, Report
-from kinetostat.studio.elements import MachineView
+from kinetostat.studio.elements import MachineView, QuantityRow
+from kinetostat.studio.exaggeration import STEPS, factor_at, factor_text, position_of, read_factor
 from kinetostat.studio.wording import engineering
 
 LAYERS = {
@@ -17,14 +22,22 @@ LAYERS = {
     "labels": "leg numbers",
 }
 """What may be hidden, by its name in scenes."""
+SCALE = "how many times larger than it is the deflected shape is drawn; a number, or auto"
 VIEWS = {"iso": "view from the corner", "front": "front view", "side": "side view", "top": "view from above"}
+THROTTLE = 0.03
+"""Seconds between two positions of a slider that a browser sends."""
 
 
 class ScenePanel:
     """The picture keeps the last pose that could be drawn; a pose without answer is explained below it."""
 
-    def __init__(self) -> None:
-        """The view with its tools, the line about the pose, and the figures."""
+    def __init__(self, exaggerate: Callable[[float | None], None]) -> None:
+        """The view with its tools, the line about the pose, and the figures.
+
+        Args:
+            exaggerate: draws the deflected shape with another factor; None to choose one.
+        """
+        self._exaggerate = exaggerate
         self._hidden: set[str] = set()
         with ui.element("div").classes("stage"):
             self._stage()
@@ -38,7 +51,12 @@ class ScenePanel:
             for view, text in VIEWS.items():
                 button = ui.button(view, on_click=lambda view=view: self.view.run_method("look", view))
                 button.props("flat dense no-caps").tooltip(text).mark(f"view-{view}")
-        self.key = ui.html("", sanitize=False).classes("scene-key").mark("scene-key")
+        with ui.element("div").classes("scene-key"):
+            self.key = ui.html("", sanitize=False).mark("scene-key")
+            self.scale = QuantityRow("deflection ×", SCALE, STEPS, slides=True).mark("exaggeration")
+            self.scale.classes("scene-scale").set_visibility(False)
+        self.scale.on("slide", lambda event: self._exaggerate(factor_at(int(event.args))), throttle=THROTTLE)
+        self.scale.on("write", self._written)
         with ui.element("div").classes("pose-line").props('role="status" aria-live="polite"') as self.line:
             self.status = ui.label("").classes("pose-status").mark("status")
             self.message = ui.label("").classes("pose-message").mark("message")
@@ -51,13 +69,26 @@ class ScenePanel:
         self._hidden = self._hidden - {layer} if on else self._hidden | {layer}
         self.view.hide(sorted(self._hidden))
 
+    def _written(self, event: GenericEventArguments) -> None:
+        try:
+            factor = read_factor(str(event.args))
+        except InputError as error:
+            self.scale.complain(str(error))
+        else:
+            self._exaggerate(factor)
+
     def draw(self, picture: Picture) -> None:
         """Show a pose, if there is something to draw."""
         if picture.scene is not None:
             self.view.run_method("show", picture.scene)
 
-    def explain(self, report: Report) -> None:
-        """Show the overlays and figures of a pose, or say why there are none and keep the last ones."""
+    def explain(self, report: Report, own: bool) -> None:
+        """Show the overlays and figures of a pose, or say why there are none and keep the last ones.
+
+        Args:
+            report: of the pose.
+            own: whether the factor of the deflected shape was chosen here.
+        """
         found = report.analysis
         answered = found.status is Status.OK
         self.line.classes(replace="pose-line" if answered else "pose-line refused")
@@ -68,6 +99,9 @@ class ScenePanel:
             return
         self.view.run_method("overlay", report.solids, [])
         self.key.set_content(scene_key(report))
+        self.scale.set_visibility(report.exaggeration is not None)
+        if report.exaggeration is not None:
+            self.scale.put(factor_text(report.exaggeration, own), position_of(report.exaggeration))
         self.figures.set_content(headline(report))
 
 
@@ -77,8 +111,6 @@ def scene_key(report: Report) -> str:
     units = {"translation": "m/N", "rotation": "rad/(N·m)"}
     for block, one in (found.indices.principal if found.indices and found.indices.principal else {}).items():
         parts.append(f'<li class="key-{block}">{block}: softest {engineering(one.compliances[-1], units[block])}</li>')
-    if report.exaggeration is not None:
-        parts.append(f'<li class="key-deflection">deflection × {report.exaggeration:,.6g}</li>')
     return f"<ul>{''.join(parts)}</ul>"
 
 

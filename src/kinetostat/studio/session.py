@@ -25,12 +25,14 @@ class Memory:
         name: of a bundled machine; empty for any other.
         now: as it is; `origin` if None.
         past: what it was, the latest last.
+        exaggeration: of the deflected shape; None to choose one for every load.
     """
 
     origin: Machine
     name: str = ""
     now: Machine | None = None
     past: tuple[Machine, ...] = ()
+    exaggeration: float | None = None
 
 
 class Session:
@@ -40,6 +42,7 @@ class Session:
         machine: as it is now; it need not be able to reach its pose.
         origin: as it was loaded; `name` if it is a bundled one.
         controls: its numbers with their ranges, fixed when it was loaded.
+        exaggeration: factor of its deflected shape, None to choose one for every load; it has no history.
     """
 
     def __init__(self, memory: Memory) -> None:
@@ -52,6 +55,7 @@ class Session:
         self.machine = memory.now or machine
         length = float(respond(machine).configuration.length)
         self.controls: dict[str, Control] = {one.path: one for one in controls(machine, length)}
+        self.exaggeration = memory.exaggeration
         self._past = [*memory.past]
         self._future: list[Machine] = []
         self._dragged: tuple[str, ...] = ()
@@ -59,7 +63,7 @@ class Session:
     @property
     def memory(self) -> Memory:
         """All that is needed to go on later."""
-        return Memory(self.origin, self.name, self.machine, tuple(self._past))
+        return Memory(self.origin, self.name, self.machine, tuple(self._past), self.exaggeration)
 
     def open(self, name: str) -> None:
         """Take a bundled machine.
