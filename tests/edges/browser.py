@@ -85,9 +85,22 @@ class Watched:
         self.tab.wait_for_function("document.querySelector('.headline')?.innerText.includes('C z')")
         self.tab.wait_for_function("document.querySelector('.plot')?.dataset.shown > 0")
 
+    def blameless(self, address: str) -> None:
+        """Nothing was wrong, and nobody else was asked for anything."""
+        assert not self.complaints
+        assert {host for host in self.hosts if host} == {urlparse(address).netloc}
+
     def text(self, where: str) -> str:
         """The text of an element."""
         return self.tab.locator(where).first.inner_text()
+
+    def choose(self, label: str, option: str) -> None:
+        """Choose from a list; on a busy machine it may need to be opened again."""
+        wanted = self.tab.get_by_role("option", name=option, exact=True)
+        while not wanted.is_visible():
+            self.tab.get_by_role("combobox", name=label, exact=True).click()
+            self.tab.wait_for_timeout(300)
+        wanted.click()
 
     def until_changed(self, where: str, before: str) -> str:
         """The text of an element once it is another."""

@@ -94,6 +94,33 @@ def test_a_front_is_shown_and_a_click_loads_a_design(tmp_path):
     on_page(steps, state=tmp_path)
 
 
+def test_a_front_of_three_objectives_is_seen_along_any_of_them(tmp_path):
+    async def steps(page):
+        await small_study(page)
+        for _ in range(2):
+            await page.send("study-add-objective", "click")
+        await page.choose("objective 2 quantity", "stiffness_x")
+        await page.send("study-start", "click")
+        assert page.one("study-problem").text == ""
+        await until(page, "done")
+        shown = page.shown("FrontView", "show")
+        assert (shown["axes"], shown["coloured"]) == ([0, 1], 2)
+        assert shown["labels"] == ["compliance_sum (SI)", "compliance_z (m/N)", "stiffness_x (N/m)"]
+        assert all(len(point) == 3 for point in [*shown["points"], shown["initial"]])
+        await page.choose("front-across", 2)
+        await page.choose("front-colour", -1)
+        shown = page.shown("FrontView", "show")
+        assert (shown["axes"], shown["coloured"]) == ([2, 1], None)
+        table = page.one("front-table")._props
+        assert table["names"][2:4] == ["maximize stiffness x (N/m)", "base radius"]
+        assert [row[:3] for row in table["values"]] == shown["points"]
+        await page.send("front-table", "pick", 1)
+        assert page.one("front-table")._props["chosen"] == page.shown("FrontView", "show")["chosen"] == 1
+        assert page.one("control geometry.base_radius")._props["text"] == table["texts"][1][3]
+
+    on_page(steps, state=tmp_path)
+
+
 def test_stopped_reloaded_resumed_and_deleted(tmp_path):
     async def steps(page):
         await small_study(page, "100000")

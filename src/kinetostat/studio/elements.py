@@ -51,6 +51,22 @@ class FrontView(Element, component=COMPONENTS / "front_view.js"):
         self._props["label"] = label
 
 
+class DesignTable(Element, component=COMPONENTS / "design_table.js"):
+    """Designs as rows that sort by any column; event `pick` with the number of a design."""
+
+    def __init__(self, label: str) -> None:
+        """No rows yet."""
+        super().__init__()
+        self._props.update(label=label, names=[], values=[], texts=[], knee=0, chosen=None)
+
+    def put(
+        self, names: list[str], values: list[list[float]], texts: list[list[str]], knee: int, chosen: int | None
+    ) -> None:
+        """Show designs: names of columns, numbers to sort by and texts to read, each [designs x columns]."""
+        self._props.update(names=names, values=values, texts=texts, knee=knee, chosen=chosen)
+        self.update()
+
+
 class QuantityRow(Element, component=COMPONENTS / "quantity_row.js"):
     """A number with its name and unit, and a slider; events `slide`, `settle`, `write`."""
 

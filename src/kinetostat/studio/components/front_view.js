@@ -1,4 +1,6 @@
-// Designs as points over two objectives: the knee and the machine as it was are marked; a click or Enter picks one.
+// Designs as points over two objectives, a third one by colour; knee and the machine as it was are marked. A click or
+// Enter picks one.
+import { bandColour, bandOf, colourBar, colourScale, css } from "kinetostat-studio/colour_scale.js";
 import { colour } from "kinetostat-studio/theme.js";
 import { frame, niceTicks, plot, prepare, short } from "kinetostat-studio/plot_axes.js";
 
@@ -20,7 +22,7 @@ export default {
     },
     range(k) {
       const { points, initial } = this.front;
-      const known = [...points, ...(initial ? [initial] : [])].map((point) => point[k]);
+      const known = [...points, ...(initial ? [initial] : [])].map((point) => point[this.front.axes[k]]);
       const [low, high] = [Math.min(...known), Math.max(...known)];
       const margin = 0.07 * (high - low) || 0.05 * Math.abs(high) || 1;
       return [low - margin, high + margin];
@@ -30,8 +32,9 @@ export default {
       const sheet = prepare(this.canvas, this.$el);
       if (!sheet) return;
       const { pen, width, height } = sheet;
-      const { points, knee, initial, chosen, label } = this.front;
-      const box = { left: 0, bottom: height, x: 66, y: 10, width: width - 66 - 14, height: height - 10 - 40 };
+      const { points, knee, initial, chosen, axes, coloured, labels } = this.front;
+      const [top, right] = coloured === null ? [10, 14] : [24, 78];
+      const box = { left: 0, bottom: height, x: 66, y: top, width: width - 66 - right, height: height - top - 40 };
       if (box.width < 20 || box.height < 20) return;
       if (!points.length) {
         pen.fillStyle = colour("ink-soft");
@@ -39,49 +42,66 @@ export default {
         return;
       }
       const [x, y] = [this.range(0), this.range(1)];
-      this.toX = (value) => box.x + (box.width * (value - x[0])) / (x[1] - x[0]);
-      this.toY = (value) => box.y + box.height * (1 - (value - y[0]) / (y[1] - y[0]));
+      const toX = (value) => box.x + (box.width * (value - x[0])) / (x[1] - x[0]);
+      const toY = (value) => box.y + box.height * (1 - (value - y[0]) / (y[1] - y[0]));
+      this.place = (point) => [toX(point[axes[0]]), toY(point[axes[1]])];
       const up = niceTicks(y[0], y[1], Math.max(2, box.height / 42));
       pen.fillStyle = colour("line");
-      for (const tick of up) pen.fillRect(box.x, Math.round(this.toY(tick)), box.width, 1);
+      for (const tick of up) pen.fillRect(box.x, Math.round(toY(tick)), box.width, 1);
       frame(pen, box, {
-        x: niceTicks(x[0], x[1], Math.max(2, box.width / 70)).map((t) => [this.toX(t), short(t)]),
-        y: up.map((t) => [this.toY(t), short(t)]),
-      }, label);
-      points.forEach((point, n) => this.dot(pen, point, n === this.near ? 6 : 4, colour("series-1")));
-      this.named(pen, box, points[knee], "knee", colour("series-2"));
+        x: niceTicks(x[0], x[1], Math.max(2, box.width / 70)).map((t) => [toX(t), short(t)]),
+        y: up.map((t) => [toY(t), short(t)]),
+      }, { x: labels[axes[0]], y: labels[axes[1]] });
+      const fill = this.fills(pen, box);
+      points.forEach((point, n) => this.dot(pen, point, n === this.near ? 6 : 4, fill(point)));
+      this.named(pen, box, points[knee], "knee", coloured === null ? colour("series-2") : fill(points[knee]));
       if (initial) this.named(pen, box, initial, "initial", colour("ink-soft"));
       if (chosen !== null && points[chosen]) this.ring(pen, points[chosen]);
     },
-    dot(pen, [x, y], size, fill) {
+    fills(pen, box) {
+      const { points, coloured, labels } = this.front;
+      if (coloured === null) return () => colour("series-1");
+      const scale = colourScale(points.map((point) => point[coloured]));
+      colourBar(pen, box, scale);
+      pen.fillStyle = colour("ink");
+      pen.textAlign = "right";
+      pen.textBaseline = "top";
+      pen.fillText(`colour: ${labels[coloured]}`, this.$el.clientWidth - 4, 4);
+      return (point) => css(bandColour(bandOf(scale.share(point[coloured]))));
+    },
+    dot(pen, point, size, fill) {
       pen.beginPath();
-      pen.arc(this.toX(x), this.toY(y), size, 0, 7);
+      pen.arc(...this.place(point), size, 0, 7);
       pen.fillStyle = fill;
       pen.fill();
       pen.lineWidth = 1;
-      pen.strokeStyle = colour("surface");
+      pen.strokeStyle = colour(this.front.coloured === null ? "surface" : "ink-soft");
       pen.stroke();
     },
     named(pen, box, point, name, fill) {
       this.dot(pen, point, 6, fill);
-      const right = this.toX(point[0]) > box.x + box.width - 60;
+      const [x, y] = this.place(point);
+      const right = x > box.x + box.width - 60;
       pen.fillStyle = colour("ink");
       pen.textAlign = right ? "right" : "left";
       pen.textBaseline = "bottom";
-      pen.fillText(name, this.toX(point[0]) + (right ? -9 : 9), this.toY(point[1]) - 3);
+      pen.fillText(name, x + (right ? -9 : 9), y - 3);
     },
-    ring(pen, [x, y]) {
+    ring(pen, point) {
       pen.beginPath();
-      pen.arc(this.toX(x), this.toY(y), 9, 0, 7);
+      pen.arc(...this.place(point), 9, 0, 7);
       pen.lineWidth = 2;
       pen.strokeStyle = colour("accent");
       pen.stroke();
     },
     nearest(event) {
-      if (!this.front?.points.length || !this.toX) return null;
+      if (!this.front?.points.length || !this.place) return null;
       const area = this.canvas.getBoundingClientRect();
       const [x, y] = [event.clientX - area.left, event.clientY - area.top];
-      const away = this.front.points.map((point) => Math.hypot(this.toX(point[0]) - x, this.toY(point[1]) - y));
+      const away = this.front.points.map((point) => {
+        const [px, py] = this.place(point);
+        return Math.hypot(px - x, py - y);
+      });
       const best = away.indexOf(Math.min(...away));
       return away[best] < NEAR ? best : null;
     },
@@ -94,11 +114,11 @@ export default {
         return;
       }
       const point = this.front.points[near];
-      const [x, y] = [this.toX(point[0]), this.toY(point[1])];
-      this.tip.textContent = `${short(point[0])}, ${short(point[1])}`;
-      this.tip.style.left = `${Math.min(x + 12, this.$el.clientWidth - 130)}px`;
-      this.tip.style.top = `${Math.max(y - 30, 0)}px`;
+      const [x, y] = this.place(point);
+      this.tip.textContent = point.map((value, k) => `${this.front.labels[k]}  ${short(value)}`).join("\n");
       this.tip.style.display = "block";
+      this.tip.style.left = `${Math.max(Math.min(x + 12, this.$el.clientWidth - this.tip.offsetWidth - 4), 0)}px`;
+      this.tip.style.top = `${Math.max(y - this.tip.offsetHeight - 8, 0)}px`;
     },
     hover(event) {
       this.aim(this.nearest(event));

@@ -1,19 +1,7 @@
 // A map of one quantity over two coordinates; a click or an arrow key asks the machine to go there.
+import { bandColour, bandOf, colourBar, colourScale } from "kinetostat-studio/colour_scale.js";
 import { colour } from "kinetostat-studio/theme.js";
 import { frame, niceTicks, plot, prepare, short } from "kinetostat-studio/plot_axes.js";
-
-const VIRIDIS = [
-  [68, 1, 84], [72, 36, 117], [65, 68, 135], [53, 95, 141], [42, 120, 142], [33, 145, 140],
-  [34, 168, 132], [68, 191, 112], [122, 209, 81], [189, 223, 38], [253, 231, 37],
-];
-const BANDS = 16;
-const WIDE_RANGE = 50; // ratio of the extremes from which colours follow the logarithm
-
-function viridis(share) {
-  const at = Math.min(Math.max(share, 0), 1) * (VIRIDIS.length - 1);
-  const i = Math.min(Math.floor(at), VIRIDIS.length - 2);
-  return VIRIDIS[i].map((c, k) => c + (VIRIDIS[i + 1][k] - c) * (at - i));
-}
 
 export default {
   mixins: [plot],
@@ -24,10 +12,7 @@ export default {
   methods: {
     show(map) {
       this.map = map;
-      const known = map.values.filter((value) => value !== null);
-      const low = Math.min(...known);
-      const high = Math.max(...known);
-      this.range = { low, high, log: low > 0 && high / low > WIDE_RANGE, none: known.length === 0 };
+      this.scale = colourScale(map.values.filter((value) => value !== null));
       this.draw();
       this.tell();
     },
@@ -35,15 +20,6 @@ export default {
       if (!this.map) return;
       this.map.here = here;
       this.draw();
-    },
-    share(value) {
-      const { low, high, log } = this.range;
-      if (!(high - low > 1e-9 * Math.abs(high))) return 0.5;
-      return log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
-    },
-    inverse(share) {
-      const { low, high, log } = this.range;
-      return log ? low * (high / low) ** share : low + (high - low) * share;
     },
     draw() {
       if (!this.map) return;
@@ -61,7 +37,7 @@ export default {
         x: across.map((t) => [this.toX(t), short(t)]),
         y: up.map((t) => [this.toY(t), short(t)]),
       }, { x: x.label, y: y.label });
-      this.bar(pen, box);
+      if (!this.scale.none) colourBar(pen, box, this.scale);
       this.cross(pen, box);
     },
     paint(pen, box, ratio) {
@@ -69,7 +45,7 @@ export default {
       const [w, h] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
       const image = pen.createImageData(w, h);
       const bands = new Int16Array(w * h);
-      const shares = values.map((value) => (value === null ? null : this.share(value)));
+      const shares = values.map((value) => (value === null ? null : this.scale.share(value)));
       const empty = colour("surface-sunk");
       const [er, eg, eb] = [1, 3, 5].map((i) => parseInt(empty.slice(i, i + 2), 16));
       for (let j = 0; j < h; j++) {
@@ -92,38 +68,20 @@ export default {
           }
           const whole = corners.map((corner) => (corner === null ? nearest : corner));
           const share = (1 - fv) * ((1 - fu) * whole[0] + fu * whole[1]) + fv * ((1 - fu) * whole[2] + fu * whole[3]);
-          const band = Math.min(Math.floor(share * BANDS), BANDS - 1);
+          const band = bandOf(share);
           bands[j * w + i] = band;
           const left = i > 0 ? bands[j * w + i - 1] : band;
           const above = j > 0 ? bands[(j - 1) * w + i] : band;
           const edge = (left >= 0 && left !== band) || (above >= 0 && above !== band);
-          const rgb = viridis((band + 0.5) / BANDS);
+          const rgb = bandColour(band);
           for (let c = 0; c < 3; c++) image.data[at + c] = edge ? rgb[c] * 0.55 + 255 * 0.45 : rgb[c];
         }
       }
       pen.putImageData(image, Math.round(box.x * ratio), Math.round(box.y * ratio));
-      if (this.range.none) {
+      if (this.scale.none) {
         pen.fillStyle = colour("ink");
         pen.textAlign = "center";
         pen.fillText("no pose can be reached here", box.x + box.width / 2, box.y + box.height / 2);
-      }
-    },
-    bar(pen, box) {
-      if (this.range.none) return;
-      const x = box.x + box.width + 12;
-      for (let band = 0; band < BANDS; band++) {
-        const rgb = viridis((band + 0.5) / BANDS);
-        pen.fillStyle = `rgb(${rgb.map(Math.round).join(",")})`;
-        const top = box.y + box.height * (1 - (band + 1) / BANDS);
-        pen.fillRect(x, top, 11, box.height / BANDS + 0.6);
-      }
-      pen.fillStyle = colour("ink-soft");
-      pen.textAlign = "left";
-      pen.textBaseline = "middle";
-      const constant = this.range.high - this.range.low <= 1e-9 * Math.abs(this.range.high);
-      for (const share of constant ? [0.5] : [0, 0.25, 0.5, 0.75, 1]) {
-        const at = Math.min(Math.max(box.y + box.height * (1 - share), box.y + 5), box.y + box.height - 5);
-        pen.fillText(short(constant ? this.range.high : this.inverse(share)), x + 15, at);
       }
     },
     cross(pen, box) {

@@ -12,7 +12,7 @@ from kinetostat.studio.design.study_form import StudyForm
 from kinetostat.studio.design.workshop import Workshop
 from kinetostat.studio.session import Session
 
-RESULT, FAVOURITES = "Result", "Favourites"
+RESULT, FRONT, FAVOURITES = "Result", "Front", "Favourites"
 
 
 class DesignTab:
@@ -37,10 +37,12 @@ class DesignTab:
                 self.runs = RunPanel(workshop.runs, load, refuse, _confirm)
             with ui.element("div").classes("card answer-card"):
                 with ui.tabs().classes("panel-tabs").props("dense no-caps") as self.tabs:
-                    for name in (RESULT, FAVOURITES):
+                    for name in (RESULT, FRONT, FAVOURITES):
                         ui.tab(name).mark(f"tab-{name}")
                 panels = ui.tab_panels(self.tabs, value=RESULT, animated=False)
                 with panels.classes("panel-body").props("keep-alive"):
+                    with ui.tab_panel(FRONT):
+                        self.runs.front.table()
                     with ui.tab_panel(RESULT):
                         self.runs.answer()
                     with ui.tab_panel(FAVOURITES):

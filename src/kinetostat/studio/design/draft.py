@@ -22,7 +22,7 @@ AROUND = 0.2
 """How far a variable may go about its present value, unless the designer says otherwise."""
 FORM = "the study"
 """What messages call it."""
-MOST_AIMS = 2
+MOST_AIMS = 4
 """Objectives that the form offers; a file may have more."""
 SEARCH = OptimizerTable()
 """The search that is offered first."""

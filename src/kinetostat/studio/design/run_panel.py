@@ -4,14 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from nicegui import ui
-from nicegui.events import GenericEventArguments
 
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
+from kinetostat.studio.design.front_panel import FrontPanel, axis_label
 from kinetostat.studio.design.progress import Follower, Progress, failure
 from kinetostat.studio.design.result_text import result_text
 from kinetostat.studio.design.runs import Run, Runs, Stage
-from kinetostat.studio.elements import CurveView, FrontView
+from kinetostat.studio.elements import CurveView
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.markup import paragraph
 
@@ -74,12 +74,11 @@ class RunPanel:
         self.bar = ui.linear_progress(0.0, show_value=False, size="4px").props('aria-label="progress"').mark("run-bar")
         self.line = ui.label("").classes("run-line").props('role="status"').mark("run-line")
         self.curve = CurveView("objective of the best design and mean over the steps").mark("run-curve")
-        self.front = FrontView("designs that no other beats; arrow keys and Enter, or a click, load one")
-        self.front.mark("run-front").on("pick", self._pick)
+        self.front = FrontPanel(self._take)
         self.timer = ui.timer(GLANCE, self.refresh, active=False)
 
     def answer(self) -> None:
-        """Put the place of the answer on the page."""
+        """Put the place of the answer on the page, once the table of the front has its own."""
         with ui.element("div").classes("design-head"):
             self.best = ui.button("Load the best design", icon="input", on_click=self._load_best)
             self.best.props("unelevated no-caps dense").mark("run-load")
@@ -158,32 +157,18 @@ class RunPanel:
         self.best.set_enabled(progress is not None and bool(progress.objectives))
         self.best.set_text("Load the knee" if several else "Load the best design")
         self.curve.set_visibility(progress is not None and not several)
-        self.front.set_visibility(several)
+        self.front.reveal(several)
 
     def _draw(self, progress: Progress) -> None:
-        labels = [_axis(one.term.label, one.term.unit) for one in progress.problem.objectives]
-        if len(labels) == 1:
-            if progress.steps > 1:
-                self.curve.run_method("show", _curve(progress, labels[0]))
-            return
-        initial = progress.result and list(progress.result["initial"]["objectives"].values())
-        self.front.run_method(
-            "show",
-            {
-                "points": [point[:2] for point in progress.objectives],
-                "knee": progress.knee,
-                "initial": initial[:2] if initial and None not in initial[:2] else None,
-                "chosen": self._place,
-                "label": {"x": labels[0], "y": labels[1]},
-            },
-        )
+        first, *others = progress.problem.objectives
+        if others:
+            self.front.show(progress, self._place)
+        elif progress.steps > 1:
+            self.curve.run_method("show", _curve(progress, axis_label(first.term.label, first.term.unit)))
 
     def _chosen(self) -> None:
         self._place = None
         self.refresh()
-
-    def _pick(self, event: GenericEventArguments) -> None:
-        self._take(int(event.args))
 
     def _load_best(self) -> None:
         if self._progress is not None:
@@ -216,10 +201,6 @@ class RunPanel:
         except InputError as error:
             self._refuse(str(error))
         self.refresh()
-
-
-def _axis(label: str, unit: str) -> str:
-    return label if unit == "1" else f"{label} ({unit})"
 
 
 def _curve(progress: Progress, label: str) -> dict[str, object]:
