@@ -25,7 +25,10 @@ from typing import Any
 import httpx
 import socketio
 
-MACHINES = ("zhang-gosselin-4dof", "hexapod", "hexapod-rus", "delta", "orthoglide", "planar-3rrr", "tripteron")
+from kinetostat.machine.loading import bundled
+
+CROWDED = "zhang-gosselin-4dof"
+"""The machine of all tabs."""
 MOVES = 60
 """Slider movements of the first figure, each after the map of the one before."""
 EVERY = 1.0 / 30.0
@@ -116,8 +119,9 @@ class Tab:
     def slider(self) -> tuple[int, str]:
         """The first slider of the pose: its element, and the listener to its movements."""
         for key, element in self.elements.items():
-            if element.get("props", {}).get("slides"):
-                return key, next(e["listener_id"] for e in element["events"] if e["type"] == "slide")
+            heard = {event["type"]: event["listener_id"] for event in element.get("events", ())}
+            if element.get("props", {}).get("slides") and "settle" in heard:
+                return key, heard["slide"]
         raise RuntimeError("the page has no slider")
 
     async def slide(self, position: int) -> None:
@@ -188,14 +192,17 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tabs", type=int, default=10)
     parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--machines", nargs="*", default=list(bundled()), help="all bundled ones unless given")
     parser.add_argument("--cores", help="processors of the server, e.g. 0,1 (taskset)")
     options = parser.parse_args()
     print("slider to map of 41 x 41 poses, ms       median   95 %")
-    for machine in MACHINES:
+    for machine in options.machines:
         with served(machine, options.cores) as (address, _):
             times = sorted(asyncio.run(one_slider(address)))
         print(f"{machine:38s} {statistics.median(times):8.0f} {times[int(0.95 * len(times))]:6.0f}")
-    with served(MACHINES[0], options.cores) as (address, process):
+    if not options.tabs:
+        return 0
+    with served(CROWDED, options.cores) as (address, process):
         return 0 if asyncio.run(many_tabs(address, process, options.tabs, options.seconds)) else 1
 
 

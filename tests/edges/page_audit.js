@@ -33,7 +33,7 @@ window.audit = {
     const found = [];
     for (const element of document.body.querySelectorAll("*")) {
       const own = element.matches("input") ? element.value : [...element.childNodes].map((n) => (n.nodeType === 3 ? n.data : "")).join("");
-      const off = element.closest(".disabled, :disabled, [aria-disabled=true], [aria-hidden=true], .machine-labels, script, style");
+      const off = element.closest(".disabled, :disabled, [aria-disabled=true], [aria-hidden=true], .machine-labels, .q-tooltip, .q-icon, [type=range], script, style");
       if (!own.trim() || off || !this.shown(element)) continue;
       const { fontSize, fontWeight } = getComputedStyle(element);
       const large = parseFloat(fontSize) >= 24 || (parseFloat(fontSize) >= 18.66 && fontWeight >= 700);
@@ -44,11 +44,20 @@ window.audit = {
   },
   controls() {
     const all = document.querySelectorAll("button, input, a[href], [tabindex='0']");
-    return [...all].filter((one) => this.shown(one) && one.tabIndex >= 0 && !one.matches(":disabled, .disabled, [aria-disabled=true]"));
+    const off = ":disabled, .disabled, [aria-disabled=true], [type=file]";
+    return [...all].filter((one) => one.tabIndex >= 0 && !one.matches(off) && this.shown(one.closest(".q-field") ?? one));
   },
   name(element) {
     const labels = [...(element.labels ?? [])].map((label) => label.innerText).join(" ");
     return (element.getAttribute("aria-label") || labels || element.innerText || element.title || "").trim();
+  },
+  number() {
+    const all = this.controls(); // a tab that has the focus is no stop of the keyboard any more: count before
+    all.forEach((one, k) => (one.auditNumber = k));
+    return all.length;
+  },
+  unnamed() {
+    return this.controls().filter((one) => !this.name(one)).map((one) => one.outerHTML.slice(0, 120));
   },
   focused() {
     const at = document.activeElement;
@@ -57,7 +66,7 @@ window.audit = {
       const style = getComputedStyle(one);
       return (style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 1) || style.boxShadow !== "none";
     };
-    const field = at.closest(".q-field__control, .q-checkbox");
-    return { number: this.controls().indexOf(at), name: this.name(at), ring: ring(at) || (field !== null && ring(field)) };
+    const field = at.closest(".q-field__control");
+    return { number: at.auditNumber ?? -1, name: this.name(at), ring: ring(at) || (field !== null && ring(field)) };
   },
 };

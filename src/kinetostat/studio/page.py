@@ -82,7 +82,7 @@ class StudioPage:
             self.redo = self._button("redo", "Redo (Ctrl+Y)", self._redo)
             self.reset = self._button("restart_alt", "Back to the machine as it was loaded", self._reset)
             mode = ui.toggle(list(MODES), value=MODES[0], on_change=lambda event: self._to_front(str(event.value)))
-            mode.props("dense no-caps unelevated").classes("choice mode").mark("mode")
+            mode.props("dense no-caps unelevated toggle-text-color=accent-ink").classes("choice mode").mark("mode")
             ui.space()
             self.upload = ui.upload(
                 on_upload=self._open_upload, on_rejected=lambda: self._refuse(TOO_LARGE), auto_upload=True,

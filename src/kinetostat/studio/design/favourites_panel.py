@@ -51,13 +51,15 @@ class FavouritesPanel:
             self.note = ui.input("note").props(f"dense outlined maxlength={LONGEST_NOTE}").mark("favourite-note")
             for box in (self.name, self.note):
                 box.classes("field grow")
-            button = ui.button("Keep", icon="star", on_click=self._keep).props("unelevated no-caps dense")
+            button = ui.button("Keep", icon="star", on_click=self._keep).props(
+                "unelevated no-caps text-color=accent-ink dense"
+            )
             button.tooltip("keep the machine as it is now").mark("favourite-keep")
         self._list = ui.element("div").classes("favourites")
         with ui.element("div").classes("design-foot"):
             ui.label("Tick two to four to compare them.").classes("note grow")
             self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._ask)
-            self.compare.props("unelevated no-caps dense").mark("favourite-compare")
+            self.compare.props("unelevated no-caps text-color=accent-ink dense").mark("favourite-compare")
         with ui.dialog() as self.window, ui.element("div").classes("comparison-window"):
             with ui.element("div").classes("comparison-head"):
                 ui.label("Designs side by side").classes("comparison-title")

@@ -81,7 +81,7 @@ class RunPanel:
         """Put the place of the answer on the page, once the table of the front has its own."""
         with ui.element("div").classes("design-head"):
             self.best = ui.button("Load the best design", icon="input", on_click=self._load_best)
-            self.best.props("unelevated no-caps dense").mark("run-load")
+            self.best.props("unelevated no-caps text-color=accent-ink dense").mark("run-load")
         self.text = ui.html(paragraph(NOTHING), sanitize=False).mark("run-result")
         self._offer(None)
 

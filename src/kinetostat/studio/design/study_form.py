@@ -59,7 +59,9 @@ class StudyForm:
         self._body = ui.element("div").classes("design-form")
         with ui.element("div").classes("design-foot"):
             self.problem = ui.label("").classes("form-problem").props('role="alert"').mark("study-problem")
-            ui.button("Start", icon="play_arrow", on_click=self._begin).props("unelevated no-caps").mark("study-start")
+            ui.button("Start", icon="play_arrow", on_click=self._begin).props(
+                "unelevated no-caps text-color=accent-ink"
+            ).mark("study-start")
         self._offer(NEW)
         self._fill()
 

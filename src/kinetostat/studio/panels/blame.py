@@ -21,7 +21,9 @@ class BlamePanel:
     def build(self) -> None:
         """The choice of a direction, and the bars."""
         self._report: Report | None = None
-        self.direction = ui.toggle(["x"], value="x", on_change=lambda: self._draw()).props("dense no-caps unelevated")
+        self.direction = ui.toggle(["x"], value="x", on_change=lambda: self._draw()).props(
+            "dense no-caps unelevated toggle-text-color=accent-ink"
+        )
         self.direction.mark("blame-direction").classes("choice")
         self.bars = ui.html("", sanitize=False).mark("blame-bars")
 

@@ -23,7 +23,9 @@ class MatricesPanel:
         """The choice of a matrix, a button to copy it, and the table."""
         self._report: Report | None = None
         with ui.row().classes("panel-tools"):
-            self.kind = ui.toggle(list(KINDS), value="C", on_change=self._draw).props("dense no-caps unelevated")
+            self.kind = ui.toggle(list(KINDS), value="C", on_change=self._draw).props(
+                "dense no-caps unelevated toggle-text-color=accent-ink"
+            )
             self.kind.mark("matrix-kind").classes("choice")
             ui.space()
             copy = ui.button("Copy", icon="content_copy", on_click=self._copy).props("flat dense no-caps")

@@ -1,0 +1,72 @@
+"""The studio for everyone, in a real browser: text that can be read, controls that the keyboard reaches, all that fits."""
+
+from pathlib import Path
+
+import pytest
+from browser import browser, needs_chromium, served
+
+pytestmark = [needs_chromium, pytest.mark.xdist_group("browser")]
+AUDIT = (Path(__file__).parent / "page_audit.js").read_text("utf-8")
+MODES = ("Explore", "Design")
+PROJECTORS = ((1024, 768), (1280, 720), (1280, 800))
+"""Widths and heights in pixels of the page; the second is a full HD screen at 150 %."""
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    with served("zhang-gosselin-4dof", str(tmp_path_factory.mktemp("state"))) as address, browser() as new_tab:
+        watched = new_tab()
+        watched.open(address)
+        watched.tab.evaluate(AUDIT)
+        watched.tab.emulate_media(reduced_motion="reduce")
+        watched.tab.add_style_tag(content="*, *::before, *::after { transition: none !important; }")
+        yield watched
+        watched.blameless(address)
+
+
+def to(page, mode):
+    page.tab.get_by_role("button", name=mode, exact=True).click()
+    page.tab.mouse.move(0, 0)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_text_is_readable_in_light_and_dark(page, mode):
+    to(page, mode)
+    for _ in range(2):
+        assert page.tab.evaluate("audit.faint()") == []
+        dark = page.tab.evaluate("document.body.classList.contains('body--dark')")
+        page.tab.get_by_role("button", name="Light or dark").click()
+        page.tab.wait_for_function("dark => document.body.classList.contains('body--dark') !== dark", arg=dark)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_keyboard_reaches_every_control_in_their_order(page, mode):
+    to(page, mode)
+    assert page.tab.evaluate("audit.unnamed()") == []
+    count = page.tab.evaluate("audit.number()")
+    page.tab.evaluate("document.activeElement.blur()")
+    page.tab.locator(".wordmark").click()
+    seen = []
+    for _ in range(count):
+        page.tab.keyboard.press("Tab")
+        seen.append(page.tab.evaluate("audit.focused()"))
+    assert [one for one in seen if one is None or not one["ring"]] == []
+    assert [one["number"] for one in seen] == list(range(count))
+
+
+@pytest.mark.parametrize("size", PROJECTORS, ids=lambda size: f"{size[0]} x {size[1]}")
+@pytest.mark.parametrize("mode", MODES)
+def test_everything_fits(page, mode, size):
+    page.tab.set_viewport_size({"width": size[0], "height": size[1]})
+    to(page, mode)
+    sizes = page.tab.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+    assert sizes == list(size)
+    for part in (".studio > section:visible", ".headline dd", ".panel-tabs .q-tab__label"):
+        for element in page.tab.locator(part).all():
+            box = element.bounding_box()
+            if box is not None:
+                assert box["x"] >= 0.0
+                assert box["x"] + box["width"] <= size[0]
+                assert box["y"] + box["height"] <= size[1]
+    stage = page.tab.locator(".stage").bounding_box()
+    assert min(stage["width"], stage["height"]) > 340
