@@ -19,6 +19,8 @@ NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"
 SOFTWARE_GRAPHICS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
 PATIENCE = 120_000
 """Milliseconds for a step: software graphics on a busy machine take seconds for a picture."""
+OPENINGS = 6
+"""Times that a list is opened at most."""
 
 
 def chromium() -> str | None:
@@ -95,12 +97,16 @@ class Watched:
         return self.tab.locator(where).first.inner_text()
 
     def choose(self, label: str, option: str) -> None:
-        """Choose from a list; on a busy machine it may need to be opened again."""
+        """Choose from a list; a busy page may let the list close again while it opens."""
         wanted = self.tab.get_by_role("option", name=option, exact=True)
-        while not wanted.is_visible():
+        for _ in range(OPENINGS):
             self.tab.get_by_role("combobox", name=label, exact=True).click()
-            self.tab.wait_for_timeout(300)
-        wanted.click()
+            try:
+                wanted.click(timeout=PATIENCE / OPENINGS)
+            except sync_api.TimeoutError:
+                continue
+            return
+        raise AssertionError(f"the list {label} never offers {option}")
 
     def until_changed(self, where: str, before: str) -> str:
         """The text of an element once it is another."""

@@ -1,4 +1,4 @@
-"""The studio for everyone, in a real browser: text that can be read, controls that the keyboard reaches, all that fits."""
+"""The studio for everyone, in a real browser: text can be read, the keyboard reaches every control, all of it fits."""
 
 from pathlib import Path
 
