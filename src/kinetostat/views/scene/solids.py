@@ -1,6 +1,6 @@
 """Solids of a scene as plain data: shapes, where they stand, what they are of. Knows no machine and no renderer.
 
-Lengths are in m. A renderer tessellates three kinds of shape and gives each material a look.
+Lengths are in m. There are three kinds of shape (`mesh` makes triangles of them); materials are named (`looks`).
 """
 
 from collections.abc import Iterable
@@ -66,11 +66,6 @@ class Swept:
 
 Shape: TypeAlias = Turned | Extruded | Swept
 
-MATERIALS = (
-    "base", "platform", "actuated", "passive", "removed", "steel", "joint", "motor", "spring", "tool", "load",
-    "ghost", "translation", "rotation", "soft translation", "soft rotation", "x axis", "y axis", "z axis",
-)  # fmt: skip
-"""What solids may be of; how each looks is the renderer's business."""
 LAYERS = ("machine", "springs", "load", "deflection", "ellipsoids", "directions", "frames", "labels")
 """What a viewer may show or hide."""
 
@@ -86,7 +81,7 @@ class Solid:
     Attributes:
         name: unique within its scene; the same part has the same name at every pose.
         shape: in its own axes.
-        material: one of `MATERIALS`.
+        material: one of `looks.LOOKS`.
         place: from its own axes to the base frame.
         scale: along its own axes.
         layer: one of `LAYERS`.
