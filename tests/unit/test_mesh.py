@@ -26,6 +26,7 @@ CLOSED = {
     "shaft": shapes.shaft(0.02, 0.4, 0.003, start=0.1),
     "ball": shapes.ball(0.05),
     "ring": shapes.ring(0.02, 0.03, 0.01),
+    "socket": shapes.socket(0.03),
     "arrow": shapes.arrow(0.2, 0.005),
     "waist": shapes.waist(0.02, 0.005, 0.1),
     "block": shapes.block(0.1, 0.2, 0.3, 0.01),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinetostat.views.rendering.light import SUN, Light
-from kinetostat.views.scene.looks import Look
+from kinetostat.views.scene.looks import Look, linear
 
 Floats = NDArray[np.float32]
 
@@ -42,13 +42,6 @@ def finish_of(looks: list[Look], numbers: NDArray[np.int64]) -> Finish:
     roughness = np.array([[look.roughness] for look in looks], dtype=np.float32)
     diffuse, mirrored = colors * (1.0 - metal), DIELECTRIC * (1.0 - metal) + colors * metal
     return Finish(diffuse[numbers], mirrored[numbers], roughness[numbers])
-
-
-def linear(color: str) -> tuple[float, float, float]:
-    """Red, green and blue of "#rrggbb" as shares of light (IEC 61966-2-1)."""
-    parts = [int(color[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
-    red, green, blue = (p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
-    return red, green, blue
 
 
 def encoded(light: Floats) -> Floats:

@@ -48,3 +48,10 @@ LOOKS = {
 def looks_data() -> dict[str, dict[str, Any]]:
     """All looks as plain data, by the name of the material."""
     return {name: asdict(look) for name, look in LOOKS.items()}
+
+
+def linear(color: str) -> tuple[float, float, float]:
+    """Red, green and blue of "#rrggbb" as shares of light (IEC 61966-2-1)."""
+    parts = [int(color[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
+    red, green, blue = (p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
+    return red, green, blue

@@ -49,7 +49,7 @@ class Mesh:
 
     @property
     def volume(self) -> float:
-        """What the triangles enclose, m^3, by the divergence theorem; of an open surface it has no meaning."""
+        """What the triangles enclose, m^3, by the divergence theorem."""
         a, b, c = (self.points[self.triangles[:, i]] for i in range(3))
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 

@@ -139,15 +139,20 @@ def as_data(scene: Scene) -> dict[str, Any]:
 
 def solid_data(solid: Solid) -> dict[str, Any]:
     """A solid as plain data; `place` holds the columns of its 3 x 4 matrix."""
-    axes = solid.place.rotation
-    columns = [axis * size for axis, size in zip((axes.x, axes.y, axes.z), solid.scale, strict=True)]
     return {
         "name": solid.name,
         "layer": solid.layer,
         "material": solid.material,
         "shape": _shape_data(solid.shape),
-        "place": [round(c, DECIMALS) for v in (*columns, solid.place.translation) for c in v.components()],
+        "place": [round(c, DECIMALS) for v in columns_of(solid) for c in v.components()],
     }
+
+
+def columns_of(solid: Solid) -> tuple[Vector, Vector, Vector, Vector]:
+    """The columns of the 3 x 4 matrix from a solid's own axes, scaled, to the base frame (m)."""
+    axes = solid.place.rotation
+    x, y, z = (axis * size for axis, size in zip((axes.x, axes.y, axes.z), solid.scale, strict=True))
+    return x, y, z, solid.place.translation
 
 
 def label_data(label: Label) -> dict[str, Any]:
