@@ -35,6 +35,13 @@ UNSHADOWED = frozenset(("springs", "frames", "directions", "ellipsoids", "deflec
 """Layers of signs, which cast no shadow."""
 
 
+class Picture(bytes):
+    """The bytes of a PNG, which a notebook displays."""
+
+    def _repr_png_(self) -> bytes:
+        return bytes(self)
+
+
 @dataclass(frozen=True)
 class Paper:
     """What a picture stands on: colours as sRGB shares, strength of shadows and grid, brightness of the machine."""
@@ -60,7 +67,7 @@ def machine_picture(
     theme: Theme = "light",
     transparent: bool = False,
     hidden: Collection[str] = PLAIN,
-) -> bytes:
+) -> Picture:
     """A picture of a machine at its pose as a PNG; arguments as for `picture`.
 
     Raises:
@@ -77,7 +84,7 @@ def picture(
     theme: Theme = "light",
     transparent: bool = False,
     hidden: Collection[str] = PLAIN,
-) -> bytes:
+) -> Picture:
     """A picture of a scene as a PNG.
 
     Args:
@@ -167,7 +174,7 @@ def _composed(machine: Floats, veil: Veil, paper: Paper, transparent: bool) -> N
     return np.round(255.0 * shares).astype(np.uint8)
 
 
-def _png(image: Image.Image) -> bytes:
+def _png(image: Image.Image) -> Picture:
     stream = io.BytesIO()
     image.save(stream, "PNG")
-    return stream.getvalue()
+    return Picture(stream.getvalue())

@@ -20,6 +20,10 @@ SIDE = 448
 """Points of a side of the ground's own map of light, at most."""
 SUN_SHARE = 0.6
 """Of the light on open ground."""
+FAINT = 0.015
+"""Share of missing light below which the ground is simply bright."""
+EDGE = 0.12
+"""Share of the picture's sides over which the ground fades towards them, so that pictures stand on a page unframed."""
 LINE = 1.1
 """Width of the grid's lines, pixels."""
 
@@ -75,10 +79,19 @@ def veil_over(ground: Ground, light: Light, camera: Camera) -> Veil:
     radius = np.linalg.norm(at, axis=-1) / (REACH * ground.size)
     here = (distance > 0.0) & (radius < 1.0)
     at, fade = np.where(here[..., None], at, 0.0), np.where(here, 1.0 - np.minimum(radius, 1.0), 0.0)
+    edge = _towards(camera.width)[None, :] * _towards(camera.height)[:, None]
     missing = 1.0 - (SUN_SHARE * light.sun / light.sun.max() + (1.0 - SUN_SHARE) * light.sky / light.sky.max())
     missing = _smooth(missing.reshape(ground.side, ground.side))
-    shadow = _between(missing, at / (SHADED * ground.size)) * np.minimum(3.0 * fade, 1.0)
-    return Veil(shadow.astype(np.float32), (_grid(at, ground.step) * fade**1.5).astype(np.float32))
+    missing = np.maximum(missing - FAINT, 0.0) / (1.0 - FAINT)
+    shadow = _between(missing, at / (SHADED * ground.size)) * np.minimum(3.0 * fade, 1.0) * edge
+    return Veil(shadow.astype(np.float32), (_grid(at, ground.step) * fade**1.5 * edge).astype(np.float32))
+
+
+def _towards(side: int) -> Array:
+    """From 0 at either end of a side of the picture to 1 well inside [side]."""
+    share = np.minimum((np.arange(side) + 0.5) / side, (side - np.arange(side) - 0.5) / side)
+    inside = np.minimum(share / EDGE, 1.0)
+    return inside * inside * (3.0 - 2.0 * inside)
 
 
 def _smooth(values: Floats) -> Floats:
