@@ -172,6 +172,15 @@ def test_what_cannot_be_had_is_said(arguments, problem):
         machine_picture(load("planar-3rpr"), **{"size": SIZE, **arguments})
 
 
+def test_signs_alone_are_drawn_without_shadow_and_nothing_is_refused():
+    arrow = Solid("load/force", shapes.arrow(0.5, 0.02), "load", layer="load")
+    assert share_of(pixels(picture(scene(arrow), SIZE)), "passive") > 0.005
+    sign = Solid("frame O/x", shapes.arrow(0.5, 0.02), "x axis", layer="frames")
+    assert share_of(pixels(picture(scene(sign), SIZE, hidden=())), "passive") > 0.005
+    with pytest.raises(InputError, match="nothing to draw"):
+        picture(scene(sign), SIZE)
+
+
 def test_a_pose_out_of_reach_cannot_be_drawn():
     with pytest.raises(InputError, match="cannot be drawn at this pose"):
         scene_of(load("delta", ["pose.z=-30 m"]))

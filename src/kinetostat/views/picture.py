@@ -103,6 +103,8 @@ def picture(
     for layer in hidden:
         choice(layer, LAYERS, "hidden")
     solids = [solid for solid in scene.solids if solid.layer not in hidden]
+    if not solids:
+        raise InputError(f"hidden leaves nothing to draw; leave out fewer of {', '.join(LAYERS)}.")
     opaque = Body([solid for solid in solids if LOOKS[solid.material].opacity == 1.0])
     clear = [Body([s for s in solids if s.material == m]) for m, look in LOOKS.items() if look.opacity < 1.0]
     bodies = [opaque, *(body for body in clear if body.solids)]

@@ -52,7 +52,9 @@ class Casters:
 
 
 def casters_of(points: Array, triangles: Indices) -> Casters:
-    """What is in the light's way, and how far it reaches."""
+    """What is in the light's way, and how far it reaches; nothing at all is a ball of radius 1 around the origin."""
+    if not len(points):
+        return Casters(points, triangles, np.zeros(3), 1.0)
     low, high = points.min(axis=0), points.max(axis=0)
     return Casters(points, triangles, 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)))
 
@@ -109,17 +111,13 @@ def light_on(points: Array, normals: Array, casters: Casters, detail: int) -> Li
     aside = SOFT * (np.random.default_rng(0).random((2, len(points)), dtype=np.float32) - 0.5)
     parts = [slice(start, start + BLOCK) for start in range(0, len(points), BLOCK)]
     with ThreadPoolExecutor(available_cores()) as threads:
-        suns, skies = (
-            list(threads.map(partial(lamp_on, casters, side=side), directions))
-            for directions, side in (
-                (_sun_directions(), min(SUN_SIDE, detail)),
-                (_sky_directions(), min(SKY_SIDE, detail // 2)),
-            )
-        )
-    sun, sky, unhidden = (np.zeros(len(points), np.float32) for _ in range(3))
-    for part in parts:
-        sun[part], _ = _fallen(suns, places[:, part], facing[:, part], aside[:, part], casters.radius)
-        sky[part], unhidden[part] = _fallen(skies, places[:, part], facing[:, part], aside[:, part], casters.radius)
+        fallen = []
+        for directions, side in ((_sun_directions(), SUN_SIDE), (_sky_directions(), min(SKY_SIDE, detail // 2))):
+            lamps = list(threads.map(partial(lamp_on, casters, side=min(side, detail)), directions))
+            pieces = ((places[:, part], facing[:, part], aside[:, part]) for part in parts)
+            found = list(threads.map(partial(_fallen, lamps, casters.radius), *zip(*pieces, strict=True)))
+            fallen.append(np.concatenate(found, axis=1))
+    (sun, _), (sky, unhidden) = fallen
     return Light(sun, sky, np.where(unhidden > 0.0, sky / np.maximum(unhidden, 1e-6), 1.0))
 
 
@@ -133,17 +131,15 @@ def lamp_on(casters: Casters, direction: Array, side: int) -> Lamp:
     return Lamp(direction.astype(np.float32), axes.astype(np.float32), shift.astype(np.float32)[:, None], nearest, side)
 
 
-def _fallen(
-    lamps: Sequence[Lamp], points: Floats, normals: Floats, aside: Floats, radius: float
-) -> tuple[Floats, Floats]:
-    """Mean light of lamps on points [3 x n], with and without what is in the way."""
+def _fallen(lamps: Sequence[Lamp], radius: float, points: Floats, normals: Floats, aside: Floats) -> Floats:
+    """Mean light of lamps on points [3 x n], with and without what is in the way [2 x n]."""
     lifted = points + normals * np.float32(2.0 * AWAY * radius / lamps[0].side)
-    seen, unhidden = np.zeros(points.shape[1], np.float32), np.zeros(points.shape[1], np.float32)
+    fallen = np.zeros((2, points.shape[1]), np.float32)
     for number, lamp in enumerate(lamps):
         cosines = np.maximum(lamp.direction @ normals, 0.0)
-        unhidden += cosines
-        seen += cosines * lamp.reaches(lifted, aside if number % 2 else -aside[::-1])
-    return seen / np.float32(len(lamps)), unhidden / np.float32(len(lamps))
+        fallen[0] += cosines * lamp.reaches(lifted, aside if number % 2 else -aside[::-1])
+        fallen[1] += cosines
+    return fallen / np.float32(len(lamps))
 
 
 def _disc(count: int) -> Array:

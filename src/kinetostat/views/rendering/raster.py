@@ -53,11 +53,15 @@ def edges_of(pixels: Array, triangles: Indices) -> Edges:
     """The edges of triangles [m x 3] of points [n x 2] in pixels, clockwise on a picture whose y points down."""
     x, y = pixels[triangles.T].transpose(2, 0, 1)
     from_x, from_y, to_x, to_y = x[_NEXT], y[_NEXT], x[_LAST], y[_LAST]
-    c = to_x * from_y - from_x * to_y
-    return Edges(to_y - from_y, from_x - to_x, c, c.sum(axis=0))
+    return Edges(to_y - from_y, from_x - to_x, to_x * from_y - from_x * to_y, _doubled(x, y))
 
 
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+
+
+def _doubled(x: Array, y: Array) -> Array:
+    """Twice the area of triangles with corners [3 x m], positive of those that face the viewer."""
+    return np.asarray((y[1] - y[0]) * (x[2] - x[0]) - (x[1] - x[0]) * (y[2] - y[0]))
 
 
 def fragments(pixels: Array, nearness: Array, triangles: Indices, width: int, height: int) -> Iterator[Fragments]:
@@ -69,11 +73,10 @@ def fragments(pixels: Array, nearness: Array, triangles: Indices, width: int, he
         triangles: [m x 3] numbers of points, counter-clockwise as seen by the viewer.
         width, height: of the picture.
     """
-    heights = pixels[:, 1][triangles.T]
-    first = np.clip(np.ceil(heights.min(axis=0) - 0.5), 0, height).astype(np.int64)
-    last = np.clip(np.floor(heights.max(axis=0) - 0.5), -1, height - 1).astype(np.int64)
-    kept = np.flatnonzero(last >= first)
-    kept = kept[edges_of(pixels, triangles[kept]).area > 0.0]
+    lefts, tops = (pixels[:, i][triangles.T] for i in range(2))
+    first = np.clip(np.ceil(tops.min(axis=0) - 0.5), 0, height).astype(np.int64)
+    last = np.clip(np.floor(tops.max(axis=0) - 0.5), -1, height - 1).astype(np.int64)
+    kept = np.flatnonzero((last >= first) & (_doubled(lefts, tops) > 0.0))
     edges = edges_of(pixels, triangles[kept])
     shares = nearness[triangles[kept].T] / edges.area
     across, up, rest = ((one * shares).sum(axis=0) for one in (edges.a, edges.b, edges.c))

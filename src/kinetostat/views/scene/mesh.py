@@ -19,7 +19,7 @@ from kinetostat.views.scene.solids import Extruded, Shape, Solid, Swept, Turned
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-AROUND = 48
+AROUND = 40
 """Sides of a solid of revolution."""
 WIRE = 12
 """Sides of a wire."""
