@@ -23,18 +23,10 @@ from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Table
 from kinetostat.engine.threads import available_cores
 from kinetostat.machine.loading import load
+from kinetostat.studies.diagnosis.hardware import processor
 from routes import DIAGONAL_OF_C, ONE, ONE_OF_C, TWELVE_OUTPUTS, Array, Route, routes_of
 
 SIZES = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000)
-
-
-def processor() -> str:
-    """The name of the processor at hand."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
-    except OSError:
-        return platform.processor() or platform.machine()
-    return next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.machine())
 
 
 def print_routes(case: Case, count: int, turns: int, folder: Path) -> None:

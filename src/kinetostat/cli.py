@@ -22,6 +22,7 @@ from kinetostat.commands.common import (
     takes_machine,
 )
 from kinetostat.commands.compare import add_compare_command
+from kinetostat.commands.doctor import add_doctor_command
 from kinetostat.commands.grid import add_grid_commands
 from kinetostat.commands.guidelines import add_guidelines_command
 from kinetostat.commands.optimize import add_optimize_commands
@@ -38,6 +39,7 @@ EXAMPLES = """examples:
   kinetostat optimize zhang-gosselin-2002 -o better
   kinetostat validate tripteron
   kinetostat reproduce
+  kinetostat doctor
 """
 
 
@@ -127,6 +129,7 @@ def _parser() -> Parser:
     )  # fmt: skip
     reproduce.add_argument("-o", "--output", type=Path, default=Path("reproduce"), help="folder (default: reproduce)")
     takes_json(reproduce)
+    add_doctor_command(commands)
     return parser
 
 

@@ -13,7 +13,7 @@ from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.studies.workspace.demands import EVERYTHING
 
-POSES = 300
+POSES = 150
 LOAD = ("load.force=[200, -100, 500]", "load.moment=[3, 5, -2]")
 PLANAR_LOAD = ("load.force=[200, -100, 0]",)
 BOTH_WAYS = ("shortest_leg", "longest_leg", "actuator_force", "leg_diameter")
@@ -41,16 +41,17 @@ def limited(machine, columns, fields):
     """The machine with limits that about one pose in five passes, each within the range that the poses use."""
     wanted = {f"limits.{name}": EVERYTHING[name] for name in fields}
     watched = with_values(machine, wanted)
+    single = [respond(at(watched, columns, i)) for i in range(POSES)]
     found = {}
     for name in fields:
-        measures = np.array([measure(watched, columns, i, name) for i in range(POSES)])
+        measures = np.array([measure(response, name) for response in single])
         found[f"limits.{name}"] = float(np.nanquantile(measures, 0.2 if EVERYTHING[name] < 1e-6 else 0.8))
     return with_values(machine, found)
 
 
-def measure(machine, columns, i, name):
+def measure(response, name):
     """The extreme of what a limit is compared with, in its own unit."""
-    checks = [c for c in respond(at(machine, columns, i)).checks if c.field == name]
+    checks = [c for c in response.checks if c.field == name]
     worst = (max if checks[0].at_most else min)(float(c.measure) for c in checks)
     if name.endswith("angle"):
         return np.arccos(np.sqrt(worst))

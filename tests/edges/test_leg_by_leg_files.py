@@ -162,3 +162,11 @@ def test_bundled_files_fulfil_the_schema(name):
 def test_the_schema_refuses_what_the_reader_refuses(old, new):
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(document.parse(GOOD.replace(old, new, 1), "mine"), machine_schema())
+
+
+def test_machines_with_one_plan_are_one_family():
+    """So that they share sections and compiled programs; other numbers are the same plan, another link model is not."""
+    numbers = build(document.parse(GOOD.replace('"15 cm"', '"12 cm"'), "thin"), "thin")
+    model = build(document.parse(GOOD.replace('model = "beam"', 'model = "rigid"', 1), "stiff"), "stiff")
+    assert numbers.family is load("tripteron").family
+    assert model.family is not numbers.family

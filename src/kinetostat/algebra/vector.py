@@ -6,7 +6,7 @@ No screws here (see `screw`) and no machine. All components are in the axes the 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, cos, is_one, minus, plus, sin, sqrt, times, total
+from kinetostat.algebra.scalar import Scalar, cos, is_one, minus, plus, sin, sqrt, times
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Vector:
 
     def dot(self, other: "Vector") -> Scalar:
         """Inner product."""
-        return total([times(a, b) for a, b in zip(self.components(), other.components(), strict=True)])
+        return plus(plus(times(self.x, other.x), times(self.y, other.y)), times(self.z, other.z))
 
     def cross(self, other: "Vector") -> "Vector":
         """Vector product self x other."""

@@ -84,6 +84,16 @@ def host_lanes() -> int:
     return 4 if features.get("avx") else 2
 
 
+VECTOR_SETS = ("sse2", "avx", "avx2", "fma", "avx512f", "neon", "sve")
+"""Instruction sets that decide how fast the code is, as LLVM calls them."""
+
+
+def host_features() -> tuple[str, ...]:
+    """Which of `VECTOR_SETS` the processor at hand has."""
+    features = llvm.get_host_cpu_features()
+    return tuple(name for name in VECTOR_SETS if features.get(name))
+
+
 NAME = "kernel"
 FUNCTION = """
 {declarations}

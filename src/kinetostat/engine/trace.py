@@ -183,10 +183,11 @@ class Graph:
 
     def _node(self, kind: Callable[..., Any], operation: str, operands: tuple[Operand, ...]) -> Any:
         key = _key(operation, operands)
-        if key not in self._known:
+        found = self._known.get(key)
+        if found is None:
             fixed = all(isinstance(operand, float) or operand.fixed for operand in operands)
-            self._known[key] = kind(self, operation, operands, fixed, bounds_of(operation, operands))
-        return self._known[key]
+            found = self._known[key] = kind(self, operation, operands, fixed, bounds_of(operation, operands))
+        return found
 
 
 def needed(results: Iterable[Operand]) -> list[Node]:
@@ -202,10 +203,9 @@ def needed(results: Iterable[Operand]) -> list[Node]:
 
 
 def _key(operation: str, operands: tuple[Operand, ...]) -> tuple[Any, ...]:
-    names: list[Any] = [o.number if isinstance(o, Node) else repr(o) for o in operands]
-    if operation in COMMUTATIVE:
-        names.sort(key=str)
-    return operation, *names
+    """What tells an expression from others: nodes by number, floats by all their digits and their sign."""
+    names = [o.number if isinstance(o, Node) else repr(o) for o in operands]
+    return (operation, frozenset(names)) if operation in COMMUTATIVE else (operation, *names)
 
 
 def bounds_of(operation: str, operands: tuple[Operand, ...]) -> Bounds | None:
@@ -213,10 +213,14 @@ def bounds_of(operation: str, operands: tuple[Operand, ...]) -> Bounds | None:
 
     What is known to be ordinary needs no code for what is rigid (infinite) or free (zero).
     """
-    known = [_bounds(operand) for operand in operands if not isinstance(operand, Condition)]
-    if any(bounds is None for bounds in known):
-        return None
-    match operation, [bounds for bounds in known if bounds]:
+    known = []
+    for operand in operands:
+        if not isinstance(operand, Condition):
+            bounds = _bounds(operand)
+            if bounds is None:
+                return None
+            known.append(bounds)
+    match operation, known:
         case "add", [(low, high), (least, most)]:
             found = low + least, high + most
         case "mul", [(low, high), (least, most)]:

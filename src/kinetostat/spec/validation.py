@@ -5,6 +5,7 @@ The model of a file is made by pydantic from the family's own dataclasses; this 
 
 import difflib
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
@@ -17,8 +18,17 @@ from kinetostat.units import KINDS
 SCHEMA_VERSION = 1
 
 
+MODELS = 64
+"""Models of files that are kept: making one takes longer than all else that reading a file is."""
+
+
 def file_model(family: str, sections: Mapping[str, type]) -> type[BaseModel]:
     """The model of a machine file of one family."""
+    return _file_model(family, tuple(sections.items()))
+
+
+@lru_cache(MODELS)
+def _file_model(family: str, sections: tuple[tuple[str, type], ...]) -> type[BaseModel]:
     content: dict[str, Any] = {
         "schema_version": (
             Literal[1],
@@ -27,7 +37,7 @@ def file_model(family: str, sections: Mapping[str, type]) -> type[BaseModel]:
         "name": (str, Field(description="what people call the machine", min_length=1, max_length=80)),
         "family": (Literal[family], Field(description="kind of machine, see `kinetostat list`")),
     }
-    return _table_model("MachineFile", sections, content)
+    return _table_model("MachineFile", dict(sections), content)
 
 
 def _table_model(title: str, sections: Mapping[str, type], content: dict[str, Any]) -> type[BaseModel]:

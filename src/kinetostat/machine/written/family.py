@@ -4,7 +4,7 @@ Which coordinates close the chains at a pose is found in `kinematics.closure`.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero, plus, reciprocal, sqrt, times, total, where
@@ -21,6 +21,11 @@ NAME = "legs"
 SUMMARY = "any machine, written leg by leg: joints by point and axis at the home pose, and the links between them"
 
 
+KEPT = 64
+"""Families that are kept, so that machines with one plan share sections, models of files, and compiled programs."""
+
+
+@lru_cache(KEPT)
 def family_of(plan: Plan) -> Family:
     """The family of all machines with this plan."""
     return Family(

@@ -123,6 +123,9 @@ class Plan:
     pose: tuple[str, ...]
     planar: bool
 
+    def __hash__(self) -> int:
+        return hash((tuple(leg.name for leg in self.legs), self.pose, self.planar))
+
 
 def literals(plan: Plan) -> dict[str, dict[str, object]]:
     """What machine files with this plan say beside numbers, by table: they then have it back."""

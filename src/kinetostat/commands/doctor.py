@@ -1,0 +1,65 @@
+"""`doctor`: whether this installation is sound, and what to do where it is not. No formula lives here."""
+
+import argparse
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from kinetostat.commands.common import DONE, NO_ANSWER, add_command, print_json, takes_json
+
+if TYPE_CHECKING:
+    from kinetostat.commands.common import Commands
+    from kinetostat.studies.diagnosis.check import Check
+
+
+def add_doctor_command(commands: "Commands") -> None:
+    """Add `doctor`."""
+    command = add_command(
+        commands, "doctor", _doctor, "versions, extras, processor and GPU, and a self-test with known numbers",
+        "kinetostat doctor --json",
+    )  # fmt: skip
+    takes_json(command)
+
+
+def _doctor(options: argparse.Namespace) -> int:
+    from kinetostat.studies.diagnosis.diagnosis import as_json, healthy
+
+    if options.json:
+        found = [*_checks()]
+        print_json(as_json(found))
+    else:
+        from rich.console import Console
+
+        from kinetostat.views.diagnosis_tables import print_checks, print_verdict
+
+        console = Console()
+        found = print_checks(console, _checks())
+        print_verdict(console, found)
+    return DONE if healthy(found) else NO_ANSWER
+
+
+def _checks() -> "Iterator[Check]":
+    """All findings; what pictures and the studio add to them is known here alone."""
+    from kinetostat.studies.diagnosis.check import Check, State, reinstall, tried
+    from kinetostat.studies.diagnosis.diagnosis import diagnose
+    from kinetostat.studio.design.place import usual_state
+
+    yield from diagnose()
+    yield tried("self-test", "pictures", _drawn, reinstall("matplotlib"))
+    yield Check("places", "cache", State.ABSENT, "none: compiled programs live in memory only")
+    yield Check("places", "configuration", State.ABSENT, "none: files and options say everything")
+    kept = usual_state()
+    said = f"{kept}: searches and favourites of the design tab"
+    yield Check("places", "studio", State.SOUND if kept.is_dir() else State.ABSENT, said)
+
+
+def _drawn() -> str:
+    """The paper's machine as a picture."""
+    from io import BytesIO
+
+    from kinetostat.machine.loading import load
+    from kinetostat.views.drawing import three_views
+
+    stream = BytesIO()
+    machine = load("zhang-gosselin-4dof")
+    three_views(machine.configure(), machine.name).savefig(stream)
+    return f"the paper's machine drawn, {stream.tell() / 1000:.0f} kB"

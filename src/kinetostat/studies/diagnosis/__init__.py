@@ -1,0 +1,1 @@
+"""Is this installation sound? Its packages, its processor, known numbers. Libraries are imported when needed."""

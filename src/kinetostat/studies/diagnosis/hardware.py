@@ -1,0 +1,56 @@
+"""What programs can run on here: system, processor and its vectors, memory, a GPU."""
+
+import os
+import platform
+from collections.abc import Iterator
+from pathlib import Path
+
+from kinetostat.engine.threads import available_cores
+from kinetostat.studies.diagnosis.check import Check, State, reinstall, tried
+
+GROUP = "machine"
+
+
+def checks() -> Iterator[Check]:
+    """System, processor, vectors, memory and GPU."""
+    yield Check(GROUP, "system", State.SOUND, f"{platform.system()} {platform.release()}, {platform.machine()}")
+    yield Check(GROUP, "processor", State.SOUND, f"{processor()}, {available_cores()} cores for this process")
+    yield tried(GROUP, "vectors", vectors, reinstall("llvmlite"))
+    memory = memory_size()
+    if memory is not None:
+        yield Check(GROUP, "memory", State.SOUND, f"{memory / 2**30:.1f} GiB")
+    yield gpu_found()
+
+
+def processor() -> str:
+    """The name of the processor at hand."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    return next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+def vectors() -> str:
+    """How many numbers one instruction of the machine code takes."""
+    from kinetostat.engine.native import host_features, host_lanes
+
+    return f"{host_lanes()} numbers of 64 bits at once ({', '.join(host_features()) or 'the plainest'})"
+
+
+def memory_size() -> int | None:
+    """Bytes of memory; None where the system does not say."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return None
+
+
+def gpu_found() -> Check:
+    """Whether an NVIDIA GPU answers; none is needed."""
+    try:
+        from kinetostat.engine.cuda_driver import gpu
+
+        return Check(GROUP, "gpu", State.SOUND, f"{gpu().name}; takes millions of points in memory")
+    except Exception as trouble:
+        return Check(GROUP, "gpu", State.ABSENT, f"none is used: {str(trouble).partition(';')[0]}")

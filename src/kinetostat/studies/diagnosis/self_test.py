@@ -1,0 +1,118 @@
+"""Numbers that are known, computed again in about two seconds: by print, by another route, and through a file.
+
+Nothing here is computed in a way of its own.
+"""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import xarray as xr
+
+from kinetostat.engine.batch import Evaluation, evaluate
+from kinetostat.engine.device import Device
+from kinetostat.engine.points import Table
+from kinetostat.engine.threads import available_cores
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import GROUPS
+from kinetostat.machine.loading import load
+from kinetostat.studies.analysis import analyze
+from kinetostat.studies.diagnosis.check import Check, UnsoundError, reinstall, tried
+from kinetostat.studies.grid.grid import evaluate_grid
+from kinetostat.studies.optimisation.problem import load_problem
+from kinetostat.studies.optimisation.result import optimize
+from kinetostat.studies.paper import printed
+from kinetostat.studies.paper.comparison import Verdict
+from kinetostat.studies.paper.tables import table_3, table_4
+from kinetostat.studies.storage import write_dataset
+
+GROUP = "self-test"
+QUANTITIES = (*GROUPS["stiffness"], *GROUPS["compliance"])
+FEW, MANY = 500, 200_000
+"""Poses for a comparison; poses for a measurement, enough to keep some cores busy for a tenth of a second."""
+SAME = 1e-9
+"""Relative difference up to which two routes to one number agree."""
+
+
+def checks() -> Iterator[Check]:
+    """The paper's numbers, the routes of the engine beside each other, a search, a file."""
+    yield tried(GROUP, "paper", paper_numbers, reinstall("kinetostat"))
+    yield tried(GROUP, "machine code", routes_agree, reinstall("llvmlite numpy"))
+    yield tried(GROUP, "throughput", throughput, reinstall("llvmlite numpy"))
+    yield tried(GROUP, "search", search, reinstall("pymoo scipy"))
+    yield tried(GROUP, "files", results_file, reinstall("h5netcdf h5py xarray"))
+
+
+def paper_numbers() -> str:
+    """Tables III and IV of the paper, as far as they are printed."""
+    found = [*table_3(), *table_4()]
+    wrong = [one for one in found if one.verdict is Verdict.DIFFERS]
+    if wrong:
+        first = wrong[0]
+        raise UnsoundError(
+            f"{len(wrong)} of {len(found)} numbers differ from print; {first.place}, {first.component}: "
+            f"{first.computed:.9g} for {first.printed}"
+        )
+    misprints = sum(one.verdict is Verdict.MISPRINT for one in found)
+    equal = len(found) - misprints
+    return f"{equal} of {len(found)} numbers of Tables III and IV as printed, {misprints} known misprints"
+
+
+def routes_agree() -> str:
+    """K and C of the paper's machine by machine code, by NumPy and pose by pose."""
+    machine, poses = load(printed.MACHINE), _poses(FEW)
+    plain = evaluate(machine, poses, QUANTITIES)
+    compiled = evaluate(machine, poses, QUANTITIES, repeated=True)
+    x, z = (float(poses.values[path][0]) for path in poses.paths)
+    single = analyze(load(printed.MACHINE, [f"pose.x={x!r}", f"pose.z={z!r}"]))
+    first = np.array([compiled.values[name][0] for name in QUANTITIES])
+    alone = np.array([*single.stiffness_diagonal, *single.compliance_diagonal])
+    apart = max(_apart(compiled, plain), float(np.abs(first / alone - 1.0).max()))
+    if not apart <= SAME or (compiled.status != Status.OK).any():
+        raise UnsoundError(f"it differs from NumPy or from a single pose by {apart:.1e}; {SAME:g} is allowed")
+    return f"K and C at {FEW} poses as by NumPy and pose by pose, to {apart:.0e}"
+
+
+def throughput() -> str:
+    """How many poses a second, with twelve numbers each."""
+    machine, poses = load(printed.MACHINE), _poses(MANY)
+    evaluate(machine, _poses(FEW), QUANTITIES, repeated=True)
+    start = time.perf_counter()
+    evaluate(machine, poses, QUANTITIES, device=Device.CPU)
+    rate = MANY / (time.perf_counter() - start)
+    return f"{rate / 1e6:.2g} million poses/s, {len(QUANTITIES)} numbers each, on {available_cores()} cores"
+
+
+def search() -> str:
+    """A short search that ends at or below the sum of compliances that the paper prints."""
+    settings = ["optimizer.method=hybrid", "optimizer.generations=10"]
+    found = optimize(load_problem("zhang-gosselin-2002", settings))
+    reached = float(found.outcome.objectives[0, 0])
+    if not reached <= float(printed.OPTIMISED_SUM):
+        raise UnsoundError(f"it ends at {reached:.9g} instead of below {printed.OPTIMISED_SUM}, the paper's optimum")
+    return f"the paper's optimum, {reached:.9g} (printed {printed.OPTIMISED_SUM}), in {found.log.count} evaluations"
+
+
+def results_file() -> str:
+    """A sweep written as NetCDF and read again, bit by bit."""
+    grid = evaluate_grid(load(printed.MACHINE), ["z=66 cm:70 cm:5"], ["compliance"])
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "sweep.nc"
+        write_dataset(path, grid)
+        with xr.open_dataset(path, engine="h5netcdf") as again:
+            if not again.equals(grid):
+                raise UnsoundError("a sweep that was written as NetCDF is not what is read")
+    return "a sweep written as NetCDF and read again, the same"
+
+
+def _poses(count: int) -> Table:
+    """Poses spread over the middle of the machine's workspace."""
+    source = np.random.default_rng(1)
+    return Table({"pose.x": source.uniform(-0.02, 0.02, count), "pose.z": source.uniform(0.66, 0.70, count)})
+
+
+def _apart(ours: Evaluation, others: Evaluation) -> float:
+    """Greatest relative difference of two evaluations."""
+    return max(float(np.abs(ours.values[name] / others.values[name] - 1.0).max()) for name in QUANTITIES)

@@ -1,0 +1,66 @@
+"""Which packages are installed, whether they suit, and which extras are there: from what the package says it needs."""
+
+import platform
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, metadata, requires, version
+
+from packaging.requirements import Requirement
+
+from kinetostat.studies.diagnosis.check import Check, State
+
+PACKAGE = "kinetostat"
+CORE, EXTRAS = "software", "extras"
+
+
+def checks() -> Iterator[Check]:
+    """The package itself, Python, what is needed, and what every extra adds."""
+    try:
+        yield Check(CORE, PACKAGE, State.SOUND, version(PACKAGE))
+    except PackageNotFoundError:
+        said = "runs from its source files and is not installed: what it needs cannot be looked up"
+        yield Check(CORE, PACKAGE, State.FAILED, said, "pip install . (in the folder with pyproject.toml)")
+        return
+    yield Check(CORE, "python", State.SOUND, f"{platform.python_version()} ({platform.python_implementation()})")
+    for requirement in requirements():
+        yield suited(requirement)
+    for extra in metadata(PACKAGE).get_all("Provides-Extra") or ():
+        yield extra_of(extra)
+
+
+def requirements(extra: str = "") -> list[Requirement]:
+    """What the package needs on this system; with an extra, what that adds."""
+    found = [Requirement(text) for text in requires(PACKAGE) or ()]
+    core = [one for one in found if one.marker is None or one.marker.evaluate({"extra": ""})]
+    if not extra:
+        return core
+    return [one for one in found if one not in core and one.marker and one.marker.evaluate({"extra": extra})]
+
+
+def suited(requirement: Requirement) -> Check:
+    """Whether a package that is needed is installed, in a version that suits."""
+    wanted = f"{requirement.name}{requirement.specifier}"
+    found = installed(requirement)
+    if found is None:
+        return Check(CORE, requirement.name, State.FAILED, "is not installed", f"pip install '{wanted}'")
+    if not requirement.specifier.contains(found, prereleases=True):
+        said = f"{found} is installed, but {requirement.specifier} is needed"
+        return Check(CORE, requirement.name, State.FAILED, said, f"pip install '{wanted}'")
+    return Check(CORE, requirement.name, State.SOUND, found)
+
+
+def extra_of(extra: str) -> Check:
+    """Whether all that an extra adds is installed."""
+    known = {one.name: installed(one) for one in requirements(extra)}
+    missing = [name for name, found in known.items() if found is None]
+    if missing:
+        said = f"not installed ({', '.join(missing)})"
+        return Check(EXTRAS, extra, State.ABSENT, said, f"pip install 'kinetostat[{extra}]'")
+    return Check(EXTRAS, extra, State.SOUND, ", ".join(f"{name} {found}" for name, found in known.items()))
+
+
+def installed(requirement: Requirement) -> str | None:
+    """The version of a package here; None if there is none."""
+    try:
+        return version(requirement.name)
+    except PackageNotFoundError:
+        return None

@@ -1,0 +1,138 @@
+"""`kinetostat doctor`: what it finds in a sound installation, and what it says where something is broken."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from importlib.metadata import PackageNotFoundError, version
+from io import StringIO
+
+import numpy as np
+from rich.console import Console
+
+from kinetostat.cli import DONE, NO_ANSWER, main
+from kinetostat.studies.diagnosis import diagnosis, self_test, software
+from kinetostat.studies.diagnosis.check import Check, State
+from kinetostat.studies.paper import printed
+from kinetostat.studies.paper.tables import table_3
+from kinetostat.views.diagnosis_tables import print_checks, print_verdict
+
+
+def test_a_sound_installation(capsys):
+    assert main(["doctor", "--json"]) == DONE
+    found = json.loads(capsys.readouterr().out)
+    assert found["healthy"] is True
+    assert found["software"]["numpy"]["said"] == np.__version__
+    assert set(found["extras"]) >= {"studio", "validate", "cluster"}
+    assert found["machine"]["vectors"]["said"][0] in "248"
+    assert "49 of 55" in found["self-test"]["paper"]["said"]
+    assert "1.017889" in found["self-test"]["search"]["said"]
+    assert {check["state"] for check in found["self-test"].values()} == {"sound"}
+    assert {"machine code", "throughput", "files", "pictures"} < set(found["self-test"])
+    assert "none" in found["places"]["cache"]["said"]
+
+
+def shown(*checks: Check) -> str:
+    console = Console(width=80, file=StringIO())
+    print_verdict(console, print_checks(console, checks))
+    return console.file.getvalue()
+
+
+def test_on_a_terminal():
+    absent = Check("extras", "studio", State.ABSENT, "not installed (nicegui)", "pip install 'kinetostat[studio]'")
+    text = shown(Check("software", "numpy", State.SOUND, "2.4.6"), absent)
+    assert "Software\n✓  numpy           2.4.6" in text
+    assert "\nExtras\n–  studio          not installed (nicegui)" in text
+    assert "→ pip install 'kinetostat[studio]'" in text
+    assert text.rstrip().splitlines()[-1].startswith("Sound.")
+
+
+def test_a_failure_on_a_terminal():
+    text = shown(Check("software", "numpy", State.FAILED, "is not installed", "pip install 'numpy>=2.1'"))
+    assert "✗  numpy           is not installed" in text
+    assert "→ pip install 'numpy>=2.1'" in text
+    assert text.rstrip().endswith("See to: numpy.")
+
+
+def installed_but(**changed):
+    def versions(name):
+        found = changed.get(name, version(name) if name not in changed else None)
+        if found is None:
+            raise PackageNotFoundError(name)
+        return found
+
+    return versions
+
+
+def test_a_package_that_is_missing(monkeypatch, capsys):
+    monkeypatch.setattr(diagnosis, "PARTS", {"software": "software"})
+    monkeypatch.setattr(software, "version", installed_but(scipy=None))
+    assert main(["doctor"]) == NO_ANSWER
+    text = capsys.readouterr().out
+    assert "✗  scipy           is not installed" in text
+    assert "→ pip install 'scipy>=1.15'" in text
+    assert "See to: scipy." in text
+
+
+def test_a_package_that_is_too_old(monkeypatch):
+    monkeypatch.setattr(software, "version", installed_but(numpy="1.26.4"))
+    numpy = next(check for check in software.checks() if check.name == "numpy")
+    assert (numpy.state, numpy.fix) == (State.FAILED, "pip install 'numpy>=2.1'")
+    assert numpy.said == "1.26.4 is installed, but >=2.1 is needed"
+
+
+def test_an_extra_that_is_missing_is_no_failure(monkeypatch):
+    monkeypatch.setattr(software, "version", installed_but(nicegui=None))
+    found = list(software.checks())
+    studio = next(check for check in found if check.name == "studio")
+    assert (studio.state, studio.fix) == (State.ABSENT, "pip install 'kinetostat[studio]'")
+    assert diagnosis.healthy(found)
+
+
+def test_not_installed_at_all(monkeypatch):
+    monkeypatch.setattr(software, "version", installed_but(kinetostat=None))
+    (only,) = software.checks()
+    assert only.state is State.FAILED
+    assert "pip install ." in only.fix
+
+
+def one_digit_off():
+    first, *others = table_3()
+    return [replace(first, verdict=self_test.Verdict.DIFFERS, computed=0.5), *others]
+
+
+def slightly_wrong(evaluate):
+    def found(*given, **options):
+        answer = evaluate(*given, **options)
+        if options.get("repeated"):
+            answer.values["stiffness_z"] *= 1.0 + 1e-6
+        return answer
+
+    return found
+
+
+def test_wrong_numbers_are_found(monkeypatch):
+    monkeypatch.setattr(self_test, "table_3", one_digit_off)
+    monkeypatch.setattr(self_test, "evaluate", slightly_wrong(self_test.evaluate))
+    monkeypatch.setattr(printed, "OPTIMISED_SUM", "1.0178")
+    monkeypatch.setattr(self_test, "write_dataset", lambda path, grid: (2.0 * grid).to_netcdf(path, engine="h5netcdf"))
+    found = {check.name: check for check in self_test.checks()}
+    assert "Table III, row 1, rx: 0.5 for 0.52371" in found["paper"].said
+    assert "1.0e-06" in found["machine code"].said
+    assert "1.0178894" in found["search"].said
+    assert "not what is read" in found["files"].said
+    failed = {name for name, check in found.items() if check.state is State.FAILED and check.fix}
+    assert failed == {"paper", "machine code", "search", "files"}
+
+
+def test_a_broken_library_hides_nothing_else(tmp_path):
+    """NumPy that cannot be imported: everything is still said, in words, and nothing is a traceback."""
+    (tmp_path / "numpy.py").write_text('raise ImportError("wrong processor")\n')
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from kinetostat.cli import main; exit(main(['doctor']))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (NO_ANSWER, "")
+    assert "✓  numpy" in done.stdout
+    assert "✗  vectors         ImportError: wrong processor" in done.stdout
+    assert "✗  self-test       cannot be looked at, ImportError: wrong processor" in done.stdout
+    assert "pip install --force-reinstall kinetostat" in done.stdout
+    assert "none: compiled programs" in done.stdout
