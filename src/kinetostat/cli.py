@@ -22,6 +22,7 @@ from kinetostat.commands.common import (
     takes_machine,
 )
 from kinetostat.commands.compare import add_compare_command
+from kinetostat.commands.export import add_export_command
 from kinetostat.commands.grid import add_grid_commands
 from kinetostat.commands.guidelines import add_guidelines_command
 from kinetostat.commands.optimize import add_optimize_commands
@@ -120,6 +121,7 @@ def _parser() -> Parser:
     add_guidelines_command(commands)
     add_compare_command(commands)
     add_optimize_commands(commands)
+    add_export_command(commands)
     add_studio_command(commands)
     reproduce = add_command(
         commands, "reproduce", _reproduce, "every table, equation and figure of the paper, printed beside computed",
