@@ -4,6 +4,7 @@ What the machine consists of is `mjcf_model`'s, how fast it moves `mjcf_pace`'s.
 """
 
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -11,7 +12,6 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.vector import Vector
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model, build
 from kinetostat.exchange.mjcf_pace import IMPEDANCE, LEAST_STEPS, Pace, pace_of
 from kinetostat.exchange.results import reference_point
@@ -21,8 +21,10 @@ from kinetostat.studies.storage import write_text
 
 Array = npt.NDArray[np.float64]
 
-THICKNESS = 0.025
-"""Radius of a link in the picture, as a share of the machine's characteristic length."""
+THICKNESS = 0.008
+"""Radius of a link in the picture, as a share of the machine's extent."""
+LEAST_EXTENT = 1e-3
+"""Size of a picture, m."""
 COLOURS = {
     "link": "0.75 0.78 0.82 1",
     "joint": "0.25 0.28 0.32 1",
@@ -43,7 +45,8 @@ def text_of(analysis: Analysis) -> str:
     """
     model = build(respond(analysis.machine).configuration)
     pace = pace_of(analysis, model)
-    radius = THICKNESS * float(analysis.length or 1.0)
+    middle, extent = _middle_and_extent(model)
+    radius = THICKNESS * extent
     root = Element("mujoco", model=analysis.machine.name)
     root.append(ElementTree.Comment(_notes(pace)))
     SubElement(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="false")
@@ -55,7 +58,8 @@ def text_of(analysis: Analysis) -> str:
     SubElement(defaults, "geom", contype="0", conaffinity="0", mass="0")
     stiff = {"solref": _n(LEAST_STEPS * pace.step, 1.0), "solimp": _n(IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0)}
     SubElement(defaults, "equality", stiff)
-    _look(root, analysis)
+    SubElement(root, "statistic", extent=_n(extent), center=_n(*middle))
+    _look(root)
     world = SubElement(root, "worldbody")
     SubElement(world, "light", pos="0 0 4", dir="0 0 -1", diffuse="0.8 0.8 0.8")
     _shapes(world, model.world, radius, "base")
@@ -69,16 +73,23 @@ def text_of(analysis: Analysis) -> str:
 
 def _notes(pace: Pace) -> str:
     return (
-        " Written by kinetostat; SI, axes of the machine's base. Springs are joint stiffnesses; rigid ones are left out.\n"
-        "     No gravity. xfrc_applied on the body 'platform' is [force, moment] at the tool point (site 'tool').\n"
-        f"     A load has settled after {pace.settling:.3g} s. Masses decide nothing that is static; those that the\n"
-        "     machine file does not say are as great as those it says, or 1 kg. Constraints are soft: keep timestep, solref and solimp as they are. "
+        " Written by kinetostat; SI, axes of the machine's base. Springs are stiffnesses of joints, rigid parts have\n"
+        "     none. No gravity. xfrc_applied on the body 'platform': force, moment at the tool point (site 'tool').\n"
+        f"     A load has settled after {pace.settling:.3g} s. Masses decide nothing that is static; those that\n"
+        "     the machine file does not say are as great as those it says, or 1 kg. Constraints are soft: keep\n"
+        "     timestep, solref and solimp as they are. "
     )
 
 
-def _look(root: Element, analysis: Analysis) -> None:
-    extent = 3.0 * float(analysis.length or 1.0)
-    SubElement(root, "statistic", extent=_n(extent), center=_n(*(analysis.platform or ([0.0] * 3,))[0]))
+def _middle_and_extent(model: Model) -> tuple[Array, float]:
+    """Middle and diagonal of the box that holds the machine, m."""
+    points = np.array([point for body in (model.platform, *model.world.every()) for point in (body.at, *body.reach)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    return (low + high) / 2.0, max(float(np.linalg.norm(high - low)), LEAST_EXTENT)
+
+
+def _look(root: Element) -> None:
+    """Light and colours."""
     SubElement(root, "visual").append(Element("headlight", ambient="0.4 0.4 0.4", diffuse="0.5 0.5 0.5"))
     asset = SubElement(root, "asset")
     SubElement(
@@ -148,8 +159,9 @@ def _platform(world: Element, model: Model, pace: Pace, radius: float, tool: Arr
     SubElement(element, "freejoint", name=body.name)
     _inertia(element, pace.masses[body.name], pace.gyration, tool - body.at)
     _shapes(element, body, radius, "platform")
+    SubElement(element, "geom", type="sphere", size=_n(1.5 * radius), material="platform")
     ring = [*body.reach, body.reach[0]]
-    for start, end in zip(ring, ring[1:], strict=False):
+    for start, end in pairwise(ring):
         _rod(element, start - body.at, end - body.at, radius, "platform")
     _rod(element, np.zeros(3), tool - body.at, 0.6 * radius, "tool")
     SubElement(element, "site", name="tool", pos=_n(*(tool - body.at)), size=_n(1.5 * radius), material="tool")

@@ -136,8 +136,9 @@ class _Chain:
         self._model, self._leg, self._plane = model, leg, plane
         self._body = model.world
         self._ball = False
-        for piece in pieces(leg, plane):
-            self._add(piece)
+        chain = pieces(leg, plane)
+        for i, piece in enumerate(chain):
+            self._add(piece, next(filter(None, map(_start, chain[i + 1 :])), None))
 
     def close(self) -> None:
         """Hold the last body and the platform together."""
@@ -145,11 +146,12 @@ class _Chain:
         self._model.platform.reach.append(tip)
         self._model.closings.append(Closing(self._ball, (self._body.name, self._model.platform.name), tip))
 
-    def _add(self, piece: Piece) -> None:
+    def _add(self, piece: Piece, after: Vector | None) -> None:
+        """A piece; `after` is where the next one begins that has a place."""
         if self._ball:
             self._after_strut()
         if isinstance(piece, Joint | Spring):
-            self._joint(piece)
+            self._joint(piece, self._model.platform.at if after is None else array(after))
         elif isinstance(piece, Beam):
             self._beam(piece)
         elif isinstance(piece, Strut):
@@ -175,11 +177,16 @@ class _Chain:
             self._body.freedoms.append(slide)
             self._model.threads.append(Thread(slide.name, hinge.name, float(joint.pitch)))
 
-    def _joint(self, piece: Joint | Spring) -> None:
-        """A joint or a spring: hinges about one point share a body, all others have one each."""
+    def _joint(self, piece: Joint | Spring, after: Array) -> None:
+        """A joint or a spring: hinges about one point share a body, all others have one each.
+
+        A slide has no place: it is put where the next piece begins, or half-way to there from the one before.
+        """
         joint = joint_of(piece)
         name = piece.name or f"{self._leg.name} joint"
-        at = self._body.at if joint.point is None else array(joint.point)
+        at = after if joint.point is None else array(joint.point)
+        if joint.point is None and self._body is not self._model.world:
+            at = (self._body.at + after) / 2.0
         if not self._shares(joint, at):
             self._grow(name, at)
         if isinstance(piece, Spring):
@@ -228,21 +235,28 @@ class _Chain:
         """Two bars on hinges: the first carries the far side, the second is closed by a ball joint."""
         near_side, normal = self._body, piece.normal
         tips = []
-        for bar, (near, _) in enumerate(piece.bars, 1):
+        for bar, (near, far) in enumerate(piece.bars, 1):
             self._body = near_side
             self._grow(f"{piece.name} bar {bar}", array(near))
             self._free(f"{piece.name} swing {bar}", Joint(normal, near))
             if np.isfinite(float(piece.bar)):
-                self._grow(f"{piece.name} stretch {bar}", array(piece.near + piece.far) * 0.5)
+                self._grow(f"{piece.name} stretch {bar}", array((near + far) * 0.5))
                 self._free(f"{piece.name} stretch {bar}", Joint(piece.along), float(piece.bar))
             tips.append(self._body)
         (_, first), (_, second) = piece.bars
         tips[1].reach.append(array(second))
         self._body = tips[0]
-        far = self._grow(f"{piece.name} far side", array(first))
-        self._free(f"{piece.name} far side", Joint(normal, first))
-        far.reach.append(array(second))
-        self._model.closings.append(Closing(True, (tips[1].name, far.name), array(second)))
+        far_side = self._grow(f"{piece.name} far side", array(first))
+        self._free(far_side.name, Joint(normal, first))
+        far_side.reach.append(array(second))
+        self._model.closings.append(Closing(True, (tips[1].name, far_side.name), array(second)))
+
+
+def _start(piece: Piece) -> Vector | None:
+    """Where a piece begins, if it has a place."""
+    if isinstance(piece, Joint | Spring):
+        return joint_of(piece).point
+    return piece.near if isinstance(piece, Parallelogram) else piece.start
 
 
 def _across(along: Array) -> Sequence[Array]:

@@ -1,7 +1,7 @@
 """Masses, time step, armature and damping of a machine in MuJoCo. Statics depend on none; rest and accuracy do.
 
-MuJoCo's constraints are soft: what closes a loop yields by about (1 - d) t² / m, with d at most 0.9999 and t at least two
-time steps. So the step follows from how much that may be beside the machine's own compliance.
+MuJoCo's constraints are soft: what closes a loop yields by about (1 - d) t² / m, with d at most 0.9999 and t at least
+two time steps. So the step follows from how much that may be beside the machine's own compliance.
 Source: MuJoCo documentation, Computation, section on the constraint model (impedance and reference acceleration).
 """
 
@@ -29,6 +29,8 @@ DAMPING = 0.7
 """Damping ratio of the machine's slowest motion: it comes to rest after one swing."""
 CALM = 2.0
 """How much longer than the geometric mean of step and damping time the period of a spring's armature is."""
+NEGLIGIBLE = 1e-9
+"""Share of the other block of C below which a block does not yield."""
 UNKNOWN_COMPLIANCE = 1e-7
 """m/N, where the machine is free or rigid, so that its own compliance says nothing."""
 
@@ -63,26 +65,23 @@ class Pace:
 def pace_of(analysis: Analysis, model: Model) -> Pace:
     """What suits a machine: accurate constraints, springs that the time step can follow, quick rest."""
     masses = _masses(model, analysis.masses)
-    gyration = GYRATION * float(analysis.length or 1.0)
-    stiff, soft = _compliances(analysis, gyration)
+    length = float(analysis.length or 1.0)
+    gyration = GYRATION * length
+    stiff, soft = min(_compliances(analysis, gyration)), max(_compliances(analysis, length))
     step = math.sqrt(YIELDING * stiff * min(masses.values()) / (1.0 - IMPEDANCE)) / LEAST_STEPS
     slowest = math.sqrt(soft * sum(masses.values()))
     return Pace(step, 2.0 * DAMPING * slowest, 20.0 * slowest, masses, gyration)
 
 
-def _compliances(analysis: Analysis, gyration: float) -> tuple[float, float]:
-    """Least and greatest size of the blocks of C, m/N: a rotation as it moves a point at the radius of gyration."""
+def _compliances(analysis: Analysis, arm: float) -> list[float]:
+    """Sizes of the blocks of C that yield, m/N: rotation as it moves a point at an arm (m) under a force there."""
     if analysis.compliance is None:
-        return UNKNOWN_COMPLIANCE, UNKNOWN_COMPLIANCE
+        return [UNKNOWN_COMPLIANCE]
     matrix = np.array(analysis.compliance)
     turns = np.array([name.startswith("r") for name in analysis.components])
-    blocks = (
-        np.linalg.norm(matrix[np.ix_(~turns, ~turns)]),
-        np.linalg.norm(matrix[np.ix_(turns, turns)]) * gyration**2,
-    )
-    sizes = [float(size) for size in blocks]
-    known = [size for size in sizes if size > 1e-9 * max(sizes)]
-    return (min(known), max(known)) if known else (UNKNOWN_COMPLIANCE, UNKNOWN_COMPLIANCE)
+    moving, turning = (float(np.linalg.norm(matrix[np.ix_(own, own)])) for own in (~turns, turns))
+    sizes = moving, turning * arm**2
+    return [size for size in sizes if size > NEGLIGIBLE * max(sizes)] or [UNKNOWN_COMPLIANCE]
 
 
 def _masses(model: Model, known: Sequence[Mass]) -> dict[str, float]:
