@@ -78,7 +78,13 @@ def _parser() -> Parser:
     new = add_command(
         commands, "new", _new, "print a commented machine or study file", "kinetostat new passive-leg-4dof > mine.toml"
     )
-    new.add_argument("family", metavar="FAMILY", help="a family, see `kinetostat list`; or study, for a study file")
+    source = new.add_mutually_exclusive_group(required=True)
+    source.add_argument(
+        "family", metavar="FAMILY", nargs="?", help="a family, see `kinetostat list`; or study, for a study file"
+    )
+    source.add_argument(
+        "--from", metavar="FILE", type=Path, dest="urdf", help="a URDF with closed loops, as a machine leg by leg"
+    )
     schema = add_command(
         commands,
         "schema",
@@ -162,6 +168,11 @@ def _list(options: argparse.Namespace) -> int:
 
 
 def _new(options: argparse.Namespace) -> int:
+    if options.urdf is not None:
+        from kinetostat.exchange.urdf_machine import machine_text
+
+        print(machine_text(options.urdf), end="")
+        return DONE
     from kinetostat.machine.loading import template
     from kinetostat.studies.bundled import study_template
 

@@ -41,7 +41,7 @@ class _Tree:
 
     def __init__(self, analysis: Analysis, configuration: Configuration) -> None:
         planar = configuration.plane is not None
-        self.robot = Element("robot", name=_word(analysis.machine.name))
+        self.robot = Element("robot", name=analysis.machine.name)
         about = {"space": "planar" if planar else "spatial", "platform": PLATFORM, "tool": TOOL}
         SubElement(self.robot, "kinetostat", about)
         self._names: Counter[str] = Counter((BASE, PLATFORM, TOOL))

@@ -73,7 +73,7 @@ def _of_element(leg: str, element: Element, before: Array, after: Array) -> Iter
     elif isinstance(element, Spring) and (element.actuated or element.hinge) and element.stiffness != 0.0:
         role = {"actuated": "true"} if element.actuated else {}
         stiffness = "rigid" if math.isinf(element.stiffness) else repr(float(element.stiffness))
-        yield _moving(element.name, element.joint, after, {"stiffness": stiffness, **role})
+        yield _moving(element.part or element.name, element.joint, after, {"stiffness": stiffness, **role})
     else:
         yield from _yielding(element.springs, before)
 

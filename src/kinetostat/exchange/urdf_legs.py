@@ -23,10 +23,11 @@ ONE_FREEDOM = {"revolute": "revolute", "continuous": "revolute", "prismatic": "p
 LONGEST_NAME = 40
 
 
-def leg_joints(path: Sequence[FileJoint], loop: FileLoop | None, origin: str) -> list[Document]:
+def leg_joints(leg: str, path: Sequence[FileJoint], loop: FileLoop | None, origin: str) -> list[Document]:
     """The joints of a leg from base to platform, as a machine file lists them.
 
     Args:
+        leg: its name, which names of joints need not repeat.
         path: the joints from the root to the platform, or to the tip of the leg.
         loop: what holds the tip to the platform, if anything does.
         origin: name of the file, for messages.
@@ -42,7 +43,7 @@ def leg_joints(path: Sequence[FileJoint], loop: FileLoop | None, origin: str) ->
     while at < len(row):
         where = f'"{origin}": joint {shorten(row[at].name)}'
         count, table = _next(row[at:], where)
-        tables.append({"name": _name(row[at].name), "point": row[at].frame[:3, 3].tolist(), **table})
+        tables.append({"name": _name(row[at].name, leg), "point": row[at].frame[:3, 3].tolist(), **table})
         at += count
     if not tables:
         tables = [{"name": "foot", "point": path[-1].frame[:3, 3].tolist(), "type": "fixed"}]
@@ -57,8 +58,9 @@ def _as_joint(loop: FileLoop) -> FileJoint:
     return FileJoint(loop.name, loop.kind, *loop.links, loop.frames[0], loop.axis, False, None, {})
 
 
-def _name(text: str) -> str:
-    return text.replace(".", "-")[:LONGEST_NAME]
+def _name(text: str, leg: str) -> str:
+    """A name as a machine file takes it."""
+    return text.removeprefix(f"{leg}_").replace(".", "-")[:LONGEST_NAME]
 
 
 def _next(row: Sequence[FileJoint], where: str) -> tuple[int, Document]:

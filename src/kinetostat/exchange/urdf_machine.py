@@ -12,10 +12,10 @@ from kinetostat.exchange.urdf_file import Array, FileJoint, FileLoop, UrdfFile, 
 from kinetostat.exchange.urdf_joints import TIP
 from kinetostat.exchange.urdf_legs import LONGEST_NAME, leg_joints
 from kinetostat.kinematics.mobility import task_coordinates
-from kinetostat.machine.loading import build
+from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.written.family import NAME
-from kinetostat.machine.written.plan import PLATFORM, SPATIAL_POSE
+from kinetostat.machine.written.plan import PLANAR_POSE, PLATFORM, SPATIAL_POSE
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.validation import SCHEMA_VERSION
@@ -40,6 +40,18 @@ def read_machine(path: Path) -> Machine:
     return build({**document, "pose": {name: document["pose"][name] for name in kept}}, file.origin)
 
 
+def machine_text(path: Path) -> str:
+    """A machine file that says the same as a URDF file.
+
+    Raises:
+        InputError: as `read_machine`.
+    """
+    return (
+        f"# Read from {path.name}. The home pose is the one of zero joint coordinates; actuators of which the URDF\n"
+        f"# gives no stiffness are rigid here.\n{as_toml(read_machine(path))}"
+    )
+
+
 def document_of(file: UrdfFile) -> Document:
     """The document of the machine, with all coordinates of its pose.
 
@@ -56,13 +68,14 @@ def document_of(file: UrdfFile) -> Document:
     rigid = _rigid_with(file, platform)
     ways = [(_path(file, platform), None), *((_path(file, _tip(file, loop, rigid)), loop) for loop in file.loops)]
     _check_apart(file, [path for path, _ in ways])
+    names = [_leg_name(path, number) for number, (path, _) in enumerate(ways, 1)]
     legs = [
-        {"name": _leg_name(path, number), "joints": leg_joints(path, loop, file.origin)}
-        for number, (path, loop) in enumerate(ways, 1)
+        {"name": name, "joints": leg_joints(name, path, loop, file.origin)}
+        for name, (path, loop) in zip(names, ways, strict=True)
     ]
     point = file.frames[platform][:3, 3]
-    names = ("x", "y", "yaw") if space == "planar" else SPATIAL_POSE
-    pose = {name: float(point["xyz".index(name)]) if name in "xyz" else 0.0 for name in names}
+    given = PLANAR_POSE if space == "planar" else SPATIAL_POSE
+    pose = {name: float(point["xyz".index(name)]) if name in "xyz" else 0.0 for name in given}
     document: Document = {"schema": SCHEMA_VERSION, "name": file.name, "family": NAME, "space": space, "pose": pose}
     document |= {"platform": {"point": point.tolist()}, "legs": legs}
     tool = file.about.get("tool", "tool")
