@@ -99,6 +99,14 @@ def test_rigid_parts_have_no_joint_and_free_ones_no_spring():
     assert (free.jnt_stiffness > 0).sum() == 5
 
 
+def test_a_planar_machine_moves_in_its_plane_only():
+    model = Loaded(analyze(load("planar-3rrr"))).model
+    hinges = model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
+    slides = model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
+    assert np.allclose(np.abs(model.jnt_axis[hinges]), [0.0, 0.0, 1.0])
+    assert np.allclose(model.jnt_axis[slides][:, 2], 0.0)
+
+
 def test_a_screw_turns_as_it_advances():
     """One leg that is one screw: a force F along it turns the platform by pitch F / k."""
     screw = {"name": "nut", "type": "helical", "joins": ["base", "platform"], "point": [0.1, 0, 0], "axis": [0, 0, 1]}

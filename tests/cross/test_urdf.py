@@ -109,6 +109,13 @@ def test_rigid_and_free_springs_survive(tmp_path):
     assert len(again.rigid) == 1, "the links are rigid bodies now, the actuator is a rigid spring still"
 
 
+def test_an_actuator_without_stiffness_stays_one(tmp_path):
+    found = analyze(load("hexapod", ["stiffness.actuator.2=0"]))
+    again = analyze(read_text(texts_of(found)[0], tmp_path))
+    assert again.free == ("leg_3 actuator actuator",)
+    assert np.allclose(again.stiffness, found.stiffness, rtol=SAME, atol=1e-6)
+
+
 def test_the_file_is_a_urdf_for_others():
     """MuJoCo, asked to give massless links a mass, builds the tree; every loop closes; two frames for each loop."""
     text, loops = texts_of(analyze(load("delta")))
@@ -140,6 +147,21 @@ def test_an_actuator_without_a_stiffness_is_rigid(tmp_path):
     machine = read_text(FIVE_BAR.replace('<kinetostat stiffness="5e3"/>', "", 1), tmp_path)
     assert analyze(machine).rigid == ("leg 1 left motor actuator",)
     assert machine.sections["legs.leg 1.left motor"].stiffness == math.inf
+
+
+def test_a_compliance_is_in_the_axes_of_its_joint(tmp_path):
+    """Origin rpy is Rz(yaw) Ry(pitch) Rx(roll): a slide soft along the joint's x is soft along R x."""
+    soft = [0.0] * 36
+    soft[21], soft[28], soft[35] = 1e-6, 1e-9, 1e-9
+    numbers = " ".join(str(c) for c in soft)
+    text = f"""<robot name="post"><link name="floor"/><link name="platform"/>
+      <joint name="drive" type="prismatic" independent="true"><parent link="floor"/><child link="head"/>
+        <axis xyz="0 0 1"/><kinetostat stiffness="1e15"/></joint> <link name="head"/>
+      <joint name="post" type="fixed"><parent link="head"/><child link="platform"/>
+      <origin xyz="0 0 1" rpy="0.3 0.5 0.7"/><kinetostat compliance="{numbers}"/></joint></robot>"""
+    compliance = np.array(analyze(read_text(text, tmp_path)).compliance)[3:, 3:]
+    x = np.array([math.cos(0.7) * math.cos(0.5), math.sin(0.7) * math.cos(0.5), -math.sin(0.5)])
+    assert x @ compliance @ x == pytest.approx(1e-6, rel=1e-6)
 
 
 REFUSED = [

@@ -70,7 +70,7 @@ def _of_element(leg: str, element: Element, before: Array, after: Array) -> Iter
         yield from _parallelogram(element)
     elif isinstance(element, Joint):
         yield _moving(element.name or f"{leg} joint", element, after, {})
-    elif isinstance(element, Spring) and (element.actuated or element.hinge) and element.stiffness != 0.0:
+    elif isinstance(element, Spring) and (element.actuated or element.hinge):
         role = {"actuated": "true"} if element.actuated else {}
         stiffness = "rigid" if math.isinf(element.stiffness) else repr(float(element.stiffness))
         yield _moving(element.part or element.name, element.joint, after, {"stiffness": stiffness, **role})
