@@ -112,7 +112,7 @@ def test_rigid_and_free_springs_survive(tmp_path):
 def test_an_actuator_without_stiffness_stays_one(tmp_path):
     found = analyze(load("hexapod", ["stiffness.actuator.2=0"]))
     again = analyze(read_text(texts_of(found)[0], tmp_path))
-    assert again.free == ("leg_3 actuator actuator",)
+    assert again.free == ("leg_3 drive actuator",)
     assert np.allclose(again.stiffness, found.stiffness, rtol=SAME, atol=1e-6)
 
 
@@ -126,7 +126,7 @@ def test_the_file_is_a_urdf_for_others():
     for loop in file.loops:
         assert np.allclose(*loop.frames, atol=1e-12)
         assert f'["{loop.links[0]}", "{loop.links[1]}"]' in loops
-    assert 'name_mot: ["leg_1_actuator", "leg_2_actuator", "leg_3_actuator"]' in loops
+    assert 'name_mot: ["leg_1_drive", "leg_2_drive", "leg_3_drive"]' in loops
 
 
 def test_the_loops_stand_in_a_file_beside_it(tmp_path):

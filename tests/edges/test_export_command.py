@@ -1,11 +1,13 @@
 """`kinetostat export` and `kinetostat new --from`, as a new user types them."""
 
 import struct
+from xml.etree import ElementTree
 
 import pytest
 
 from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
 from kinetostat.exchange.formats import KNOWN
+from kinetostat.machine.loading import bundled
 
 MACHINE = "zhang-gosselin-4dof"
 
@@ -70,6 +72,26 @@ def test_a_machine_written_out_is_read_in(tmp_path, capsys):
     own.write_text(capsys.readouterr().out, encoding="utf-8")
     assert main(["check", str(own)]) == DONE
     assert "legs.z.slide.stiffness" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("to", ["mjcf", "urdf", "nastran", "abaqus", "ansys"])
+def test_a_name_stays_a_name(to, tmp_path):
+    """Whatever people call their machine, it adds no line and no element to a file."""
+    own, path = tmp_path / "own.toml", tmp_path / "out"
+    text = bundled()["hexapod"].replace('name   = "', 'name   = "a\\u0001b\\nSPC,1,2\\"<x/>&é ', 1)
+    own.write_text(text, encoding="utf-8")
+    assert main(["export", str(own), "--to", to, "-o", str(path)]) == DONE
+    written = path.read_text(encoding="utf-8")
+    assert "\nSPC" not in written
+    if to in ("mjcf", "urdf"):
+        root = ElementTree.fromstring(written)
+        assert 'a?b?SPC,1,2"<x/>&é' in (root.get("model") or root.get("name"))
+
+
+def test_the_loops_do_not_replace_the_machine(tmp_path, capsys):
+    assert main(["export", MACHINE, "--to", "urdf", "-o", str(tmp_path / "m.yaml")]) == BAD_INPUT
+    assert "another suffix" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 def test_new_wants_a_family_or_a_file(capsys):

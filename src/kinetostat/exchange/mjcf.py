@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model, build
 from kinetostat.exchange.mjcf_pace import IMPEDANCE, LEAST_STEPS, Pace, pace_of
+from kinetostat.exchange.names import printable
 from kinetostat.exchange.results import reference_point
 from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.analysis import Analysis
@@ -47,7 +48,7 @@ def text_of(analysis: Analysis) -> str:
     pace = pace_of(analysis, model)
     middle, extent = _middle_and_extent(model)
     radius = THICKNESS * extent
-    root = Element("mujoco", model=analysis.machine.name)
+    root = Element("mujoco", model=printable(analysis.machine.name))
     root.append(ElementTree.Comment(_notes(pace)))
     SubElement(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="false")
     option = SubElement(root, "option", timestep=_n(pace.step), gravity="0 0 0", integrator="Euler", solver="Newton")

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.exchange.names import plain
 from kinetostat.exchange.results import reference_point
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
@@ -57,7 +58,7 @@ def tool_stiffness(analysis: Analysis) -> ToolStiffness:
     missing = [name for name in COMPONENTS if name not in names]
     plane = (f"The machine is planar: {' '.join(missing)} are absent, fix them.",) if missing else ()
     notes = (
-        f"Cartesian stiffness of {_plain(analysis.machine.name)} at its tool point, by kinetostat.",
+        f"Cartesian stiffness of {plain(analysis.machine.name)} at its tool point, by kinetostat.",
         "Order of the degrees of freedom: ux uy uz rotx roty rotz. (kinetostat's own order is rx ry rz x y z.)",
         "SI: N/m, N/rad, N.m/rad; node coordinates in m; axes of the machine's base.",
         "A wrench at the node moves it by the tool's deflection against the base of the machine.",
@@ -70,11 +71,6 @@ def _without_rounding(matrix: Array) -> Array:
     """The symmetric matrix with exact zeros where an entry is but rounding."""
     sizes = np.sqrt(np.outer(np.diag(matrix), np.diag(matrix)))
     return np.where(np.abs(matrix) > ROUNDING * sizes, (matrix + matrix.T) / 2.0, 0.0)
-
-
-def _plain(text: str) -> str:
-    """Text without what is not ASCII: these programs read nothing else."""
-    return text.encode("ascii", "replace").decode("ascii")
 
 
 def comments(stiffness: ToolStiffness, mark: str) -> str:

@@ -15,12 +15,14 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.exchange.names import printable
 from kinetostat.exchange.results import reference_point
 from kinetostat.exchange.urdf_joints import OPPOSITE, TIP, UrdfJoint, joints_of
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.machine import Configuration
 from kinetostat.machine.written.plan import BASE, PLATFORM
+from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_text
 from kinetostat.validation.pieces import array
@@ -41,7 +43,7 @@ class _Tree:
 
     def __init__(self, analysis: Analysis, configuration: Configuration) -> None:
         planar = configuration.plane is not None
-        self.robot = Element("robot", name=analysis.machine.name)
+        self.robot = Element("robot", name=printable(analysis.machine.name))
         about = {"space": "planar" if planar else "spatial", "platform": PLATFORM, "tool": TOOL}
         SubElement(self.robot, "kinetostat", about)
         self._names: Counter[str] = Counter((BASE, PLATFORM, TOOL))
@@ -151,9 +153,15 @@ def _n(*numbers: float) -> str:
 
 
 def write(analysis: Analysis, path: Path) -> list[Path]:
-    """Write the URDF, and the YAML of its loops beside it."""
+    """Write the URDF, and the YAML of its loops beside it.
+
+    Raises:
+        InputError: if the file is called as the one beside it.
+    """
     text, loops = texts_of(analysis)
     beside = path.with_suffix(".yaml")
+    if beside == path:
+        raise InputError(f'"{path}" is where the closed loops go; give the URDF another suffix, e.g. .urdf.')
     write_text(path, text)
     write_text(beside, loops)
     return [path, beside]

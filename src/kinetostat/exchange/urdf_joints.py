@@ -73,7 +73,8 @@ def _of_element(leg: str, element: Element, before: Array, after: Array) -> Iter
     elif isinstance(element, Spring) and (element.actuated or element.hinge):
         role = {"actuated": "true"} if element.actuated else {}
         stiffness = "rigid" if math.isinf(element.stiffness) else repr(float(element.stiffness))
-        yield _moving(element.part or element.name, element.joint, after, {"stiffness": stiffness, **role})
+        name = (element.part or element.name).replace("actuator", "drive")  # an actuator is named after its joint again
+        yield _moving(name, element.joint, after, {"stiffness": stiffness, **role})
     else:
         yield from _yielding(element.springs, before)
 
