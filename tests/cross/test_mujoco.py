@@ -98,8 +98,23 @@ def test_rigid_parts_have_no_joint_and_free_ones_no_spring():
     assert (free.jnt_stiffness > 0).sum() == 5
 
 
+def arm(joints, pose, **more):
+    """A machine with one leg."""
+    document = {"schema": 1, "name": "arm", "family": NAME, "platform": {"point": [0.5, 0, 0]}, "pose": pose}
+    return build({**document, "legs": [{"name": "leg", "joints": joints, **more.pop("leg", {})}], **more}, "arm")
+
+
 def test_a_planar_machine_moves_in_its_plane_only():
-    model = Loaded(analyze(load("planar-3rrr"))).model
+    motor = {"name": "motor", "type": "revolute", "joins": ["base", "crank"], "point": [0, 0, 0], "axis": [0, 0, 1]}
+    motor |= {"actuated": True, "stiffness": "5e3 N*m/rad"}
+    end = {"name": "end", "type": "fixed", "joins": ["crank", "platform"], "point": [0.5, 0, 0]}
+    beam = {"links": {"crank": {"model": "beam", "section": "bar"}}}
+    bar = {"bar": {"shape": "round", "diameter": "20 mm", "material": "steel"}}
+    found = analyze(arm([motor, end], {"x": 0.5}, leg=beam, sections=bar, space="planar"))
+    loaded = Loaded(found)
+    compare(found, loaded)
+    model = loaded.model
+    assert model.nv == 6 + 1 + 3, "the free platform, the motor, and the beam's bending, tension and shear in the plane"
     hinges = model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
     slides = model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
     assert np.allclose(np.abs(model.jnt_axis[hinges]), [0.0, 0.0, 1.0])
@@ -110,8 +125,7 @@ def test_a_screw_turns_as_it_advances():
     """One leg that is one screw: a force F along it turns the platform by pitch F / k."""
     screw = {"name": "nut", "type": "helical", "joins": ["base", "platform"], "point": [0.1, 0, 0], "axis": [0, 0, 1]}
     screw |= {"pitch": "5 mm", "actuated": True, "stiffness": "2e3 N*m/rad"}
-    document = {"schema": 1, "name": "screw", "family": NAME, "platform": {"point": [0, 0, 0.2]}, "pose": {"z": 0.2}}
-    found = analyze(build({**document, "legs": [{"name": "leg", "joints": [screw]}]}, "screw"))
+    found = analyze(arm([screw], {"z": 0.0}))
     compare(found, Loaded(found))
 
 

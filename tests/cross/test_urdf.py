@@ -109,6 +109,13 @@ def test_rigid_and_free_springs_survive(tmp_path):
     assert len(again.rigid) == 1, "the links are rigid bodies now, the actuator is a rigid spring still"
 
 
+def test_links_of_every_model_and_bearings_that_give_survive(tmp_path):
+    settings = ["legs.z.distal.model=lumped", "legs.y.proximal.model=timoshenko", "legs.x.wrist.stiffness=200"]
+    settings += ["legs.z.wrist.compliance=[0, 0, 0, 2e-9, 2e-9, 4e-9]"]
+    found = analyze(load("tripteron", settings))
+    assert_same(found, analyze(read_text(texts_of(found)[0], tmp_path)))
+
+
 def test_an_actuator_without_stiffness_stays_one(tmp_path):
     found = analyze(load("hexapod", ["stiffness.actuator.2=0"]))
     again = analyze(read_text(texts_of(found)[0], tmp_path))
