@@ -24,9 +24,8 @@ class Loaded:
     """A model at rest, and what a wrench does to its tool."""
 
     def __init__(self, found):
-        text = text_of(found)
-        self.model = mujoco.MjModel.from_xml_string(text)
-        self.settled = float(text.split("settled after ")[1].split(" s")[0])
+        self.model = mujoco.MjModel.from_xml_string(text_of(found))
+        self.settled = self.model.numeric("settling_time").data[0]
         self.data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, self.data)
 

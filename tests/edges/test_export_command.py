@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
+from kinetostat.commands.export import FORMATS
 from kinetostat.exchange.formats import KNOWN
 from kinetostat.machine.loading import bundled
 
@@ -19,6 +20,10 @@ def test_every_format_is_written(one, tmp_path, capsys):
     assert str(path) in capsys.readouterr().out.replace("\n", "")
     assert path.stat().st_size > 100
     assert not [other for other in tmp_path.iterdir() if other.name.startswith(".")]
+
+
+def test_help_names_every_format():
+    assert FORMATS.replace(" or ", ", ").split(", ") == [one.name for one in KNOWN]
 
 
 def test_the_suffix_names_the_format_and_the_machine_the_file(tmp_path, monkeypatch):

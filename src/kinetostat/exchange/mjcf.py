@@ -24,6 +24,14 @@ Array = npt.NDArray[np.float64]
 
 THICKNESS = 0.008
 """Radius of a link in the picture, as a share of the machine's extent."""
+NOTES = (
+    " Written by kinetostat; SI, axes of the machine's base. Springs are stiffnesses of joints, rigid parts have\n"
+    "     none. No gravity. xfrc_applied on the body 'platform': force, moment at the tool point (site 'tool').\n"
+    "     A load has settled after 'settling_time', s. Masses decide nothing that is static; those that the\n"
+    "     machine file does not say are as great as those it says, or 1 kg. Constraints are soft: keep timestep,\n"
+    "     solref and solimp as they are. "
+)
+"""What a reader of the file must know."""
 LEAST_EXTENT = 1e-3
 """Size of a picture, m."""
 COLOURS = {
@@ -49,12 +57,13 @@ def text_of(analysis: Analysis) -> str:
     middle, extent = _middle_and_extent(model)
     radius = THICKNESS * extent
     root = Element("mujoco", model=printable(analysis.machine.name))
-    root.append(ElementTree.Comment(_notes(pace)))
+    root.append(ElementTree.Comment(NOTES))
     SubElement(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="false")
     option = SubElement(root, "option", timestep=_n(pace.step), gravity="0 0 0", integrator="Euler", solver="Newton")
     option.set("tolerance", "1e-12")
     option.set("iterations", "200")
     SubElement(option, "flag", contact="disable")
+    SubElement(SubElement(root, "custom"), "numeric", name="settling_time", data=_n(pace.settling))
     defaults = SubElement(root, "default")
     SubElement(defaults, "geom", contype="0", conaffinity="0", mass="0")
     stiff = {"solref": _n(LEAST_STEPS * pace.step, 1.0), "solimp": _n(IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0)}
@@ -70,16 +79,6 @@ def text_of(analysis: Analysis) -> str:
     _constraints(root, model)
     ElementTree.indent(root, " ")
     return ElementTree.tostring(root, encoding="unicode") + "\n"
-
-
-def _notes(pace: Pace) -> str:
-    return (
-        " Written by kinetostat; SI, axes of the machine's base. Springs are stiffnesses of joints, rigid parts have\n"
-        "     none. No gravity. xfrc_applied on the body 'platform': force, moment at the tool point (site 'tool').\n"
-        f"     A load has settled after {pace.settling:.3g} s. Masses decide nothing that is static; those that\n"
-        "     the machine file does not say are as great as those it says, or 1 kg. Constraints are soft: keep\n"
-        "     timestep, solref and solimp as they are. "
-    )
 
 
 def _middle_and_extent(model: Model) -> tuple[Array, float]:
