@@ -3,24 +3,52 @@
     from kinetostat import analyze, load
     found = analyze(load("zhang-gosselin-4dof", ["pose.x=5 mm"]))
 
-Names load their modules when first used, so that importing the package costs nothing.
+Names load their modules when first used, so that importing the package costs nothing; their types in `__init__.pyi`.
 """
 
+import sys
 from importlib import import_module
 from typing import Any
 
 _HOMES = {
     "load": "kinetostat.machine.loading",
+    "build": "kinetostat.machine.loading",
     "bundled": "kinetostat.machine.loading",
+    "changed": "kinetostat.machine.changing",
     "analyze": "kinetostat.studies.analysis",
     "evaluate_grid": "kinetostat.studies.grid.grid",
+    "workspace": "kinetostat.studies.workspace.workspace",
+    "sensitivity": "kinetostat.studies.sensitivity",
+    "guidelines": "kinetostat.studies.guidelines.guidelines",
+    "compare": "kinetostat.studies.comparison.designs",
     "load_problem": "kinetostat.studies.optimisation.problem",
     "optimize": "kinetostat.studies.optimisation.result",
+    "validate": "kinetostat.validation.comparison",
     "reproduce": "kinetostat.studies.paper.reproduction",
+    "machine_picture": "kinetostat.views.picture",
+    "plot": "kinetostat.views.answers",
+    "save": "kinetostat.views.saving",
+    "Machine": "kinetostat.machine.machine",
+    "Status": "kinetostat.kinematics.status",
     "InputError": "kinetostat.spec.errors",
 }
+_SHOWN = {
+    "Machine": "kinetostat.machine.machine",
+    "Analysis": "kinetostat.studies.analysis",
+    "Workspace": "kinetostat.studies.workspace.workspace",
+    "Sensitivity": "kinetostat.studies.sensitivity",
+    "Guidelines": "kinetostat.studies.guidelines.guidelines",
+    "Comparison": "kinetostat.studies.comparison.designs",
+    "Result": "kinetostat.studies.optimisation.result",
+    "Validation": "kinetostat.validation.comparison",
+}
+"""What notebooks show as HTML, and where it is defined: told to them by name, so that nothing is imported for it."""
 
-__all__ = ["InputError", "analyze", "bundled", "evaluate_grid", "load", "load_problem", "optimize", "reproduce"]
+__all__ = [
+    "InputError", "Machine", "Status", "analyze", "build", "bundled", "changed", "compare", "evaluate_grid",
+    "guidelines", "load", "load_problem", "machine_picture", "optimize", "plot", "reproduce", "save", "sensitivity",
+    "validate", "workspace",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
@@ -31,3 +59,19 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return __all__
+
+
+def load_ipython_extension(shell: Any) -> None:
+    """Let IPython show machines, answers and figures as tables and pictures; in a notebook, importing does it."""
+    formatters = shell.display_formatter.formatters
+    for name, module in _SHOWN.items():
+        formatters["text/html"].for_type_by_name(module, name, lambda answer: _notebook().html_of(answer))
+    formatters["image/png"].for_type_by_name("matplotlib.figure", "Figure", lambda figure: _notebook().png_of(figure))
+
+
+def _notebook() -> Any:
+    return import_module("kinetostat.views.notebook")
+
+
+if "IPython" in sys.modules and (_shell := sys.modules["IPython"].get_ipython()) is not None:
+    load_ipython_extension(_shell)

@@ -14,6 +14,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.changing import changed
 from kinetostat.machine.loading import load
 from kinetostat.views.scene.anatomy import anatomy
+from kinetostat.views.scene.looks import LOOKS
 from kinetostat.views.scene.machine_scene import (
     Deflection,
     deflection_overlays,
@@ -22,7 +23,7 @@ from kinetostat.views.scene.machine_scene import (
     response_overlays,
 )
 from kinetostat.views.scene.shapes import convex_hull, rounded_hull, shaft
-from kinetostat.views.scene.solids import LAYERS, MATERIALS, Turned, as_data
+from kinetostat.views.scene.solids import LAYERS, Turned, as_data
 from machines import every_machine
 
 
@@ -50,7 +51,7 @@ def test_every_machine_can_be_drawn(case):
     scene = scene_of(case.machine)
     names = [solid.name for solid in scene.solids]
     assert len(set(names)) == len(names)
-    assert {solid.material for solid in scene.solids} <= set(MATERIALS)
+    assert {solid.material for solid in scene.solids} <= set(LOOKS)
     assert {solid.layer for solid in scene.solids} | {label.layer for label in scene.labels} <= set(LAYERS)
     data = as_data(scene)
     assert all(math.isfinite(number) for number in numbers_in(data))

@@ -24,17 +24,22 @@ def read_value(machine: Machine, path: str, text: str) -> float:
     return _read(parameter.path, parameter.quantity, text)
 
 
-def changed(machine: Machine, values: Mapping[str, float]) -> Machine:
-    """The machine with some fields, or entries of fields, at other SI values, each checked by itself.
+def changed(machine: Machine, values: Mapping[str, float | str]) -> Machine:
+    """The machine with some fields, or entries of fields, at other values, each checked by itself.
 
     Cheap, and of the same family, so that what has been compiled for it is used again.
 
+    Args:
+        machine: which stays as it is.
+        values: by path, in SI or as text with a unit.
+
     Raises:
-        InputError: an unknown field, or a value out of bounds.
+        InputError: an unknown field, no quantity, or a value out of bounds.
     """
     leaves: dict[str, float] = {}
-    for path, value in values.items():
+    for path, given in values.items():
         parameter = find(machine.family, path)
+        value = read_value(machine, path, given) if isinstance(given, str) else given
         _check(parameter.path, parameter.quantity, value)
         leaves.update(dict.fromkeys(parameter.leaves, value))
     return with_values(machine, leaves)

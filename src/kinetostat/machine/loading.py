@@ -63,12 +63,19 @@ def load(machine: str | Path, settings: Sequence[str] = ()) -> Machine:
     return build(documents.read(path), name, settings)
 
 
-def build(document: Document, origin: str, settings: Sequence[str] = ()) -> Machine:
-    """A machine from a document; `origin` names it in messages.
+def build(document: str | Document, origin: str = "the machine", settings: Sequence[str] = ()) -> Machine:
+    """A machine from what a machine file says.
+
+    Args:
+        document: its TOML text, or the tables in it.
+        origin: names it in messages.
+        settings: overrides "path=value".
 
     Raises:
         InputError: a mistake in the document or an override.
     """
+    if isinstance(document, str):
+        document = documents.parse(document, origin)
     if document.get("family") == written.NAME:
         return _build_written(document, origin, settings)
     family = _family(document.get("family"), origin)

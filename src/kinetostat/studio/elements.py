@@ -5,6 +5,8 @@ from pathlib import Path
 import nicegui.elements.scene  # noqa: F401  (registers three.js, which NiceGUI brings with it)
 from nicegui.element import Element
 
+from kinetostat.views.scene.looks import looks_data
+
 COMPONENTS = Path(__file__).parent / "components"
 MODULES = {"kinetostat-studio": str(COMPONENTS)}
 
@@ -17,6 +19,7 @@ class MachineView(Element, component=COMPONENTS / "machine_view.js", esm=MODULES
         super().__init__()
         self._props["label"] = label
         self._props["hidden"] = []
+        self._props["looks"] = looks_data()
 
     def hide(self, layers: list[str]) -> None:
         """Show all layers but these."""

@@ -36,6 +36,8 @@ STYLE: Any = {
     "pdf.fonttype": 42,
     "figure.dpi": 200,
 }
+FORMATS: dict[str, Any] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+"""In which figures are written, and what leaves the date out: equal figures are equal files."""
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito: distinct for colour-blind readers and in grey."""
 DASHES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
@@ -97,12 +99,16 @@ def curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
 
 def save(figure: Figure, stem: Path) -> list[Path]:
     """Write a figure as PNG (200 dpi), SVG and PDF beside each other; returns the paths."""
-    paths = [stem.with_name(f"{stem.name}.{suffix}") for suffix in ("png", "svg", "pdf")]
+    paths = [stem.with_name(f"{stem.name}.{suffix}") for suffix in FORMATS]
     for path in paths:
-        dateless: Any = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[path.suffix[1:]]
-        with replacing(path) as temporary, mpl.rc_context(STYLE):
-            figure.savefig(temporary, metadata=dateless)
+        save_figure(figure, path)
     return paths
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure to a file whose suffix is one of `FORMATS`; PNG has 200 dpi."""
+    with replacing(path) as temporary, mpl.rc_context(STYLE):
+        figure.savefig(temporary, metadata=FORMATS[path.suffix[1:].lower()])
 
 
 def as_svg(figure: Figure) -> str:

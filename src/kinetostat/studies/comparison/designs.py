@@ -6,7 +6,7 @@ printed or drawn is in `views`.
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from kinetostat.algebra.screw import COMPONENTS
@@ -117,11 +117,15 @@ def read_design(text: str, settings: Sequence[str] = ()) -> Design:
     return Design(text, machine, analyze(machine))
 
 
-def compare(designs: Sequence[Design], ranges: Sequence[str] = (), progress: Progress = silent) -> Comparison:
+def compare(
+    designs: Sequence[Design | Machine | str] | Mapping[str, Machine],
+    ranges: Sequence[str] = (),
+    progress: Progress = silent,
+) -> Comparison:
     """Designs side by side, each at its own pose and, where ranges are given, all over the same grid.
 
     Args:
-        designs: two or more.
+        designs: two or more; machines, by names of your own if you like, or texts as `read_design` takes them.
         ranges: "FIELD=from:to:count", of fields that all of them have.
         progress: told how far the work is.
 
@@ -132,16 +136,27 @@ def compare(designs: Sequence[Design], ranges: Sequence[str] = (), progress: Pro
         raise InputError(
             f"compare takes 2 to {MOST_DESIGNS} designs, not {len(designs)}; give files, names or NAME:path=value."
         )
-    over, poses = rows_over([design.machine for design in designs], ranges, progress) if ranges else ((), ())
+    given = list(_designs(designs))
+    over, poses = rows_over([design.machine for design in given], ranges, progress) if ranges else ((), ())
     return Comparison(
-        tuple(designs),
-        _differences(designs),
-        rows_at_poses([design.analysis for design in designs]),
-        tuple(_softest(design) for design in designs),
+        tuple(given),
+        _differences(given),
+        rows_at_poses([design.analysis for design in given]),
+        tuple(_softest(design) for design in given),
         tuple(ranges),
         poses,
         over,
     )
+
+
+def _designs(given: Sequence[Design | Machine | str] | Mapping[str, Machine]) -> Iterator[Design]:
+    """What was given, analysed; machines without a name of their own are numbered."""
+    named = given.items() if isinstance(given, Mapping) else ((f"design {n}", one) for n, one in enumerate(given, 1))
+    for name, one in named:
+        if isinstance(one, Machine):
+            yield Design(name, one, analyze(one))
+        else:
+            yield read_design(one) if isinstance(one, str) else one
 
 
 def _differences(designs: Sequence[Design]) -> tuple[Difference, ...]:

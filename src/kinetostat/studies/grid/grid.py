@@ -90,7 +90,7 @@ def _coordinates(grid: Grid, pairs: Sequence[tuple[Range, Parameter]]) -> dict[s
 def evaluate_grid(
     machine: Machine,
     ranges: Sequence[str],
-    quantities: Sequence[str],
+    quantities: Sequence[str] = ("compliance",),
     progress: Progress = silent,
 ) -> xr.Dataset:
     """Quantities over all combinations of some ranges.

@@ -3,27 +3,6 @@ import { CSS2DObject, CSS2DRenderer, OrbitControls, THREE } from "nicegui-scene"
 import { geometryOf } from "kinetostat-studio/solid_geometry.js";
 import { isDark, onTheme } from "kinetostat-studio/theme.js";
 
-const LOOKS = {
-  base: { color: 0x8b929c, metalness: 0.15, roughness: 0.6 },
-  platform: { color: 0xc3c9d1, metalness: 0.3, roughness: 0.42 },
-  actuated: { color: 0x1f6fb4, metalness: 0.2, roughness: 0.38 },
-  passive: { color: 0xd9721f, metalness: 0.15, roughness: 0.42 },
-  removed: { color: 0x9aa3ad, metalness: 0.0, roughness: 0.8, opacity: 0.25 },
-  steel: { color: 0xd3d8de, metalness: 0.85, roughness: 0.24 },
-  joint: { color: 0x4a525d, metalness: 0.55, roughness: 0.42 },
-  motor: { color: 0x2b3440, metalness: 0.35, roughness: 0.5 },
-  tool: { color: 0xb9a76a, metalness: 0.8, roughness: 0.3 },
-  spring: { color: 0x17a673, metalness: 0.3, roughness: 0.35 },
-  load: { color: 0xc81e4a, metalness: 0.0, roughness: 0.5 },
-  ghost: { color: 0xd01f50, metalness: 0.0, roughness: 0.9, opacity: 0.4 },
-  translation: { color: 0x2f9fe0, metalness: 0.0, roughness: 0.35, opacity: 0.38 },
-  rotation: { color: 0xa855c7, metalness: 0.1, roughness: 0.4 },
-  "soft translation": { color: 0x0b7fc7, metalness: 0.1, roughness: 0.4 },
-  "soft rotation": { color: 0x8a2fb0, metalness: 0.1, roughness: 0.4 },
-  "x axis": { color: 0xd23b3b, metalness: 0.0, roughness: 0.5 },
-  "y axis": { color: 0x2c9c4a, metalness: 0.0, roughness: 0.5 },
-  "z axis": { color: 0x2d62d3, metalness: 0.0, roughness: 0.5 },
-};
 const THEMES = {
   light: { sky: 0xf7f9fb, ground: 0xe3e7ec, grid: 0x9aa6b4, gridOpacity: 0.32, shadow: 0.26, light: 1.0 },
   dark: { sky: 0x1b222c, ground: 0x11161d, grid: 0x6b7a8c, gridOpacity: 0.28, shadow: 0.5, light: 0.72 },
@@ -47,7 +26,7 @@ function drawsInSoftware() {
 export default {
   template: `<div class="machine-view"><canvas tabindex="0" role="img" :aria-label="label"
       @keydown="turn"></canvas><div class="machine-labels"></div></div>`,
-  props: { label: String, hidden: Array },
+  props: { label: String, hidden: Array, looks: Object },
   mounted() {
     const canvas = this.$el.querySelector("canvas");
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawsInSoftware(), alpha: false });
@@ -67,14 +46,13 @@ export default {
     this.sharpness(this.slow ? COARSE : 1);
     this.controls.maxPolarAngle = Math.PI * 0.96;
     this.materials = {};
-    for (const [name, look] of Object.entries(LOOKS)) {
-      const { opacity, ...rest } = look;
+    for (const [name, look] of Object.entries(this.looks)) {
+      const transparent = look.opacity < 1;
       this.materials[name] = new THREE.MeshStandardMaterial({
-        ...rest,
-        transparent: opacity !== undefined,
-        opacity: opacity ?? 1,
-        depthWrite: opacity === undefined,
-        side: opacity === undefined ? THREE.DoubleSide : THREE.FrontSide,
+        ...look,
+        transparent,
+        depthWrite: !transparent,
+        side: transparent ? THREE.FrontSide : THREE.DoubleSide,
       });
     }
     this.geometries = new Map();

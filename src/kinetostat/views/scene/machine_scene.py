@@ -6,9 +6,13 @@ from dataclasses import dataclass
 
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.vector import Displacement, Vector
+from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.deflected import DeflectedLink
 from kinetostat.kinetostatics.indices import Principal
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import BASE_FRAME, Configuration, Machine
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.refusal import why_not
 from kinetostat.views.scene import joints, links, overlays, shapes
 from kinetostat.views.scene.anatomy import Anatomy, JointPart, anatomy, together
 from kinetostat.views.scene.overlays import Measure
@@ -22,6 +26,8 @@ BED = 4.5
 """Depth of a rail's bed below its carriage's joint, in radii of its leg."""
 FRAME = 0.11
 """Length of a frame's axes as a share of the machine's diagonal."""
+DRAWN = (Status.OK, Status.JOINT_LIMIT, Status.SINGULAR)
+"""Poses at which every part has its place."""
 
 
 def proportions_of(machine: Machine, configuration: Configuration) -> Proportions:
@@ -35,6 +41,20 @@ def proportions_of(machine: Machine, configuration: Configuration) -> Proportion
         {rail.name: rail.point for leg in legs for rail in leg.rails},
         size,
     )
+
+
+def scene_of(machine: Machine) -> Scene:
+    """A machine at its pose, in proportions that suit it there.
+
+    Raises:
+        InputError: not every part has a place at the pose; the message says why.
+    """
+    response = respond(machine)
+    points = [point for leg in response.configuration.legs for point in leg.path]
+    placed = all(math.isfinite(c) for point in points for c in point.components())
+    if Status(int(response.status)) not in DRAWN or not placed:
+        raise InputError(f"The machine cannot be drawn at this pose. {why_not(machine, response, ())}")
+    return machine_scene(machine, response.configuration, proportions_of(machine, response.configuration))
 
 
 def machine_scene(machine: Machine, configuration: Configuration, sizes: Proportions) -> Scene:

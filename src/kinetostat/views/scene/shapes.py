@@ -68,7 +68,7 @@ def socket(radius: float) -> Turned:
     angles = [math.radians(a) for a in range(-60, 21, 10)]
     outer = [(1.22 * radius * math.cos(a), 1.22 * radius * math.sin(a)) for a in angles]
     rim = (1.02 * radius * math.cos(angles[-1]), 1.02 * radius * math.sin(angles[-1]))
-    return Turned(((0.0, outer[0][1]), *outer, rim))
+    return Turned(((0.0, outer[0][1]), *outer, rim, (0.0, rim[1])))
 
 
 @kept

@@ -1,6 +1,6 @@
 """Solids of a scene as plain data: shapes, where they stand, what they are of. Knows no machine and no renderer.
 
-Lengths are in m. A renderer tessellates three kinds of shape and gives each material a look.
+Lengths are in m. There are three kinds of shape (`mesh` makes triangles of them); materials are named (`looks`).
 """
 
 from collections.abc import Iterable
@@ -66,11 +66,6 @@ class Swept:
 
 Shape: TypeAlias = Turned | Extruded | Swept
 
-MATERIALS = (
-    "base", "platform", "actuated", "passive", "removed", "steel", "joint", "motor", "spring", "tool", "load",
-    "ghost", "translation", "rotation", "soft translation", "soft rotation", "x axis", "y axis", "z axis",
-)  # fmt: skip
-"""What solids may be of; how each looks is the renderer's business."""
 LAYERS = ("machine", "springs", "load", "deflection", "ellipsoids", "directions", "frames", "labels")
 """What a viewer may show or hide."""
 
@@ -86,7 +81,7 @@ class Solid:
     Attributes:
         name: unique within its scene; the same part has the same name at every pose.
         shape: in its own axes.
-        material: one of `MATERIALS`.
+        material: one of `looks.LOOKS`.
         place: from its own axes to the base frame.
         scale: along its own axes.
         layer: one of `LAYERS`.
@@ -144,15 +139,20 @@ def as_data(scene: Scene) -> dict[str, Any]:
 
 def solid_data(solid: Solid) -> dict[str, Any]:
     """A solid as plain data; `place` holds the columns of its 3 x 4 matrix."""
-    axes = solid.place.rotation
-    columns = [axis * size for axis, size in zip((axes.x, axes.y, axes.z), solid.scale, strict=True)]
     return {
         "name": solid.name,
         "layer": solid.layer,
         "material": solid.material,
         "shape": _shape_data(solid.shape),
-        "place": [round(c, DECIMALS) for v in (*columns, solid.place.translation) for c in v.components()],
+        "place": [round(c, DECIMALS) for v in columns_of(solid) for c in v.components()],
     }
+
+
+def columns_of(solid: Solid) -> tuple[Vector, Vector, Vector, Vector]:
+    """The columns of the 3 x 4 matrix from a solid's own axes, scaled, to the base frame (m)."""
+    axes = solid.place.rotation
+    x, y, z = (axis * size for axis, size in zip((axes.x, axes.y, axes.z), solid.scale, strict=True))
+    return x, y, z, solid.place.translation
 
 
 def label_data(label: Label) -> dict[str, Any]:

@@ -1,0 +1,26 @@
+"""Types of the package's names, for editors and type checkers; `__init__.py` loads them when they are used."""
+
+from typing import Any
+
+from kinetostat.kinematics.status import Status as Status
+from kinetostat.machine.changing import changed as changed
+from kinetostat.machine.loading import build as build
+from kinetostat.machine.loading import bundled as bundled
+from kinetostat.machine.loading import load as load
+from kinetostat.machine.machine import Machine as Machine
+from kinetostat.spec.errors import InputError as InputError
+from kinetostat.studies.analysis import analyze as analyze
+from kinetostat.studies.comparison.designs import compare as compare
+from kinetostat.studies.grid.grid import evaluate_grid as evaluate_grid
+from kinetostat.studies.guidelines.guidelines import guidelines as guidelines
+from kinetostat.studies.optimisation.problem import load_problem as load_problem
+from kinetostat.studies.optimisation.result import optimize as optimize
+from kinetostat.studies.paper.reproduction import reproduce as reproduce
+from kinetostat.studies.sensitivity import sensitivity as sensitivity
+from kinetostat.studies.workspace.workspace import workspace as workspace
+from kinetostat.validation.comparison import validate as validate
+from kinetostat.views.answers import plot as plot
+from kinetostat.views.picture import machine_picture as machine_picture
+from kinetostat.views.saving import save as save
+
+def load_ipython_extension(shell: Any) -> None: ...

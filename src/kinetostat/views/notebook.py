@@ -1,0 +1,156 @@
+"""Machines and answers in a notebook: the terminal's tables as HTML, with a picture. Nothing is computed here.
+
+Colours are the page's own, so that light and dark pages read alike; nothing is fetched from elsewhere.
+"""
+
+import base64
+import io
+from collections.abc import Iterator
+from html import escape
+from typing import Any
+
+from matplotlib.figure import Figure
+from rich.cells import cell_len
+from rich.console import Console
+from rich.padding import Padding
+from rich.style import Style
+from rich.table import Column, Table
+from rich.text import Text
+
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.analysis import Analysis
+from kinetostat.views.answers import kind_of
+from kinetostat.views.picture import machine_picture
+
+WIDTH = 200
+"""Characters of a line: a notebook scrolls."""
+SIZE = (640, 480)
+"""Pixels of a picture, which is shown at half of that."""
+DOTS = 110
+"""Pixels per inch of a figure."""
+CSS = """
+.kinetostat{font-size:13px;line-height:1.45;max-width:72em;display:flow-root}
+.kinetostat p{margin:.2em 0}
+.kinetostat .dim{opacity:.65}
+.kinetostat .good{color:#1a9a50}.kinetostat .bad{color:#e0506a}.kinetostat .warn{color:#c98a1b}
+.kinetostat table{font-size:inherit;border-collapse:collapse;border:0;margin:.9em 0 .6em}
+.kinetostat table{font-variant-numeric:tabular-nums}
+.kinetostat caption{caption-side:top;text-align:left;font-weight:600;padding:0 0 .3em;color:inherit;white-space:nowrap}
+.kinetostat tr,.kinetostat tbody tr:nth-child(odd),.kinetostat tbody tr:hover{background:none}
+.kinetostat th,.kinetostat td{padding:.16em .9em .16em 0;text-align:left;border:0;color:inherit;vertical-align:top}
+.kinetostat .num{text-align:right;white-space:nowrap;padding-left:.6em}
+.kinetostat th{font-weight:600;opacity:.75;border-bottom:1px solid rgba(128,128,128,.45)}
+.kinetostat td{border-bottom:1px solid rgba(128,128,128,.14)}
+.kinetostat img{display:block;max-width:100%;height:auto;margin:.4em 0}
+.kinetostat img.aside{float:right;margin:0 0 1em 2em}
+.kinetostat img.figure{background:#fff;border-radius:6px;padding:4px}
+.kinetostat summary{cursor:pointer;opacity:.75;margin:.4em 0}
+""".strip()
+COLOURS = {"green": "good", "red": "bad", "yellow": "warn"}
+
+
+def html_of(answer: object) -> str:
+    """A machine or an answer as a piece of HTML: a picture where there is one, and the tables of the terminal."""
+    page = _Page()
+    kind_of(answer).tell(page, answer)
+    tables = "".join(page.parts)
+    if isinstance(answer, Machine):
+        about = f"<p><b>{escape(answer.name)}</b> <span class='dim'>{escape(answer.family.summary)}</span></p>"
+        tables = f"{about}{_picture(answer)}<details><summary>all fields</summary>{tables}</details>"
+    elif isinstance(answer, Analysis):
+        tables = _picture(answer.machine, "aside") + tables
+    else:
+        tables += _figures(answer)
+    return f'<div class="kinetostat"><style>{CSS}</style>{tables}</div>'
+
+
+def png_of(figure: Figure) -> bytes:
+    """A figure as a PNG."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=DOTS, metadata={"Software": None})
+    return stream.getvalue()
+
+
+def _figures(answer: object) -> str:
+    drawn = kind_of(answer).figures(answer)
+    return "".join(_image(png_of(figure), name, "figure") for name, figure in drawn.items())
+
+
+def _picture(machine: Machine, kind: str = "machine") -> str:
+    """The machine from the corner, or why it cannot be drawn."""
+    try:
+        data = machine_picture(machine, SIZE, transparent=True)
+    except InputError as error:
+        return f"<p class='dim'>{escape(str(error))}</p>"
+    return _image(data, machine.name, kind, SIZE[0] // 2)
+
+
+def _image(data: bytes, what: str, kind: str, width: int | None = None) -> str:
+    source = "data:image/png;base64," + base64.b64encode(data).decode()
+    wide = f' width="{width}"' if width else ""
+    return f'<img class="{kind}" alt="{escape(what)}"{wide} src="{source}">'
+
+
+class _Page(Console):
+    """A console whose lines and tables become HTML."""
+
+    def __init__(self) -> None:
+        super().__init__(file=io.StringIO(), width=WIDTH)
+        self.parts: list[str] = []
+        self._line = ""
+
+    def print(self, *objects: Any, end: str = "\n", style: str | Style | None = None, **how: Any) -> None:
+        """Take what would be printed."""
+        for thing in objects:
+            whole = thing.renderable if isinstance(thing, Padding) else thing
+            if isinstance(whole, Table):
+                self.parts.append(_table(whole))
+            else:
+                self._line += _styled(_text(whole, how.get("markup", True)), style)
+        if end == "\n" and self._line.strip():
+            self.parts += [f"<p>{line}</p>" for line in self._line.split("\n") if line.strip()]
+            self._line = ""
+
+
+def _text(thing: object, markup: bool) -> Text:
+    if isinstance(thing, Text):
+        return thing
+    return Text.from_markup(str(thing)) if markup else Text(str(thing))
+
+
+def _styled(text: Text, style: str | Style | None = None) -> str:
+    """Text with its styles as HTML, inside a style for all of it."""
+    plain = Console(file=io.StringIO(), width=WIDTH)
+    parts = [_within(escape(part.text), part.style) for part in text.render(plain)]
+    return _within("".join(parts), Style.parse(style) if isinstance(style, str) else style)
+
+
+def _within(content: str, style: Style | None) -> str:
+    """HTML in a style: what of it a page shows."""
+    if style is None or not content:
+        return content
+    named = [COLOURS[style.color.name]] if style.color and style.color.name in COLOURS else []
+    classes = " ".join([*named, *(["dim"] if style.dim else [])])
+    content = f"<b>{content}</b>" if style.bold else content
+    return f'<span class="{classes}">{content}</span>' if classes else content
+
+
+def _table(table: Table) -> str:
+    """A table of the terminal as one of HTML."""
+    caption = f"<caption>{_styled(_text(table.title, True))}</caption>" if table.title else ""
+    heads = "".join(_cell("th", column, column.header) for column in table.columns)
+    rows = "".join(f"<tr>{row}</tr>" for row in _rows(table))
+    shown = any(cell_len(str(column.header)) for column in table.columns)
+    return f"<table>{caption}{f'<thead><tr>{heads}</tr></thead>' if shown else ''}<tbody>{rows}</tbody></table>"
+
+
+def _rows(table: Table) -> Iterator[str]:
+    cells = zip(*(column.cells for column in table.columns), strict=True)
+    for row, held in zip(table.rows, cells, strict=True):
+        yield "".join(_cell("td", column, cell, row.style) for column, cell in zip(table.columns, held, strict=True))
+
+
+def _cell(tag: str, column: Column, content: object, style: str | Style | None = None) -> str:
+    numeric = ' class="num"' if column.justify == "right" else ""
+    return f"<{tag}{numeric}>{_styled(_text(content, True), style)}</{tag}>".replace("\n", "<br>")

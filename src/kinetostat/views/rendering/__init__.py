@@ -1,0 +1,1 @@
+"""Scenes as pixels, by NumPy alone: camera, triangles, light and shadow, surfaces, ground, labels."""

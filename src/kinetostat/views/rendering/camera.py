@@ -1,0 +1,82 @@
+"""Where a picture is taken from, and where points of the base frame fall on it. Knows no pixel's colour."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+VIEWS = {"iso": (1.0, -1.35, 0.75), "front": (0.0, -1.0, 0.02), "side": (1.0, 0.0, 0.02), "top": (0.0, -0.02, 1.0)}
+"""From the machine to the camera, base axes."""
+FIELD = math.radians(32.0)
+"""Angle of the picture's shorter side."""
+MARGIN = 0.07
+"""Share of a picture that stays empty on each side."""
+FITS = 12
+"""Times the camera is moved until what it shows fills the picture."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera without distortion.
+
+    Attributes:
+        eye: base frame, m.
+        axes: to the right, down and forward in the picture, base axes, [3 x 3] by rows.
+        focal: pixels per unit of slope.
+        width, height: of the picture, pixels.
+    """
+
+    eye: Array
+    axes: Array
+    focal: float
+    width: int
+    height: int
+
+    def project(self, points: Array) -> tuple[Array, Array]:
+        """Points [n x 3] (m) as pixels [n x 2] from the upper left corner, and the inverse of their depth [n], 1/m."""
+        seen = (points - self.eye) @ self.axes.T
+        nearness = 1.0 / seen[:, 2]
+        centre = (0.5 * self.width, 0.5 * self.height)
+        return seen[:, :2] * (self.focal * nearness)[:, None] + centre, nearness
+
+    def rays(self, x: Array, y: Array) -> Array:
+        """Ways [n x 3] from the eye through points of the picture (pixels) that gain a depth of 1."""
+        across, down = (x - 0.5 * self.width) / self.focal, (y - 0.5 * self.height) / self.focal
+        return np.stack([across, down, np.ones_like(across)], axis=-1) @ self.axes
+
+    def enlarged(self, factor: int) -> "Camera":
+        """The same view with more pixels."""
+        return Camera(self.eye, self.axes, self.focal * factor, self.width * factor, self.height * factor)
+
+
+def axes_towards(forward: Sequence[float] | Array) -> Array:
+    """Axes to the right, down and forward of one who looks that way with z up, [3 x 3] by rows."""
+    ahead = np.array(forward) / np.linalg.norm(forward)
+    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    right = right / np.linalg.norm(right) if np.linalg.norm(right) > 0.0 else np.array((1.0, 0.0, 0.0))
+    return np.stack([right, np.cross(ahead, right), ahead])
+
+
+def camera_on(points: Array, direction: Sequence[float], width: int, height: int) -> Camera:
+    """A camera in some direction from points [n x 3] (base frame, m) that fills its picture with them.
+
+    Args:
+        points: what is to be seen.
+        direction: from there to the camera, base axes.
+        width, height: of the picture, pixels.
+    """
+    axes = axes_towards(-np.array(direction, dtype=float))
+    half = math.tan(0.5 * FIELD) * np.array([width, height]) / min(width, height)
+    target = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    distance = float(np.linalg.norm(np.ptp(points, axis=0))) / half.min()
+    for _ in range(FITS):
+        seen = (points - target) @ axes.T + (0.0, 0.0, distance)
+        slopes = seen[:, :2] / seen[:, 2:]
+        low, high = slopes.min(axis=0), slopes.max(axis=0)
+        target = target + 0.5 * distance * (low + high) @ axes[:2]
+        distance *= float(np.max(0.5 * (high - low) / half)) / (1.0 - 2.0 * MARGIN)
+    return Camera(target - distance * axes[2], axes, 0.5 * height / half[1], width, height)

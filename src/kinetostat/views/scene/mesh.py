@@ -1,0 +1,251 @@
+"""The three shapes of a scene as triangles, for whatever draws or writes them. Knows no material and no format.
+
+Points are in the shape's own axes, m. A point on a sharp edge is there once for each of its faces, which so have
+normals of their own; points that coincide have equal coordinates, bit by bit.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinetostat.algebra.vector import Vector
+from kinetostat.views.scene.polygon import cut_in_triangles, edge_normals, narrowed
+from kinetostat.views.scene.solids import Extruded, Shape, Solid, Swept, Turned
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+AROUND = 40
+"""Sides of a solid of revolution."""
+WIRE = 12
+"""Sides of a wire."""
+ROUNDING = 3
+"""Steps in which an edge is broken."""
+SMOOTH = 0.8
+"""Cosine between the normals of neighbouring faces above which the edge between them is shaded round."""
+POINT = 1e-9
+"""Radius below which a circle is a point, in units of the largest."""
+KEPT = 1024
+"""Meshes that are kept: a machine has about a hundred, few of which change while it moves."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles with normals.
+
+    Attributes:
+        points: [n x 3], m.
+        normals: [n x 3], unit vectors that point out of the body.
+        triangles: [m x 3], numbers of points, counter-clockwise as seen from outside.
+    """
+
+    points: Array
+    normals: Array
+    triangles: Indices
+
+    @property
+    def volume(self) -> float:
+        """What the triangles enclose, m^3, by the divergence theorem."""
+        a, b, c = (self.points[self.triangles[:, i]] for i in range(3))
+        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
+@lru_cache(KEPT)
+def mesh_of(shape: Shape) -> Mesh:
+    """The triangles of a shape in its own axes; equal shapes share one mesh, whose arrays cannot be changed."""
+    match shape:
+        case Turned():
+            mesh = _turned(shape)
+        case Extruded():
+            mesh = _extruded(shape)
+        case Swept():
+            mesh = _swept(shape)
+    for array in (mesh.points, mesh.normals, mesh.triangles):
+        array.setflags(write=False)
+    return mesh
+
+
+def placed(solid: Solid) -> Mesh:
+    """The triangles of a solid in the base frame."""
+    mesh, scale = mesh_of(solid.shape), np.array(solid.scale)
+    axes = solid.place.rotation
+    turn = np.array([_numbers(axis) for axis in (axes.x, axes.y, axes.z)])
+    normals = (mesh.normals / scale) @ turn
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Mesh((mesh.points * scale) @ turn + _numbers(solid.place.translation), normals, mesh.triangles)
+
+
+def _numbers(vector: Vector) -> tuple[float, float, float]:
+    x, y, z = vector.components()
+    return float(x), float(y), float(z)
+
+
+def _turned(shape: Turned) -> Mesh:
+    profile = np.array(shape.profile)
+    profile = profile[[True, *(np.linalg.norm(np.diff(profile, axis=0), axis=1) > 0.0)]]
+    profile[profile[:, 0] < POINT * profile[:, 0].max(), 0] = 0.0
+    ways = np.diff(profile, axis=0)
+    outward = np.stack([ways[:, 1], -ways[:, 0]], axis=1) / np.linalg.norm(ways, axis=1, keepdims=True)
+    closed = bool(np.all(profile[0] == profile[-1]))
+    starts, ends = _ends_of_faces(outward, closed)
+    angles = [math.tau * k / AROUND for k in range(AROUND)]
+    cosines, sines = np.cos(angles), np.sin(angles)
+
+    def around(pairs: Array) -> Array:
+        radius, height = pairs[..., 0, None], pairs[..., 1, None]
+        return np.stack([radius * cosines, radius * sines, height + 0.0 * cosines], axis=-1)
+
+    points = around(np.stack([profile[:-1], profile[1:]], axis=1))
+    normals = around(np.stack([starts, ends], axis=1))
+    return _bands(points, normals, closed=True)
+
+
+def _ends_of_faces(normals: Array, closed: bool) -> tuple[Array, Array]:
+    """Normals at the first and last line of each face of a strip: its own, or shared where the edge is round."""
+    before, after = np.roll(normals, 1, axis=0), np.roll(normals, -1, axis=0)
+    if not closed:
+        before[0], after[-1] = normals[0], normals[-1]
+    return _shared(normals, before), _shared(normals, after)
+
+
+def _shared(own: Array, other: Array) -> Array:
+    smooth = np.einsum("ij,ij->i", own, other) >= SMOOTH
+    both = np.where(smooth[:, None], own + other, own)
+    return both / np.linalg.norm(both, axis=1, keepdims=True)
+
+
+def _bands(points: Array, normals: Array, closed: bool) -> Mesh:
+    """Bands of quadrilaterals, each between two lines of its own.
+
+    Args:
+        points, normals: [bands x 2 x count x 3], along each band's first and second line; to the left of the way along
+            a line is its band's second line, as seen from outside.
+        closed: whether the end of a line is its beginning.
+    """
+    bands, _, count, _ = points.shape
+    step = np.arange(count if closed else count - 1)
+    ahead = (step + 1) % count
+    quads = np.stack([step, ahead, ahead + count, step + count], axis=1)
+    quads = (quads + 2 * count * np.arange(bands)[:, None, None]).reshape(-1, 4)
+    return _without_slivers(points.reshape(-1, 3), normals.reshape(-1, 3), _halved(quads))
+
+
+def _halved(quads: Indices) -> Indices:
+    return np.concatenate([quads[:, [0, 1, 3]], quads[:, [1, 2, 3]]])
+
+
+def _without_slivers(points: Array, normals: Array, triangles: Indices) -> Mesh:
+    """Without triangles of which two corners coincide, and without points that no triangle has."""
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    real = np.any(a != b, axis=1) & np.any(b != c, axis=1) & np.any(c != a, axis=1)
+    used, numbers = np.unique(triangles[real], return_inverse=True)
+    return Mesh(points[used], normals[used], numbers.reshape(-1, 3))
+
+
+def _joined(meshes: Sequence[Mesh]) -> Mesh:
+    starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    return Mesh(
+        np.concatenate([mesh.points for mesh in meshes]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+        np.concatenate([mesh.triangles + start for mesh, start in zip(meshes, starts, strict=False)]),
+    )
+
+
+def _extruded(shape: Extruded) -> Mesh:
+    outline = np.array(shape.outline)
+    outline = outline[np.any(outline != np.roll(outline, 1, axis=0), axis=1)]
+    chamfer = min(shape.chamfer, 0.5 * shape.height)
+    steps = [0.5 * math.pi * k / ROUNDING for k in range(ROUNDING + 1)] if chamfer > 0.0 else [0.5 * math.pi]
+    lower = [(chamfer * (1.0 - math.sin(a)), chamfer * (1.0 - math.cos(a)), a) for a in steps]
+    rows = [*lower, *((inset, shape.height - up, math.pi - a) for inset, up, a in reversed(lower))]
+    rings = np.stack([_level(narrowed(outline, inset) if inset else outline, height) for inset, height, _ in rows])
+    tilts = np.array([tilt for *_, tilt in rows])
+    caps = [_cap(rings[-1], 1.0), _cap(rings[0], -1.0)]
+    return _joined([_wall(rings, tilts, edge_normals(outline)), *caps])
+
+
+def _level(flat: Array, height: float) -> Array:
+    return np.column_stack([flat, np.full(len(flat), height)])
+
+
+def _wall(rings: Array, tilts: Array, outward: Array) -> Mesh:
+    """The side of a plate, edge by edge.
+
+    Args:
+        rings: corners by height [rows x corners x 3].
+        tilts: of the surface at each row: 0 down, pi/2 outwards, pi up.
+        outward: normals of the outline's edges [corners x 2].
+    """
+    flats = _ends_of_faces(outward, closed=True)
+    points = np.stack([rings, np.roll(rings, -1, axis=1)], axis=2)
+    side = np.sin(tilts)[:, None, None]
+    up = np.broadcast_to(-np.cos(tilts)[:, None, None], (*rings.shape[:2], 1))
+    normals = np.stack([np.concatenate([side * flat, up], axis=2) for flat in flats], axis=2)
+    # From [rows, edges, ends] to one band an edge, whose lines run down at its two corners.
+    return _bands(points[::-1].transpose(1, 2, 0, 3), normals[::-1].transpose(1, 2, 0, 3), closed=False)
+
+
+def _cap(ring: Array, up: float) -> Mesh:
+    triangles = np.array(cut_in_triangles(ring[:, :2]), dtype=np.int64)
+    normals = np.broadcast_to((0.0, 0.0, up), ring.shape).copy()
+    return Mesh(ring, normals, triangles if up > 0.0 else triangles[:, ::-1].copy())
+
+
+def _swept(shape: Swept) -> Mesh:
+    path = np.array(shape.path)
+    tangents = _tangents(path, shape.closed)
+    first, second = _frames(tangents, shape.closed)
+    angles = math.tau * np.arange(WIRE) / WIRE
+    spokes = first[:, None] * np.cos(angles)[:, None] + second[:, None] * np.sin(angles)[:, None]
+    rings = path[:, None] + shape.radius * spokes
+    following = (np.arange(len(path) if shape.closed else len(path) - 1) + 1) % len(path)
+    before = np.arange(len(following))
+    points = np.stack([rings[before], rings[following]], axis=1)
+    tube = _bands(points, np.stack([spokes[before], spokes[following]], axis=1), closed=True)
+    if shape.closed:
+        return tube
+    return _joined([tube, _disc(rings[0], -tangents[0]), _disc(rings[-1], tangents[-1])])
+
+
+def _tangents(path: Array, closed: bool) -> Array:
+    ways = np.diff(path, axis=0, append=path[:1])
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    if not closed:
+        ways[-1] = ways[-2]
+    arriving = np.roll(ways, 1, axis=0)
+    if not closed:
+        arriving[0] = ways[0]
+    both = ways + arriving
+    return both / np.linalg.norm(both, axis=1, keepdims=True)
+
+
+def _frames(tangents: Array, closed: bool) -> tuple[Array, Array]:
+    """Two normals [n x 3] at each point of a curve, carried along it without twist; of a closed one they come back."""
+    first = np.empty_like(tangents)
+    start = np.cross(tangents[0], np.eye(3)[np.argmin(np.abs(tangents[0]))])
+    first[0] = start / np.linalg.norm(start)
+    for i in range(1, len(tangents)):
+        first[i] = _carried(first[i - 1], tangents[i])
+    if closed:
+        back, side = _carried(first[-1], tangents[0]), np.cross(tangents[0], first[0])
+        twist = math.atan2(back @ side, back @ first[0])
+        angles = -twist * np.arange(len(tangents))[:, None] / len(tangents)
+        first = first * np.cos(angles) + np.cross(tangents, first) * np.sin(angles)
+    return first, np.cross(tangents, first)
+
+
+def _carried(normal: Array, tangent: Array) -> Array:
+    flat = normal - tangent * (normal @ tangent)
+    carried: Array = flat / np.linalg.norm(flat)
+    return carried
+
+
+def _disc(ring: Array, normal: Array) -> Mesh:
+    """A flat end whose rim is convex."""
+    fan = np.array([(0, k, k + 1) for k in range(1, len(ring) - 1)])
+    turned = np.cross(ring[1] - ring[0], ring[2] - ring[0]) @ normal < 0.0
+    return Mesh(ring, np.broadcast_to(normal, ring.shape).copy(), fan[:, ::-1].copy() if turned else fan)

@@ -1,0 +1,192 @@
+"""The names that Python users have: which they are, how they are called, that they are typed, and what they cost.
+
+`python_names.txt` holds them; a name that changes breaks somebody's program, so that changing the file is a decision.
+"""
+
+import ast
+import importlib
+import inspect
+import json
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+import kinetostat
+from kinetostat import (
+    InputError,
+    Machine,
+    Status,
+    analyze,
+    build,
+    bundled,
+    changed,
+    compare,
+    evaluate_grid,
+    guidelines,
+    load,
+    load_problem,
+    machine_picture,
+    optimize,
+    plot,
+    save,
+    sensitivity,
+    validate,
+    workspace,
+)
+
+SNAPSHOT = Path(__file__).with_name("python_names.txt")
+
+
+def signature(name):
+    """A name with its arguments as its source has them, on a line; of a class, its name alone."""
+    thing = getattr(kinetostat, name)
+    if inspect.isclass(thing):
+        return f"class {name}"
+    (function,) = ast.parse(textwrap.dedent(inspect.getsource(inspect.unwrap(thing)))).body
+    return f"{name}({ast.unparse(function.args)}) -> {ast.unparse(function.returns)}"
+
+
+def test_the_names_are_those_of_the_file():
+    assert SNAPSHOT.read_text().splitlines() == [signature(name) for name in sorted(kinetostat.__all__)]
+
+
+def test_every_name_has_its_type_for_editors():
+    stub = ast.parse(Path(kinetostat.__file__).with_suffix(".pyi").read_text())
+    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom) and node.module != "typing"]
+    typed = {alias.asname: node.module for node in imports for alias in node.names}
+    assert set(typed) == set(kinetostat.__all__) == set(dir(kinetostat))
+    for name, home in typed.items():
+        assert getattr(importlib.import_module(home), name) is getattr(kinetostat, name)
+
+
+def test_a_name_that_there_is_not_is_refused_with_those_that_there_are():
+    with pytest.raises(AttributeError, match=r"has no 'analyse'; it has .*analyze"):
+        kinetostat.analyse  # noqa: B018
+
+
+def test_importing_the_package_imports_nothing():
+    code = "import kinetostat, sys; print([m for m in sys.modules if m.startswith('kinetostat.') or m == 'numpy'])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_load_analyse_map_optimise_and_plot_in_five_lines(tmp_path):
+    machine = load("zhang-gosselin-4dof", ["stiffness.passive_links=rigid"])
+    assert analyze(machine).status is Status.OK
+    grid = evaluate_grid(machine, ["x=-1 cm:1 cm:3", "z=67 cm:69 cm:3"])
+    better = optimize(load_problem("zhang-gosselin-2002", ["optimizer.generations=2", "optimizer.population=8"]))
+    assert [save(plot(found), tmp_path / f"{n}.png").stat().st_size > 10_000 for n, found in enumerate([grid, better])]
+
+
+def test_a_machine_is_built_from_text_or_tables_as_from_its_file():
+    text = bundled()["tricept"]
+    assert build(text).sections == load("tricept").sections
+    tables = {
+        "schema": 1,
+        "name": "mine",
+        "family": "planar-3rpr",
+        "geometry": {
+            "base_radius": 0.4,
+            "base_angles": ["-90 deg", "30 deg", "150 deg"],
+            "platform_radius": "12 cm",
+            "platform_angles": ["-90 deg", "30 deg", "150 deg"],
+        },
+        "stiffness": {"actuator": "1 N/um"},
+        "pose": {"x": 0.0, "y": "1 cm", "angle": "5 deg"},
+    }
+    before = json.dumps(tables)
+    machine = build(tables, settings=["pose.y=2 cm"])
+    assert isinstance(machine, Machine)
+    assert machine.sections["pose"].y == 0.02
+    assert json.dumps(tables) == before
+    with pytest.raises(InputError, match="base_radius"):
+        build({**tables, "geometry": {"base_radius": "wide", "platform_radius": 0.1}})
+    with pytest.raises(InputError, match="not valid TOML"):
+        build("family =")
+
+
+def test_a_changed_machine_takes_numbers_and_text_and_leaves_the_first_alone():
+    machine = load("hexapod")
+    other = changed(machine, {"pose.x": "5 mm", "pose.y": 0.01})
+    assert (other.sections["pose"].x, other.sections["pose"].y) == (0.005, 0.01)
+    assert machine.sections["pose"].x == 0.0
+    with pytest.raises(InputError, match=r"pose\.x"):
+        changed(machine, {"pose.x": "5 kg"})
+
+
+def test_machines_are_compared_under_names_of_their_own():
+    machine = load("hexapod")
+    pair = [machine, changed(machine, {"pose.z": "16 cm"})]
+    assert [design.label for design in compare(pair).designs] == ["design 1", "design 2"]
+    named = compare(dict(zip(["low", "high"], pair, strict=True)))
+    assert [design.label for design in named.designs] == ["low", "high"]
+    assert named.rows == compare(pair).rows
+    assert {one.parameters[0].path for one in named.differences} == {"pose.z"}
+
+
+def answers():
+    machine = load("planar-3rpr")
+    ranges = ["x=-2 cm:2 cm:5", "y=-2 cm:2 cm:5"]
+    return {
+        "machine": machine,
+        "analysis": analyze(machine),
+        "grid": evaluate_grid(machine, ranges),
+        "workspace": workspace(machine, ranges),
+        "sensitivity": sensitivity(machine),
+        "guidelines": guidelines(machine),
+        "comparison": compare([machine, changed(machine, {"pose.x": 0.01})]),
+        "validation": validate(machine),
+    }
+
+
+@pytest.fixture(scope="module")
+def found():
+    return answers()
+
+
+@pytest.mark.parametrize("name", ["machine", "grid", "workspace", "sensitivity", "guidelines", "comparison"])
+def test_answers_have_a_figure(found, name):
+    figure = plot(found[name])
+    assert figure.axes
+    assert figure.get_size_inches().min() > 1.0
+
+
+def test_a_figure_that_there_is_not_is_refused_with_those_that_there_are(found):
+    assert plot(found["guidelines"], "design").axes
+    with pytest.raises(InputError, match="choose from design"):
+        plot(found["guidelines"], "spider web")
+    with pytest.raises(InputError, match="no figure of this Analysis"):
+        plot(found["analysis"])
+    with pytest.raises(InputError, match="int is no answer"):
+        plot(42)
+    with pytest.raises(InputError, match="no answer"):
+        plot(xr.Dataset())
+
+
+@pytest.mark.parametrize(
+    "name", ["analysis", "grid", "workspace", "sensitivity", "guidelines", "comparison", "validation"]
+)
+def test_answers_are_kept_as_plain_data(found, name, tmp_path):
+    path = save(found[name], tmp_path / "deep" / "answer.json")
+    assert isinstance(json.loads(path.read_text("utf-8")), dict)
+
+
+def test_what_is_kept_is_what_it_was(found, tmp_path):
+    assert load(save(found["machine"], tmp_path / "machine.toml")).sections == found["machine"].sections
+    assert xr.load_dataset(save(found["grid"], tmp_path / "grid.nc")).identical(found["grid"])
+    assert (save(found["machine"], tmp_path / "machine.glb")).read_bytes()[:4] == b"glTF"
+    small = machine_picture(found["machine"], (64, 48))
+    assert save(small, tmp_path / "small.PNG").read_bytes() == small
+    for suffix, start in ((".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")):
+        assert save(plot(found["grid"]), tmp_path / f"map{suffix}").read_bytes().startswith(start)
+
+
+@pytest.mark.parametrize(("name", "file"), [("machine", "machine.step"), ("grid", "grid.csv"), ("analysis", "noend")])
+def test_a_suffix_that_cannot_be_written_is_refused_with_those_that_can(found, name, file, tmp_path):
+    with pytest.raises(InputError, match=r"suffix of .*\.(json|toml)"):
+        save(found[name], tmp_path / file)
+    assert not list(tmp_path.iterdir())
