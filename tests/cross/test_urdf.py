@@ -35,6 +35,7 @@ FIVE_BAR = """<?xml version="1.0"?>
   </joint>
   <joint name="left wrist" type="fixed">
     <parent link="left rod"/> <child link="hand"/> <origin xyz="0.1853610612 0.0578037812 0" rpy="0 0 -0.3"/>
+    <axis xyz="0 0 0"/>
   </joint>
   <joint name="right motor" type="revolute">
     <parent link="floor"/> <child link="right crank"/> <origin xyz="0.1 0 0"/> <axis xyz="0 0 1"/>
@@ -142,7 +143,7 @@ def test_the_loops_stand_in_a_file_beside_it(tmp_path):
 
 
 def test_a_file_of_somebody_else(tmp_path):
-    """A five-bar: turned frames, axes of any length, motors by `independent` and by a transmission, a revolute loop."""
+    """A five-bar: turned frames, axes of any length or none, motors by attribute and transmission, a revolute loop."""
     found = analyze(read_text(FIVE_BAR, tmp_path))
     assert found.status is Status.OK
     assert found.mobility.actuators == found.mobility.full_cycle == 2

@@ -19,6 +19,8 @@ Array = npt.NDArray[np.float64]
 
 MOST_JOINTS = 2000
 """Joints of a file: more is a mistake."""
+AXISLESS = ("fixed", "spherical")
+"""Kinds of joints of which an axis, often written as 0 0 0, means nothing."""
 LARGEST_NUMBER = 1e100
 """Bound of every number in a file."""
 
@@ -230,9 +232,9 @@ class _Reader:
         found = element.find("axis")
         axis = np.array(numbers("1 0 0" if found is None else found.get("xyz", "1 0 0"), 3, f"{where}: axis"))
         size = float(np.linalg.norm(axis))
-        if size == 0.0:
+        if size == 0.0 and element.get("type") not in AXISLESS:
             raise InputError(f'{where}: its axis has no length; give a direction, e.g. <axis xyz="0 0 1"/>.')
-        return axis / size
+        return axis / (size or 1.0)
 
     def _placement(self, element: Element | None, where: str) -> Array:
         """A frame from xyz (m) and rpy (rad, fixed axes) [4 x 4]."""
