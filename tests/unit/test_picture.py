@@ -11,9 +11,10 @@ from kinetostat.algebra.vector import Displacement, Vector, rotation_x
 from kinetostat.machine.loading import load
 from kinetostat.spec.errors import InputError
 from kinetostat.views.picture import machine_picture, picture
+from kinetostat.views.rendering.body import Body, hits_of
 from kinetostat.views.rendering.camera import VIEWS, camera_on
 from kinetostat.views.rendering.light import casters_of, light_on
-from kinetostat.views.rendering.raster import depth_map, nearest_triangles
+from kinetostat.views.rendering.raster import depth_map, edges_of, nearest_triangles
 from kinetostat.views.scene import shapes
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.mesh import mesh_of
@@ -125,6 +126,23 @@ def test_triangles_cover_every_pixel_between_them_once():
     plane = (5.0 + 0.1 * x - 0.05 * y).ravel()
     assert near[inside] == pytest.approx(plane[inside], rel=1e-6)
     assert depth_map(points, nearness, triangles, side)[inside] == pytest.approx(plane[inside], rel=1e-6)
+
+
+def test_rays_meet_a_floor_where_it_is_however_steeply_it_runs_away():
+    place = Displacement(rotation_x(1.0, 0.0), Vector(0.0, 0.0, -0.1))
+    slab = Body([Solid("slab", shapes.block(20.0, 60.0, 0.1), "steel", place)])
+    seen = hits_of(slab, camera_on(slab.points, (0.0, -1.0, 0.3), 200, 150), 1)
+    top = seen.normals[:, 2] > 0.99
+    assert top.sum() > 100
+    assert seen.points[top, 2] == pytest.approx(0.0, abs=1e-4)
+    assert np.ptp(seen.points[top, 1]) > 50.0
+
+
+def test_shares_of_corners_add_up_and_are_1_at_their_own():
+    shares = edges_of(np.array([(0.0, 0.0), (0.0, 4.0), (4.0, 0.0)]), np.array([(0, 1, 2)])).weights(
+        np.array([0, 0]), np.array([0.0, 1.0]), np.array([4.0, 1.0])
+    )
+    assert shares.T.tolist() == [[0.0, 1.0, 0.0], [0.5, 0.25, 0.25]]
 
 
 def test_triangles_that_face_away_are_not_seen():

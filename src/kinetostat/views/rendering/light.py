@@ -1,4 +1,7 @@
-"""Sun and sky as many distant lamps, each with a map of what is in its way: light on points. Knows no colour."""
+"""Sun and sky as many distant lamps, each with a map of what is in its way: light on points. Knows no colour.
+
+Products are `einsum`, which stays in its thread; a matrix product would start threads of its own in each of ours.
+"""
 
 import math
 from collections.abc import Sequence
@@ -92,7 +95,7 @@ class Lamp:
 
     def reaches(self, points: Floats, aside: Floats) -> NDArray[np.bool_]:
         """Whether points [3 x n] (base frame, m) are lit, looked up `aside` by some pixels of the map [2 x n]."""
-        placed = self.axes @ points + self.shift
+        placed = np.einsum("ij,jn->in", self.axes, points) + self.shift
         column, row = np.clip(placed[:2] + aside, 0, self.side - 1).astype(np.int32)
         lit: NDArray[np.bool_] = self.nearest[row * self.side + column] <= -placed[2]
         return lit
@@ -126,7 +129,7 @@ def lamp_on(casters: Casters, direction: Array, side: int) -> Lamp:
     scale = np.array([0.5 * (side - 4) / casters.radius, 0.5 * (side - 4) / casters.radius, 1.0])
     axes = axes_towards(-direction) * scale[:, None]
     shift = np.array([0.5 * side, 0.5 * side, 0.0]) - axes @ casters.centre
-    placed = casters.points @ axes.T + shift
+    placed = np.einsum("nj,ij->ni", casters.points, axes) + shift
     nearest = depth_map(placed[:, :2], -placed[:, 2], casters.triangles, side)
     return Lamp(direction.astype(np.float32), axes.astype(np.float32), shift.astype(np.float32)[:, None], nearest, side)
 
@@ -136,7 +139,7 @@ def _fallen(lamps: Sequence[Lamp], radius: float, points: Floats, normals: Float
     lifted = points + normals * np.float32(2.0 * AWAY * radius / lamps[0].side)
     fallen = np.zeros((2, points.shape[1]), np.float32)
     for number, lamp in enumerate(lamps):
-        cosines = np.maximum(lamp.direction @ normals, 0.0)
+        cosines = np.maximum(np.einsum("i,in->n", lamp.direction, normals), 0.0)
         fallen[0] += cosines * lamp.reaches(lifted, aside if number % 2 else -aside[::-1])
         fallen[1] += cosines
     return fallen / np.float32(len(lamps))
