@@ -23,6 +23,7 @@ from kinetostat.commands.common import (
 )
 from kinetostat.commands.compare import add_compare_command
 from kinetostat.commands.doctor import add_doctor_command
+from kinetostat.commands.export import add_export_command
 from kinetostat.commands.grid import add_grid_commands
 from kinetostat.commands.guidelines import add_guidelines_command
 from kinetostat.commands.optimize import add_optimize_commands
@@ -79,7 +80,13 @@ def _parser() -> Parser:
     new = add_command(
         commands, "new", _new, "print a commented machine or study file", "kinetostat new passive-leg-4dof > mine.toml"
     )
-    new.add_argument("family", metavar="FAMILY", help="a family, see `kinetostat list`; or study, for a study file")
+    source = new.add_mutually_exclusive_group(required=True)
+    source.add_argument(
+        "family", metavar="FAMILY", nargs="?", help="a family, see `kinetostat list`; or study, for a study file"
+    )
+    source.add_argument(
+        "--from", metavar="FILE", type=Path, dest="urdf", help="a URDF with closed loops, as a machine leg by leg"
+    )
     schema = add_command(
         commands,
         "schema",
@@ -122,6 +129,7 @@ def _parser() -> Parser:
     add_guidelines_command(commands)
     add_compare_command(commands)
     add_optimize_commands(commands)
+    add_export_command(commands)
     add_studio_command(commands)
     reproduce = add_command(
         commands, "reproduce", _reproduce, "every table, equation and figure of the paper, printed beside computed",
@@ -163,6 +171,11 @@ def _list(options: argparse.Namespace) -> int:
 
 
 def _new(options: argparse.Namespace) -> int:
+    if options.urdf is not None:
+        from kinetostat.exchange.urdf_machine import machine_text
+
+        print(machine_text(options.urdf), end="")
+        return DONE
     from kinetostat.machine.loading import template
     from kinetostat.studies.bundled import study_template
 

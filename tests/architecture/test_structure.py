@@ -19,6 +19,7 @@ LAYERS = [
     "studies",
     "validation",
     "views",
+    "exchange",
 ]
 """From the bottom up (DESIGN section 4): each may import itself and those before it."""
 EDGES = ["commands", "cli", "studio", "__main__"]

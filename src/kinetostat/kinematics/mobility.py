@@ -122,6 +122,27 @@ def freedoms(configuration: Configuration, reference: Vector) -> Freedoms:
     return Freedoms(SPATIAL - rank, tuple(legs), spins, imposed - (rank - away), SPATIAL - _rank(holding))
 
 
+def task_coordinates(configuration: Configuration, reference: Vector) -> tuple[int, ...]:
+    """Coordinates that give the platform's freedoms, actuators free: as few as do, translations before rotations.
+
+    Args:
+        configuration: at the pose.
+        reference: point of reference of twists, base frame, m.
+
+    Returns:
+        Numbers of x y z rx ry rz = 0 ... 5, ascending.
+    """
+    constraints, _ = _platform_wrenches(configuration, reference)
+    count = SPATIAL - _rank(constraints)
+    turned = np.linalg.svd(constraints)[0][:, SPATIAL - count :]
+    free = np.vstack([turned[3:], turned[:3]])
+    kept: list[int] = []
+    for number in range(SPATIAL):
+        if _rank(free[[*kept, number]]) > len(kept):
+            kept.append(number)
+    return tuple(kept)
+
+
 def _drives(leg: Leg) -> list[Joint]:
     """The joints that actuators hold; one without stiffness holds nothing."""
     return [spring.joint for spring in leg.springs if spring.actuated and float(spring.stiffness) > 0.0]

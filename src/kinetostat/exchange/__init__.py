@@ -1,0 +1,1 @@
+"""The machine and its results in the formats of other programs, and back."""

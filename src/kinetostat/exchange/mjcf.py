@@ -1,0 +1,202 @@
+"""A machine as MuJoCo's XML (MJCF): bodies, joints with springs, closed loops by `connect` and `weld`, a look.
+
+What the machine consists of is `mjcf_model`'s, how fast it moves `mjcf_pace`'s.
+"""
+
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.exchange.mjcf_model import Body, Freedom, Model, build
+from kinetostat.exchange.mjcf_pace import IMPEDANCE, LEAST_STEPS, Pace, pace_of
+from kinetostat.exchange.names import printable
+from kinetostat.exchange.results import reference_point
+from kinetostat.kinetostatics.response import respond
+from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.storage import write_text
+
+Array = npt.NDArray[np.float64]
+
+THICKNESS = 0.008
+"""Radius of a link in the picture, as a share of the machine's extent."""
+NOTES = (
+    " Written by kinetostat; SI, axes of the machine's base. Springs are stiffnesses of joints, rigid parts have\n"
+    "     none. No gravity. xfrc_applied on the body 'platform': force, moment at the tool point (site 'tool').\n"
+    "     A load has settled after 'settling_time', s. Masses decide nothing that is static; those that the\n"
+    "     machine file does not say are as great as those it says, or 1 kg. Constraints are soft: keep timestep,\n"
+    "     solref and solimp as they are. "
+)
+"""What a reader of the file must know."""
+LEAST_EXTENT = 1e-3
+"""Size of a picture, m."""
+COLOURS = {
+    "link": "0.75 0.78 0.82 1",
+    "joint": "0.25 0.28 0.32 1",
+    "actuator": "0.90 0.49 0.13 1",
+    "spring": "0.20 0.55 0.75 1",
+    "platform": "0.16 0.44 0.36 1",
+    "base": "0.35 0.37 0.40 1",
+    "tool": "0.85 0.15 0.15 1",
+}
+"""Red, green, blue and opacity of what one sees."""
+
+
+def text_of(analysis: Analysis) -> str:
+    """The model: at rest, without gravity, unstressed at the pose; a wrench on the platform acts at the tool point.
+
+    Raises:
+        InputError: if the machine has a part that cannot be told.
+    """
+    model = build(respond(analysis.machine).configuration)
+    pace = pace_of(analysis, model)
+    middle, extent = _middle_and_extent(model)
+    radius = THICKNESS * extent
+    root = Element("mujoco", model=printable(analysis.machine.name))
+    root.append(ElementTree.Comment(NOTES))
+    SubElement(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="false")
+    option = SubElement(root, "option", timestep=_n(pace.step), gravity="0 0 0", integrator="Euler", solver="Newton")
+    option.set("tolerance", "1e-12")
+    option.set("iterations", "200")
+    SubElement(option, "flag", contact="disable")
+    SubElement(SubElement(root, "custom"), "numeric", name="settling_time", data=_n(pace.settling))
+    defaults = SubElement(root, "default")
+    SubElement(defaults, "geom", contype="0", conaffinity="0", mass="0")
+    stiff = {"solref": _n(LEAST_STEPS * pace.step, 1.0), "solimp": _n(IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0)}
+    SubElement(defaults, "equality", stiff)
+    SubElement(root, "statistic", extent=_n(extent), center=_n(*middle))
+    _look(root)
+    world = SubElement(root, "worldbody")
+    SubElement(world, "light", pos="0 0 4", dir="0 0 -1", diffuse="0.8 0.8 0.8")
+    _shapes(world, model.world, radius, "base")
+    for child in model.world.children:
+        _body(world, child, model.world, pace, radius)
+    _platform(world, model, pace, radius, np.array(reference_point(analysis)))
+    _constraints(root, model)
+    ElementTree.indent(root, " ")
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _middle_and_extent(model: Model) -> tuple[Array, float]:
+    """Middle and diagonal of the box that holds the machine, m."""
+    points = np.array([point for body in (model.platform, *model.world.every()) for point in (body.at, *body.reach)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    return (low + high) / 2.0, max(float(np.linalg.norm(high - low)), LEAST_EXTENT)
+
+
+def _look(root: Element) -> None:
+    """Light and colours."""
+    SubElement(root, "visual").append(Element("headlight", ambient="0.4 0.4 0.4", diffuse="0.5 0.5 0.5"))
+    asset = SubElement(root, "asset")
+    SubElement(
+        asset, "texture", type="skybox", builtin="gradient", rgb1="0.95 0.97 1", rgb2="0.75 0.8 0.88", width="64",
+        height="64",
+    )  # fmt: skip
+    for name, colour in COLOURS.items():
+        SubElement(asset, "material", name=name, rgba=colour)
+
+
+def _body(parent: Element, body: Body, before: Body, pace: Pace, radius: float) -> None:
+    element = SubElement(parent, "body", name=body.name, pos=_n(*(body.at - before.at)))
+    _inertia(element, pace.masses[body.name], pace.gyration, np.zeros(3))
+    for freedom in body.freedoms:
+        _joint(element, freedom, body, pace)
+    _shapes(element, body, radius, "link")
+    for freedom in body.freedoms:
+        _joint_shape(element, freedom, body, radius)
+    for child in body.children:
+        _body(element, child, body, pace, radius)
+
+
+def _inertia(element: Element, mass: float, gyration: float, at: Array) -> None:
+    SubElement(element, "inertial", pos=_n(*at), mass=_n(mass), diaginertia=_n(*[mass * gyration**2] * 3))
+
+
+def _joint(element: Element, freedom: Freedom, body: Body, pace: Pace) -> None:
+    joint = SubElement(element, "joint", name=freedom.name, axis=_n(*freedom.axis))
+    joint.set("type", "slide" if freedom.point is None else "hinge")
+    if freedom.point is not None:
+        joint.set("pos", _n(*(freedom.point - body.at)))
+    if freedom.stiffness > 0.0:
+        joint.set("stiffness", _n(freedom.stiffness))
+        joint.set("damping", _n(pace.damping(freedom.stiffness)))
+        joint.set("armature", _n(pace.armature(freedom.stiffness)))
+
+
+def _shapes(element: Element, body: Body, radius: float, material: str) -> None:
+    """The links of a body: rods from its origin to where others begin."""
+    for point in body.reach:
+        if material == "base":
+            SubElement(element, "geom", type="sphere", size=_n(1.6 * radius), pos=_n(*point), material=material)
+        else:
+            _rod(element, np.zeros(3), point - body.at, radius, material)
+
+
+def _rod(element: Element, start: Array, end: Array, radius: float, material: str) -> None:
+    if float(np.linalg.norm(end - start)) > 0.1 * radius:
+        SubElement(element, "geom", type="capsule", fromto=_n(*start, *end), size=_n(radius), material=material)
+
+
+def _joint_shape(element: Element, freedom: Freedom, body: Body, radius: float) -> None:
+    """A hinge is a pin, a slide a longer one; springs are coloured."""
+    material = "actuator" if freedom.actuated else "spring" if freedom.stiffness > 0.0 else "joint"
+    middle = np.zeros(3) if freedom.point is None else freedom.point - body.at
+    half = freedom.axis * radius * (4.0 if freedom.point is None else 1.8)
+    size = _n((1.4 if freedom.point is None else 1.2) * radius)
+    SubElement(element, "geom", type="cylinder", fromto=_n(*(middle - half), *(middle + half)), size=size).set(
+        "material", material
+    )
+
+
+def _platform(world: Element, model: Model, pace: Pace, radius: float, tool: Array) -> None:
+    """The platform: free, its centre of mass at the tool point, so that loads on it act there."""
+    body = model.platform
+    element = SubElement(world, "body", name=body.name, pos=_n(*body.at))
+    SubElement(element, "freejoint", name=body.name)
+    _inertia(element, pace.masses[body.name], pace.gyration, tool - body.at)
+    _shapes(element, body, radius, "platform")
+    SubElement(element, "geom", type="sphere", size=_n(1.5 * radius), material="platform")
+    ring = [*body.reach, body.reach[0]]
+    for start, end in pairwise(ring):
+        _rod(element, start - body.at, end - body.at, radius, "platform")
+    _rod(element, np.zeros(3), tool - body.at, 0.6 * radius, "tool")
+    SubElement(element, "site", name="tool", pos=_n(*(tool - body.at)), size=_n(1.5 * radius), material="tool")
+
+
+def _constraints(root: Element, model: Model) -> None:
+    equality = SubElement(root, "equality")
+    places = {body.name: body.at for body in [*model.world.every(), model.platform]}
+    for closing in model.closings:
+        first, second = closing.bodies
+        if closing.ball:
+            anchor = closing.point - places[first]
+            SubElement(equality, "connect", body1=first, body2=second, anchor=_n(*anchor))
+        else:
+            anchor = closing.point - places[second]
+            SubElement(equality, "weld", body1=first, body2=second, anchor=_n(*anchor))
+    for thread in model.threads:
+        SubElement(equality, "joint", joint1=thread.slide, joint2=thread.hinge, polycoef=_n(0.0, thread.pitch, 0, 0, 0))
+
+
+def _n(*numbers: float) -> str:
+    """Numbers with all their digits."""
+    return " ".join(_digits(numbers))
+
+
+def _digits(numbers: Iterable[float]) -> Iterator[str]:
+    for number in numbers:
+        yield repr(float(number)).removesuffix(".0")
+
+
+def write(analysis: Analysis, path: Path) -> list[Path]:
+    """Write the model.
+
+    Raises:
+        InputError: if the machine has a part that cannot be told.
+    """
+    write_text(path, text_of(analysis))
+    return [path]

@@ -1,0 +1,270 @@
+"""A URDF file as links, joints and loops with their places at zero joint coordinates. Data only: nothing is resolved.
+
+No document type is accepted, so that no entity can be defined, let alone expanded; size and counts are bounded.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.spec.document import LARGEST_FILE
+from kinetostat.spec.errors import InputError, shorten
+
+Array = npt.NDArray[np.float64]
+
+MOST_JOINTS = 2000
+"""Joints of a file: more is a mistake."""
+AXISLESS = ("fixed", "spherical")
+"""Kinds of joints of which an axis, often written as 0 0 0, means nothing."""
+LARGEST_NUMBER = 1e100
+"""Bound of every number in a file."""
+
+
+@dataclass(frozen=True)
+class FileJoint:
+    """A joint of the file, placed at zero joint coordinates.
+
+    Attributes:
+        name, kind: as written.
+        parent, child: names of its links.
+        frame: of itself and of its child, in the root link's frame, m [4 x 4].
+        axis: unit vector in the root link's frame; of a fixed joint without meaning.
+        actuated: by a <transmission>, `independent`, or as its extension says.
+        mimics: name and multiplier of the joint that it follows, None if it follows none.
+        extension: attributes of its element <kinetostat>.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    frame: Array
+    axis: Array
+    actuated: bool
+    mimics: tuple[str, float] | None
+    extension: dict[str, str]
+
+
+@dataclass(frozen=True)
+class FileLoop:
+    """A closed loop: two links with the frame of the joint between them, seen from each [4 x 4], and its axis."""
+
+    name: str
+    kind: str
+    links: tuple[str, str]
+    frames: tuple[Array, Array]
+    axis: Array
+
+
+@dataclass(frozen=True)
+class UrdfFile:
+    """What a file says.
+
+    Attributes:
+        origin: name of the file, for messages.
+        name: of the robot.
+        about: attributes of the element <kinetostat> of the robot.
+        root: name of the link that hangs on none.
+        joints: by name of their child link.
+        frames: of every link in the root link's frame, m [4 x 4].
+        loops: in the order of the file.
+    """
+
+    origin: str
+    name: str
+    about: dict[str, str]
+    root: str
+    joints: dict[str, FileJoint]
+    frames: dict[str, Array]
+    loops: tuple[FileLoop, ...]
+
+
+class _NoDocumentType(TreeBuilder):
+    """Builds elements; a document type, in which entities are defined, ends the reading."""
+
+    def doctype(self, name: str, *_identifiers: str | None) -> None:
+        """Refuse it."""
+        raise InputError(f"The file declares a document type ({shorten(name)}); remove the line <!DOCTYPE ...>.")
+
+
+def read(path: Path) -> UrdfFile:
+    """The links, joints and loops of a file.
+
+    Raises:
+        InputError: no such file, too large, not XML, not URDF, or a joint or number that makes no sense.
+    """
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(LARGEST_FILE + 1)
+    except OSError as error:
+        raise InputError(f'"{path}" cannot be read: {error.strerror}.') from None
+    if len(data) > LARGEST_FILE:
+        raise InputError(f'"{path}" is larger than {LARGEST_FILE >> 20} MiB; keep meshes out of the file.')
+    return parse(data, str(path))
+
+
+def parse(data: bytes, origin: str) -> UrdfFile:
+    """The same of the bytes of a file; `origin` names it in messages.
+
+    Raises:
+        InputError: as `read`.
+    """
+    parser = XMLParser(target=_NoDocumentType())
+    try:
+        parser.feed(data)
+        robot = parser.close()
+    except (ParseError, LookupError, ValueError) as error:
+        said = str(error) if isinstance(error, InputError) else f"it is not XML: {error}."
+        raise InputError(f'"{origin}": {said}') from None
+    if robot.tag != "robot":
+        raise InputError(f'"{origin}" is not a URDF: its root is <{robot.tag}>, not <robot>.')
+    return _Reader(robot, origin).read()
+
+
+class _Reader:
+    """A file while it is read."""
+
+    def __init__(self, robot: Element, origin: str) -> None:
+        self._robot, self._origin = robot, origin
+        self._links = [self._text(link, "name", "a link") for link in robot.findall("link")]
+        self._elements = robot.findall("joint")
+        transmitted = robot.findall("transmission/joint")
+        self._driven = {joint.get("name") for joint in transmitted}
+        if not 1 <= len(self._elements) <= MOST_JOINTS:
+            raise InputError(f'"{origin}" has {len(self._elements)} joints; it needs 1 to {MOST_JOINTS:,}.')
+
+    def read(self) -> UrdfFile:
+        """Everything, placed."""
+        children: dict[str, list[Element]] = {}
+        parents: dict[str, str] = {}
+        for element in self._elements:
+            where = self._where(element)
+            parent, child = (self._link(element, end, where) for end in ("parent", "child"))
+            if child in parents:
+                raise InputError(f"{where}: link {shorten(child)} hangs on two joints; close the loop with <loop>.")
+            parents[child] = parent
+            children.setdefault(parent, []).append(element)
+        roots = [link for link in self._links if link not in parents]
+        if len(roots) != 1:
+            raise InputError(f'"{self._origin}" needs one link that hangs on no joint, the base; it has {len(roots)}.')
+        frames: dict[str, Array] = {roots[0]: np.eye(4)}
+        joints: dict[str, FileJoint] = {}
+        pending = [roots[0]]
+        while pending:
+            parent = pending.pop()
+            for element in children.get(parent, ()):
+                joint = self._joint(element, parent, frames[parent])
+                joints[joint.child], frames[joint.child] = joint, joint.frame
+                pending.append(joint.child)
+        if len(frames) < len(self._links):
+            lost = next(link for link in self._links if link not in frames)
+            raise InputError(f'"{self._origin}": link {shorten(lost)} hangs on itself; joints must form a tree.')
+        loops = tuple(self._loops(frames))
+        about = self._robot.find("kinetostat")
+        name = self._robot.get("name", "machine")
+        return UrdfFile(
+            self._origin, name, dict(about.attrib if about is not None else {}), roots[0], joints, frames, loops
+        )
+
+    def _joint(self, element: Element, parent: str, frame: Array) -> FileJoint:
+        where = self._where(element)
+        own = frame @ self._placement(element.find("origin"), where)
+        extension = element.find("kinetostat")
+        said = dict(extension.attrib if extension is not None else {})
+        name = self._text(element, "name", "a joint")
+        driven = name in self._driven or "true" in (element.get("independent"), said.get("actuated"))
+        return FileJoint(
+            name,
+            self._text(element, "type", where),
+            parent,
+            self._link(element, "child", where),
+            own,
+            own[:3, :3] @ self._axis(element, where),
+            driven,
+            self._mimics(element, where),
+            said,
+        )
+
+    def _mimics(self, element: Element, where: str) -> tuple[str, float] | None:
+        found = element.find("mimic")
+        if found is None:
+            return None
+        return self._text(found, "joint", where), numbers(found.get("multiplier", "1"), 1, f"{where}: multiplier")[0]
+
+    def _loops(self, frames: dict[str, Array]) -> Iterator[FileLoop]:
+        for element in self._robot.findall("loop"):
+            where = f'"{self._origin}": loop {shorten(element.get("name", ""))}'
+            ends = [element.find(end) for end in ("predecessor", "successor")]
+            links, places = [], []
+            for end in ends:
+                link = None if end is None else end.get("link", end.get("name"))
+                if end is None or link not in frames:
+                    raise InputError(f"{where} must name two links of the file, as <predecessor> and <successor>.")
+                links.append(link)
+                places.append(frames[link] @ self._placement(end.find("origin"), where))
+            axis = places[0][:3, :3] @ self._axis(element, where)
+            name, kind = self._text(element, "name", "a loop"), element.get("type", "fixed")
+            yield FileLoop(name, kind, (links[0], links[1]), (places[0], places[1]), axis)
+
+    def _where(self, element: Element) -> str:
+        return f'"{self._origin}": joint {shorten(element.get("name", ""))}'
+
+    def _text(self, element: Element, key: str, where: str) -> str:
+        value = element.get(key, "").strip()
+        if not value:
+            prefix = where if where.startswith('"') else f'"{self._origin}": {where}'
+            raise InputError(f"{prefix} has no {key}; every one needs it.")
+        return value
+
+    def _link(self, element: Element, end: str, where: str) -> str:
+        found = element.find(end)
+        link = "" if found is None else found.get("link", "")
+        if link not in self._links:
+            raise InputError(f"{where}: its {end} link is {shorten(link)}, which the file does not define.")
+        return link
+
+    def _axis(self, element: Element, where: str) -> Array:
+        found = element.find("axis")
+        axis = np.array(numbers("1 0 0" if found is None else found.get("xyz", "1 0 0"), 3, f"{where}: axis"))
+        size = float(np.linalg.norm(axis))
+        if size == 0.0 and element.get("type") not in AXISLESS:
+            raise InputError(f'{where}: its axis has no length; give a direction, e.g. <axis xyz="0 0 1"/>.')
+        return axis / (size or 1.0)
+
+    def _placement(self, element: Element | None, where: str) -> Array:
+        """A frame from xyz (m) and rpy (rad, fixed axes) [4 x 4]."""
+        frame = np.eye(4)
+        if element is not None:
+            frame[:3, 3] = numbers(element.get("xyz", "0 0 0"), 3, f"{where}: xyz")
+            frame[:3, :3] = _turned(*numbers(element.get("rpy", "0 0 0"), 3, f"{where}: rpy"))
+        return frame
+
+
+def numbers(text: str, count: int, where: str) -> list[float]:
+    """So many finite numbers from a text with blanks between.
+
+    Raises:
+        InputError: other words, or another number of them.
+    """
+    try:
+        found = [float(word) for word in text.split()]
+    except ValueError:
+        found = []
+    if len(found) != count or not all(math.isfinite(c) and abs(c) < LARGEST_NUMBER for c in found):
+        wanted = "a number" if count == 1 else f"{count} numbers"
+        raise InputError(f"{where} is {shorten(text)}; it must be {wanted}, SI.")
+    return found
+
+
+def _turned(roll: float, pitch: float, yaw: float) -> Array:
+    """Rz(yaw) Ry(pitch) Rx(roll) [3 x 3]."""
+    (ca, sa), (cb, sb), (cc, sc) = ((math.cos(angle), math.sin(angle)) for angle in (roll, pitch, yaw))
+    about_x = np.array([[1, 0, 0], [0, ca, -sa], [0, sa, ca]])
+    about_y = np.array([[cb, 0, sb], [0, 1, 0], [-sb, 0, cb]])
+    about_z = np.array([[cc, -sc, 0], [sc, cc, 0], [0, 0, 1]])
+    return np.asarray(about_z @ about_y @ about_x)

@@ -1,0 +1,108 @@
+"""`kinetostat export` and `kinetostat new --from`, as a new user types them."""
+
+import struct
+from xml.etree import ElementTree
+
+import pytest
+
+from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
+from kinetostat.commands.export import FORMATS
+from kinetostat.exchange.formats import KNOWN
+from kinetostat.machine.loading import bundled
+
+MACHINE = "zhang-gosselin-4dof"
+
+
+@pytest.mark.parametrize("one", KNOWN, ids=lambda one: one.name)
+def test_every_format_is_written(one, tmp_path, capsys):
+    path = tmp_path / f"out{one.suffix}"
+    assert main(["export", MACHINE, "--to", one.name, "-o", str(path)]) == DONE
+    assert str(path) in capsys.readouterr().out.replace("\n", "")
+    assert path.stat().st_size > 100
+    assert not [other for other in tmp_path.iterdir() if other.name.startswith(".")]
+
+
+def test_help_names_every_format():
+    assert FORMATS.replace(" or ", ", ").split(", ") == [one.name for one in KNOWN]
+
+
+def test_the_suffix_names_the_format_and_the_machine_the_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", MACHINE, "-o", "k.inp"]) == DONE
+    assert "*USER ELEMENT" in (tmp_path / "k.inp").read_text()
+    assert main(["export", MACHINE, "--to", "nastran"]) == DONE
+    assert (tmp_path / f"{MACHINE}.bdf").is_file()
+
+
+def test_glb_is_gltf_binary(tmp_path):
+    path = tmp_path / "machine.glb"
+    assert main(["export", MACHINE, "-o", str(path)]) == DONE
+    data = path.read_bytes()
+    magic, version, length = struct.unpack("<4sII", data[:12])
+    assert (magic, version, length) == (b"glTF", 2, len(data))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        ([MACHINE], BAD_INPUT, "give --to"),
+        ([MACHINE, "--to", "step"], BAD_INPUT, "choose from mjcf, urdf"),
+        ([MACHINE, "-o", "a.docx"], BAD_INPUT, "ends as one of"),
+        (["nope", "--to", "csv"], BAD_INPUT, "neither a file nor a bundled machine"),
+        ([MACHINE, "--to", "csv", "--set", "pose.z=3 m"], NO_ANSWER, "span 3 m"),
+        ([MACHINE, "--to", "ansys", "--set", "stiffness.passive_links=rigid"], BAD_INPUT, "K is not finite"),
+    ],
+)
+def test_what_cannot_be_written_is_said(arguments, code, told, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", *arguments]) == code
+    message = capsys.readouterr().err
+    assert told in message
+    assert "Traceback" not in message
+    assert not list(tmp_path.iterdir()), "nothing is left behind"
+
+
+def test_a_place_that_cannot_be_written_keeps_what_was_there(tmp_path, capsys):
+    (tmp_path / "file").write_text("mine")
+    assert main(["export", MACHINE, "-o", str(tmp_path / "file" / "k.csv")]) == BAD_INPUT
+    assert "cannot be written" in capsys.readouterr().err
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_a_machine_written_out_is_read_in(tmp_path, capsys):
+    urdf, own = tmp_path / "tripteron.urdf", tmp_path / "own.toml"
+    assert main(["export", "tripteron", "-o", str(urdf)]) == DONE
+    capsys.readouterr()
+    assert main(["new", "--from", str(urdf)]) == DONE
+    own.write_text(capsys.readouterr().out, encoding="utf-8")
+    assert main(["check", str(own)]) == DONE
+    assert "legs.z.slide.stiffness" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("to", ["mjcf", "urdf", "nastran", "abaqus", "ansys"])
+def test_a_name_stays_a_name(to, tmp_path):
+    """Whatever people call their machine, it adds no line and no element to a file."""
+    own, path = tmp_path / "own.toml", tmp_path / "out"
+    text = bundled()["hexapod"].replace('name   = "', 'name   = "a\\u0001b\\nSPC,1,2\\"<x/>&é ', 1)
+    own.write_text(text, encoding="utf-8")
+    assert main(["export", str(own), "--to", to, "-o", str(path)]) == DONE
+    written = path.read_text(encoding="utf-8")
+    assert "\nSPC" not in written
+    if to in ("mjcf", "urdf"):
+        root = ElementTree.fromstring(written)
+        assert 'a?b?SPC,1,2"<x/>&é' in (root.get("model") or root.get("name"))
+
+
+def test_the_loops_do_not_replace_the_machine(tmp_path, capsys):
+    assert main(["export", MACHINE, "--to", "urdf", "-o", str(tmp_path / "m.yaml")]) == BAD_INPUT
+    assert "another suffix" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_new_wants_a_family_or_a_file(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["new"])
+    assert ended.value.code == BAD_INPUT
+    assert "FAMILY --from is required" in capsys.readouterr().err
+    assert main(["new", "--from", "missing.urdf"]) == BAD_INPUT
+    assert '"missing.urdf" cannot be read' in capsys.readouterr().err

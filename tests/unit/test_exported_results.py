@@ -1,0 +1,104 @@
+"""Results for other programs: CSV, NetCDF and MATLAB say what the analysis says, with units."""
+
+import csv
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.io import loadmat
+
+from kinetostat.exchange.formats import KNOWN, choose
+from kinetostat.machine.loading import load
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.analysis import analyze
+
+WITH_TOOL = ('tool.offset=["10 mm", "0 mm", "-80 mm"]',)
+
+
+def written(name, to, tmp_path, *settings):
+    found = analyze(load(name, settings))
+    (path,) = choose(to, None).write(found, tmp_path / f"{name}.{to}")
+    return found, path
+
+
+@pytest.mark.parametrize("name", ["zhang-gosselin-4dof", "planar-3rpr"])
+def test_netcdf_holds_k_and_c_by_the_names_of_their_rows(name, tmp_path):
+    found, path = written(name, "netcdf", tmp_path, *WITH_TOOL)
+    with xr.open_dataset(path, engine="h5netcdf") as dataset:
+        assert dataset["stiffness"].dims == ("row", "column")
+        assert list(dataset["row"].values) == list(found.components)
+        assert dataset["stiffness"].values.tolist() == found.stiffness
+        assert (
+            dataset["compliance"].sel(row="x", column="rz")
+            == found.compliance[-2 if name[0] == "p" else 3][list(found.components).index("rz")]
+        )
+        assert dataset["compliance_share"].sel(spring=found.shares[0].name).values.tolist() == pytest.approx(
+            list(found.shares[0].compliance)
+        )
+        assert all("units" in variable.attrs for variable in dataset.data_vars.values())
+        assert dataset["pose_x"].attrs["units"] == "m"
+
+
+def test_the_tool_point_is_where_the_tool_is(tmp_path):
+    found, path = written("zhang-gosselin-4dof", "netcdf", tmp_path, *WITH_TOOL)
+    position, rotation = found.platform
+    with xr.open_dataset(path, engine="h5netcdf") as dataset:
+        away = dataset["tool_point"].values - np.array(position)
+    assert np.array(rotation).T @ away == pytest.approx([0.01, 0.0, -0.08])
+
+
+@pytest.mark.parametrize("name", ["zhang-gosselin-4dof", "planar-3rpr"])
+def test_csv_has_a_number_a_line_with_its_unit(name, tmp_path):
+    found, path = written(name, "csv", tmp_path)
+    rows = list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+    told = {(row["quantity"], row["row"], row["column"]): (row["value"], row["unit"]) for row in rows}
+    size = len(found.components)
+    for i, row in enumerate(found.components):
+        for j, column in enumerate(found.components):
+            assert float(told["compliance", row, column][0]) == found.compliance[i][j]
+    assert sum(row["quantity"] == "stiffness" for row in rows) == size**2
+    assert told["stiffness", "rz", "rz"][1] == "N·m/rad"
+    assert told["stiffness", "rz", "x"][1] == told["stiffness", "x", "rz"][1] == "N/rad"
+    assert told["compliance", "x", "y"][1] == "m/N"
+    drive = next(share for share in found.shares if "actuator" in share.name)
+    assert told["spring_stiffness", drive.name, ""] == (repr(drive.stiffness), "N/m")
+
+
+def test_what_is_not_finite_is_left_out(tmp_path):
+    _, path = written("zhang-gosselin-4dof", "csv", tmp_path, "stiffness.passive_links=rigid")
+    text = path.read_text(encoding="utf-8")
+    assert "\nstiffness," not in text
+    assert "\ncompliance,rz,rz,0.0," in text
+    assert "\nspring_stiffness,passive link 1,,inf," in text
+
+
+def test_matlab_reads_matrices_pose_and_units(tmp_path):
+    found, path = written("zhang-gosselin-4dof", "mat", tmp_path, *WITH_TOOL)
+    data = loadmat(path, squeeze_me=True)
+    assert data["K"].tolist() == found.stiffness
+    assert data["C"].tolist() == found.compliance
+    assert data["order"].tolist() == ["rx", "ry", "rz", "x", "y", "z"]
+    assert data["reference_point"].shape == (3,)
+    assert float(data["pose"]["z"]) == 0.68
+    assert str(data["units"]["K"]) == "N·m/rad, N/rad, N/m"
+    assert set(data["pose"].dtype.names) == {"x", "z", "theta5", "theta6"}
+
+
+def test_matlab_has_no_matrix_where_there_is_none(tmp_path):
+    _, path = written("zhang-gosselin-4dof", "mat", tmp_path, "stiffness.passive_links=rigid")
+    data = loadmat(path)
+    assert data["K"].size == 0
+    assert data["C"].shape == (6, 6)
+
+
+@pytest.mark.parametrize("one", KNOWN, ids=lambda one: one.name)
+def test_a_format_is_found_by_name_and_by_suffix(one, tmp_path):
+    assert choose(one.name, None) is one
+    assert choose(None, tmp_path / f"machine{one.suffix}") is one
+
+
+def test_an_unknown_format_is_refused(tmp_path):
+    with pytest.raises(InputError, match='"mjfc"; did you mean "mjcf"'):
+        choose("mjfc", None)
+    with pytest.raises(InputError, match=r"ends as one of: mjcf \(\.xml\)"):
+        choose(None, tmp_path / "machine.step")
