@@ -1,5 +1,5 @@
 // Designs as points over two objectives: the knee and the machine as it was are marked; a click or Enter picks one.
-import { colour } from "kinetostat-studio/theme.js";
+import { colour } from "kinetostat-scene/theme.js";
 import { frame, niceTicks, plot, prepare, short } from "kinetostat-studio/plot_axes.js";
 
 const NEAR = 18; // pixels within which a click means a point

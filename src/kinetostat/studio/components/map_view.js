@@ -1,5 +1,5 @@
 // A map of one quantity over two coordinates; a click or an arrow key asks the machine to go there.
-import { colour } from "kinetostat-studio/theme.js";
+import { colour } from "kinetostat-scene/theme.js";
 import { frame, niceTicks, plot, prepare, short } from "kinetostat-studio/plot_axes.js";
 
 const VIRIDIS = [
