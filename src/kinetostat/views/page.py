@@ -25,7 +25,7 @@ def whole_page(title: str, style: str, body: Iterable[str]) -> str:
     """
     head = (
         '<!doctype html>\n<html lang="en-GB">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(title)}</title>\n<style>\n{STYLE}{style}</style>\n</head>\n"
     )
     return f"{head}<body>\n" + "\n".join(body) + "\n</body>\n</html>\n"
