@@ -27,6 +27,7 @@ from kinetostat.commands.export import add_export_command
 from kinetostat.commands.grid import add_grid_commands
 from kinetostat.commands.guidelines import add_guidelines_command
 from kinetostat.commands.optimize import add_optimize_commands
+from kinetostat.commands.report import add_report_command
 from kinetostat.commands.sensitivity import add_sensitivity_command
 from kinetostat.commands.studio import add_studio_command
 from kinetostat.commands.workspace import add_workspace_command
@@ -39,6 +40,7 @@ EXAMPLES = """examples:
   kinetostat map     zhang-gosselin-4dof --over "x=-2 cm:2 cm:41" --over "z=66 cm:70 cm:41" -o maps
   kinetostat optimize zhang-gosselin-2002 -o better
   kinetostat validate tripteron
+  kinetostat report tripteron -o report.html
   kinetostat reproduce
   kinetostat doctor
 """
@@ -130,6 +132,7 @@ def _parser() -> Parser:
     add_compare_command(commands)
     add_optimize_commands(commands)
     add_export_command(commands)
+    add_report_command(commands)
     add_studio_command(commands)
     reproduce = add_command(
         commands, "reproduce", _reproduce, "every table, equation and figure of the paper, printed beside computed",

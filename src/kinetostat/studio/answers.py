@@ -6,14 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.algebra.screw import Wrench
-from kinetostat.algebra.vector import Vector
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Array, Axis, Grid
 from kinetostat.kinematics.singularity import free_twist
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.deflected import deflected_links
-from kinetostat.kinetostatics.loading import deflection
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import SINGULAR, Response, respond
 from kinetostat.machine.limits import is_set
@@ -22,6 +18,7 @@ from kinetostat.machine.parameters import find, values
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.sensitivity import Sensitivity, sensitivity
 from kinetostat.views.scene import machine_scene as scenes
+from kinetostat.views.scene.overlaid import overlays_of
 from kinetostat.views.scene.overlays import Measure, twist_solids
 from kinetostat.views.scene.profiles import Proportions
 from kinetostat.views.scene.solids import Scene, as_data, solid_data
@@ -99,19 +96,8 @@ class Report:
 
 def report(wish: ReportWish) -> Report:
     """Everything that one pose has to say."""
-    machine, found = wish.machine, analyze(wish.machine)
-    if found.status is not Status.OK or found.indices is None:
-        return Report(found, [], None)
-    response = respond(machine)
-    configuration = response.configuration
-    solids = scenes.response_overlays(machine, configuration, wish.sizes, found.indices.principal)
-    factor = None
-    if found.load is not None:
-        load = Wrench(Vector(*found.load.wrench[:3]), Vector(*found.load.wrench[3:]))
-        motion = deflection(response.compliance, load)
-        moved = scenes.Deflection(load, motion, tuple(deflected_links(response, load)))
-        ghost, factor = scenes.deflection_overlays(machine, configuration, wish.sizes, moved, wish.exaggeration)
-        solids += ghost
+    found = analyze(wish.machine)
+    solids, factor = overlays_of(found, wish.sizes, wish.exaggeration)
     return Report(found, [solid_data(solid) for solid in solids], factor)
 
 

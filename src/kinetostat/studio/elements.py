@@ -5,13 +5,14 @@ from pathlib import Path
 import nicegui.elements.scene  # noqa: F401  (registers three.js, which NiceGUI brings with it)
 from nicegui.element import Element
 
+from kinetostat.views.scene.browser import RENDERER
 from kinetostat.views.scene.looks import looks_data
 
 COMPONENTS = Path(__file__).parent / "components"
-MODULES = {"kinetostat-studio": str(COMPONENTS)}
+MODULES = {"kinetostat-studio": str(COMPONENTS), "kinetostat-scene": str(RENDERER)}
 
 
-class MachineView(Element, component=COMPONENTS / "machine_view.js", esm=MODULES):
+class MachineView(Element, component=RENDERER / "machine_view.js", esm=MODULES):
     """Scenes of solids, with light, shadows and a camera; methods `show`, `overlay`, `look`."""
 
     def __init__(self, label: str) -> None:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 from rich.console import Console
+from rich.table import Table
 
 from kinetostat.kinetostatics.eigenscrews import Eigenscrew
 from kinetostat.kinetostatics.indices import PrincipalStiffness
@@ -27,57 +28,69 @@ def print_analysis(console: Console, analysis: Analysis, along: Sequence[Along] 
     point = "the tool point T" if any(machine.sections["tool"].offset) else "the platform point P"
     about = f"Components {' '.join(names)} at {point}, {analysis.axes} axes. Rank {analysis.rank}."
     console.print(about, style="dim", highlight=False)
-    _print_matrix(
-        console, f"Stiffness K ({UNITS_OF_K})", names, analysis.stiffness, analysis.stiffness_diagonal, "rigid"
-    )
-    _print_matrix(
-        console, f"Compliance C ({UNITS_OF_C})", names, analysis.compliance, analysis.compliance_diagonal, "free"
-    )
-    _print_shares(console, analysis, full)
-    _print_directions(console, analysis)
-    _print_along(console, along)
+    console.print(stiffness_table(analysis))
+    console.print(compliance_table(analysis))
+    console.print(shares_table(analysis, full))
+    shown = [principal_table(analysis), along_table(along)]
     if full and analysis.indices:
-        _print_eigenscrews(console, analysis.indices.eigenscrews)
+        shown.append(eigenscrew_table(analysis.indices.eigenscrews))
     if analysis.load:
-        _print_load(console, names, analysis.load)
-    _print_summary(console, analysis)
+        shown += [load_table(names, analysis.load), actuator_table(analysis.load), reaction_table(analysis.load)]
+    for table in shown:
+        if table.row_count:
+            console.print(table)
+    for line in remarks(analysis):
+        console.print(line, highlight=False, markup=False)
 
 
-def _print_matrix(
-    console: Console, title: str, names: Sequence[str], rows: Rows | None, diagonal: Sequence[float], endless: str
-) -> None:
+def stiffness_table(analysis: Analysis) -> Table:
+    """K, or its diagonal where a direction is rigid."""
+    title = f"Stiffness K ({UNITS_OF_K})"
+    return _matrix_table(title, analysis.components, analysis.stiffness, analysis.stiffness_diagonal, "rigid")
+
+
+def compliance_table(analysis: Analysis) -> Table:
+    """C, or its diagonal where a direction is free."""
+    title = f"Compliance C ({UNITS_OF_C})"
+    return _matrix_table(title, analysis.components, analysis.compliance, analysis.compliance_diagonal, "free")
+
+
+def _matrix_table(
+    title: str, names: Sequence[str], rows: Rows | None, diagonal: Sequence[float], endless: str
+) -> Table:
     table = numeric_table(title, "", names)
     if rows is None:
         table.add_row("diagonal", *(number(value, endless) for value in diagonal))
     else:
         for name, row in zip(names, without_rounding(rows), strict=True):
             table.add_row(name, *(number(value) for value in row))
-    console.print(table)
+    return table
 
 
-def _print_shares(console: Console, analysis: Analysis, full: bool) -> None:
+def shares_table(analysis: Analysis, full: bool = False) -> Table:
     """Attribution, by default of joints and links as a whole."""
     table = numeric_table("Attribution: shares in the diagonal of C", "part", analysis.components)
-    for name, shares in [(s.name, [s]) for s in analysis.shares] if full else _by_part(analysis.shares):
+    for name, shares in [(s.name, [s]) for s in analysis.shares] if full else by_part(analysis.shares):
         columns = zip(*(share.compliance for share in shares), strict=True)
         parts = [None if None in column else sum(c for c in column if c is not None) for column in columns]
         table.add_row(name, *("–" if part is None else f"{100 * part:.1f} %" for part in parts))
-    console.print(table)
+    return table
 
 
-def _by_part(shares: Sequence[SpringShare]) -> list[tuple[str, list[SpringShare]]]:
+def by_part(shares: Sequence[SpringShare]) -> list[tuple[str, list[SpringShare]]]:
+    """The shares of springs by the joint or link that they stand for."""
     found: dict[str, list[SpringShare]] = {}
     for share in shares:
         found.setdefault(share.part, []).append(share)
     return list(found.items())
 
 
-def _print_directions(console: Console, analysis: Analysis) -> None:
-    if analysis.indices is None:
-        return
+def principal_table(analysis: Analysis) -> Table:
+    """Least and largest stiffness of each block, free to follow and held; empty where there is none."""
     columns = ["least", "largest", "softest direction", "stiffest direction"]
     table = numeric_table("Principal stiffnesses (N/m, N·m/rad)", "", columns)
-    free, guided = analysis.indices.free or {}, analysis.indices.guided or {}
+    found = analysis.indices
+    free, guided = (found.free or {}, found.guided or {}) if found else ({}, {})
     for what, blocks, block in (
         ("force", free, "translation"),
         ("force, rotations held", guided, "translation"),
@@ -86,19 +99,17 @@ def _print_directions(console: Console, analysis: Analysis) -> None:
     ):
         if block in blocks:
             table.add_row(what, *_ellipsoid(blocks[block]))
-    if table.row_count:
-        console.print(table)
+    return table
 
 
-def _print_along(console: Console, along: Sequence[Along]) -> None:
-    if not along:
-        return
+def along_table(along: Sequence[Along]) -> Table:
+    """Stiffness along and about directions."""
     columns = ["force", "rotations held", "moment", "point held"]
     table = numeric_table("Stiffness along and about directions (N/m, N·m/rad)", "direction", columns)
     for one in along:
         values = (one.force, one.force_held, one.moment, one.moment_held)
         table.add_row(_direction(one.direction), *(number(value, "rigid") for value in values))
-    console.print(table)
+    return table
 
 
 def _ellipsoid(found: PrincipalStiffness) -> list[str]:
@@ -109,33 +120,46 @@ def _ellipsoid(found: PrincipalStiffness) -> list[str]:
 
 
 def _direction(vector: Sequence[float]) -> str:
-    return " ".join(f"{component + 0.0:+.2f}" for component in vector)
+    return " ".join(f"{round(component, 2) + 0.0:+.2f}" for component in vector)
 
 
-def _print_eigenscrews(console: Console, screws: Sequence[Eigenscrew]) -> None:
-    if not screws:
-        return
+def eigenscrew_table(screws: Sequence[Eigenscrew]) -> Table:
+    """Eigenvalue, pitch, direction and point of each."""
     table = numeric_table("Eigenscrews", "", ["eigenvalue (N/rad)", "pitch (mm/rad)", "direction", "point from T (mm)"])
     for i, screw in enumerate(screws, 1):
-        point = "–" if screw.point is None else " ".join(f"{1e3 * c:.4g}" for c in screw.point)
+        point = "–" if screw.point is None else _millimetres(screw.point)
         pitch = "infinite" if math.isinf(screw.pitch) else number(1e3 * screw.pitch)
         table.add_row(str(i), number(screw.eigenvalue, "infinite"), pitch, _direction(screw.direction), point)
-    console.print(table)
+    return table
 
 
-def _print_load(console: Console, names: Sequence[str], load: LoadCase) -> None:
+def _millimetres(point: Sequence[float]) -> str:
+    """A point given in m, without rounding."""
+    return " ".join(f"{1e3 * c if abs(c) > ROUNDING else 0.0:.4g}" for c in point)
+
+
+def load_table(names: Sequence[str], load: LoadCase) -> Table:
+    """The load and the deflection of the tool point."""
     kept = [("rx", "ry", "rz", "x", "y", "z").index(name) for name in names]
     table = numeric_table("Load at the tool point (N·m, N) and its deflection (rad, m)", "", names)
     size = max(abs(c) for c in load.wrench)
     table.add_row("load", *(number(load.wrench[i] if abs(load.wrench[i]) > ROUNDING * size else 0.0) for i in kept))
     table.add_row("deflection", *(number(load.deflection[i], "free") for i in kept))
-    console.print(table)
+    return table
+
+
+def actuator_table(load: LoadCase) -> Table:
+    """What each actuator bears, and how far it gives."""
     table = numeric_table("Actuators under it", "", ["load", "", "deformation", ""])
     for spring in load.springs:
         if spring.actuated:
             units = ("N·m", "rad") if spring.turning else ("N", "m")
             table.add_row(spring.name, number(spring.load), units[0], number(spring.deformation), units[1])
-    console.print(table)
+    return table
+
+
+def reaction_table(load: LoadCase) -> Table:
+    """The wrench in each passive joint."""
     table = numeric_table(
         "Load passed on towards the base, at the joint (N·m, N)", "joint", ["mx", "my", "mz", "fx", "fy", "fz"]
     )
@@ -143,10 +167,11 @@ def _print_load(console: Console, names: Sequence[str], load: LoadCase) -> None:
         size = max(abs(float(c)) for c in reaction.wrench.components()) or 1.0
         parts = [float(c) for c in reaction.wrench.components()]
         table.add_row(reaction.joint, *(number(c if abs(c) > ROUNDING * size else 0.0) for c in parts))
-    console.print(table)
+    return table
 
 
-def _print_summary(console: Console, analysis: Analysis) -> None:
+def remarks(analysis: Analysis) -> list[str]:
+    """Mobility, internal loads, centre, condition and mass, a sentence each."""
     lines = []
     if analysis.mobility:
         found = analysis.mobility
@@ -165,8 +190,7 @@ def _print_summary(console: Console, analysis: Analysis) -> None:
     if analysis.indices:
         centre = analysis.indices.centres["stiffness"]
         if centre is not None:
-            shown = " ".join(f"{1e3 * c if abs(c) > ROUNDING else 0.0:.4g}" for c in centre)
-            lines.append(f"Centre of stiffness: {shown} mm from the point above.")
+            lines.append(f"Centre of stiffness: {_millimetres(centre)} mm from the point above.")
         lines.append(
             f"Condition of K: {number(analysis.indices.condition, 'infinite')}, of the leg wrenches: "
             f"{number(analysis.condition)}, of the actuators' Jacobian: "
@@ -175,8 +199,7 @@ def _print_summary(console: Console, analysis: Analysis) -> None:
         )
     if analysis.masses:
         lines.append(_moving(analysis))
-    for line in lines:
-        console.print(line, highlight=False, markup=False)
+    return lines
 
 
 def _moving(analysis: Analysis) -> str:

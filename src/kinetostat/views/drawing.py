@@ -19,10 +19,11 @@ Loop = list[Vector]
 
 
 def three_views(configuration: Configuration, title: str) -> Figure:
-    """Front, side and plan of a machine, to scale, in mm; actuated legs blue, passive legs orange."""
+    """Front, side and plan of a machine, of a planar one the plan alone, to scale, in mm; actuated legs blue."""
+    views = VIEWS if configuration.plane is None else VIEWS[2:]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.6, 3.3), layout="constrained")
-        for panel, (name, across, up) in zip(figure.subplots(1, 3), VIEWS, strict=True):
+        figure = Figure(figsize=(7.6 if len(views) > 1 else 4.0, 3.3), layout="constrained")
+        for panel, (name, across, up) in zip(figure.subplots(1, len(views), squeeze=False).flat, views, strict=True):
             _draw_view(panel, configuration, across, up)
             panel.set(title=name, xlabel=f"{across} (mm)", ylabel=f"{up} (mm)", aspect="equal")
             panel.margins(0.12)
@@ -34,7 +35,8 @@ def three_views(configuration: Configuration, title: str) -> Figure:
 def _draw_view(panel: Axes, configuration: Configuration, across: str, up: str) -> None:
     reference = configuration.platform.translation
     actuated = [leg for leg in configuration.legs if leg.actuated]
-    for plate in (_loop([leg.path[0] for leg in actuated]), _loop([leg.path[-1] for leg in actuated])):
+    standing = [leg for leg in actuated if len(leg.path) > 1]
+    for plate in (_loop([leg.path[0] for leg in standing]), _loop([leg.path[-1] for leg in standing])):
         panel.fill(*_flat(plate, across, up), facecolor="#dddddd", edgecolor=PLATE, linewidth=0.8, alpha=0.8)
     for leg in configuration.legs:
         _draw_leg(panel, leg, across, up, leg in actuated)
@@ -48,7 +50,7 @@ def _draw_leg(panel: Axes, leg: Leg, across: str, up: str, actuated: bool) -> No
     colour = LEG if actuated else CONSTRAINT
     panel.plot(x, y, "-", color=colour, linewidth=1.4 if actuated else 2.2, solid_capstyle="round")
     panel.plot(x, y, "o", color="white", markeredgecolor=colour, markersize=4 if actuated else 5, markeredgewidth=1.0)
-    if actuated:
+    if actuated and len(x) > 1:
         middle = [0.45 * ends[0] + 0.55 * ends[1] for ends in (x, y)]
         panel.plot([x[0], middle[0]], [y[0], middle[1]], color=colour, linewidth=3.2, solid_capstyle="butt")
         if up == "y":

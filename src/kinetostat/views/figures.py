@@ -42,6 +42,8 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito: distinct for colour-blind readers and in grey."""
 DASHES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
 LEVELS = 12
+MARGIN = 0.04
+"""Inches around a figure that stands in a page."""
 FLAT = 1e-9
 """Relative spread below which a map is constant and has no contours."""
 
@@ -115,7 +117,7 @@ def as_svg(figure: Figure) -> str:
     """A figure as one SVG element, to stand inside a page."""
     text = io.StringIO()
     with mpl.rc_context({**STYLE, "svg.fonttype": "path"}):
-        figure.savefig(text, format="svg", metadata={"Date": None})
+        figure.savefig(text, format="svg", metadata={"Date": None}, bbox_inches="tight", pad_inches=MARGIN)
     return text.getvalue()[text.getvalue().index("<svg") :]
 
 

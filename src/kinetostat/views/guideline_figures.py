@@ -28,9 +28,17 @@ def guideline_figures(found: Guidelines) -> dict[str, Figure]:
     if found.here is None:
         return {}
     drawn = {"design": design_figure(found)} if found.moves else {}
+    rigid = limit_figure(found)
+    return {**drawn, "rigid": rigid} if rigid else drawn
+
+
+def limit_figure(found: Guidelines) -> Figure | None:
+    """Stiffness of each direction against that of elements; None where no element has a limit of rigidity."""
+    if found.here is None:
+        return None
     limits = [(one, found.here.rigid[k, :, 0]) for k, one in enumerate(found.found) if not one.actuated]
     shown = [(one, row) for one, row in limits if (np.isfinite(row) & (row > 0.0)).any()]
-    return {**drawn, "rigid": rigid_figure(found, shown[-MOST_PANELS:])} if shown else drawn
+    return rigid_figure(found, shown[-MOST_PANELS:]) if shown else None
 
 
 def design_figure(found: Guidelines) -> Figure:

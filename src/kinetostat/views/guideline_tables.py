@@ -1,9 +1,11 @@
 """Guidelines on a terminal: sentences, and the tables behind them. Nothing is computed but rounding."""
 
 import math
+from collections.abc import Iterator
 
 from rich.console import Console
 from rich.padding import Padding
+from rich.table import Table
 
 from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.guidelines.moves import Move
@@ -20,6 +22,10 @@ TOPICS = {
 MOST_ROWS = 16
 """Parameters that are printed; all of them on demand."""
 MOST_NAMED = 8
+LEGEND = "· any stiffness will do; never: nothing else yields in that direction."
+"""Of the table of limits."""
+ALIKE = "poses: at how many of them all arrows of the row point as they do here."
+"""Of the table of parameters."""
 
 
 def print_guidelines(console: Console, found: Guidelines, full: bool = False) -> None:
@@ -34,8 +40,9 @@ def print_guidelines(console: Console, found: Guidelines, full: bool = False) ->
         return
     _print_sentences(console, found, full)
     _print_equations(console, found)
-    _print_shares(console, found, found.here)
-    _print_limits(console, found, found.here)
+    console.print(element_table(found, found.here))
+    console.print(limit_table(found, found.here))
+    console.print(f"{LEGEND}\n", style="dim")
     _print_moves(console, found, full)
 
 
@@ -46,12 +53,13 @@ def _print_sentences(console: Console, found: Guidelines, full: bool) -> None:
         if own and (full or topic != "design"):
             console.print(f"\n[bold]{title}[/bold]")
             for one in own:
-                aside = "" if one.holds is None else f" \\[{_over_poses(one.holds)}]"
+                aside = "" if one.holds is None else f" \\[{over_poses(one.holds)}]"
                 console.print(Padding(f"- {one.text}[dim]{aside}[/dim]", (0, 0, 0, 1)), highlight=False)
     console.print()
 
 
-def _over_poses(share: float) -> str:
+def over_poses(share: float) -> str:
+    """At how many poses something holds."""
     return "everywhere" if share == 1.0 else f"at {100 * share:.3g} % of the poses"
 
 
@@ -60,18 +68,28 @@ def _print_equations(console: Console, found: Guidelines) -> None:
     if found.equations is None:
         return
     console.print("[bold]K at this pose[/bold], by the stiffness k of one part of each element (SI)")
-    for i, name in enumerate(found.components):
-        terms = [f"{number(row[i])} k({element})" for element, row in found.equations.items() if row[i] != 0.0]
-        console.print(f"  K_{name} = {' + '.join(terms) or '0'}", highlight=False, markup=False)
+    for line in equations(found):
+        console.print(f"  {line}", highlight=False, markup=False)
     console.print()
 
 
-def _print_shares(console: Console, found: Guidelines, here: Roles) -> None:
+def equations(found: Guidelines) -> list[str]:
+    """The diagonal of K as sums over elements, a line each; none where K is no such sum."""
+    rows = (found.equations or {}).items()
+    sums = [
+        " + ".join(f"{number(row[i])} k({element})" for element, row in rows if row[i] != 0.0)
+        for i in range(len(found.components))
+    ]
+    return [f"K_{name} = {terms or '0'}" for name, terms in zip(found.components, sums, strict=True)] if rows else []
+
+
+def element_table(found: Guidelines, here: Roles) -> Table:
+    """What each element contributes to each direction."""
     table = numeric_table("Shares in the diagonal of C", "element", found.components)
     for element, row in zip(found.found, here.shares[:, :, 0].tolist(), strict=True):
         cells = ["–" if math.isnan(p) else f"[bold]{100 * p:.1f} %[/bold]" if p >= 0.5 else _share(p) for p in row]
         table.add_row(element.name, *cells)
-    console.print(table)
+    return table
 
 
 def _share(part: float) -> str:
@@ -79,7 +97,7 @@ def _share(part: float) -> str:
     return "·" if part == 0.0 else text if part >= MATTERS else f"[dim]{text}[/dim]"
 
 
-def _print_limits(console: Console, found: Guidelines, here: Roles) -> None:
+def limit_table(found: Guidelines, here: Roles) -> Table:
     """From which stiffness on each element counts as rigid: absolute where it has one stiffness, else relative."""
     table = numeric_table("Counts as rigid from (within 1 %)", "element", ["now", *found.components])
     for k, element in enumerate(found.found):
@@ -91,8 +109,7 @@ def _print_limits(console: Console, found: Guidelines, here: Roles) -> None:
             own = 1.0 if rigid else element.stiffness
             now = "rigid" if rigid else f"{_limit(element.stiffness)} {element.unit}"
             table.add_row(element.name, now, *(_limit(factor * own) for factor in row))
-    console.print(table)
-    console.print("· any stiffness will do; never: nothing else yields in that direction.\n", style="dim")
+    return table
 
 
 def _limit(value: float) -> str:
@@ -106,24 +123,35 @@ def _limit(value: float) -> str:
 
 
 def _print_moves(console: Console, found: Guidelines, full: bool) -> None:
+    shown = found.moves if full else found.moves[:MOST_ROWS]
+    console.print(move_table(found, len(shown)))
+    if found.poses[0]:
+        console.print(ALIKE, style="dim")
+    console.print(found.meaning, highlight=False, style="dim")
+    for line in left_out(found, len(shown)):
+        console.print(line, highlight=False)
+
+
+def move_table(found: Guidelines, count: int) -> Table:
+    """What each of the first parameters does to each direction."""
     grid = bool(found.poses[0])
     heads = ["parameter", *found.components, *(["poses"] if grid else [])]
     table = numeric_table("What one percent more does: percent stiffer ▲ or softer ▼", heads[0], heads[1:])
-    shown = found.moves if full else found.moves[:MOST_ROWS]
-    for move in shown:
+    for move in found.moves[:count]:
         table.add_row(move.path, *(_arrow(p) for p in move.percents), *([_alike(move)] if grid else []))
-    console.print(table)
-    if grid:
-        console.print("poses: at how many of them all arrows of the row point as they do here.", style="dim")
-    console.print(found.meaning, highlight=False, style="dim")
-    hidden = len(found.moves) - len(shown)
+    return table
+
+
+def left_out(found: Guidelines, count: int) -> Iterator[str]:
+    """What the table of the first parameters does not show, in sentences."""
+    hidden = len(found.moves) - count
     if hidden:
-        console.print(f"{hidden} more do less; --full has all.", highlight=False)
+        yield f"{hidden} more do less; `kinetostat guidelines --full` has all."
     if found.idle:
-        console.print(f"No direction depends on {_few(found.idle)}.", highlight=False)
+        yield f"No direction depends on {_few(found.idle)}."
     for reason in dict.fromkeys(why for _, why in found.skipped):
         paths = [path for path, why in found.skipped if why == reason]
-        console.print(f"Left out {reason}: {_few(paths)}.", highlight=False)
+        yield f"Left out {reason}: {_few(paths)}."
 
 
 def _few(paths: tuple[str, ...] | list[str]) -> str:

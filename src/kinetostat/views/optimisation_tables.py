@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 
 from rich.console import Console
+from rich.table import Table
 
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.result_data import message
@@ -25,17 +26,20 @@ def print_result(console: Console, found: Result) -> None:
     console.print(f"{problem.study.name}: {problem.machine.name}", style="bold", highlight=False)
     console.print(f"{message(found)} Judged at {problem.poses.told}; method {problem.method}.", highlight=False)
     if len(problem.objectives) > 1:
-        _print_front(console, found)
-    _print_worth(console, found)
-    _print_design(console, found)
-    _print_directions(console, found)
+        console.print(front_table(found))
+    console.print(worth_table(found))
+    console.print(variable_table(found))
+    console.print(direction_table(found))
     if found.robustness:
-        _print_robustness(console, found.robustness)
-    for line in _remarks(found):
+        console.print(scatter_table(found.robustness))
+        if found.robustness.failing:
+            console.print(failing(found.robustness), highlight=False)
+    for line in remarks(found):
         console.print(line, highlight=False)
 
 
-def _print_worth(console: Console, found: Result) -> None:
+def worth_table(found: Result) -> Table:
+    """Objectives and constraints before and after."""
     best = "knee of the front" if len(found.problem.objectives) > 1 else "best"
     table = numeric_table("What it is worth", "", ["initial", best, "gain", "unit"])
     for k, objective in enumerate(found.problem.objectives):
@@ -46,10 +50,11 @@ def _print_worth(console: Console, found: Result) -> None:
     for k, one in enumerate(found.problem.constraints):
         before, after = found.initial.constraints[0, k], found.outcome.constraints[0, k]
         table.add_row(one.label, number(before), number(after), "", "" if one.term.unit == "1" else one.term.unit)
-    console.print(table)
+    return table
 
 
-def _print_design(console: Console, found: Result) -> None:
+def variable_table(found: Result) -> Table:
+    """The variables before and after, where they meet bounds, and what they do to the objectives."""
     objectives = found.problem.objectives
     heads = ["% per %"] if len(objectives) == 1 else [f"% per % ({k + 1})" for k in range(len(objectives))]
     table = numeric_table("The design", "variable", ["initial", "best", "at bound", *heads])
@@ -62,19 +67,21 @@ def _print_design(console: Console, found: Result) -> None:
         table.add_row(variable.name, variable.shown(variable.initial), variable.shown(value), bound, *percents)
         for field in variable.fields[1:]:
             table.add_row(f"  with {field.path}", "", "", "", *[""] * len(heads))
-    console.print(table)
+    return table
 
 
-def _print_directions(console: Console, found: Result) -> None:
+def direction_table(found: Result) -> Table:
+    """The compliance of each direction before and after."""
     worst = "" if found.problem.poses.count == 1 else ", the worst of all poses"
     table = numeric_table(f"Compliance{worst}", "direction", ["initial", "best", "times stiffer", "unit"])
     for one in found.directions:
         name = one.name.removeprefix("compliance_")
         table.add_row(name, number(one.before), number(one.after), _times(one.gain), one.unit)
-    console.print(table)
+    return table
 
 
-def _print_robustness(console: Console, robustness: Robustness) -> None:
+def scatter_table(robustness: Robustness) -> Table:
+    """How the objectives scatter under the tolerances."""
     title = f"Under the tolerances: {robustness.machines:,} random machines"
     title += f" and {robustness.corners:,} with every tolerance at an end" if robustness.corners else ""
     table = numeric_table(title, "", ["nominal", "mean", "std. dev.", "95 % within", "worst", "unit"])
@@ -82,12 +89,16 @@ def _print_robustness(console: Console, robustness: Robustness) -> None:
         figures = (_exact(value) for value in (one.nominal, one.mean))
         rest = (number(one.deviation), _exact(one.usual), _exact(one.worst))
         table.add_row(one.label, *figures, *rest, one.unit)
-    console.print(table)
-    if robustness.failing:
-        console.print(f"{robustness.failing:.3g} of the random machines are not feasible.", highlight=False)
+    return table
 
 
-def _print_front(console: Console, found: Result) -> None:
+def failing(robustness: Robustness) -> str:
+    """How many of the random machines are not feasible."""
+    return f"{robustness.failing:.3g} of the random machines are not feasible."
+
+
+def front_table(found: Result) -> Table:
+    """Designs of the front, the knee among them."""
     problem, outcome = found.problem, found.log.outcome(found.front)
     shown = {round(k * (len(found.front) - 1) / (MOST_ROWS - 1)) for k in range(MOST_ROWS)} | {found.knee}
     names = [f"{one.term.label}\n{one.term.unit}".replace(" (", "\n(") for one in problem.objectives]
@@ -101,10 +112,10 @@ def _print_front(console: Console, found: Result) -> None:
         held = zip(problem.space.searched, problem.space.values(genes), strict=True)
         cells = [number(value) for value in outcome.objectives[k]] + [one.shown(value) for one, value in held]
         table.add_row("knee" if k == found.knee else "", *cells, style="bold" if k == found.knee else None)
-    console.print(table)
+    return table
 
 
-def _remarks(found: Result) -> Iterator[str]:
+def remarks(found: Result) -> Iterator[str]:
     """What a designer should not overlook."""
     bounded = [one for one in found.influences if one.bound]
     if bounded and len(found.problem.objectives) == 1:

@@ -12,6 +12,7 @@ from kinetostat.studies.paper.claims import Claim, Finding
 from kinetostat.studies.paper.comparison import Comparison, Verdict
 from kinetostat.studies.paper.reproduction import Reproduction
 from kinetostat.views.figures import as_svg
+from kinetostat.views.page import Markup, figure, table, whole_page
 
 MARKS = {
     Verdict.EQUAL: "good",
@@ -22,32 +23,17 @@ MARKS = {
     Finding.FAILS: "bad",
 }
 
+NUMERIC = (False, False, True, True, False, False)
+"""Columns of the table of numbers."""
+
 STYLE = """
-:root { color-scheme: light; --ink: #1c2430; --soft: #5a6675; --line: #d9dfe6; --paper: #ffffff; --blue: #0072b2; }
-* { box-sizing: border-box; }
-body { margin: 0 auto; max-width: 62rem; padding: 2.5rem 1.5rem 4rem; background: var(--paper); color: var(--ink);
-  font: 15px/1.55 system-ui, "Segoe UI", "Helvetica Neue", "DejaVu Sans", sans-serif; }
-h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 .3rem; }
-h2 { font-size: 1.2rem; margin: 2.6rem 0 .6rem; padding-top: .8rem; border-top: 1px solid var(--line); }
-h3 { font-size: 1rem; margin: 1.6rem 0 .4rem; }
-p { max-width: 46rem; margin: .5rem 0; }
-.soft { color: var(--soft); }
 .tiles { display: flex; flex-wrap: wrap; gap: .8rem; margin: 1.4rem 0; }
 .tile { border: 1px solid var(--line); border-radius: .5rem; padding: .6rem .9rem; }
 .tile b { display: block; font-size: 1.6rem; line-height: 1.2; }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; margin: .6rem 0 1rem; font-variant-numeric: tabular-nums; }
-caption { text-align: left; font-weight: 600; padding: .3rem 0; }
-th { text-align: left; font-weight: 600; color: var(--soft); }
-th, td { padding: .22rem .9rem .22rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }
-td.n, th.n { text-align: right; white-space: nowrap; } td:first-child { white-space: nowrap; }
 .mark { border-radius: .3rem; padding: .05rem .45rem; font-size: .85rem; white-space: nowrap; }
 .good { background: #dff3e4; color: #14532d; } .note { background: #fdf0cf; color: #6b4400; }
 .bad { background: #fde0df; color: #7f1d1d; }
-figure { margin: 1rem 0; } figure svg { max-width: 100%; height: auto; }
-figcaption { color: var(--soft); font-size: .9rem; max-width: 46rem; }
 dl dt { font-weight: 600; margin-top: 1rem; } dl dd { margin: .15rem 0 0 0; max-width: 46rem; }
-@media print { h2 { break-after: avoid; } table, figure, dd { break-inside: avoid; } body { font-size: 11px; } }
 """
 
 CAPTIONS = {
@@ -69,8 +55,7 @@ def page(found: Reproduction, figures: Mapping[str, Figure]) -> str:
         found: what to show.
         figures: by name, drawn; each name has a caption here.
     """
-    pictures = {name: f"<figure>{as_svg(figures[name])}<figcaption>{escape(CAPTIONS[name])}</figcaption></figure>"
-                for name in figures}  # fmt: skip
+    pictures = {name: figure(as_svg(drawn), CAPTIONS[name]) for name, drawn in figures.items()}
     body = [
         "<h1>Zhang and Gosselin's machine, reproduced</h1>",
         '<p class="soft">D. Zhang and C. M. Gosselin, "Parallel kinematic machine design with kinetostatic model", '
@@ -97,12 +82,7 @@ def page(found: Reproduction, figures: Mapping[str, Figure]) -> str:
         "<h2>Slips of typography</h2>",
         f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in printed.TYPOGRAPHY)}</ul>",
     ]
-    head = (
-        '<!doctype html>\n<html lang="en-GB">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>Zhang and Gosselin's machine, reproduced by kinetostat</title>\n<style>{STYLE}</style>\n</head>\n"
-    )
-    return f"{head}<body>\n" + "\n".join(body) + "\n</body>\n</html>\n"
+    return whole_page("Zhang and Gosselin's machine, reproduced by kinetostat", STYLE, body)
 
 
 def _tiles(found: Reproduction) -> str:
@@ -131,7 +111,7 @@ def _numbers(comparisons: Sequence[Comparison]) -> Iterable[str]:
         rows = []
         for place, members in groupby(group, key=lambda one: one.place):
             rows += [_number_row(one, place if first else "") for one, first in _marking_first(members)]
-        yield _table(titles[head], heads, rows, 2)
+        yield table(titles[head], heads, rows, NUMERIC)
 
 
 def _marking_first(members: Iterable[Comparison]) -> Iterable[tuple[Comparison, bool]]:
@@ -139,7 +119,7 @@ def _marking_first(members: Iterable[Comparison]) -> Iterable[tuple[Comparison, 
 
 
 def _number_row(one: Comparison, place: str) -> tuple[str, ...]:
-    verdict = _mark(one.verdict) + (f" {escape(one.reason)}" if one.reason else "")
+    verdict = Markup(_mark(one.verdict) + (f" {escape(one.reason)}" if one.reason else ""))
     return place, one.component, one.printed, f"{one.computed:.9g}", one.unit, verdict
 
 
@@ -155,7 +135,7 @@ def _equations(found: Reproduction) -> str:
         for check in found.checks
     ]
     heads = ("equation", "statement", "residual", "tolerance", "verdict")
-    return _table("The paper's own matrices A, B, J and J' against legs as (W, G)", heads, rows, 2)
+    return table("The paper's own matrices A, B, J and J' against legs as (W, G)", heads, rows, NUMERIC[-5:])
 
 
 def _statements(claims: Sequence[Claim]) -> str:
@@ -167,19 +147,5 @@ def _statements(claims: Sequence[Claim]) -> str:
     return f"<dl>{''.join(entries)}</dl>"
 
 
-def _mark(verdict: Verdict | Finding) -> str:
-    return f'<span class="mark {MARKS[verdict]}">{escape(verdict.value)}</span>'
-
-
-def _table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[str]], numeric: int) -> str:
-    """A table whose two columns from `numeric` on hold numbers, and whose last column is HTML."""
-    classes = [' class="n"' if numeric <= i < numeric + 2 else "" for i in range(len(heads))]
-    top = "".join(f"<th{kind}>{escape(head)}</th>" for head, kind in zip(heads, classes, strict=True))
-    lines = []
-    for *texts, last in rows:
-        cells = "".join(f"<td{kind}>{escape(text)}</td>" for text, kind in zip(texts, classes, strict=False))
-        lines.append(f"<tr>{cells}<td>{last}</td></tr>")
-    return (
-        f'<div class="scroll"><table><caption>{escape(caption)}</caption><thead><tr>{top}</tr></thead>'
-        f"<tbody>{''.join(lines)}</tbody></table></div>"
-    )
+def _mark(verdict: Verdict | Finding) -> Markup:
+    return Markup(f'<span class="mark {MARKS[verdict]}">{escape(verdict.value)}</span>')

@@ -1,6 +1,7 @@
 """Sensitivities as a table on a terminal: parameters by rank against indices. Nothing is computed but rounding."""
 
 from rich.console import Console
+from rich.table import Table
 
 from kinetostat.studies.sensitivity import Sensitivity, notes
 from kinetostat.units import KINDS
@@ -16,19 +17,24 @@ LEAST = 0.0005
 
 def print_sensitivity(console: Console, answer: Sensitivity) -> None:
     """The parameters that matter most, and what the numbers mean."""
-    group = family_of_names(answer.quantities)
-    heads = [spoken(name.removeprefix(f"{group}_")) for name in answer.quantities]
-    title = f"{answer.machine.name}: {group}, {MEASURE}" if group else f"{answer.machine.name}: {MEASURE}"
-    table = numeric_table(title, "parameter", ["value", *heads])
-    for one in answer.influences[:MOST_ROWS]:
-        value = f"{number(one.value)} {KINDS[one.kind].unit}".rstrip()
-        table.add_row(one.path, value, *(_percent(percent) for percent in one.percents))
-    console.print(table)
+    console.print(influence_table(answer, MOST_ROWS))
     hidden = len(answer.influences) - MOST_ROWS
     if hidden > 0:
         console.print(f"{hidden} more have less influence; --json has all.")
     for note in notes(answer):
         console.print(note, highlight=False)
+
+
+def influence_table(answer: Sensitivity, count: int) -> Table:
+    """The first parameters by rank, with their values and what they do to each index."""
+    group = family_of_names(answer.quantities)
+    heads = [spoken(name.removeprefix(f"{group}_")) for name in answer.quantities]
+    title = f"{answer.machine.name}: {group}, {MEASURE}" if group else f"{answer.machine.name}: {MEASURE}"
+    table = numeric_table(title, "parameter", ["value", *heads])
+    for one in answer.influences[:count]:
+        value = f"{number(one.value)} {KINDS[one.kind].unit}".rstrip()
+        table.add_row(one.path, value, *(_percent(percent) for percent in one.percents))
+    return table
 
 
 def _percent(value: float | None) -> str:

@@ -39,6 +39,11 @@ def print_studies(console: Console, studies: Mapping[str, StudyFile]) -> None:
 
 def print_machine(console: Console, machine: Machine) -> None:
     """Every value of a machine with its meaning."""
+    console.print(machine_table(machine))
+
+
+def machine_table(machine: Machine) -> Table:
+    """Every value of a machine with its meaning."""
     table = text_table(f"{machine.name} ({machine.family.name})", "field", "value", "meaning")
     held = values(machine)
     found = list(parameters(machine.family))
@@ -47,7 +52,7 @@ def print_machine(console: Console, machine: Machine) -> None:
     for parameter in whole:
         shown = readable([held[leaf] for leaf in parameter.leaves], parameter.quantity)
         table.add_row(parameter.path, shown, parameter.quantity.meaning)
-    console.print(table)
+    return table
 
 
 def readable(values: Sequence[float], quantity: Quantity) -> str:

@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 
 from rich.console import Console
+from rich.table import Table
 
+from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.validation.comparison import Array, Validation
 from kinetostat.views.analysis_tables import UNITS_OF_C
 from kinetostat.views.tables import number, numeric_table
@@ -18,20 +20,43 @@ def print_validation(console: Console, validation: Validation, agreed: float) ->
     kept = list(family.components)
     titles = {"kinetostat": validation.ours, validation.engine: validation.theirs}
     for title, matrix in titles.items():
-        _print_matrix(console, f"Compliance C, {title} ({UNITS_OF_C})", family.component_names, matrix[kept][:, kept])
-    table = numeric_table("Relative difference by block", "", [*validation.differences, "uncertainty of the engine"])
-    table.add_row("", *(f"{value:.1e}" for value in validation.differences.values()), f"{validation.uncertainty:.1e}")
-    console.print(table)
-    table = numeric_table("How the engine comes to it", validation.varied, ["difference"])
-    for scale, apart in validation.trials:
-        table.add_row(f"{scale:.3g}", f"{apart:.1e}")
-    console.print(table)
+        shown = f"Compliance C, {title} ({UNITS_OF_C})"
+        console.print(matrix_table(shown, family.component_names, matrix[kept][:, kept]))
+    console.print(difference_table(validation))
+    console.print(trial_table(validation))
     verdict = "agree" if validation.difference <= agreed else "DIFFER"
     console.print(f"The two {verdict}: {validation.difference:.1e}, allowed {agreed:g}.", highlight=False)
 
 
-def _print_matrix(console: Console, title: str, names: Sequence[str], matrix: Array) -> None:
+def matrix_table(title: str, names: Sequence[str], matrix: Array) -> Table:
+    """A compliance."""
     table = numeric_table(title, "", names)
     for name, row in zip(names, matrix, strict=True):
         table.add_row(name, *(number(float(entry)) for entry in row))
-    console.print(table)
+    return table
+
+
+def diagonal_table(validation: Validation) -> Table:
+    """The diagonal of C, ours and theirs, and the relative difference of each entry."""
+    table = numeric_table("Diagonal of C", "direction", ["kinetostat", validation.engine, "difference", "unit"])
+    family = validation.machine.family
+    for i, name in zip(family.components, family.component_names, strict=True):
+        ours, theirs = float(validation.ours[i, i]), float(validation.theirs[i, i])
+        apart = f"{abs(theirs / ours - 1.0):.1e}" if ours else "–"
+        table.add_row(name, f"{ours:.9g}", f"{theirs:.9g}", apart, QUANTITIES[f"compliance_{name}"].unit)
+    return table
+
+
+def difference_table(validation: Validation) -> Table:
+    """The relative difference of each block, and how far the engine may be trusted."""
+    table = numeric_table("Relative difference by block", "", [*validation.differences, "uncertainty of the engine"])
+    table.add_row("", *(f"{value:.1e}" for value in validation.differences.values()), f"{validation.uncertainty:.1e}")
+    return table
+
+
+def trial_table(validation: Validation) -> Table:
+    """How the engine's answer converges."""
+    table = numeric_table("How the engine comes to it", validation.varied, ["difference"])
+    for scale, apart in validation.trials:
+        table.add_row(f"{scale:.3g}", f"{apart:.1e}")
+    return table

@@ -1,5 +1,5 @@
 // Colours for numbers, in bands that the eye can tell apart, and the bar that says which is which.
-import { colour } from "kinetostat-studio/theme.js";
+import { colour } from "kinetostat-scene/theme.js";
 import { short } from "kinetostat-studio/plot_axes.js";
 
 const VIRIDIS = [

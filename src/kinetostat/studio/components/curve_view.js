@@ -1,5 +1,5 @@
 // Curves over one number, on logarithmic axes where that shows more; the present value is marked.
-import { colour } from "kinetostat-studio/theme.js";
+import { colour } from "kinetostat-scene/theme.js";
 import { frame, logTicks, niceTicks, plot, prepare, short } from "kinetostat-studio/plot_axes.js";
 
 const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3], [4, 2], [1, 2]];

@@ -1,7 +1,7 @@
 // Designs as points over two objectives, a third one by colour; knee and the machine as it was are marked. A click or
 // Enter picks one.
 import { bandColour, bandOf, colourBar, colourScale, css } from "kinetostat-studio/colour_scale.js";
-import { colour } from "kinetostat-studio/theme.js";
+import { colour } from "kinetostat-scene/theme.js";
 import { frame, niceTicks, plot, prepare, short } from "kinetostat-studio/plot_axes.js";
 
 const NEAR = 18; // pixels within which a click means a point

@@ -1,6 +1,6 @@
 // A map of one quantity over two coordinates; a click or an arrow key asks the machine to go there.
 import { bandColour, bandOf, colourBar, colourScale } from "kinetostat-studio/colour_scale.js";
-import { colour } from "kinetostat-studio/theme.js";
+import { colour } from "kinetostat-scene/theme.js";
 import { frame, niceTicks, plot, prepare, short } from "kinetostat-studio/plot_axes.js";
 
 export default {

@@ -1,5 +1,5 @@
 // What plots share: a canvas that is drawn again when its size or the colours of the page change, ticks and labels.
-import { colour, onTheme } from "kinetostat-studio/theme.js";
+import { colour, onTheme } from "kinetostat-scene/theme.js";
 
 export const FONT = '11px Roboto, "Segoe UI", sans-serif';
 

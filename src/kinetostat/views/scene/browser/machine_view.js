@@ -1,7 +1,7 @@
 // Draws scenes of solids: light, materials, camera and labels live here; what there is to see does not.
 import { CSS2DObject, CSS2DRenderer, OrbitControls, THREE } from "nicegui-scene";
-import { geometryOf } from "kinetostat-studio/solid_geometry.js";
-import { isDark, onTheme } from "kinetostat-studio/theme.js";
+import { geometryOf } from "kinetostat-scene/solid_geometry.js";
+import { isDark, onTheme } from "kinetostat-scene/theme.js";
 
 const THEMES = {
   light: { sky: 0xf7f9fb, ground: 0xe3e7ec, grid: 0x9aa6b4, gridOpacity: 0.32, shadow: 0.26, light: 1.0 },

@@ -1,0 +1,96 @@
+"""A report as a PDF: its content as data, and a Typst template that lays it out.
+
+Typst reads the content as JSON, so that nothing in a name or a file can be taken for a command.
+"""
+
+import json
+import struct
+from base64 import b64encode
+from dataclasses import asdict
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+from kinetostat.spec.errors import InputError
+from kinetostat.views.report.content import Block, Figure, Formula, Report, Section
+from kinetostat.views.report.formulas import FORMULAS
+
+TEMPLATE = Path(__file__).with_name("report.typ")
+INSTALL = "A PDF needs Typst; install it with: pip install 'kinetostat[report]', or write an HTML page: -o report.html."
+FAR = "\u2e80"
+"""From this character on, a text may need the fonts of the system; without it, bytes are the same on every machine."""
+
+
+def check_typst() -> None:
+    """Say how to get Typst where it is not installed.
+
+    Raises:
+        InputError: it is not.
+    """
+    if find_spec("typst") is None:
+        raise InputError(INSTALL)
+
+
+def pdf_bytes(report: Report) -> bytes:
+    """The file; the same bytes from the same report.
+
+    Raises:
+        InputError: Typst is not installed.
+    """
+    return bytes(_compiled(report, format="pdf"))
+
+
+def page_pictures(report: Report, dots: float) -> list[bytes]:
+    """Every page as a PNG, with so many dots to an inch.
+
+    Raises:
+        InputError: Typst is not installed.
+    """
+    return list(_compiled(report, format="png", ppi=dots))
+
+
+def _compiled(report: Report, **form: Any) -> Any:
+    check_typst()
+    compiler: Any = import_module("typst")
+
+    files: dict[str, bytes] = {}
+    content = {
+        "kind": report.kind,
+        "title": report.title,
+        "facts": report.facts,
+        "sections": [_section(one, files) for one in report.sections],
+        "attachments": dict(report.attachments),
+    }
+    text = json.dumps(content, ensure_ascii=False)
+    sources: dict[str, Any] = {"main": TEMPLATE.read_bytes(), "report.json": text.encode(), **files}
+    fonts = [str(Path(mpl.get_data_path()) / "fonts" / "ttf")]
+    plain = max(text) < FAR
+    return compiler.compile(sources, font_paths=fonts, ignore_system_fonts=plain, **form)
+
+
+def _section(section: Section, files: dict[str, bytes]) -> dict[str, Any]:
+    return {"kind": "section", "title": section.title, "blocks": [_block(one, files) for one in section.blocks]}
+
+
+def _block(block: Block, files: dict[str, bytes]) -> dict[str, Any]:
+    match block:
+        case Section():
+            return _section(block, files)
+        case Figure(caption, picture, width):
+            name = f"figure-{len(files) + 1}.svg"
+            files[name] = (picture if isinstance(picture, str) else _wrapped(picture)).encode()
+            return {"kind": "figure", "caption": caption, "file": name, "width": width}
+        case Formula(name):
+            return {"kind": "formula", "typst": FORMULAS[name].typst}
+    return {"kind": type(block).__name__.lower(), **asdict(block)}
+
+
+def _wrapped(png: bytes) -> str:
+    """A PNG inside an SVG element, because files that are handed to Typst must be text."""
+    width, height = struct.unpack(">II", png[16:24])
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}">'
+    data = b64encode(png).decode()
+    return f'{head}<image width="{width}" height="{height}" href="data:image/png;base64,{data}"/></svg>'

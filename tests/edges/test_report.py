@@ -1,0 +1,281 @@
+"""`kinetostat report`: a page holds what `analyze` says, asks for nothing, is the same again, and trusts no name."""
+
+import io
+import json
+from contextlib import redirect_stdout
+
+import pytest
+from machine_files import GOOD
+from pypdf import PdfReader
+from report_pages import MACHINE, QUICK, Page, no_pictures, number, reported, small_pictures
+
+from kinetostat.cli import main
+from kinetostat.machine.loading import bundled, load
+from kinetostat.machine.parameters import values
+from kinetostat.studies.analysis import analyze
+from kinetostat.studies.report import answers
+from kinetostat.studies.report.ranges import usual_ranges
+from kinetostat.views.report import live, pdf
+from kinetostat.views.report.assembly import report_of
+from kinetostat.views.report.html_page import html_page
+from kinetostat.views.report.record import Origin
+from studies import SMALL
+
+LOAD = ["--set", 'load.force=["0 N","0 N","-500 N"]']
+HOSTILE = '<script>alert(1)</script> #import "x": $a$ [/red] *b* @c \\d'
+ORIGIN = Origin("kinetostat report", (("machine.toml", "x = 1 < 2"),), "", "{}")
+FAST = ("maps", "guidelines", "sensitivity", "validation")
+TINY = SMALL + "[optimizer]\npopulation = 12\ngenerations = 4\n"
+
+
+@pytest.fixture(autouse=True)
+def _blank(monkeypatch):
+    no_pictures(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        small_pictures(patch)
+        return Page(reported(tmp_path_factory.mktemp("report") / "r.html", MACHINE, *LOAD))
+
+
+@pytest.fixture(scope="module")
+def printed(tmp_path_factory):
+    """A PDF of a machine with a hostile name."""
+    folder = tmp_path_factory.mktemp("report")
+    file = folder / "mine.toml"
+    file.write_text(GOOD.replace('"test machine"', json.dumps(HOSTILE)), "utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        no_pictures(patch)
+        return PdfReader(io.BytesIO(reported(folder / "r.pdf", file, *QUICK, "--author", HOSTILE)))
+
+
+def told(*words):
+    """What a command says as JSON."""
+    said = io.StringIO()
+    with redirect_stdout(said):
+        assert main([*words, "--json"]) == 0
+    return json.loads(said.getvalue())
+
+
+def quick(machine):
+    """The page about a machine, without what takes time."""
+    found = answers.gather(machine, without=FAST)
+    return html_page(report_of(found, "Validation was left out.", ORIGIN, {}, True))
+
+
+def test_its_matrices_are_those_of_analyze(paper):
+    found = told("analyze", MACHINE, *LOAD)
+    assert paper.results == found
+    for start, key in (("Stiffness K", "stiffness"), ("Compliance C", "compliance")):
+        heads, *rows = paper.table(start)
+        assert heads[1:] == [row[0] for row in rows] == found["order"]
+        for row, expected in zip(rows, found[key], strict=True):
+            assert [number(cell) for cell in row[1:]] == pytest.approx(expected, rel=1e-3, abs=1e-12)
+
+
+def test_its_loads_are_those_of_analyze(paper):
+    load_case = paper.results["load"]
+    _, loaded, deflected = paper.table("The load at the tool point")
+    assert [number(cell) for cell in loaded[1:]] == pytest.approx(load_case["wrench"])
+    assert [number(cell) for cell in deflected[1:]] == pytest.approx(load_case["deflection"], rel=1e-3)
+    actuators = [spring for spring in load_case["springs"] if spring["actuated"]]
+    rows = paper.table("Actuators under")[1:]
+    assert [number(row[1]) for row in rows] == pytest.approx([one["load"] for one in actuators], rel=1e-4)
+
+
+def test_every_number_of_the_machine_has_its_unit(paper):
+    sheet = {row[0]: row[1] for row in paper.table("All values")[1:]}
+    assert sheet["geometry.base_radius"] == "0.22 m"
+    assert sheet["geometry.base_angle"] == "30°"
+    assert sheet["stiffness.actuator"] == "4 × 1000 N/m"
+    assert sheet["load.force"] == "0 N, 0 N, −500 N"
+
+
+def test_every_question_has_a_section(paper):
+    for title in ("Data sheet", "Attribution", "Load case", "Over the poses", "Guidelines", "Sensitivity", "Validation",
+                  "Method", "Record"):  # fmt: skip
+        assert title in paper.text
+    assert "Exudyn" in paper.text
+    assert "agrees" in paper.text
+    assert "Over x (mm) from −50 to 50 and z (mm) from 630 to 730" in paper.text
+    assert "twice as stiff" in paper.text
+    ranking = [row[0] for row in paper.table("Percent by which each entry")[1:]]
+    assert ranking[0] == "geometry.passive_links.0"
+
+
+def test_it_can_be_made_again(paper, tmp_path):
+    """The command, the file as written, and the machine with its overrides are in the page."""
+    assert 'kinetostat report zhang-gosselin-4dof --set \'load.force=["0 N","0 N","-500 N"]\'' in paper.text
+    assert "# Ka: one for all legs, or a list, one per leg" in paper.text
+    again = tmp_path / "again.toml"
+    again.write_text(json.loads(paper.attached["machine.toml"]), "utf-8")
+    assert values(load(again)) == values(load(MACHINE, LOAD[1:]))
+
+
+def test_a_page_asks_for_nothing(paper):
+    assert {address.split(":")[0].split("#")[0] for address in paper.addresses} <= {"data", ""}
+    assert not {"link rel=stylesheet", "iframe", "object", "embed", "base"} & set(paper.tags)
+    styles = "".join(text for name, text in paper.attached.items() if name == "?")
+    assert "@import" not in styles
+    assert "url(" not in styles
+
+
+@pytest.mark.parametrize("suffix", ["html", "pdf"])
+def test_the_same_input_gives_the_same_bytes(suffix, tmp_path):
+    words = ["planar-3rrr", "--without", "validation", "--without", "guidelines"]
+    first, second = (reported(tmp_path / folder / f"r.{suffix}", *words) for folder in "ab")
+    assert first == second
+
+
+def test_a_pdf_has_pages_with_numbers_and_carries_its_data(printed):
+    text = "\n".join(page.extract_text() for page in printed.pages)
+    count = len(printed.pages)
+    assert 4 <= count <= 12
+    assert f"{count} / {count}" in printed.pages[-1].extract_text()
+    assert "0.0704587" not in text, "the matrix, not the coefficients"
+    assert "70.4587" in text
+    assert "−0.5" not in printed.metadata.title
+    results = json.loads(printed.attachments["results.json"][0])
+    assert results["stiffness_diagonal"][3] == pytest.approx(70.4587, rel=1e-6)
+    assert printed.attachments["machine.toml"][0].decode().startswith("schema = 1")
+
+
+def test_a_name_is_no_command_in_a_pdf(printed):
+    assert printed.metadata.title == HOSTILE
+    text = "".join(printed.pages[0].extract_text().replace("\u200b", "").split())
+    assert text.count("".join(HOSTILE.split())) >= 3, "title, machine, author"
+
+
+def test_a_name_is_no_command_on_a_page(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(GOOD.replace('"test machine"', json.dumps(HOSTILE)) + "# </pre><script>\n", "utf-8")
+    page = Page(reported(tmp_path / "r.html", file, *QUICK, "--without", "maps", "--author", HOSTILE))
+    assert page.text.count(HOSTILE) >= 3
+    assert "# </pre><script>" in page.text
+    assert page.results["name"] == HOSTILE
+    ours = {"machine.toml", "results.json", "live-data", "?"}
+    assert set(page.attached) == ours
+    assert not any("alert(1)" in text for name, text in page.attached.items() if name in ("?", "live-data"))
+
+
+def test_rigid_and_free_directions_say_so(tmp_path):
+    rigid = Page(quick(load(MACHINE, ["stiffness.passive_links=rigid"])))
+    assert "Some directions are rigid: K is infinite there" in rigid.text
+    assert rigid.table("Stiffness K")[1][3] == "rigid"
+    free = Page(quick(load(MACHINE, ["stiffness.actuator=[0, 1000, 1000, 1000]"])))
+    assert "Some directions are free: C is infinite there" in free.text
+    assert "free" in free.table("Compliance C")[1]
+
+
+def test_what_a_file_lacks_is_said_in_a_sentence():
+    page = Page(quick(load(MACHINE)))
+    for sentence in ("The machine file has no load.", "Maps were left out.", "Guidelines were left out.",
+                     "Sensitivities were left out.", "Validation was left out."):  # fmt: skip
+        assert sentence in page.text
+
+
+@pytest.mark.parametrize("name", bundled())
+def test_every_bundled_machine_has_a_page(name):
+    page = Page(quick(load(name)))
+    assert page.results == {}
+    assert page.table("Compliance C")
+    assert {"svg", "img", "math"} <= set(page.tags)
+
+
+@pytest.mark.parametrize("setting", ["pose.z=3 m", "limits.longest_leg=10 cm"])
+def test_a_pose_without_answer_has_no_report(setting, tmp_path, capsys):
+    assert main(["report", MACHINE, "--set", setting, "-o", str(tmp_path / "r.html")]) == 1
+    assert analyze(load(MACHINE, [setting])).message in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["-o", "r.docx"], "a report is .html or .pdf"),
+        (["--over", "x=0:1:3", "--over", "z=0:1:3", "--over", "theta5=0:1:3"], "one coordinate or two, not 3"),
+        (["--over", "height=0:1:3"], "is not a field"),
+        (["--engine", "abacus"], "There is no engine"),
+    ],
+)
+def test_bad_input_is_refused_with_its_reason(words, reason, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["report", MACHINE, *words]) == 2
+    assert reason in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_typst_a_pdf_is_refused_at_once(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(pdf, "find_spec", lambda _: None)
+    assert main(["report", MACHINE, "-o", str(tmp_path / "r.pdf")]) == 2
+    assert "pip install 'kinetostat[report]'" in capsys.readouterr().err
+
+
+def test_without_the_renderer_a_page_shows_the_picture_and_says_so(monkeypatch):
+    monkeypatch.setattr(live, "renderer", lambda: None)
+    page = Page(quick(load(MACHINE)))
+    assert "live-data" not in page.attached
+    assert "img" in page.tags
+    assert "make the report after pip install 'kinetostat[report]'" in page.text
+
+
+def test_a_report_that_is_stopped_leaves_the_old_file(tmp_path, capsys, monkeypatch):
+    def stop(*arguments):
+        raise KeyboardInterrupt
+
+    kept = tmp_path / "r.html"
+    kept.write_text("old")
+    monkeypatch.setattr(answers, "sensitivity", stop)
+    assert main(["report", MACHINE, "-o", str(kept)]) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["r.html"]
+    assert kept.read_text() == "old"
+
+
+def test_ranges_end_where_the_machine_can_follow():
+    """With limits in the file, as far as these allow; every end has an answer, and ends are round."""
+    limits = ["limits.longest_leg=1.4 m", "limits.shortest_leg=0.9 m"]
+    spans = []
+    for settings in ([], limits):
+        ranges = usual_ranges(load("tricept", settings), 5)
+        assert [text.split("=")[0] for text in ranges] == ["pose.length", "pose.theta1"]
+        for text in ranges:
+            path, _, ends = text.partition("=")
+            low, high, count = ends.split(":")
+            assert count == "5"
+            for end in (low, high):
+                assert analyze(load("tricept", [*settings, f"{path}={end}"])).status.word == "ok"
+        spans.append(float(high) - float(low))
+    assert spans[1] > spans[0]
+
+
+def test_the_users_ranges_are_mapped(tmp_path):
+    page = Page(reported(tmp_path / "r.html", MACHINE, "--over", "stiffness.passive_links=1e3:1e7:9:log", *QUICK))
+    assert "from 1000 to 1×10⁷" in page.text
+    least, greatest = (number(cell) for cell in page.table("Extremes")[3][1:3])
+    assert (least, greatest) == pytest.approx((1.5e-7, 1.5e-3), rel=1e-3)
+
+
+def test_a_study_is_reported_with_its_best_design(tmp_path):
+    file, folder = tmp_path / "study.toml", tmp_path / "searched"
+    file.write_text(TINY, "utf-8")
+    found = told("optimize", str(file), "-o", str(folder))
+    page = Page(reported(tmp_path / "r.html", file, *QUICK, "--without", "maps"))
+    assert page.results["name"].endswith(", optimised")
+    worth = page.table("What it is worth")[1]
+    assert number(worth[2]) == pytest.approx(found["objective"], rel=1e-8)
+    bounds = {row[0]: row[2:4] for row in page.table("Variables and their bounds")[1:]}
+    assert bounds["geometry.base_radius"] == ["0.2 m", "0.26 m"]
+    assert [row[0] for row in page.table("Variables of")[1:]] == list(found["variables"])
+    stored = Page(reported(tmp_path / "s.html", folder, *QUICK, "--without", "maps"))
+    assert stored.results == page.results
+    assert stored.tables == page.tables
+
+
+def test_a_study_without_feasible_design_has_no_report(tmp_path, capsys):
+    file = tmp_path / "study.toml"
+    file.write_text(TINY + '[[constraints]]\nquantity = "compliance_z"\nat_most = "1e-9 m/N"\n', "utf-8")
+    assert main(["report", str(file), "-o", str(tmp_path / "r.html")]) == 1
+    assert "No feasible design was found" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
