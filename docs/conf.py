@@ -14,14 +14,12 @@ exclude_patterns = ["generated", "measured", "site_build"]
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
-suppress_warnings: list[str] = []
-nitpicky = False
 default_role = "code"
 highlight_language = "none"
 html_math_renderer = "mathml"
 
-autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
 python_use_unqualified_type_names = True
 
 html_theme = "furo"
@@ -29,6 +27,7 @@ html_title = f"kinetostat {version}"
 html_static_path = ["site_build/static"]
 html_css_files = ["style.css"]
 html_copy_source = False
+html_show_copyright = False
 html_show_sourcelink = False
 pygments_style = "friendly"
 pygments_dark_style = "github-dark"

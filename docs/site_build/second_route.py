@@ -13,7 +13,7 @@ Array = npt.NDArray[np.float64]
 
 
 def compliance(response: Response) -> Array:
-    """C at the tool point, base axes [6 x 6], from joints and springs alone: theory, section 2, equation (7).
+    """C at the tool point, base axes [6 x 6], from joints and springs alone: theory, section 2, equation (4).
 
     Rows that a planar machine does not have are 0. Lengths are in units of the machine's while the system is solved.
     """

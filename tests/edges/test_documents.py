@@ -140,3 +140,12 @@ def test_a_false_answer_is_found_out():
     assert missing("C rx 0.516404\n ...\nry 1.404595", said) is None
     assert missing("C rx 0.516405", said) == "C rx 0.516405"
     assert missing("ry 1.404595\nrx 0.516404", said) == "rx 0.516404"
+
+
+def test_equations_are_numbered_in_order_and_those_that_are_named_exist():
+    theory = (ROOT / "docs/theory.md").read_text("utf-8")
+    numbers = [int(number) for number in re.findall(r"\\tag\{(\d+)\}", theory)]
+    assert numbers == list(range(1, 1 + theory.count("\n$$\n") // 2))
+    named = {int(number) for page in pages() for number in re.findall(r"equation \((\d+)\)", page.read_text("utf-8"))}
+    assert named
+    assert named <= set(numbers)
