@@ -134,7 +134,10 @@ def main() -> None:
     if options.one:
         one(options.one[0], int(options.one[1]))
         return
-    print(f"Measured on {date.today()}: {processor()}, {available_cores()} of {os.cpu_count()} cores; Python {platform.python_version()}, ", end="")
+    print(
+        f"Measured on {date.today()}: {processor()}, {available_cores()} of {os.cpu_count()} cores; Python {platform.python_version()}, ",
+        end="",
+    )
     print(f"NumPy {np.__version__}.")
     with tempfile.TemporaryDirectory() as folder:
         for name in options.machines:

@@ -7,6 +7,8 @@ from docutils import nodes
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 
+BRACKET = re.compile(r"<mo>(&#x0005B;)</mo>(?=<mtable>)|(?<=</mtable>)<mo>(&#x0005D;)</mo>")
+"""Beside a matrix, which it is as high as."""
 NUMBER = re.compile(r"\\tag\{(.+?)\}")
 
 
@@ -17,7 +19,7 @@ def add_renderer(app: Sphinx) -> None:
 
 def inline(writer: nodes.NodeVisitor, node: nodes.Element) -> None:
     """A formula within a line."""
-    writer.body.append(convert(node.astext()))  # type: ignore[attr-defined]
+    writer.body.append(drawn(node.astext()))  # type: ignore[attr-defined]
     raise nodes.SkipNode
 
 
@@ -25,7 +27,13 @@ def display(writer: nodes.NodeVisitor, node: nodes.Element) -> None:
     """An equation of its own, with the number that `\\tag` gives it and an anchor of that number."""
     text = node.astext()
     number = NUMBER.search(text)
-    body = convert(NUMBER.sub("", text).strip(), display="block")
-    label = f'<a class="eqno" id="eq-{escape(number[1])}" href="#eq-{escape(number[1])}">({escape(number[1])})</a>' if number else ""
+    body = drawn(NUMBER.sub("", text).strip(), "block")
+    anchor = f"eq-{escape(number[1])}" if number else ""
+    label = f'<a class="eqno" id="{anchor}" href="#{anchor}">({escape(number[1])})</a>' if number else ""
     writer.body.append(f'<div class="equation">{body}{label}</div>\n')  # type: ignore[attr-defined]
     raise nodes.SkipNode
+
+
+def drawn(text: str, display: str = "inline") -> str:
+    """LaTeX as MathML."""
+    return BRACKET.sub(r'<mo stretchy="true" fence="true">\1\2</mo>', convert(text, display=display))

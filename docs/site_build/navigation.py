@@ -3,8 +3,8 @@
 from pathlib import Path
 
 PAGES = {
-    "Start": ["start", "tutorials/paper-machine", "tutorials/own-machine", "tutorials/optimise", "tutorials/read-a-map"]
-    + ["tutorials/jupyter"],
+    "Start": ["start"],
+    "Tutorials": [f"tutorials/{name}" for name in ("paper-machine", "own-machine", "read-a-map", "optimise", "jupyter")],
     "Do": ["leg-by-leg", "how-to-choose-a-link-model", "guidelines", "workspace", "design", "studio"],
     "Know": ["theory", "verification", "validation", "performance"],
     "Look up": ["gallery", "api", "faq", "extending", "changelog"],

@@ -2,7 +2,6 @@
 
 import inspect
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,5 +27,3 @@ def escaped(line: str) -> str:
     """A line of plain text as reStructuredText."""
     parts = re.split(r"(`[^`]+`|:[a-z]+:`?)", line)
     return "".join(part if i % 2 else re.sub(r"([*|]|_(?=\W|$))", r"\\\1", part) for i, part in enumerate(parts))
-
-

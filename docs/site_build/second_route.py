@@ -47,4 +47,3 @@ def columns(screws: Sequence[Screw], length: float) -> Array:
     """Twists as columns [6 x n], angles times the length (m)."""
     rows = np.array([screw.components() for screw in screws], dtype=float).reshape(-1, 6)
     return rows.T * np.repeat([length, 1.0], 3)[:, None]
-

@@ -68,7 +68,11 @@ def closed_forms(_folder: Path) -> str:
 def _closed() -> Iterator[tuple[str, ...]]:
     height, k = 0.1, 20e6
     found = analyze(load("hexapod-cubic")).stiffness_diagonal
-    forms = {"1.5 k Hc²": (1.5 * k * height**2, (0, 1)), "6 k Hc²": (6 * k * height**2, (2,)), "2 k": (2 * k, (3, 4, 5))}
+    forms = {
+        "1.5 k Hc²": (1.5 * k * height**2, (0, 1)),
+        "6 k Hc²": (6 * k * height**2, (2,)),
+        "2 k": (2 * k, (3, 4, 5)),
+    }
     for form, (value, entries) in forms.items():
         for i in entries:
             yield _closed_row("hexapod-cubic", f"K {GROUPS['stiffness'][i][10:]}", form, value, found[i])
@@ -127,7 +131,8 @@ def _added(name: str) -> str:
 def _product(response: Response, exist: list[int], length: float) -> str:
     scale = np.diag(np.repeat([length, 1.0], 3)[exist])
     stiffness, compliance = (
-        np.array(matrix.rows(), dtype=float)[np.ix_(exist, exist)] for matrix in (response.stiffness, response.compliance)
+        np.array(matrix.rows(), dtype=float)[np.ix_(exist, exist)]
+        for matrix in (response.stiffness, response.compliance)
     )
     scaled = (np.linalg.inv(scale) @ stiffness @ np.linalg.inv(scale), scale @ compliance @ scale)
     error = np.linalg.norm(scaled[0] @ scaled[1] - np.eye(len(exist)))

@@ -1,7 +1,6 @@
 """A study as the text of a file that `read_study` reads back as the same study. Nothing is looked up or solved."""
 
 import json
-import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -30,11 +29,7 @@ def _table(head: str, table: Mapping[str, Any]) -> list[str]:
 
 def _pairs(table: Mapping[str, Any]) -> Iterator[str]:
     for key, value in table.items():
-        yield f"{_key(key)} = {_value(value)}"
-
-
-def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
+        yield f"{key(key)} = {_value(value)}"
 
 
 def _value(value: Any) -> str:
