@@ -134,11 +134,8 @@ def main() -> None:
     if options.one:
         one(options.one[0], int(options.one[1]))
         return
-    print(
-        f"Measured on {date.today()}: {processor()}, {available_cores()} of {os.cpu_count()} cores; Python {platform.python_version()}, ",
-        end="",
-    )
-    print(f"NumPy {np.__version__}.")
+    print(f"Measured on {date.today()}: {processor()}, {available_cores()} of {os.cpu_count()} cores; ", end="")
+    print(f"Python {platform.python_version()}, NumPy {np.__version__}.")
     with tempfile.TemporaryDirectory() as folder:
         for name in options.machines:
             print_routes(CASES[name], options.poses, options.turns, Path(folder))

@@ -1,4 +1,4 @@
-"""The documentation as a site: `sphinx-build -W docs site`. Pages are Markdown; what is generated is in `site_build`."""
+"""The documentation as a site: `sphinx-build -W docs site`. Pages are Markdown; `site_build` generates the rest."""
 
 import sys
 from importlib.metadata import version as version_of

@@ -2,21 +2,32 @@
 
 from pathlib import Path
 
+TUTORIALS = ("paper-machine", "own-machine", "read-a-map", "optimise", "jupyter")
 PAGES = {
-    "Start": ["start"],
-    "Tutorials": [f"tutorials/{name}" for name in ("paper-machine", "own-machine", "read-a-map", "optimise", "jupyter")],
-    "Do": ["leg-by-leg", "how-to-choose-a-link-model", "guidelines", "workspace", "design", "studio"],
+    "Start": ["start", "install"],
+    "Tutorials": [f"tutorials/{name}" for name in TUTORIALS],
+    "Do": [
+        "leg-by-leg",
+        "how-to-choose-a-link-model",
+        "guidelines",
+        "workspace",
+        "design",
+        "report",
+        "export",
+        "studio",
+    ],
     "Know": ["theory", "verification", "validation", "performance"],
-    "Look up": ["gallery", "api", "faq", "extending", "changelog"],
+    "Look up": ["gallery", "python", "api", "faq", "extending", "changelog"],
 }
 """By the heading of their group."""
 
 
-def contents(_folder: Path) -> str:
+def contents(folder: Path) -> str:
     """The table of contents of the front page."""
     groups = []
     for caption, pages in PAGES.items():
-        groups += ["```{toctree}", ":hidden:", f":caption: {caption}", "", *pages, "```", ""]
+        written = [page for page in pages if (folder / f"{page}.md").exists()]
+        groups += ["```{toctree}", ":hidden:", f":caption: {caption}", "", *written, "```", ""]
     return "\n".join(groups)
 
 

@@ -1,4 +1,4 @@
-"""Tables of the verification manual: every number beside the same number by another way, computed when the site is built."""
+"""Tables of the verification manual: every number beside the same by another way, computed as the site is built."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -140,7 +140,7 @@ def _product(response: Response, exist: list[int], length: float) -> str:
 
 
 def engine(_folder: Path) -> str:
-    """Every bundled machine in the multibody engine, at its bundled pose; with the benchmark's table for both engines."""
+    """Every bundled machine in the multibody engine, at its bundled pose."""
     chosen = KNOWN[0]
     rows = []
     for name in bundled():

@@ -44,7 +44,7 @@ def arguments(node):
 def told(docstring):
     """Names in the section `Args:`."""
     section = docstring.partition("Args:\n")[2].split("\n\n")[0]
-    names = re.findall(r"^    ([\w*, ]+?):(?: |$)", section, re.MULTILINE)
+    names = re.findall(r"^    (\*{0,2}\w[\w*, ]*?):(?: |$)", section, re.MULTILINE)
     return {name.strip(" *") for entry in names for name in entry.split(",")}
 
 

@@ -12,6 +12,7 @@ SMALL = 22
 CALLED_FROM_OUTSIDE = {
     "dask_setup": "called by workers of a cluster, by this name",
     "engines": "what is installed, for tests and benchmarks",
+    "_repr_png_": "called by notebooks, by this name",
     "seconds": "times a kernel alone, for benchmarks",
 }
 """Names that nothing in the package uses, and who does."""

@@ -12,7 +12,7 @@ from kinetostat.cli import main
 from kinetostat.machine.loading import build, load
 from kinetostat.studies.optimisation.problem import load_problem
 from kinetostat.studio import serving
-from kinetostat.views import figures
+from kinetostat.views import figures, saving
 from pages import KINDS, ROOT, blocks, commands, dialogues, missing, pages
 
 NOT_RUN = {
@@ -24,6 +24,13 @@ NOT_RUN = {
 """What no test runs, by the words it starts with, and why."""
 
 PAGES = [page.relative_to(ROOT) for page in pages()]
+
+
+class DrawnOnce(dict):
+    """All formats of figures, the first of which is enough where every one would be written."""
+
+    def __iter__(self):
+        yield next(super().__iter__())
 
 
 class Reader:
@@ -109,8 +116,9 @@ def placed(document, path, table):
 @pytest.fixture
 def reader(tmp_path, monkeypatch):
     """A reader in an empty folder. Figures are drawn once each; a studio starts up to where it would listen."""
+    assert saving.FORMATS is figures.FORMATS, "files that are named have any format"
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(figures, "FORMATS", ("png",))
+    monkeypatch.setattr(figures, "FORMATS", DrawnOnce(figures.FORMATS))
     monkeypatch.setattr(serving, "serve", lambda *_: None)
     return Reader(tmp_path)
 

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from kinetostat.spec.document import toml_key
 from kinetostat.spec.study import StudyFile
 
 TABLES = ("set", "poses", "optimizer", "robustness")
@@ -29,7 +30,7 @@ def _table(head: str, table: Mapping[str, Any]) -> list[str]:
 
 def _pairs(table: Mapping[str, Any]) -> Iterator[str]:
     for key, value in table.items():
-        yield f"{key(key)} = {_value(value)}"
+        yield f"{toml_key(key)} = {_value(value)}"
 
 
 def _value(value: Any) -> str:
