@@ -2,7 +2,7 @@
 
 Prints Markdown to stdout.
 
-    python benchmarks/link_models.py
+    python benchmarks/link_models.py > docs/measured/link-models.md
 """
 
 import numpy as np

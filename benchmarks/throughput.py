@@ -1,7 +1,9 @@
 """Poses per second of three machines: kinetostat beside batched NumPy, hand-written C++ and PyNite, in one run.
 
-Run `python benchmarks/throughput.py`; it prints Markdown. Every route but PyNite's uses all cores, and the routes take
+It prints Markdown, the tables of `docs/performance.md`. Every route but PyNite's uses all cores, and the routes take
 turns, so that a busy machine slows all of them; each counts by its best turn.
+
+    python benchmarks/throughput.py > docs/measured/throughput.md
 """
 
 import argparse
@@ -14,6 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -66,9 +69,9 @@ def difference(route: Route, twelve: Sequence[Array]) -> str:
     return f"{max(float(np.abs(a / b[: len(a)] - 1.0).max()) for a, b in pairs):.0e}"
 
 
-def print_sizes(title: str, name: str, sizes: Sequence[int]) -> None:
+def print_sizes(name: str, sizes: Sequence[int]) -> None:
     """Cost against batch size, each in a process of its own, so that its peak of memory is its own."""
-    print(f"\n### {title}: twelve outputs, against the size of the batch\n")
+    print("\nAgainst the size of the batch, twelve outputs; each size in a process of its own:\n")
     print("| poses | first call | later calls | per pose | peak memory of the process |")
     print("|---|---|---|---|---|")
     for size in sizes:
@@ -123,13 +126,13 @@ def main() -> None:
     if options.one:
         one(options.one[0], int(options.one[1]))
         return
-    print(f"{processor()}, {available_cores()} of {os.cpu_count()} cores; Python {platform.python_version()}, ", end="")
-    print(f"NumPy {np.__version__}.")
+    print(f"Measured on {date.today()}: {processor()}, {available_cores()} of {os.cpu_count()} cores; ", end="")
+    print(f"Python {platform.python_version()}, NumPy {np.__version__}.")
     with tempfile.TemporaryDirectory() as folder:
         for name in options.machines:
             print_routes(CASES[name], options.poses, options.turns, Path(folder))
             if options.sizes:
-                print_sizes(CASES[name].title, name, options.sizes)
+                print_sizes(name, options.sizes)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 Prints Markdown to stdout, progress to stderr; takes some minutes. Needs `kinetostat[validate]`.
 
-    python benchmarks/validation_table.py > table.md
+    python benchmarks/validation_table.py > docs/measured/validation.md
 """
 
 import math

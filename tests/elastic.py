@@ -48,3 +48,15 @@ stiffnesses = st.integers(0, 10**6).map(lambda seed: spring_matrix(seed, 8)).fil
 turns = rotations().map(turn)
 offsets = vectors(0.5).map(lambda v: np.array(v.components(), dtype=float))
 directions = rotations().map(lambda rotation: np.array(rotation.z.components(), dtype=float))
+
+
+def stiffness_at(stiffness, offset) -> np.ndarray:
+    """K [6 x 6] referred to the point at `offset` (m, base axes) from the present one."""
+    back = np.block([[np.eye(3), np.zeros((3, 3))], [cross(offset), np.eye(3)]])
+    return back.T @ stiffness @ back
+
+
+def compliance_at(compliance, offset) -> np.ndarray:
+    """C [6 x 6] likewise."""
+    there = np.block([[np.eye(3), np.zeros((3, 3))], [-cross(offset), np.eye(3)]])
+    return there @ compliance @ there.T

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinetostat.kinetostatics.centres import centre_of_compliance, compliance_at
+from elastic import compliance_at
+from kinetostat.kinetostatics.centres import centre_of_compliance
 from kinetostat.kinetostatics.eigenscrews import compliance_eigenscrews
 from kinetostat.kinetostatics.indices import (
     free_stiffness_along,

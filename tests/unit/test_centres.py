@@ -7,15 +7,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from elastic import PLANE, cross, offsets, spring_matrix, stiffnesses, turns, wrench_moved
+from elastic import (
+    PLANE,
+    compliance_at,
+    cross,
+    offsets,
+    spring_matrix,
+    stiffness_at,
+    stiffnesses,
+    turns,
+    wrench_moved,
+)
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinetostatics.centres import (
     centre_of_compliance,
     centre_of_elasticity,
     centre_of_stiffness,
-    compliance_at,
-    stiffness_at,
 )
 
 STABLE = 1e-7
@@ -152,5 +160,3 @@ def test_what_has_no_centre_is_refused():
         centre_of_stiffness(np.eye(3), (0, 1, 2))
     with pytest.raises(ValueError, match="6 components"):
         centre_of_compliance(np.eye(3))
-    with pytest.raises(ValueError, match="finite"):
-        stiffness_at(np.full((6, 6), math.inf), [0, 0, 0])

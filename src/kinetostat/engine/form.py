@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinetostat.algebra.scalar import Scalar
 from kinetostat.engine.body import Array
-from kinetostat.engine.trace import Graph, Traced
+from kinetostat.engine.trace import Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
@@ -124,3 +125,8 @@ def traced(kind: Kind, form: Form) -> Inputs:
     used = {path: -fixed[place] if negative else fixed[place] for path, place, negative in form.uses}
     machine = with_values(kind.machine, {**dict(form.constant), **used, **columns})
     return Inputs(graph, fixed, columns, {**used, **columns}, machine)
+
+
+def number(value: Scalar) -> Operand:
+    """A result as a program takes it: a node, or a float where it depends on nothing."""
+    return float(value) if isinstance(value, int | float) else value

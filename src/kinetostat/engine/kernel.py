@@ -13,14 +13,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar, where
+from kinetostat.algebra.scalar import where
 from kinetostat.engine.body import Array, Body, Codes, Runnable
 from kinetostat.engine.cuda import GpuProgram
 from kinetostat.engine.cuda_driver import Gpu, gpu
 from kinetostat.engine.device import Device
-from kinetostat.engine.form import Form, Kind, angles, form_of, reduced, traced
+from kinetostat.engine.form import Form, Kind, angles, form_of, number, reduced, traced
 from kinetostat.engine.native import Program
-from kinetostat.engine.trace import Operand, Traced
+from kinetostat.engine.trace import Traced
 from kinetostat.kinematics.closed_form import closed_joints
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.status import Status
@@ -125,8 +125,8 @@ def _program(kind: Kind, form: Form, quantities: tuple[str, ...], iterated: bool
     response = respond(given.machine, _joints(given.machine, joints))
     accepted = response.status < Status.OK + 0.5
     results = [where(accepted, QUANTITIES[name].value(response), math.nan) for name in quantities]
-    numbers = [_number(result) for result in results]
-    body = Body(given.fixed, [*given.columns.values(), *joints], numbers, _number(response.status))
+    numbers = [number(result) for result in results]
+    body = Body(given.fixed, [*given.columns.values(), *joints], numbers, number(response.status))
     return Program(body) if device is None else GpuProgram(body, device)
 
 
@@ -136,8 +136,3 @@ def _joints(machine: Machine, columns: Sequence[Traced]) -> Joints | None:
         return Joints(tuple(columns[:-1]), columns[-1])
     closed = closed_joints(machine.chains()) if machine.family.chains else None
     return Joints(tuple(closed[0]), closed[1]) if closed else None
-
-
-def _number(value: Scalar) -> Operand:
-    """A result as a program takes it: a node, or a float where it depends on nothing."""
-    return float(value) if isinstance(value, int | float) else value

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from kinetostat.algebra.scalar import Scalar, plus, times, where
 from kinetostat.engine.body import Body
-from kinetostat.engine.form import Form, Inputs, Kind, traced
+from kinetostat.engine.form import Form, Inputs, Kind, number, traced
 from kinetostat.engine.trace import Operand, Traced
 from kinetostat.kinematics.closed_form import closed_joints
 from kinetostat.kinematics.closing import closing_equations
@@ -44,15 +44,15 @@ def objectives_of(
     else:
         response = respond(given.machine, Joints(joints, placed[0]) if placed else None)
     accepted = response.status < Status.OK + 0.5
-    results = [_number(where(accepted, _weighted(response, weights), math.nan)) for weights in objectives]
-    return _question(given, (*joints, *placed), results, _number(response.status), (*_inputs(given, paths), *joints))
+    results = [number(where(accepted, _weighted(response, weights), math.nan)) for weights in objectives]
+    return _question(given, (*joints, *placed), results, number(response.status), (*_inputs(given, paths), *joints))
 
 
 def equations_of(kind: Kind, form: Form, paths: Sequence[str]) -> Question:
     """What vanishes where the legs of a machine written leg by leg close at its pose; columns likewise."""
     given = traced(kind, form)
     joints, placed = _joints(given)
-    results = [_number(gap) for gap in closing_equations(given.machine.chains(), joints)]
+    results = [number(gap) for gap in closing_equations(given.machine.chains(), joints)]
     return _question(given, (*joints, *placed), results, 0.0, (*_inputs(given, paths), *joints))
 
 
@@ -78,9 +78,4 @@ def _weighted(response: Response, weights: Weights) -> Operand:
     value: Scalar = 0.0
     for name, weight in weights:
         value = plus(value, times(float(weight), QUANTITIES[name].value(response)))
-    return _number(value)
-
-
-def _number(value: Scalar) -> Operand:
-    """A result as a program takes it: a node, or a float where it depends on nothing."""
-    return float(value) if isinstance(value, int | float) else value
+    return number(value)

@@ -5,7 +5,6 @@ computed. Every rewriting is exact in IEEE arithmetic, infinities and NaN includ
 """
 
 import math
-import operator
 from collections.abc import Callable, Iterable
 from typing import Any, NoReturn, TypeAlias
 
@@ -318,9 +317,6 @@ def _div(a: Any, b: Any) -> Any:
     if (minus := _negated(b)) is not None:
         return -_div(a, minus)
     return _binary("div", a, b)
-
-
-_COMPARISONS = {"lt": operator.lt, "le": operator.le}
 
 
 def _compare(operation: str, a: Any, b: Any) -> Condition | bool:

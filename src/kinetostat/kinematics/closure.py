@@ -293,7 +293,7 @@ def _pose_gap(
 
 
 def pose_of(end: tuple[Array, Array]) -> dict[str, Array]:
-    """The six pose coordinates of a placement: P (m), and the angles of Q = Rz(yaw) Ry(pitch) Rx(roll), rad."""
+    """Pose coordinates of placements, each [points]: P (m), and the angles of Q = Rz(yaw) Ry(pitch) Rx(roll), rad."""
     turn, point = end
     flat = np.hypot(turn[:, 0, 0], turn[:, 1, 0])
     angles = {

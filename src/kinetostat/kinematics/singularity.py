@@ -28,6 +28,9 @@ def conditioning(legs: Sequence[LegScrews], length: float, guide: Sequence[Wrenc
         legs: at one reference point, base axes.
         length: characteristic length, m.
         guide: of a planar machine, the wrenches against twists that do not exist there.
+
+    Returns:
+        As many as the smaller of 6 and the number of wrenches [n].
     """
     wrenches = [*(wrench for leg in legs for wrench in leg.wrenches), *guide]
     return np.asarray(np.linalg.svd(columns(wrenches, 1.0 / length, 1.0), compute_uv=False), dtype=float)

@@ -195,7 +195,7 @@ def weighted_sum(shares: Sequence[tuple[Screw, Scalar]], length: Scalar) -> Symm
 
     Args:
         shares: screws a and weights w >= 0, infinity included.
-        length: what to multiply translational components by, to compare them with rotational ones.
+        length: what to multiply translational components by, to compare them with rotational ones, m or 1/m.
     """
     finite = Symmetric6.total([Symmetric6.dyad(a, a) * where(w < INFINITE, w, 0.0) for a, w in shares])
     reached = [_endless(w, screw, length) for screw, w in shares]

@@ -1,4 +1,4 @@
-"""Where the elasticity of a machine is centred: K and C at another point, centres of stiffness, compliance, elasticity.
+"""Where the elasticity of a machine is centred: centres of stiffness, compliance, elasticity.
 
 They belong to the machine and move with it: the point of space found does not depend on the reference point. In space
 (6 x 6) or in the plane (3 x 3, rows rz x y). The normal form's screws are in `eigenscrews`.
@@ -20,22 +20,6 @@ INDEFINITE = 1e-12
 
 Point: TypeAlias = list[float]
 """From the reference point P, base axes, m [3]."""
-
-
-def stiffness_at(stiffness: Matrix, offset: Sequence[float]) -> Array:
-    """K referred to the point at `offset` (m, base axes [3]) from the present one, base axes [6 x 6].
-
-    Raises:
-        ValueError: if K is not 6 x 6 and finite.
-    """
-    back = np.block([[np.eye(3), np.zeros((3, 3))], [_cross(offset), np.eye(3)]])
-    return np.asarray(back.T @ _required(stiffness) @ back)
-
-
-def compliance_at(compliance: Matrix, offset: Sequence[float]) -> Array:
-    """C referred to the point at `offset` (m, base axes [3]) from the present one; likewise."""
-    there = np.block([[np.eye(3), np.zeros((3, 3))], [-_cross(offset), np.eye(3)]])
-    return np.asarray(there @ _required(compliance) @ there.T)
 
 
 def centre_of_stiffness(stiffness: Matrix | None, components: Sequence[int] = SPATIAL) -> Point | None:
@@ -102,23 +86,6 @@ def centre_of_elasticity(
     return None if soft is None else _skew_part(soft[3:, :3], soft[:3, :3])
 
 
-def _cross(a: Sequence[float] | Array) -> Array:
-    """The matrix of a x . [3 x 3]."""
-    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]], dtype=float)
-
-
-def _vee(matrix: Array) -> Array:
-    """a, where matrix - matrix^T = [a x]."""
-    return np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
-
-
-def _required(matrix: Matrix) -> Array:
-    array = finite(matrix)
-    if array is None:
-        raise ValueError("only a finite matrix can be referred to another point: take C where K is infinite")
-    return array
-
-
 def _spatial(matrix: Matrix | None, components: Sequence[int]) -> Array | None:
     """The matrix with zeros for what a planar machine lacks [6 x 6]."""
     if tuple(components) not in (SPATIAL, PLANAR):
@@ -149,3 +116,8 @@ def _skew_part(coupling: Array, block: Array) -> Point | None:
     if values[0] <= INDEFINITE * values[-1]:
         return None
     return [0.5 * float(c) for c in _vee(np.asarray(np.linalg.solve(block, coupling.T).T, dtype=float))]
+
+
+def _vee(matrix: Array) -> Array:
+    """a, where matrix - matrix^T = [a x]."""
+    return np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])

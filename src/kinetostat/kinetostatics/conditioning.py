@@ -59,11 +59,6 @@ def twist_condition(twists: npt.ArrayLike, length: float, components: Sequence[i
     return _condition(twists, _scale(components, _positive(length)))
 
 
-def wrench_condition(wrenches: npt.ArrayLike, length: float, components: Sequence[int] = SPATIAL) -> float:
-    """Likewise for columns that are wrenches (moments N·m above forces N), moments divided by `length` (m)."""
-    return _condition(wrenches, _scale(components, 1.0 / _positive(length)))
-
-
 def _positive(length: float) -> float:
     if not 0.0 < length < np.inf:
         raise ValueError(f"a characteristic length is positive, not {length}")

@@ -4,7 +4,6 @@ import difflib
 import json
 import math
 import operator
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache, reduce
@@ -146,7 +145,7 @@ def as_toml(machine: Machine) -> str:
         section = machine.sections.get(name)
         if section is not None and _left_out(machine.family.every_section[name], section):
             continue
-        lines += ["", f"[{'.'.join(_key(part) for part in name.split('.'))}]"]
+        lines += ["", f"[{'.'.join(documents.toml_key(part) for part in name.split('.'))}]"]
         lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get(name, {}).items()]
         lines += _quantity_lines(machine.family.every_section[name], section) if section is not None else []
     return "\n".join(lines) + "\n"
@@ -164,11 +163,6 @@ def _quantity_lines(fields: type, section: Any) -> Iterator[str]:
             continue
         texts = [json.dumps(quantity.show(value)) for value in (held if quantity.count else (held,))]
         yield f"{field} = {'[' + ', '.join(texts) + ']' if quantity.count else texts[0]}"
-
-
-def _key(name: str) -> str:
-    """A name as TOML takes it in a table's header."""
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
 
 
 def template(family: str) -> str:

@@ -1,6 +1,8 @@
 """Machine and study files as text: read safely, override, write. Nothing is interpreted here; see `validation`."""
 
 import copy
+import json
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -143,3 +145,8 @@ def _index(entries: list[Any], key: str, path: str) -> int:
         known = f"the list has entries 0 to {len(entries) - 1}"
         raise InputError(f"--set {shorten(path)}: {shorten(key)} is not an entry; {known}.")
     return int(key)
+
+
+def toml_key(name: str) -> str:
+    """A name as TOML takes it in a table's header."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)

@@ -1,10 +1,10 @@
 """A study as the text of a file that `read_study` reads back as the same study. Nothing is looked up or solved."""
 
 import json
-import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from kinetostat.spec.document import toml_key
 from kinetostat.spec.study import StudyFile
 
 TABLES = ("set", "poses", "optimizer", "robustness")
@@ -30,11 +30,7 @@ def _table(head: str, table: Mapping[str, Any]) -> list[str]:
 
 def _pairs(table: Mapping[str, Any]) -> Iterator[str]:
     for key, value in table.items():
-        yield f"{_key(key)} = {_value(value)}"
-
-
-def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
+        yield f"{toml_key(key)} = {_value(value)}"
 
 
 def _value(value: Any) -> str:

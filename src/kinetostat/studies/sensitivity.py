@@ -35,6 +35,11 @@ FREE = "as free, so that C is infinite or does not feel it"
 OPENS = "as the legs would no longer close if one of them changed alone"
 
 
+def greatest_of(percents: Sequence[float | None]) -> float:
+    """Size of the greatest; 0 if there is none."""
+    return max((abs(percent) for percent in percents if percent is not None), default=0.0)
+
+
 @dataclass(frozen=True)
 class Influence:
     """What one parameter does to the indices.
@@ -60,7 +65,7 @@ class Influence:
     @property
     def greatest(self) -> float:
         """Size of the greatest of the percents; 0 if there is none."""
-        return max((abs(percent) for percent in self.percents if percent is not None), default=0.0)
+        return greatest_of(self.percents)
 
 
 @dataclass(frozen=True)

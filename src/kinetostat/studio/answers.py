@@ -10,7 +10,6 @@ from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Array, Axis, Grid
 from kinetostat.kinematics.singularity import free_twist
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import SINGULAR, Response, respond
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Load, Machine
@@ -196,8 +195,3 @@ def map_quantities(machine: Machine) -> dict[str, str]:
     names = machine.family.component_names
     found = {f"{matrix}_{name}": f"{matrix} {name}" for matrix in ("compliance", "stiffness") for name in names}
     return {**found, "regularity": "regularity"}
-
-
-def unit_of(quantity: str) -> str:
-    """The SI unit of a quantity."""
-    return QUANTITIES[quantity].unit

@@ -12,7 +12,7 @@ from kinetostat.engine.points import Array, Points
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
-from kinetostat.studies.sensitivity import Sensitivity
+from kinetostat.studies.sensitivity import Sensitivity, greatest_of
 
 FELT = 1e-3
 """Percent per percent below which a parameter counts as doing nothing to a direction."""
@@ -46,7 +46,7 @@ class Move:
     @property
     def greatest(self) -> float:
         """Size of the greatest of the percents."""
-        return max((abs(percent) for percent in self.percents if percent is not None), default=0.0)
+        return greatest_of(self.percents)
 
 
 def moves_at(answer: Sensitivity, yielding: npt.NDArray[np.bool_]) -> list[Move]:

@@ -151,7 +151,7 @@ def optimize(
     log = search(assess, watch) if folder is None else search_into(assess, folder, watch, resume, stop)
     initial = assess(_as_it_is(problem))
     several = len(problem.objectives) > 1
-    front = front_of(log) if several else _single(log)
+    front = front_of(log) if several else best_feasible(log)
     found = Result(problem, log, initial, front, knee_of(log, front) if several and len(front) else 0)
     return _explained(assess, found) if found.solved else found
 
@@ -162,7 +162,8 @@ def _as_it_is(problem: Problem) -> Array:
     return np.where(picked, np.maximum(problem.space.initial, 0.0), problem.space.initial)[None]
 
 
-def _single(log: Log) -> Rows:
+def best_feasible(log: Log) -> Rows:
+    """Where the best design of a log stands; nowhere if it is not feasible."""
     first = log.kept[:1]
     return first if log.outcome(first).violation[0] == 0.0 else first[:0]
 

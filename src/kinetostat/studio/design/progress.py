@@ -8,9 +8,8 @@ from typing import Any
 from kinetostat.engine.points import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.optimisation.front import front_of, knee_of
-from kinetostat.studies.optimisation.log import Log
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.result import designed
+from kinetostat.studies.optimisation.result import best_feasible, designed
 from kinetostat.studies.optimisation.search import kept_log, stored_problem
 from kinetostat.studies.study_folder import Record, noted
 from kinetostat.studio.design.runs import RESULT, Run, Stage
@@ -77,7 +76,7 @@ class Follower:
             return Progress(run, self.problem, result=result)
         log = kept_log(self.problem, self._folder, self._last)
         several = len(self.problem.objectives) > 1
-        front = front_of(log) if several else _single(log)
+        front = front_of(log) if several else best_feasible(log)
         return Progress(
             run,
             self.problem,
@@ -91,11 +90,6 @@ class Follower:
             knee_of(log, front) if several and len(front) else 0,
             result,
         )
-
-
-def _single(log: Log) -> Any:
-    first = log.kept[:1]
-    return first if log.outcome(first).violation[0] == 0.0 else first[:0]
 
 
 def _result(folder: Path) -> dict[str, Any] | None:

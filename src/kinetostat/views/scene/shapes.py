@@ -157,13 +157,6 @@ def helix(radius: float, length: float, turns: float, wire: float) -> Swept:
 
 
 @kept
-def circle(radius: float, wire: float) -> Swept:
-    """A wire circle in the x-y plane."""
-    angles = [math.tau * i / (2 * ROUND) for i in range(2 * ROUND)]
-    return Swept(tuple((radius * math.cos(a), radius * math.sin(a), 0.0) for a in angles), wire, closed=True)
-
-
-@kept
 def arc(radius: float, turn: float, wire: float) -> Swept:
     """A wire arc in the x-y plane, from x over the angle `turn` (rad)."""
     angles = [turn * i / (2 * ROUND) for i in range(2 * ROUND + 1)]

@@ -1,0 +1,14 @@
+"""Tables and numbers as Markdown."""
+
+from collections.abc import Iterable, Sequence
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: int = 0) -> str:
+    """A table; so many of its last columns are numbers, set to the right."""
+    rules = ["---"] * (len(head) - numbers) + ["---:"] * numbers
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in (head, rules, *rows)) + "\n"
+
+
+def difference(value: float) -> str:
+    """A relative difference, to one digit: more of it is chance."""
+    return "0" if value == 0.0 else f"{value:.0e}"

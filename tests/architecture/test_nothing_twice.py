@@ -1,0 +1,87 @@
+"""Nothing in the package is dead, and no function is written twice."""
+
+import ast
+import copy
+from collections import Counter, defaultdict
+
+from source import modules
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+SMALL = 22
+"""Nodes of a body up to which functions may be alike: a property that passes one thing on."""
+CALLED_FROM_OUTSIDE = {
+    "dask_setup": "called by workers of a cluster, by this name",
+    "engines": "what is installed, for tests and benchmarks",
+    "_repr_png_": "called by notebooks, by this name",
+    "seconds": "times a kernel alone, for benchmarks",
+}
+"""Names that nothing in the package uses, and who does."""
+
+
+def names_used():
+    """Every name that is read, imported apart: importing is no use."""
+    found = Counter()
+    for tree in modules().values():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+                found[node.id] += 1
+            elif isinstance(node, ast.Attribute):
+                found[node.attr] += 1
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.isidentifier():
+                found[node.value] += 1
+    return found
+
+
+def names_defined():
+    """Functions, classes, methods and constants, with where they stand; what Python calls by itself apart."""
+    for module, tree in modules().items():
+        for node in ast.walk(tree):
+            if isinstance(node, Function | ast.ClassDef) and not node.name.startswith("__"):
+                yield node.name, module
+        for node in tree.body:
+            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+            yield from ((one.id, module) for one in targets if isinstance(one, ast.Name) and one.id[:2] != "__")
+
+
+def test_every_name_is_used():
+    used = names_used()
+    dead = {name: module for name, module in names_defined() if not used[name]}
+    assert dead.keys() == CALLED_FROM_OUTSIDE.keys(), dead
+
+
+class Unnamed(ast.NodeTransformer):
+    """Calls what is local to a function by numbers."""
+
+    def __init__(self, function):
+        stored = {n.id for n in ast.walk(function) if isinstance(n, ast.Name) and not isinstance(n.ctx, ast.Load)}
+        given = [one.arg for one in ast.walk(function.args) if isinstance(one, ast.arg)]
+        self.names = {name: f"_{i}" for i, name in enumerate((*given, *sorted(stored - set(given))))}
+
+    def visit_Name(self, node):
+        return ast.Name(self.names.get(node.id, node.id), node.ctx)
+
+
+def normal(function):
+    """The body of a function without its docstring and the names of what is local to it."""
+    body = function.body[1:] if ast.get_docstring(function) else function.body
+    return Unnamed(function).visit(ast.Module([copy.deepcopy(statement) for statement in body], []))
+
+
+def size(tree):
+    return sum(1 for _ in ast.walk(tree))
+
+
+def test_names_of_what_is_local_do_not_matter():
+    one, same, other = ast.parse(
+        "def f(a): b = g(a); return b\ndef f(x): y = g(x); return y\ndef f(x): return h(x)"
+    ).body
+    assert ast.dump(normal(one)) == ast.dump(normal(same)) != ast.dump(normal(other))
+
+
+def test_no_function_is_written_twice():
+    found = defaultdict(list)
+    for module, tree in modules().items():
+        for node in ast.walk(tree):
+            if isinstance(node, Function) and size(body := normal(node)) > SMALL:
+                found[ast.dump(body)].append(f"{module}.{node.name}")
+    assert not [places for places in found.values() if len(places) > 1]

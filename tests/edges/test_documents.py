@@ -1,0 +1,159 @@
+"""What the documentation says, done: every command runs, every file is read, every answer is the printed one."""
+
+import io
+import re
+import tomllib
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+
+import pytest
+
+from kinetostat.cli import main
+from kinetostat.machine.loading import build, load
+from kinetostat.studies.optimisation.problem import load_problem
+from kinetostat.studio import serving
+from kinetostat.views import figures, saving
+from pages import KINDS, ROOT, blocks, commands, dialogues, missing, pages
+
+NOT_RUN = {
+    "python3 -m pip install": "sets an environment up; .ci/run does it",
+    "pip install": "changes the environment; .ci/run installs the wheel in one of its own",
+    ".uv/bin/uv": "an environment of its own, set up by .ci/run, which also runs tests and linters in it",
+    "bash .ci/run": "runs these tests",
+}
+"""What no test runs, by the words it starts with, and why."""
+
+PAGES = [page.relative_to(ROOT) for page in pages()]
+
+
+class DrawnOnce(dict):
+    """All formats of figures, the first of which is enough where every one would be written."""
+
+    def __iter__(self):
+        yield next(super().__iter__())
+
+
+class Reader:
+    """Somebody who does what a page says, in a folder of their own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.said = ""
+        self.names: dict[str, object] = {"__name__": "__main__"}
+
+    def do(self, block):
+        return getattr(self, f"do_{block.kind or 'quotation'}")(block)
+
+    def do_quotation(self, block):
+        assert not block.words
+
+    def do_toml(self, block):
+        name, *path = block.words
+        if path:
+            document = tomllib.loads((self.folder / name).read_text("utf-8"))
+            build(placed(document, path[0], tomllib.loads(block.text)), name)
+            return
+        (self.folder / name).write_text(block.text, "utf-8")
+        read = load_problem if "objectives" in tomllib.loads(block.text) else load
+        read(name)
+
+    def do_sh(self, block):
+        self.said = ""
+        for words in commands(block.text):
+            assert self.run(words) == 0, f"{' '.join(words)}\n{self.said}"
+
+    def do_console(self, block):
+        for words, expected in dialogues(block.text):
+            self.said = ""
+            self.run(words)
+            self.compare(expected)
+
+    def do_python(self, block):
+        with redirect_stdout(io.StringIO()) as said:
+            exec(compile(block.text, f"line {block.line}", "exec"), self.names)
+        self.said = said.getvalue()
+
+    def do_text(self, block):
+        self.compare(block.text)
+
+    def compare(self, expected):
+        absent = missing(expected, self.said)
+        assert absent is None, f"not said: {absent}\nsaid:\n{self.said}"
+
+    def run(self, words):
+        """Run one command; its exit code. What it says is added to what was said."""
+        if words[0] != "kinetostat":
+            command = " ".join(words)
+            assert command.startswith(tuple(NOT_RUN)), f"{command}: run it, or say in NOT_RUN why not"
+            assert all((ROOT / word).exists() for word in words if word.endswith(".py"))
+            return 0
+        *words, target = words if words[-2] == ">" else (*words, None)
+        told, warned = io.StringIO(), io.StringIO()
+        with redirect_stdout(told), redirect_stderr(warned):
+            try:
+                code = main([word for word in words[1:] if word != ">"])
+            except SystemExit as stop:
+                code = stop.code
+        if target:
+            (self.folder / target).write_text(told.getvalue(), "utf-8")
+        self.said += told.getvalue() + warned.getvalue()
+        return code
+
+
+def placed(document, path, table):
+    """A document with a table in the place of what stands at a path; at `.` it is added, as if written at the end."""
+    if path == ".":
+        lists = {key: [*document[key], *value] for key, value in table.items() if isinstance(document.get(key), list)}
+        return document | table | lists
+    *way, last = [int(key) if key.isdecimal() else key for key in path.split(".")]
+    at = document
+    for key in way:
+        at = at[key]
+    at[last] = table
+    return document
+
+
+@pytest.fixture
+def reader(tmp_path, monkeypatch):
+    """A reader in an empty folder. Figures are drawn once each; a studio starts up to where it would listen."""
+    assert saving.FORMATS is figures.FORMATS, "files that are named have any format"
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(figures, "FORMATS", DrawnOnce(figures.FORMATS))
+    monkeypatch.setattr(serving, "serve", lambda *_: None)
+    return Reader(tmp_path)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_what_a_page_says_is_so(page, reader):
+    for block in blocks(ROOT / page):
+        try:
+            reader.do(block)
+        except BaseException as error:
+            error.add_note(f"{page}, line {block.line}")
+            raise
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_every_block_says_what_it_is(page):
+    assert {block.kind for block in blocks(ROOT / page)} <= set(KINDS)
+
+
+@pytest.mark.parametrize("words", NOT_RUN)
+def test_nothing_is_excused_that_is_not_there(words):
+    assert any(re.search(rf"^{re.escape(words)}", page.read_text("utf-8"), re.MULTILINE) for page in pages())
+
+
+def test_a_false_answer_is_found_out():
+    said = "  C  rx  0.516404\n     ry  1.404595\n"
+    assert missing("C rx 0.516404\n ...\nry 1.404595", said) is None
+    assert missing("C rx 0.516405", said) == "C rx 0.516405"
+    assert missing("ry 1.404595\nrx 0.516404", said) == "rx 0.516404"
+
+
+def test_equations_are_numbered_in_order_and_those_that_are_named_exist():
+    theory = (ROOT / "docs/theory.md").read_text("utf-8")
+    numbers = [int(number) for number in re.findall(r"\\tag\{(\d+)\}", theory)]
+    assert numbers == list(range(1, 1 + theory.count("\n$$\n") // 2))
+    named = {int(number) for page in pages() for number in re.findall(r"equation \((\d+)\)", page.read_text("utf-8"))}
+    assert named
+    assert named <= set(numbers)

@@ -1,0 +1,37 @@
+"""The notebooks are the tutorials, have no outputs, and run from the first cell to the last."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import nbclient
+import nbformat
+import pytest
+
+from pages import ROOT
+
+EXAMPLES = sorted((ROOT / "examples").glob("*.ipynb"))
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
+
+
+def test_they_are_what_the_tutorials_make(tmp_path):
+    kept = {path.name: path.read_text("utf-8") for path in EXAMPLES}
+    code = (
+        "import runpy, sys, pathlib; made = runpy.run_path(sys.argv[1]);"
+        "[pathlib.Path(f'{name}.ipynb').write_text(made['written'](name), 'utf-8') for name in made['NOTEBOOKS']]"
+    )
+    subprocess.run([sys.executable, "-c", code, str(ROOT / "docs/site_build/notebooks.py")], cwd=tmp_path, check=True)
+    made = {path.name: path.read_text("utf-8") for path in tmp_path.iterdir()}
+    assert made == kept, "run `python docs/site_build/notebooks.py`"
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_a_notebook_runs(path, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    notebook = nbformat.read(path, as_version=4)
+    assert not [cell for cell in notebook.cells if cell.get("outputs")]
+    nbclient.NotebookClient(notebook, timeout=None, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    said = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    assert said
+    assert not [output for output in said if "kinetostat: " in output.get("text", "")]
