@@ -8,6 +8,7 @@ The convention, for every fenced block of README.md, CONTRIBUTING.md and docs/:
     ```console            `$ command` and what it says, whatever its exit code
     ```python             run, all blocks of a page in one namespace
     ```text               lines that the block before has said, in this order; `...` leaves some out
+    ```xml                elements of a file, which must be well formed
     ```                   a quotation; nothing is done with it
 
 Blank space does not count when lines are compared; every digit does.
@@ -22,7 +23,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 FENCE = re.compile(r"^(?P<indent> *)```(?P<info>[^\n`]*)\n(?P<text>.*?)^(?P=indent)```$", re.MULTILINE | re.DOTALL)
-KINDS = ("toml", "sh", "console", "python", "text", "")
+KINDS = ("toml", "sh", "console", "python", "text", "xml", "")
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,8 @@ SMALL = 22
 """Nodes of a body up to which functions may be alike: a property that passes one thing on."""
 CALLED_FROM_OUTSIDE = {
     "dask_setup": "called by workers of a cluster, by this name",
+    "doctype": "called by the parser of XML, by this name",
+    "page_pictures": "the pages of a PDF, for the pictures of the documentation",
     "engines": "what is installed, for tests and benchmarks",
     "_repr_png_": "called by notebooks, by this name",
     "seconds": "times a kernel alone, for benchmarks",

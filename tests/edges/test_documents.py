@@ -5,6 +5,7 @@ import re
 import tomllib
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -20,6 +21,7 @@ NOT_RUN = {
     "pip install": "changes the environment; .ci/run installs the wheel in one of its own",
     ".uv/bin/uv": "an environment of its own, set up by .ci/run, which also runs tests and linters in it",
     "bash .ci/run": "runs these tests",
+    "docker": "needs an engine for containers; test_packaging.py gives the Dockerfile's command to our parser",
 }
 """What no test runs, by the words it starts with, and why."""
 
@@ -72,6 +74,9 @@ class Reader:
         with redirect_stdout(io.StringIO()) as said:
             exec(compile(block.text, f"line {block.line}", "exec"), self.names)
         self.said = said.getvalue()
+
+    def do_xml(self, block):
+        ElementTree.fromstring(f"<robot>{block.text}</robot>")
 
     def do_text(self, block):
         self.compare(block.text)
