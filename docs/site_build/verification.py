@@ -15,10 +15,12 @@ from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.paper.reproduction import Reproduction, reproduce
 from kinetostat.validation.answer import block_differences
-from kinetostat.validation.comparison import KNOWN, validate
+from kinetostat.validation.comparison import AGREED, KNOWN, validate
 from site_build.markdown import difference, table
 from site_build.second_route import compliance
 
+SAME = 1e-9
+"""Relative difference of two routes beyond which the build stops; what is seen is some rounding units."""
 BLOCKS = ("rotation", "coupling", "translation")
 PUBLISHED = {
     "rx": ("5.2e-6", 0, 0),
@@ -37,7 +39,13 @@ def paper() -> Reproduction:
 
 
 def printed_beside_computed(_folder: Path) -> str:
-    """Every number of the paper, with its verdict."""
+    """Every number of the paper, with its verdict.
+
+    Raises:
+        ValueError: a number differs from print, and no misprint explains it.
+    """
+    if not paper().explained:
+        raise ValueError("numbers of the paper differ; see `kinetostat reproduce`")
     rows = (
         (one.place, one.component, one.printed, f"{one.computed:.7g}", one.unit, one.reason or one.verdict.value)
         for one in paper().comparisons
@@ -48,7 +56,8 @@ def printed_beside_computed(_folder: Path) -> str:
 def equations(_folder: Path) -> str:
     """The paper's equations as statements whose residual vanishes."""
     rows = (
-        (one.equation, one.statement, difference(one.residual), difference(one.tolerance)) for one in paper().checks
+        (one.equation, one.statement, difference(one.residual, one.tolerance), f"{one.tolerance:.0e}")
+        for one in paper().checks
     )
     return table(("equation", "statement", "residual", "allowed"), rows, 2)
 
@@ -88,14 +97,25 @@ def _yields(path: str) -> bool:
 
 
 def _closed_row(machine: str, entry: str, form: str, expected: float, found: float) -> tuple[str, ...]:
-    return machine, entry, form, f"{expected:.9g}", f"{found:.9g}", difference(abs(found / expected - 1))
+    return machine, entry, form, f"{expected:.9g}", f"{found:.9g}", difference(abs(found / expected - 1), SAME)
 
 
 def published_elsewhere(_folder: Path) -> str:
     """The general hexapod beside what its authors print."""
     found = analyze(load("hexapod")).compliance or []
-    rows = ((name, text, f"{abs(found[i][j]):.6g}") for name, (text, i, j) in PUBLISHED.items())
+    rows = ((name, text, _as_printed(abs(found[i][j]), text)) for name, (text, i, j) in PUBLISHED.items())
     return table(("entry of C", "printed", "computed"), rows, 2)
+
+
+def _as_printed(value: float, text: str) -> str:
+    """A value to more digits than are printed.
+
+    Raises:
+        ValueError: it does not round to what is printed.
+    """
+    if float(f"{value:.1e}") != float(text):
+        raise ValueError(f"{value:.6g} is printed as {text}")
+    return f"{value:.6g}"
 
 
 def second_routes(_folder: Path) -> str:
@@ -110,7 +130,7 @@ def _routes(name: str) -> tuple[str, ...]:
     ours = np.array(response.compliance.rows(), dtype=float)
     dense = max(block_differences(compliance(response), ours, length).values())
     exist = list(machine.family.components)
-    return f"`{name}`", difference(dense), _compiled(name, ours), _added(name), _product(response, exist, length)
+    return f"`{name}`", difference(dense, SAME), _compiled(name, ours), _added(name), _product(response, exist, length)
 
 
 def _compiled(name: str, ours: np.ndarray) -> str:
@@ -119,13 +139,13 @@ def _compiled(name: str, ours: np.ndarray) -> str:
     names = [GROUPS["compliance"][i] for i in machine.family.components]
     found = evaluate(machine, Table({path: np.array([values(machine)[path]])}), names, repeated=True).values
     pairs = [(found[name][0], ours[i, i]) for name, i in zip(names, machine.family.components, strict=True)]
-    return difference(max(abs(a / b - 1.0) for a, b in pairs if b))
+    return difference(max(abs(a / b - 1.0) for a, b in pairs if b), SAME)
 
 
 def _added(name: str) -> str:
     shares = np.array([[share or 0.0 for share in one.compliance] for one in analyze(load(name)).shares])
     sums = shares.sum(axis=0)
-    return difference(float(abs(sums[sums > 0] - 1.0).max()))
+    return difference(float(abs(sums[sums > 0] - 1.0).max()), SAME)
 
 
 def _product(response: Response, exist: list[int], length: float) -> str:
@@ -136,7 +156,7 @@ def _product(response: Response, exist: list[int], length: float) -> str:
     )
     scaled = (np.linalg.inv(scale) @ stiffness @ np.linalg.inv(scale), scale @ compliance @ scale)
     error = np.linalg.norm(scaled[0] @ scaled[1] - np.eye(len(exist)))
-    return difference(float(error / (np.linalg.norm(scaled[0]) * np.linalg.norm(scaled[1]))))
+    return difference(float(error / (np.linalg.norm(scaled[0]) * np.linalg.norm(scaled[1]))), SAME)
 
 
 def engine(_folder: Path) -> str:
@@ -145,5 +165,5 @@ def engine(_folder: Path) -> str:
     rows = []
     for name in bundled():
         answer = validate(load(name), chosen.name)
-        rows.append((f"`{name}`", *(difference(answer.differences[block]) for block in BLOCKS)))
+        rows.append((f"`{name}`", *(difference(answer.differences[block], AGREED) for block in BLOCKS)))
     return table((f"machine ({chosen.name} {chosen.version})", *BLOCKS), rows, len(BLOCKS))
