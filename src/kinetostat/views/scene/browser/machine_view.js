@@ -7,7 +7,8 @@ const THEMES = {
   light: { sky: 0xf7f9fb, ground: 0xe3e7ec, grid: 0x9aa6b4, gridOpacity: 0.32, shadow: 0.26, light: 1.0 },
   dark: { sky: 0x1b222c, ground: 0x11161d, grid: 0x6b7a8c, gridOpacity: 0.28, shadow: 0.5, light: 0.72 },
 };
-const VIEWS = { iso: [1.0, -1.35, 0.75], front: [0, -1, 0.02], side: [1, 0, 0.02], top: [0.001, -0.02, 1] };
+const VIEWS = { iso: [1.0, -1.35, 0.75], front: [0, -1, 0.02], side: [1, 0, 0.02], top: [0, -0.02, 1] };
+const FILLED = 0.84; // share of the canvas across which the machine may reach
 const UNLIT = new Set(["frames", "directions", "ellipsoids", "deflection"]);
 
 const SLOW = 120; // ms of a frame from which pictures are coarse while something moves, and fine at rest
@@ -41,6 +42,7 @@ export default {
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener("change", () => this.draw());
+    this.controls.addEventListener("start", () => (this.view = null));
     this.slow = drawsInSoftware();
     this.finest = this.slow ? FINE : 1;
     this.sharpness(this.slow ? COARSE : 1);
@@ -236,18 +238,42 @@ export default {
       }
       this.renderer.shadowMap.needsUpdate = true;
     },
+    // Looks from one of the VIEWS so that the machine just fits, and again when the canvas changes, until somebody turns it.
     look(view) {
       if (!this.centre) return;
-      const direction = new THREE.Vector3(...VIEWS[view]).normalize();
-      const narrow = Math.min(1, this.camera.aspect);
-      const distance = (0.5 * this.size) / Math.tan((this.camera.fov * Math.PI) / 360) / narrow;
-      this.camera.position.copy(this.centre).addScaledVector(direction, distance);
+      this.view = view;
+      const back = new THREE.Vector3(...VIEWS[view]).normalize();
+      const right = new THREE.Vector3().crossVectors(this.camera.up, back).normalize();
+      const up = new THREE.Vector3().crossVectors(back, right);
+      const slope = Math.tan((this.camera.fov * Math.PI) / 360) * FILLED;
+      const [aside, wide] = this.span(right, back, slope * this.camera.aspect);
+      const [above, high] = this.span(up, back, slope);
+      const target = this.centre.clone().addScaledVector(right, aside).addScaledVector(up, above);
+      const distance = Math.max(wide, high);
+      this.camera.position.copy(target).addScaledVector(back, distance);
       this.camera.near = distance / 100;
       this.camera.far = distance * 20;
       this.camera.updateProjectionMatrix();
-      this.controls.target.copy(this.centre);
+      this.controls.target.copy(target);
       this.controls.update();
       this.draw();
+    },
+    // Where the camera must stand along an axis, and how far back, for the machine to lie between the slopes +-slope.
+    span(axis, back, slope) {
+      let [low, high] = [-Infinity, -Infinity];
+      for (const mesh of this.groups.machine.meshes.values()) {
+        if (UNLIT.has(mesh.userData.layer)) continue;
+        mesh.geometry.computeBoundingBox();
+        const { min, max } = mesh.geometry.boundingBox;
+        for (let corner = 0; corner < 8; corner++) {
+          const point = new THREE.Vector3(corner & 1 ? min.x : max.x, corner & 2 ? min.y : max.y, corner & 4 ? min.z : max.z);
+          point.applyMatrix4(mesh.matrix).sub(this.centre);
+          const [along, near] = [point.dot(axis), slope * point.dot(back)];
+          high = Math.max(high, near + along);
+          low = Math.max(low, near - along);
+        }
+      }
+      return [(high - low) / 2, (high + low) / (2 * slope)];
     },
     turn(event) {
       const step = Math.PI / 24;
@@ -255,6 +281,7 @@ export default {
       const move = { ...moves, "+": [0, 0, 0.9], "-": [0, 0, 1.1] }[event.key];
       if (!move) return;
       event.preventDefault();
+      this.view = null;
       const arm = this.camera.position.clone().sub(this.controls.target);
       const polar = new THREE.Spherical().setFromVector3(new THREE.Vector3(arm.x, arm.z, -arm.y));
       polar.theta += move[0];
@@ -272,6 +299,7 @@ export default {
       this.labelRenderer.setSize(width, height);
       this.camera.aspect = width / height;
       this.camera.updateProjectionMatrix();
+      if (this.view) this.look(this.view);
       this.render(); // at once: a canvas is empty after its size has changed
     },
     draw() {
