@@ -13,7 +13,7 @@ from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.studies.workspace.demands import EVERYTHING
 
-POSES = 150
+POSES = 300
 LOAD = ("load.force=[200, -100, 500]", "load.moment=[3, 5, -2]")
 PLANAR_LOAD = ("load.force=[200, -100, 0]",)
 BOTH_WAYS = ("shortest_leg", "longest_leg", "actuator_force", "leg_diameter")

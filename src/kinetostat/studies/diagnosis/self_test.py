@@ -1,4 +1,4 @@
-"""Numbers that are known, computed again in about two seconds: by print, by another route, and through a file.
+"""Numbers that are known, computed again in a few seconds: by print, by another route, and through a file.
 
 Nothing here is computed in a way of its own.
 """
