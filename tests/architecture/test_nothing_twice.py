@@ -2,7 +2,7 @@
 
 import ast
 import copy
-from collections import Counter, defaultdict
+from collections import defaultdict
 
 from source import modules
 
@@ -11,6 +11,7 @@ SMALL = 22
 """Nodes of a body up to which functions may be alike: a property that passes one thing on."""
 CALLED_FROM_OUTSIDE = {
     "dask_setup": "called by workers of a cluster, by this name",
+    "error": "called by argparse, by this name",
     "doctype": "called by the parser of XML, by this name",
     "page_pictures": "the pages of a PDF, for the pictures of the documentation",
     "engines": "what is installed, for tests and benchmarks",
@@ -20,34 +21,44 @@ CALLED_FROM_OUTSIDE = {
 """Names that nothing in the package uses, and who does."""
 
 
-def names_used():
-    """Every name that is read, imported apart: importing is no use."""
-    found = Counter()
+def read_in(tree):
+    """Names that a module reads."""
+    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+
+
+def taken_from_others():
+    """What is imported, as (module, name); names that are read of objects and modules, or told as text."""
+    imported, read = set(), set()
     for tree in modules().values():
         for node in ast.walk(tree):
-            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
-                found[node.id] += 1
+            if isinstance(node, ast.ImportFrom):
+                imported |= {(node.module, alias.name) for alias in node.names}
             elif isinstance(node, ast.Attribute):
-                found[node.attr] += 1
+                read.add(node.attr)
             elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.isidentifier():
-                found[node.value] += 1
-    return found
+                read.add(node.value)
+    return imported, read
 
 
-def names_defined():
-    """Functions, classes, methods and constants, with where they stand; what Python calls by itself apart."""
-    for module, tree in modules().items():
-        for node in ast.walk(tree):
-            if isinstance(node, Function | ast.ClassDef) and not node.name.startswith("__"):
-                yield node.name, module
-        for node in tree.body:
-            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
-            yield from ((one.id, module) for one in targets if isinstance(one, ast.Name) and one.id[:2] != "__")
+def defined_in(tree):
+    """Functions, classes, methods and constants of a module; what Python calls by itself apart."""
+    for node in ast.walk(tree):
+        if isinstance(node, Function | ast.ClassDef) and not node.name.startswith("__"):
+            yield node.name
+    for node in tree.body:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        yield from (one.id for one in targets if isinstance(one, ast.Name) and one.id[:2] != "__")
 
 
 def test_every_name_is_used():
-    used = names_used()
-    dead = {name: module for name, module in names_defined() if not used[name]}
+    """By its own module, or by another that imports it from there: a name of the same spelling elsewhere is no use."""
+    imported, read = taken_from_others()
+    dead = {
+        name: module
+        for module, tree in modules().items()
+        for name in set(defined_in(tree)) - read_in(tree) - read
+        if (module, name) not in imported
+    }
     assert dead.keys() == CALLED_FROM_OUTSIDE.keys(), dead
 
 

@@ -23,9 +23,6 @@ MAP_POINTS, GUIDELINE_POINTS = 41, 7
 """Points along each coordinate of the maps, and of the poses at which guidelines are tried."""
 MOST_AXES = 2
 
-PARTS = ("maps", "guidelines", "sensitivity", "validation")
-"""What takes time and may be left out."""
-
 
 @dataclass(frozen=True)
 class Answers:
@@ -62,7 +59,7 @@ def gather(
     Args:
         machine: with its pose.
         ranges: of the maps, "FIELD=from:to:count[:log]", one or two; none to choose them.
-        without: names from `PARTS` that are left out.
+        without: what takes time and is left out: maps, guidelines, sensitivity.
         result: of a study whose best design the machine is.
         progress: told how far the work is.
 

@@ -41,13 +41,6 @@ def ball(radius: float) -> Turned:
 
 
 @kept
-def ring(inner: float, outer: float, width: float) -> Turned:
-    """A bush about z, centred at the origin."""
-    low, high = -0.5 * width, 0.5 * width
-    return Turned(((inner, low), (outer, low), (outer, high), (inner, high), (inner, low)))
-
-
-@kept
 def cone(bottom: float, top: float, length: float) -> Turned:
     """A frustum about z from the origin."""
     return Turned(((0.0, 0.0), (bottom, 0.0), (top, length), (0.0, length)))
