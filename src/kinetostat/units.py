@@ -7,6 +7,7 @@ import math
 import re
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import pint
 
@@ -56,6 +57,8 @@ KINDS = {
     )
 }
 
+UNITS = Path(__file__).with_name("units.txt")
+"""The units that there are."""
 RIGID = "rigid"
 """How people write an infinite stiffness."""
 
@@ -120,7 +123,7 @@ def _allowed(wanted: Kind) -> str:
 
 @cache
 def _registry() -> "pint.UnitRegistry[float]":
-    return pint.UnitRegistry()
+    return pint.UnitRegistry(str(UNITS))
 
 
 @cache

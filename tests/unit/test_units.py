@@ -2,9 +2,10 @@
 
 import math
 
+import pint
 import pytest
 
-from kinetostat.units import KINDS, UnitError, parse, show
+from kinetostat.units import KINDS, UNITS, UnitError, parse, show
 
 GOOD = [
     ("12 cm", "length", 0.12),
@@ -35,6 +36,8 @@ GOOD = [
     ("1e7 N*m/rad", "torsional stiffness", 1e7),
     ("1e7 N·m/rad", "torsional stiffness", 1e7),
     ("1 N*m/deg", "torsional stiffness", 180 / math.pi),
+    ("1 lbf/in", "linear stiffness", 4.4482216152605 / 0.0254),
+    ("1 arcsec", "angle", math.pi / 648000),
     ("rigid", "linear stiffness", math.inf),
     (" Rigid ", "torsional stiffness", math.inf),
     ("0 N/m", "linear stiffness", 0.0),
@@ -79,15 +82,15 @@ BAD = [
     ({"m": 1}, "length", "it must be a length"),
     (b"1 m", "length", "it must be a length"),
     (1 + 0j, "length", "it must be a length"),
-    ("30 percent", "angle", "is no unit of angle"),
+    ("30 percent", "angle", "is unknown"),
     ("30 %", "angle", "is not a unit"),
     ("2 radian**2", "angle", "is no unit of angle"),
     ("2 m/m", "angle", "is no unit of angle"),
-    ("2 pi", "angle", "is no unit of angle"),
+    ("2 pi", "angle", "is unknown"),
     ("30 m", "angle", "is no unit of angle"),
     ("20 N*m/rad", "linear stiffness", "is no unit of linear stiffness"),
     ("20 N/m", "torsional stiffness", "is no unit of torsional stiffness"),
-    ("20 degC", "length", "is no unit of length"),
+    ("20 degC", "length", "is unknown"),
     ("20 degC/m", "length", '"degC/m"'),
     ("20 degC**2", "length", '"degC**2"'),
     ("3 m/3", "length", '"m/3"'),
@@ -150,3 +153,13 @@ def test_what_is_shown_has_its_unit():
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 def test_every_example_is_a_quantity_of_its_kind(kind):
     assert parse(kind.example, kind.name) > 0.0
+
+
+def test_our_units_are_what_pint_knows_under_these_names():
+    ours, known = pint.UnitRegistry(str(UNITS)), pint.UnitRegistry()
+    names = {*ours, "mm", "µm", "kN", "GPa", "mrad"}
+    assert {"deg", "°", "lbf", "psi", "tonne"} <= names
+    for name in names:
+        mine, theirs = (one.Quantity(1.0, name).to_root_units() for one in (ours, known))
+        assert mine.magnitude == pytest.approx(theirs.magnitude, rel=1e-14), name
+        assert str(mine.units) == str(theirs.units), name
