@@ -21,8 +21,10 @@ from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.diagnosis.check import Check, UnsoundError, reinstall, tried
 from kinetostat.studies.grid.grid import evaluate_grid
+from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.problem import load_problem
-from kinetostat.studies.optimisation.result import optimize
+from kinetostat.studies.optimisation.result import best_feasible
+from kinetostat.studies.optimisation.search import search
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.comparison import Verdict
 from kinetostat.studies.paper.tables import table_3, table_4
@@ -41,7 +43,7 @@ def checks() -> Iterator[Check]:
     yield tried(GROUP, "paper", paper_numbers, reinstall("kinetostat"))
     yield tried(GROUP, "machine code", routes_agree, reinstall("llvmlite numpy"))
     yield tried(GROUP, "throughput", throughput, reinstall("llvmlite numpy"))
-    yield tried(GROUP, "search", search, reinstall("pymoo scipy"))
+    yield tried(GROUP, "search", short_search, reinstall("pymoo scipy"))
     yield tried(GROUP, "files", results_file, reinstall("h5netcdf h5py xarray"))
 
 
@@ -85,14 +87,14 @@ def throughput() -> str:
     return f"{rate / 1e6:.2g} million poses/s, {len(QUANTITIES)} numbers each, on {available_cores()} cores"
 
 
-def search() -> str:
+def short_search() -> str:
     """A short search that ends at or below the sum of compliances that the paper prints."""
     settings = ["optimizer.method=hybrid", "optimizer.generations=10"]
-    found = optimize(load_problem("zhang-gosselin-2002", settings))
-    reached = float(found.outcome.objectives[0, 0])
+    log = search(Assessor(load_problem("zhang-gosselin-2002", settings)))
+    reached = float(log.outcome(best_feasible(log)).objectives[:, 0].min(initial=np.inf))
     if not reached <= float(printed.OPTIMISED_SUM):
         raise UnsoundError(f"it ends at {reached:.9g} instead of below {printed.OPTIMISED_SUM}, the paper's optimum")
-    return f"the paper's optimum, {reached:.9g} (printed {printed.OPTIMISED_SUM}), in {found.log.count} evaluations"
+    return f"the paper's optimum, {reached:.9g} (printed {printed.OPTIMISED_SUM}), in {log.count} evaluations"
 
 
 def results_file() -> str:

@@ -75,10 +75,10 @@ def _judge(fully: bool, partly: bool = False) -> Finding:
 
 
 def _nearly_rigid() -> Claim:
-    rigid = np.array(at("stiffness.passive_links=rigid").compliance_diagonal)[list(FREE)]
+    rigid = np.array(at("stiffness.passive_links=rigid").compliance.diagonal())[list(FREE)]
     ratios = [10.0**n for n in range(8)]
     gaps = [
-        float(np.max(np.array(at(f"stiffness.passive_links={1e3 * r}").compliance_diagonal)[list(FREE)] / rigid - 1))
+        float(np.max(np.array(at(f"stiffness.passive_links={1e3 * r}").compliance.diagonal())[list(FREE)] / rigid - 1))
         for r in ratios
     ]
     response = respond(load(printed.MACHINE))
@@ -168,7 +168,7 @@ def _stiff_enough() -> Claim:
 
 
 def _largest() -> Claim:
-    table = {ratio: at(f"stiffness.passive_links={1e3 * ratio}").stiffness_diagonal for ratio in (1.0, 100.0)}
+    table = {ratio: at(f"stiffness.passive_links={1e3 * ratio}").stiffness.diagonal() for ratio in (1.0, 100.0)}
     along_z = {ratio: k[5] >= max(k[3:]) for ratio, k in table.items()}
     about_z = all(k[2] > k[0] for k in table.values())
     first, stiff = table[1.0], table[100.0]
@@ -208,7 +208,7 @@ def _count(flags: npt.NDArray[Any]) -> int:
 
 
 def _stiffness_over(settings: list[tuple[str, ...]]) -> npt.NDArray[np.float64]:
-    return np.array([at(*setting).stiffness_diagonal for setting in settings])
+    return np.array([at(*setting).stiffness.diagonal() for setting in settings])
 
 
 def _platform_size() -> Claim:

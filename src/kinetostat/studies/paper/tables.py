@@ -5,9 +5,8 @@ from collections.abc import Iterator, Sequence
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.kinetostatics.elements import elements
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
-from kinetostat.kinetostatics.response import respond
+from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.loading import load
-from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.guidelines.roles import equations_of_k
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.comparison import Comparison, compare, rounds_to
@@ -19,9 +18,9 @@ SYMBOLS = {"passive link 1": "k52", "passive link 2": "k54"}
 """The paper's names of our springs; all actuators are Ka."""
 
 
-def at(*settings: str) -> Analysis:
+def at(*settings: str) -> Response:
     """The paper's machine with some values changed."""
-    return analyze(load(printed.MACHINE, settings))
+    return respond(load(printed.MACHINE, settings))
 
 
 def table_3() -> Iterator[Comparison]:
@@ -29,7 +28,7 @@ def table_3() -> Iterator[Comparison]:
     for i, row in enumerate(printed.TABLE_3):
         found = at(f"stiffness.passive_links={row.setting}")
         place = f"Table III, row {i + 1}"
-        yield from _row(place, row.values, found.compliance_diagonal, COMPLIANCE_UNITS)
+        yield from _row(place, row.values, found.compliance.diagonal(), COMPLIANCE_UNITS)
         if row.label == "10^6 Ka":
             yield _label(place, row.values[2])
 
@@ -38,7 +37,7 @@ def _label(place: str, value: str) -> Comparison:
     """Which ratio K_passive / Ka gives the printed C_rz: the row's label is wrong."""
     for exponent in range(10):
         stiffness = printed.ACTUATOR * 10**exponent
-        if rounds_to(at(f"stiffness.passive_links={stiffness}").compliance_diagonal[2], value):
+        if rounds_to(at(f"stiffness.passive_links={stiffness}").compliance.diagonal()[2], value):
             return compare(place, "K_passive / Ka", "1e6", float(10**exponent), "1")
     return compare(place, "K_passive / Ka", "1e6", 0.0, "1")
 
@@ -47,7 +46,7 @@ def table_4() -> Iterator[Comparison]:
     """Stiffness against the stiffness of the passive leg."""
     for i, row in enumerate(printed.TABLE_4):
         found = at(f"stiffness.passive_links={row.setting}")
-        yield from _row(f"Table IV, row {i + 1}", row.values, found.stiffness_diagonal, STIFFNESS_UNITS)
+        yield from _row(f"Table IV, row {i + 1}", row.values, found.stiffness.diagonal(), STIFFNESS_UNITS)
 
 
 def _row(place: str, values: Sequence[str], computed: Sequence[float], units: Sequence[str]) -> Iterator[Comparison]:
@@ -57,7 +56,7 @@ def _row(place: str, values: Sequence[str], computed: Sequence[float], units: Se
 
 def coefficients(*settings: str) -> dict[str, tuple[float, ...]]:
     """Per stiffness Ka, k52, k54, its coefficients in the six diagonal entries of K (all actuators alike)."""
-    response = respond(load(printed.MACHINE, settings))
+    response = at(*settings)
     found = equations_of_k(response, elements(response.configuration), range(len(COMPONENTS)))
     return {SYMBOLS.get(name, "Ka"): row for name, row in (found or {}).items()}
 
@@ -82,9 +81,9 @@ def _coefficient_unit(symbol: str, component: str) -> str:
 def section_4_3() -> Iterator[Comparison]:
     """Compliances of the initial and of the optimised design, their sums and the gain (all weights one, SI)."""
     initial, best = at(printed.STIFF), at(*printed.OPTIMISED_DESIGN)
-    yield from _row("Section 4.3, initial", printed.INITIAL, initial.compliance_diagonal, COMPLIANCE_UNITS)
-    yield from _row("Section 4.3, optimised", printed.OPTIMISED, best.compliance_diagonal, COMPLIANCE_UNITS)
-    before, after = sum(initial.compliance_diagonal), sum(best.compliance_diagonal)
+    yield from _row("Section 4.3, initial", printed.INITIAL, initial.compliance.diagonal(), COMPLIANCE_UNITS)
+    yield from _row("Section 4.3, optimised", printed.OPTIMISED, best.compliance.diagonal(), COMPLIANCE_UNITS)
+    before, after = sum(initial.compliance.diagonal()), sum(best.compliance.diagonal())
     yield compare("Section 4.3, initial", "sum (eq. 40)", printed.INITIAL_SUM, before, "SI, weights 1")
     yield compare("Section 4.3, optimised", "sum (eq. 40)", printed.OPTIMISED_SUM, after, "SI, weights 1")
     yield compare("Section 4.3", "gain", printed.IMPROVEMENT, before / after, "1")
