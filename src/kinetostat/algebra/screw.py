@@ -1,6 +1,9 @@
 """Screws: twists and wrenches, their reciprocal product, and their transport to another point or other axes.
 
 Rotation first, as everywhere in kinetostat: a twist is [omega; v], a wrench [moment; force]. Nothing here knows legs.
+
+Source: theory (28); Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation (1994), sections 2.4
+and 2.5. Axes are whatever the caller's are; every function names the point at which its screw is.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Line segments: how near two of them come. No machine here."""
+"""Line segments: how near two of them come. No machine here.
+
+Points are in axes that the caller chooses.
+"""
 
 from kinetostat.algebra.scalar import Scalar, minus, plus, reciprocal, smaller, times, where
 from kinetostat.algebra.vector import Vector

@@ -2,6 +2,8 @@
 
 Every loop runs over a size known while tracing, so that traced code has no loop and no LAPACK call. Structural
 zeros are used: sparse vectors are taken first and only their non-zero rows are touched.
+
+Source: theory (1), (6), (7) and (9); G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed. (2013), section 5.2.
 """
 
 from collections.abc import Sequence

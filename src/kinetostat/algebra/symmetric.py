@@ -1,6 +1,8 @@
 """Symmetric 6x6 matrices held as their 21 upper entries: what K and C are.
 
 Only sums of weighted dyads and look-ups live here; factorisations are in `solve`.
+
+Source: theory (10), whose dyads they are sums of. In the axes and at the point of the screws that they are made of.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,7 @@
-"""Where two links meet, or a link and a rail: closed forms for legs with elbows and slides. Knows no machine."""
+"""Where two links meet, or a link and a rail: closed forms for legs with elbows and slides. Knows no machine.
+
+Source: theory (13), (14) and (23). All points are in axes that the caller chooses.
+"""
 
 from kinetostat.algebra.scalar import Scalar, minus, plus, reciprocal, sqrt, times
 from kinetostat.algebra.vector import Vector

@@ -1,6 +1,8 @@
 """Vectors of three scalars, and the rotations and rigid displacements that act on them.
 
 No screws here (see `screw`) and no machine. All components are in the axes the caller names; lengths are in m.
+
+Source: R. M. Murray, Z. Li and S. S. Sastry, A Mathematical Introduction to Robotic Manipulation (1994), section 2.2.
 """
 
 from collections.abc import Sequence

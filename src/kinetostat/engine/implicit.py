@@ -1,4 +1,7 @@
-"""Derivatives of joint coordinates that only equations give: linear systems pose by pose. Knows no machine."""
+"""Derivatives of joint coordinates that only equations give: linear systems pose by pose. Knows no machine.
+
+Source: theory (34).
+"""
 
 import numpy as np
 

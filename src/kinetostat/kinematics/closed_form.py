@@ -1,4 +1,7 @@
-"""Joint coordinates in closed form where every leg has one: for one pose, for many, or traced. No iteration here."""
+"""Joint coordinates in closed form where every leg has one: for one pose, for many, or traced. No iteration here.
+
+Source: theory (23). Placements are in the base frame.
+"""
 
 from kinetostat.algebra.scalar import Scalar, cos, plus, sin, times, where
 from kinetostat.algebra.vector import Displacement, Vector, rotation_x, rotation_y, rotation_z

@@ -1,6 +1,8 @@
 """The equations that joint coordinates of a machine written leg by leg satisfy, over any scalar. They are not solved.
 
 What solves them is in `closure`; how their solution changes with the machine and its pose follows from them alone.
+
+Source: theory (19)-(21), in the base frame.
 """
 
 from collections.abc import Sequence

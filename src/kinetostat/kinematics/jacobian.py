@@ -1,4 +1,7 @@
-"""The Jacobian of a machine: how its platform moves with its actuators, all links rigid."""
+"""The Jacobian of a machine: how its platform moves with its actuators, all links rigid.
+
+Source: theory (3) with the deformations of actuators as their rates; eq. 1.
+"""
 
 from collections.abc import Sequence
 
@@ -12,7 +15,7 @@ from kinetostat.machine.leg import LegScrews, Spring
 def actuator_jacobian(
     legs: Sequence[LegScrews], springs: Sequence[Sequence[Spring]], length: float, guide: Sequence[Wrench] = ()
 ) -> Array:
-    """Platform twist per unit rate of each actuator, W^T t = (J_e^T W)^T rates with rates of actuators alone (eq. 1).
+    """Platform twist per unit rate of each actuator, W^T t = (J_e^T W)^T rates with rates of actuators alone.
 
     Where legs impose constraints twice, the equations agree for rates that the machine can have.
 

@@ -1,6 +1,8 @@
 """Whether a pose keeps within the limits of a machine's legs and joints, and if not, which it passes. Loads elsewhere.
 
 Every comparison is between scalars without a branch, so that one pose, many and the compiled engine judge alike.
+
+Source: the definitions on the documentation's page on limits and workspace.
 """
 
 import math

@@ -1,6 +1,8 @@
 """Mobility and singularities from the screws: what can move, what is constrained twice, what is lost or gained here.
 
 Freedoms of the platform are those that all legs leave it with rigid links and free actuators.
+
+Source: theory (24)-(27); screws are in base axes.
 """
 
 from collections.abc import Sequence

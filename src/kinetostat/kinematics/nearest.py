@@ -1,4 +1,7 @@
-"""The admissible pose nearest to one that the legs cannot take: what a refusal offers instead. One pose."""
+"""The admissible pose nearest to one that the legs cannot take: what a refusal offers instead. One pose.
+
+Source: theory section 6.
+"""
 
 from collections.abc import Callable
 

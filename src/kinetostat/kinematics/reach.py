@@ -1,4 +1,7 @@
-"""Can the legs close at a pose, and if not, why. Screws and singularities are elsewhere."""
+"""Can the legs close at a pose, and if not, why. Screws and singularities are elsewhere.
+
+Source: theory section 4 for links that meet, theory (23) for legs of three revolutes.
+"""
 
 from kinetostat.algebra.scalar import Scalar, smaller
 from kinetostat.machine.machine import Closure, Configuration

@@ -1,4 +1,7 @@
-"""Singularities of one pose from its screws: which leg locks up, and which twist the locked machine leaves free."""
+"""Singularities of one pose from its screws: which leg locks up, and which twist the locked machine leaves free.
+
+Source: theory sections 2 and 8; screws are at one reference point, in base axes.
+"""
 
 from collections.abc import Sequence
 

@@ -1,6 +1,8 @@
 """Legs to the platform: K and C from what the legs carry and how they yield (theory section 2).
 
 One form serves rigid and flexible machines: springs enter by compliance, and a rigid or free one is exact.
+
+Source: theory (4)-(6) and (8)-(10). All screws, K and C are at one reference point, in the axes of the legs' screws.
 """
 
 from collections.abc import Sequence
@@ -63,7 +65,7 @@ def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
         length: characteristic length, m; scales rows, the result does not depend on it.
         guide: of a planar machine, the wrenches against twists that do not exist there.
 
-    Source: theory section 2; eqs. 21 and 32.
+    Source: theory (4), (8) and (9), eqs. 21 and 32.
     """
     redundant = sum(len(leg.wrenches) for leg in legs) + len(guide) > SIZE
     balanced = [relaxed(leg) for leg in legs] if redundant else legs
@@ -124,7 +126,7 @@ def in_modes(modes: Sequence[Modes], rows: Sequence[Sequence[Scalar]]) -> list[t
 def compliance_matrix(statics: Statics) -> Symmetric6:
     """C = sum_e s_e xi_e xi_e^T, t_small = C w (rad, m per N·m, N); infinite where a free spring moves the platform.
 
-    Source: eq. 21, extended to flexible links.
+    Source: theory (6) and (10), eq. 21 extended to flexible links.
     """
     return weighted_sum(statics.motions, reciprocal(statics.length))
 
@@ -132,7 +134,7 @@ def compliance_matrix(statics: Statics) -> Symmetric6:
 def stiffness_matrix(statics: Statics) -> Symmetric6:
     """K = sum_e k_e b_e b_e^T, w = K t_small (N·m, N per rad, m); infinite where a rigid spring holds the platform.
 
-    Source: eq. 32.
+    Source: theory (8) and (10), eq. 32.
     """
     return weighted_sum(statics.actions, statics.length)
 
@@ -140,7 +142,7 @@ def stiffness_matrix(statics: Statics) -> Symmetric6:
 def flexible_stiffness(legs: Sequence[LegScrews]) -> Symmetric6:
     """K = sum_i W_i G_i^-1 W_i^T for legs that all yield (G_i > 0), however many; infinite if one does not.
 
-    Source: theory section 2, eq. 32. A second route to `stiffness_matrix`, and the only one for redundant legs.
+    Source: theory (5), eq. 32. A second route to `stiffness_matrix`, and the only one for redundant legs.
     """
     shares = [Symmetric6.dyad(b, b) * k for leg in legs for b, k in leg_modes(leg)]
     return Symmetric6.total(shares)

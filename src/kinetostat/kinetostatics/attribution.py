@@ -1,4 +1,7 @@
-"""Who is to blame: the exact share of each spring in every entry of K and C. Sums of the shares are K and C."""
+"""Who is to blame: the exact share of each spring in every entry of K and C. Sums of the shares are K and C.
+
+Source: theory (10) and (11). At the reference point and in the axes of the statics they are made of.
+"""
 
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.symmetric import Symmetric6

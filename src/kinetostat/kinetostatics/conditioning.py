@@ -1,6 +1,8 @@
 """Conditioning: how unevenly K or a Jacobian treats the directions, rotations made comparable by a given length.
 
 No index of one unit here (see `indices`). The length is the caller's choice and goes with every number printed.
+
+Source: theory section 10; J. Salisbury and J. Craig, "Articulated hands", Int. J. Robotics Research 1(1), 1982.
 """
 
 from collections.abc import Sequence

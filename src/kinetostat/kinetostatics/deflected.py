@@ -1,4 +1,7 @@
-"""The deflected shape: where every joint and link of a loaded machine goes, to first order. One pose."""
+"""The deflected shape: where every joint and link of a loaded machine goes, to first order. One pose.
+
+Source: theory (31) and (32).
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

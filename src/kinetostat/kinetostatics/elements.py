@@ -1,6 +1,8 @@
 """Elastic elements: springs that a designer changes together, and what C becomes when one of them is stiffened.
 
 Formulas are over any scalar: one pose, or many as arrays. What they mean for a design is a study's business.
+
+Source: theory (10) and (33), eqs. 33-38. C and K are at the response's reference point, base axes.
 """
 
 import math

@@ -1,6 +1,8 @@
 """Numbers of one pose that machines are designed by: softest and stiffest direction, condition, legs, actuators.
 
 All over scalars, so that the engine evaluates them for whole populations. Directions and tables are in `indices`.
+
+Source: theory section 10.
 """
 
 import math

@@ -6,6 +6,8 @@ the `components` rz x y and matrices 3 x 3.
 
 "Free": the other block carries no load and follows (a machine alone, loaded at its tool). "Guided": the other block is
 held, as by a second guide. Free is never stiffer than guided.
+
+Source: theory section 10.
 """
 
 import math

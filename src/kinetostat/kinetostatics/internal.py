@@ -2,6 +2,8 @@
 
 Elasticity decides them where something on their way yields; where all is rigid, statics leaves them undecided, and no
 motion of the platform depends on them.
+
+Source: theory (9) and theory section 7.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,7 @@
-"""A leg as (W, G): how it yields when it carries a wrench. One leg at a time; the platform is `assembly`'s."""
+"""A leg as (W, G): how it yields when it carries a wrench. One leg at a time; the platform is `assembly`'s.
+
+Source: theory (3), (7), (8) and (11). Screws are at one reference point, in base axes.
+"""
 
 import math
 from collections.abc import Sequence
@@ -27,7 +30,7 @@ Action = tuple[Wrench, Scalar]
 def leg_compliance(leg: LegScrews) -> list[list[Scalar]]:
     """G = W^T J_e S J_e^T W [m x m], symmetric and >= 0: W^T t = G lambda.
 
-    Source: theory section 2. Zero for a rigid leg; infinite where a free spring is loaded.
+    Source: theory (3). Zero for a rigid leg; infinite where a free spring is loaded.
     """
     size, springs = range(len(leg.wrenches)), list(zip(leg.compliance, leg.loads, strict=True))
     return [[total([times(s, times(row[a], row[b])) for s, row in springs]) for b in size] for a in size]
@@ -131,7 +134,7 @@ def modes_of(leg: LegScrews) -> Modes:
 def leg_modes(leg: LegScrews) -> list[Action]:
     """The leg's stiffness W G^-1 W^T as m shares: wrenches for which G is diagonal, infinite where G vanishes.
 
-    Source: theory section 2, eq. 32.
+    Source: theory (8), eq. 32.
     """
     modes = modes_of(leg)
     return [(wrench, reciprocal(d)) for wrench, d in zip(modes.wrenches, modes.compliance, strict=True)]
@@ -157,7 +160,7 @@ def leg_resistance(leg: LegScrews) -> Resistance:
     for any k_e from free to rigid. With more (springs in series) or fewer, and where a load is felt by no spring, it is
     s_e c_e c_e^T, where c_e = W G^-1 W^T J_e is the load in e per unit twist; modes of G that vanish are rigid.
 
-    Source: theory section 2.
+    Source: theory (10) and (11).
     """
     if len(leg.loads) != len(leg.wrenches):
         leg = relaxed(leg)

@@ -1,4 +1,7 @@
-"""A wrench on the platform: how far it moves, and what every leg, spring and joint carries. One pose."""
+"""A wrench on the platform: how far it moves, and what every leg, spring and joint carries. One pose.
+
+Source: theory (28) and (29). Wrenches and twists are in base axes, at the point that each function names.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Whether the actuators bear the load of a machine: limits of force and moment. Limits of geometry are elsewhere."""
+"""Whether the actuators bear the load of a machine: limits of force and moment. Limits of geometry are elsewhere.
+
+Source: theory (29).
+"""
 
 from kinetostat.algebra.scalar import is_zero, times
 from kinetostat.kinematics.limits import SLACK, Check

@@ -1,4 +1,7 @@
-"""The scalars of a response that maps, sweeps and tables may ask for, by name, with unit and label."""
+"""The scalars of a response that maps, sweeps and tables may ask for, by name, with unit and label.
+
+Source: theory section 10. At the tool point.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass

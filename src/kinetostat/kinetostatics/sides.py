@@ -1,4 +1,7 @@
-"""On which side of its singularities a machine stands: what tells two regions apart that only a singularity joins."""
+"""On which side of its singularities a machine stands: what tells two regions apart that only a singularity joins.
+
+Source: theory (30).
+"""
 
 from kinetostat.algebra.scalar import Scalar, reciprocal, times
 from kinetostat.algebra.screw import Wrench

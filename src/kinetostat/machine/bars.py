@@ -1,4 +1,7 @@
-"""Pairs of equal bars on spherical joints, as in the legs of a Delta: what they let move and what they carry."""
+"""Pairs of equal bars on spherical joints, as in the legs of a Delta: what they let move and what they carry.
+
+Source: theory (16). Points and axes are in the base frame.
+"""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,7 @@
-"""Legs with an actuated crank at the base and a rod to the platform: R-U-S. The platform is the family's business."""
+"""Legs with an actuated crank at the base and a rod to the platform: R-U-S. The platform is the family's business.
+
+Source: theory (13)-(15). Points and axes are in the base frame.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -2,6 +2,8 @@
 
 A leg turns itself into screws (J_p, J_e, W) at a reference point; how a pose places its joints is the family's
 business (`catalogue`), what the screws do to the platform is that of `kinetostatics`.
+
+Source: theory (1) and (2), eqs. 1-4. In the base frame.
 """
 
 from collections.abc import Sequence
@@ -242,7 +244,7 @@ class Leg:
         return replace(self, chain=chain, lines=tuple(line.displaced(motion) for line in self.lines))
 
     def screws(self, reference: Vector, length: Scalar, absent: Sequence[Joint] = ()) -> LegScrews:
-        """Its screws at a point; the wrenches are the space reciprocal to the passive twists (theory section 2).
+        """Its screws at a point; the wrenches are the space reciprocal to the passive twists (theory (1)).
 
         Args:
             reference: base frame, m.
@@ -288,7 +290,7 @@ def two_force_leg(
 ) -> Leg:
     """U-P-S with the prismatic joint actuated: it carries a force along its line and nothing else.
 
-    Row a_i of A over rho_i in eqs. 1-4.
+    Source: theory (2); row a_i of A over rho_i in eqs. 1-4.
 
     Args:
         name: of the leg.

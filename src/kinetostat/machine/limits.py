@@ -1,6 +1,8 @@
 """What the parts of a machine bear: the table [limits] of its file, and which parts each limit is about.
 
 Whether a pose keeps within them is `kinematics.limits`' and, under load, `kinetostatics.overload`'s business.
+
+Points are in the base frame.
 """
 
 import math

@@ -1,6 +1,8 @@
 """Links that yield: beams, lumped virtual joints, parallelograms, and a compliance matrix of one's own, all as springs.
 
 What a section and a material make of a link is `section`'s; where links lie is the family's business.
+
+Source: theory (17) and (18); Tables I and II of the paper for lumped joints. Points and axes are in the base frame.
 """
 
 from collections.abc import Sequence

@@ -1,6 +1,8 @@
 """Links of a family that have a mass: what people call them, where their cross-section may stand, how long they are.
 
 What they weigh together is `mass`' business; links of machines written leg by leg are in their files.
+
+Points are in the base frame.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,6 +1,8 @@
 """The machine: a family, its parameters as plain frozen data, and what the family makes of them at a pose.
 
 Parameters may be floats or traced scalars; nothing here validates (that is `spec`) and nothing here solves.
+
+Points and axes are in the base frame.
 """
 
 from collections.abc import Callable, Mapping, Sequence

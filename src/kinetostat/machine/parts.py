@@ -2,6 +2,8 @@
 
 A stiffness that is infinite by form (the float itself, as a default is) leaves no spring behind, one that is zero by
 form leaves a free joint; arrays and traced values always leave a spring, whatever they hold.
+
+Points and axes are in the base frame.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,7 @@
-"""Two rings of joints, on the base and on the platform: how most families say where their legs begin and end."""
+"""Two rings of joints, on the base and on the platform: how most families say where their legs begin and end.
+
+Points are in the base frame, those of the platform's ring before it is moved in its own.
+"""
 
 from collections.abc import Sequence
 from typing import Annotated

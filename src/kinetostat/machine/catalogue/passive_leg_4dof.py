@@ -1,7 +1,7 @@
 """The paper's machine: four U-P-S legs and a passive leg R - link - R - link - Hooke that leaves four freedoms.
 
-What people may write about it and its closed-form kinematics (theory section 3). Its stiffness is computed elsewhere,
-as for any machine.
+What people may write about it and its closed-form kinematics (theory (12), base frame). Its stiffness is computed
+elsewhere, as for any machine.
 """
 
 from typing import Annotated

@@ -1,6 +1,6 @@
 """A machine written leg by leg as a family: its chains at the home pose, and where joint coordinates take them.
 
-Which coordinates close the chains at a pose is found in `kinematics.closure`.
+Which coordinates close the chains at a pose is found in `kinematics.closure`. Points and axes are in the base frame.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
