@@ -1,6 +1,6 @@
 """The scalars of a response that maps, sweeps and tables may ask for, by name, with unit and label.
 
-Source: theory section 10. At the tool point.
+Source: theory section 10. At the tool point, base axes.
 """
 
 from collections.abc import Callable
