@@ -28,6 +28,8 @@ _HOMES = {
     "machine_picture": "kinetostat.views.picture",
     "plot": "kinetostat.views.answers",
     "save": "kinetostat.views.saving",
+    "report": "kinetostat.views.report.writing",
+    "export": "kinetostat.exchange.formats",
     "Machine": "kinetostat.machine.machine",
     "Status": "kinetostat.kinematics.status",
     "InputError": "kinetostat.spec.errors",
@@ -45,9 +47,9 @@ _SHOWN = {
 """What notebooks show as HTML, and where it is defined: told to them by name, so that nothing is imported for it."""
 
 __all__ = [
-    "InputError", "Machine", "Status", "analyze", "build", "bundled", "changed", "compare", "evaluate_grid",
-    "guidelines", "load", "load_problem", "machine_picture", "optimize", "plot", "reproduce", "save", "sensitivity",
-    "validate", "workspace",
+    "InputError", "Machine", "Status", "analyze", "build", "bundled", "changed", "compare", "evaluate_grid", "export",
+    "guidelines", "load", "load_problem", "machine_picture", "optimize", "plot", "report", "reproduce", "save",
+    "sensitivity", "validate", "workspace",
 ]  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from kinetostat.exchange.formats import export as export
 from kinetostat.kinematics.status import Status as Status
 from kinetostat.machine.changing import changed as changed
 from kinetostat.machine.loading import build as build
@@ -21,6 +22,7 @@ from kinetostat.studies.workspace.workspace import workspace as workspace
 from kinetostat.validation.comparison import validate as validate
 from kinetostat.views.answers import plot as plot
 from kinetostat.views.picture import machine_picture as machine_picture
+from kinetostat.views.report.writing import report as report
 from kinetostat.views.saving import save as save
 
 def load_ipython_extension(shell: Any) -> None: ...

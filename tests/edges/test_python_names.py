@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
+from report_pages import QUICK, Page, no_pictures
 
 import kinetostat
 from kinetostat import (
@@ -26,17 +27,20 @@ from kinetostat import (
     changed,
     compare,
     evaluate_grid,
+    export,
     guidelines,
     load,
     load_problem,
     machine_picture,
     optimize,
     plot,
+    report,
     save,
     sensitivity,
     validate,
     workspace,
 )
+from kinetostat.cli import DONE, main
 
 SNAPSHOT = Path(__file__).with_name("python_names.txt")
 
@@ -189,4 +193,45 @@ def test_what_is_kept_is_what_it_was(found, tmp_path):
 def test_a_suffix_that_cannot_be_written_is_refused_with_those_that_can(found, name, file, tmp_path):
     with pytest.raises(InputError, match=r"suffix of .*\.(json|toml)"):
         save(found[name], tmp_path / file)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_machine_is_exported_as_by_the_command(tmp_path, monkeypatch):
+    machine = load("tripteron")
+    assert export(machine, tmp_path / "ours.mac") == [tmp_path / "ours.mac"]
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", "tripteron", "--to", "ansys", "-o", "theirs.mac"]) == DONE
+    assert (tmp_path / "ours.mac").read_bytes() == (tmp_path / "theirs.mac").read_bytes()
+    assert export(machine, tmp_path / "table.txt", "csv")[0].read_text().startswith("quantity")
+    with pytest.raises(InputError, match="give --to"):
+        export(machine, tmp_path / "table.txt")
+    with pytest.raises(InputError, match="would have to span"):
+        export(changed(load("delta"), {"pose.z": "-30 m"}), tmp_path / "far.csv")
+    assert not (tmp_path / "far.csv").exists()
+
+
+def test_a_report_of_a_machine_and_of_a_result_say_how_to_have_them_again(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    no_pictures(monkeypatch)
+    machine = load("tripteron", ["pose.x=5 mm"])
+    page = Page(report(machine, "our-own.html", without=QUICK[1::2], author="N. N.").read_text("utf-8"))
+    save(machine, "machine.toml")
+    assert main(["report", "machine.toml", *QUICK, "--author", "N. N.", "-o", "second.html"]) == DONE
+    assert Path("second.html").read_text("utf-8") == Path("our-own.html").read_text("utf-8").replace(
+        "our-own.html", "second.html"
+    )
+    assert page.results["pose"]["x"] == 0.005
+    better = optimize(load_problem("zhang-gosselin-2002", ["optimizer.generations=2", "optimizer.population=8"]))
+    study = Page(report(better, "study.html", without=QUICK[1::2]).read_text("utf-8"))
+    assert study.results["compliance"] == analyze(better.machine).compliance
+
+
+def test_a_report_that_cannot_be_is_refused(tmp_path):
+    machine = load("planar-3rpr")
+    with pytest.raises(InputError, match=r"report is \.html or \.pdf"):
+        report(machine, tmp_path / "report.doc")
+    with pytest.raises(InputError, match='did you mean "maps"'):
+        report(machine, tmp_path / "report.html", without=["map"])
+    with pytest.raises(InputError, match="would have to span"):
+        report(changed(load("delta"), {"pose.z": "-30 m"}), tmp_path / "report.html")
     assert not list(tmp_path.iterdir())

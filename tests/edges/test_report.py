@@ -10,6 +10,7 @@ from pypdf import PdfReader
 from report_pages import MACHINE, QUICK, Page, no_pictures, number, reported, small_pictures
 
 from kinetostat.cli import main
+from kinetostat.commands.report import WITHOUT
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values
 from kinetostat.studies.analysis import analyze
@@ -24,7 +25,6 @@ from studies import SMALL
 LOAD = ["--set", 'load.force=["0 N","0 N","-500 N"]']
 HOSTILE = '<script>alert(1)</script> #import "x": $a$ [/red] *b* @c \\d'
 ORIGIN = Origin("kinetostat report", (("machine.toml", "x = 1 < 2"),), "", "{}")
-FAST = ("maps", "guidelines", "sensitivity", "validation")
 TINY = SMALL + "[optimizer]\npopulation = 12\ngenerations = 4\n"
 
 
@@ -61,7 +61,7 @@ def told(*words):
 
 def quick(machine):
     """The page about a machine, without what takes time."""
-    found = answers.gather(machine, without=FAST)
+    found = answers.gather(machine, without=answers.PARTS)
     return html_page(report_of(found, "Validation was left out.", ORIGIN, {}, True))
 
 
@@ -182,6 +182,10 @@ def test_every_bundled_machine_has_a_page(name):
     assert page.results == {}
     assert page.table("Compliance C")
     assert {"svg", "img", "math"} <= set(page.tags)
+
+
+def test_the_command_leaves_out_what_can_be_left_out():
+    assert WITHOUT == answers.PARTS
 
 
 @pytest.mark.parametrize("setting", ["pose.z=3 m", "limits.longest_leg=10 cm"])

@@ -1,12 +1,14 @@
-"""Which formats there are, and which of our modules writes each. Nothing is written here."""
+"""Which formats there are, and which of our modules writes each; a machine is exported by one of them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.analysis import Analysis, analyze
 
 
 @dataclass(frozen=True)
@@ -68,3 +70,24 @@ def choose(name: str | None, path: Path | None) -> Format:
         names = ", ".join(f"{one.name} ({one.suffix})" for one in KNOWN)
         raise InputError(f"No format is named; give --to, or a file with -o that ends as one of: {names}.")
     return found[0]
+
+
+def export(machine: Machine, path: str | Path, to: str | None = None) -> list[Path]:
+    """Write a machine, or its results at its pose, in the format of another program, whole or not at all.
+
+    Args:
+        machine: at a pose that has an answer.
+        path: of the file; one that is there is replaced.
+        to: name of the format, as in `kinetostat export --to`; None to go by the suffix of the path.
+
+    Returns:
+        What was written: some formats need several files.
+
+    Raises:
+        InputError: an unknown format, no answer at the pose, what the format cannot hold, or a place that cannot be
+            written.
+    """
+    chosen, found = choose(to, Path(path)), analyze(machine)
+    if found.status is not Status.OK:
+        raise InputError(found.message)
+    return chosen.write(found, Path(path))

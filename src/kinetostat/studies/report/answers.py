@@ -10,7 +10,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.ranges import parse_range
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.grid.grid import evaluate_grid
@@ -22,6 +22,10 @@ from kinetostat.studies.sensitivity import Sensitivity, sensitivity
 MAP_POINTS, GUIDELINE_POINTS = 41, 7
 """Points along each coordinate of the maps, and of the poses at which guidelines are tried."""
 MOST_AXES = 2
+PARTS = ("maps", "guidelines", "sensitivity", "validation")
+"""What takes time and may be left out of a report."""
+STEPS = 7
+"""Of the whole work on a report, as progress counts them; the last two are validation and the file."""
 
 
 @dataclass(frozen=True)
@@ -59,13 +63,15 @@ def gather(
     Args:
         machine: with its pose.
         ranges: of the maps, "FIELD=from:to:count[:log]", one or two; none to choose them.
-        without: what takes time and is left out: maps, guidelines, sensitivity.
+        without: what is left out, of `PARTS`; validation is another engine's answer and not asked for here.
         result: of a study whose best design the machine is.
-        progress: told how far the work is.
+        progress: told how far the work on a report is: five of `STEPS`.
 
     Raises:
-        InputError: a bad range, or too many.
+        InputError: a bad range, too many, or an unknown part.
     """
+    for part in without:
+        choice(part, PARTS, "the part of a report to leave out")
     if len(ranges) > MOST_AXES:
         raise InputError(f"a report maps one coordinate or two, not {len(ranges)}; leave out an --over.")
     analysis = analyze(machine)
@@ -75,13 +81,13 @@ def gather(
     refused: dict[str, str] = {}
     if not over:
         refused["maps"] = "No coordinate of the pose can change by itself here, so that there is nothing to map."
-    progress(1, 5)
+    progress(1, STEPS)
     maps = evaluate_grid(machine, over, list(_diagonal(machine))) if over and "maps" not in without else None
-    progress(2, 5)
+    progress(2, STEPS)
     ranked = sensitivity(machine) if "sensitivity" not in without else None
-    progress(3, 5)
+    progress(3, STEPS)
     advice = _advice(machine, over) if "guidelines" not in without else None
-    progress(5, 5)
+    progress(5, STEPS)
     return Answers(machine, analysis, maps, advice, ranked, result, refused)
 
 

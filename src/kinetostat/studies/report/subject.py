@@ -65,8 +65,12 @@ def _stored(folder: Path, settings: Sequence[str]) -> Subject:
     if settings:
         raise InputError(f'"{folder}" holds a study with settings of its own; leave out --set.')
     problem = stored_problem(folder)
-    inputs = (("study.toml", study_toml(problem.study)), ("machine.toml", as_toml(problem.machine)))
-    return Subject(problem.machine, inputs, problem, folder)
+    return Subject(problem.machine, texts_of(problem), problem, folder)
+
+
+def texts_of(problem: Problem) -> Texts:
+    """Texts from which a problem can be read again, the study first."""
+    return ("study.toml", study_toml(problem.study)), ("machine.toml", as_toml(problem.machine))
 
 
 def _study(name: str, path: Path, settings: Sequence[str]) -> Subject:

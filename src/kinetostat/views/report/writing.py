@@ -1,0 +1,149 @@
+"""A report as a file: all that there is to say of a machine, asked, assembled, and written as a page or as PDF."""
+
+import json
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from kinetostat.engine.batch import Progress, silent
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.loading import as_toml
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.analysis_data import as_json
+from kinetostat.studies.optimisation.result import Result
+from kinetostat.studies.optimisation.result_data import message
+from kinetostat.studies.report.answers import STEPS, Answers, gather
+from kinetostat.studies.report.subject import Texts, texts_of
+from kinetostat.studies.storage import replacing
+from kinetostat.validation.comparison import Validation, choose, validate
+from kinetostat.views.report.assembly import report_of
+from kinetostat.views.report.html_page import html_page
+from kinetostat.views.report.pdf import check_typst, pdf_bytes
+from kinetostat.views.report.record import Origin
+
+SUFFIXES = (".html", ".pdf")
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a report is to hold.
+
+    Attributes:
+        ranges: of the maps, "FIELD=from:to:count[:log]", one or two; none to choose them.
+        without: parts that take time and are left out, of `studies.report.answers.PARTS`.
+        engine: of the validation; None for the first that is installed.
+        author, date: for the title block; None for none.
+    """
+
+    ranges: Sequence[str] = ()
+    without: Sequence[str] = ()
+    engine: str | None = None
+    author: str | None = None
+    date: str | None = None
+
+    def options(self) -> list[str]:
+        """The words of the command line that ask for it."""
+        single = (("--engine", self.engine), ("--author", self.author), ("--date", self.date))
+        pairs = [("--over", self.ranges), ("--without", self.without)]
+        pairs += [(name, [value]) for name, value in single if value]
+        return [word for name, values in pairs for value in values for word in (name, value)]
+
+
+def report(
+    about: Machine | Result,
+    path: str | Path,
+    ranges: Sequence[str] = (),
+    without: Sequence[str] = (),
+    *,
+    engine: str | None = None,
+    author: str | None = None,
+    date: str | None = None,
+    progress: Progress = silent,
+) -> Path:
+    """Write everything about a machine, or about a study and its best design, into one file for a design review.
+
+    Args:
+        about: a machine at a pose that has an answer, or the result of a study.
+        path: of the file, .html (the machine in three dimensions) or .pdf; one that is there is replaced.
+        ranges: of the maps, "FIELD=from:to:count[:log]", one or two; none to choose them.
+        without: what takes time and is left out: maps, guidelines, sensitivity, validation.
+        engine: of the validation, exudyn or pynite; None for the first that is installed.
+        author, date: for the title block. Without a date, the same input gives the same bytes.
+        progress: told how far the work is.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: no answer at the pose, no design that meets the conditions, a bad range or part, a file that is no
+            report or cannot be written, a library that is missing.
+    """
+    place, wanted = report_path(path), Wanted(ranges, without, engine, author, date)
+    result = about if isinstance(about, Result) else None
+    if result is not None and not result.solved:
+        raise InputError(message(result))
+    machine = about.machine if isinstance(about, Result) else about
+    answers = gather(machine, ranges, without, result, progress)
+    if answers.analysis.status is not Status.OK:
+        raise InputError(answers.analysis.message)
+    inputs = texts_of(result.problem) if result else (("machine.toml", as_toml(machine)),)
+    write_report(answers, wanted, [inputs[0][0]], inputs, place, progress)
+    return place
+
+
+def report_path(path: str | Path) -> Path:
+    """The path of a report, before the work is done.
+
+    Raises:
+        InputError: the suffix is none of a report, or what writes it is not installed.
+    """
+    place = Path(path)
+    if place.suffix not in SUFFIXES:
+        raise InputError(f'a report is {" or ".join(SUFFIXES)}, not "{place}"; write e.g. -o report.html.')
+    if place.suffix == ".pdf":
+        check_typst()
+    return place
+
+
+def write_report(
+    answers: Answers, wanted: Wanted, subject: Sequence[str], inputs: Texts, path: Path, progress: Progress = silent
+) -> None:
+    """Write what has been found, whole or not at all.
+
+    Args:
+        answers: of a pose whose status is OK.
+        wanted: what the report holds besides.
+        subject: words of the command line that name the machine or study, with its overrides.
+        inputs: name and text of each file that it was read from.
+        path: from `report_path`.
+        progress: told of the last two of `STEPS`.
+
+    Raises:
+        InputError: an unknown engine, or a place that cannot be written.
+    """
+    command = shlex.join(["kinetostat", "report", *subject, *wanted.options(), "-o", path.name])
+    results = json.dumps(as_json(answers.analysis), ensure_ascii=False, allow_nan=False, indent=1)
+    origin = Origin(command, inputs, as_toml(answers.machine), results)
+    about = {name: text for name, text in (("Author", wanted.author), ("Date", wanted.date)) if text}
+    page = path.suffix == ".html"
+    validation = _validation(answers.machine, wanted)
+    progress(STEPS - 1, STEPS)
+    whole = report_of(answers, validation, origin, about, page)
+    data = html_page(whole).encode() if page else pdf_bytes(whole)
+    with replacing(path) as temporary:
+        temporary.write_bytes(data)
+    progress(STEPS, STEPS)
+
+
+def _validation(machine: Machine, wanted: Wanted) -> Validation | str:
+    """What an independent engine says, or why it says nothing."""
+    if "validation" in wanted.without:
+        return "Validation was left out."
+    if wanted.engine:
+        choose(wanted.engine)
+    try:
+        return validate(machine, wanted.engine)
+    except InputError as reason:
+        return str(reason)
