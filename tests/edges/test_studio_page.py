@@ -1,8 +1,11 @@
 """Every control of the studio's page, driven without a browser: numbers as `analyze` has them, refusals, history."""
 
 import asyncio
+import io
 import json
 import math
+import zipfile
+from pathlib import Path
 
 import httpx
 import pytest
@@ -11,6 +14,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse
 from studio_page import on_page
 
+from kinetostat import export
 from kinetostat.cli import main
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studies.analysis import analyze
@@ -279,6 +283,26 @@ def test_a_file_of_ones_own_opens_and_saves():
         await page.send("save", "click")
         assert 'family = "hexapod"' in (await saved).text
         assert 'x = "0.001 m"' in saved.result().text
+
+    on_page(steps)
+
+
+def test_the_machine_as_it_stands_is_written_for_other_programs(tmp_path):
+    async def steps(page):
+        await page.choose("machines", "delta")
+        await page.send("control pose.x", "write", "5 mm")
+        sent = {}
+        for name in ("csv", "urdf"):
+            download = asyncio.ensure_future(page.user.download.next(timeout=300.0))
+            await page.send(f"file-{name}", "click")
+            sent[name] = await download
+        export(load("delta", ["pose.x=5 mm"]), tmp_path / "ours.csv")
+        assert sent["csv"].text == (tmp_path / "ours.csv").read_text("utf-8")
+        with zipfile.ZipFile(io.BytesIO(sent["urdf"].content)) as archive:
+            assert {Path(held).suffix for held in archive.namelist()} == {".urdf", ".yaml"}
+        await page.send("control pose.z", "write", "-30 m")
+        await page.send("file-report, page", "click")
+        assert any("would have to span" in message for message in page.user.notify.messages)
 
     on_page(steps)
 

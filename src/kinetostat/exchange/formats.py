@@ -43,7 +43,7 @@ class Format:
 
 KNOWN = (
     Format("mjcf", ".xml", "mjcf", "machine for MuJoCo: bodies, joints, springs, closed loops"),
-    Format("urdf", ".urdf", "urdf", "machine as URDF with closed loops and stiffnesses; read back by `new --from`"),
+    Format("urdf", ".urdf", "urdf", "machine as URDF with closed loops and stiffnesses; read back by new --from"),
     Format("glb", ".glb", "glb", "solids of the machine at its pose, for any 3-D viewer"),
     Format("csv", ".csv", "results_csv", "results at the pose, a number a line with its unit"),
     Format("netcdf", ".nc", "results", "results at the pose, labelled, with units"),

@@ -14,6 +14,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, PictureWish, Report, ReportWish, picture, report
 from kinetostat.studio.design.design_tab import DesignTab
 from kinetostat.studio.design.workshop import Workshop
+from kinetostat.studio.files_menu import FilesMenu
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.map_panel import MapPanel
 from kinetostat.studio.panels.blame import BlamePanel
@@ -90,6 +91,7 @@ class StudioPage:
             ).props('accept=".toml" aria-hidden="true"').classes("unseen").mark("upload")  # fmt: skip
             self._button("folder_open", "Open a machine file", lambda: self.upload.run_method("pickFiles"), "open")
             self._button("download", "Save the machine as a file", self._save, "save")
+            self.files = FilesMenu(self.session, self._refuse)
             self._button("contrast", "Light or dark", self.dark.toggle, "theme")
 
     @staticmethod
@@ -222,7 +224,7 @@ class StudioPage:
         ui.notify(message, type="negative", multi_line=True, close_button="close", timeout=0, position="top")
 
     def _close(self) -> None:
-        for part in (self._pictures, self._reports, self.map, self.design):
+        for part in (self._pictures, self._reports, self.map, self.files, self.design):
             part.close()
         for panel in self.panels.values():
             panel.close()

@@ -1,0 +1,106 @@
+"""The menu of what a machine can be written as beside its file: reports, and formats of other programs.
+
+The work is that of the commands, in a process of its own, so that the page goes on meanwhile.
+"""
+
+import asyncio
+import io
+import sys
+import zipfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from nicegui import background_tasks, ui
+
+from kinetostat.exchange.formats import KNOWN
+from kinetostat.studio.session import Session
+
+REPORTS = (
+    ("report, page", ".html", "for a design review, with the machine in three dimensions"),
+    ("report, PDF", ".pdf", "for a design review, on paper"),
+)
+"""Name, suffix and description of each kind of report."""
+BUSY = "A file is being written already; wait until it is done."
+
+
+class FilesMenu:
+    """A button with a menu; a file that is chosen is written and sent to the browser."""
+
+    def __init__(self, session: Session, refuse: Callable[[str], None]) -> None:
+        """Build the button.
+
+        Args:
+            session: whose machine is written, as it is when a file is chosen.
+            refuse: shows why there is no file.
+        """
+        self._session, self._refuse = session, refuse
+        self._process: asyncio.subprocess.Process | None = None
+        self._busy = False
+        text = "Report, and formats of other programs"
+        self._button = ui.button(icon="ios_share").props(f'flat round dense aria-label="{text}"').mark("files")
+        with self._button.tooltip(text), ui.menu().props('auto-close max-height="90vh"'):
+            for name, suffix, summary in REPORTS:
+                self._item(name, suffix, summary, ["report"])
+            ui.separator()
+            for one in KNOWN:
+                self._item(one.name, one.suffix, one.summary, ["export", "--to", one.name])
+
+    def _item(self, name: str, suffix: str, summary: str, words: Sequence[str]) -> None:
+        item = ui.menu_item(on_click=lambda: self._choose(words, suffix)).props("dense").mark(f"file-{name}")
+        with item, ui.item_section():
+            ui.item_label(f"{name} ({suffix})")
+            ui.item_label(summary).props("caption")
+
+    def _choose(self, words: Sequence[str], suffix: str) -> None:
+        if self._busy:
+            self._refuse(BUSY)
+            return
+        self._busy = True
+        background_tasks.create(self._send(words, suffix), name="studio file")
+
+    async def _send(self, words: Sequence[str], suffix: str) -> None:
+        name, machine = self._session.as_file()
+        wanted = f"{Path(name).stem}{suffix}"
+        with self._button:
+            waiting = ui.notification(f"Writing {wanted} …", spinner=True, timeout=None, position="top")
+        try:
+            with TemporaryDirectory() as folder:
+                (Path(folder) / name).write_bytes(machine)
+                refused = await self._run(Path(folder), [words[0], name, *words[1:], "-o", wanted])
+                (Path(folder) / name).unlink()
+                found = sorted(Path(folder).iterdir())
+                data = [(path.name, path.read_bytes()) for path in found]
+        finally:
+            self._busy = False
+            waiting.dismiss()
+        with self._button:
+            if not data:
+                self._refuse(refused)
+            elif len(data) == 1:
+                ui.download(data[0][1], data[0][0])
+            else:
+                ui.download(_packed(data), f"{Path(name).stem}.zip")
+
+    async def _run(self, folder: Path, words: Sequence[str]) -> str:
+        """Run a command in a folder; returns what it says where it fails."""
+        self._process = await asyncio.create_subprocess_exec(
+            sys.executable, "-m", "kinetostat", *words, cwd=folder,
+            stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.PIPE,
+        )  # fmt: skip
+        _, said = await self._process.communicate()
+        return said.decode("utf-8", "replace").removeprefix("kinetostat: ").strip() or "The file could not be written."
+
+    def close(self) -> None:
+        """Nobody waits for a file any more: the page is gone."""
+        if self._process is not None and self._process.returncode is None:
+            self._process.kill()
+
+
+def _packed(files: Sequence[tuple[str, bytes]]) -> bytes:
+    """Several files as one archive."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in files:
+            archive.writestr(name, data)
+    return stream.getvalue()
