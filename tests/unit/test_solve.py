@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kinetostat.algebra.scalar import is_zero
-from kinetostat.algebra.solve import complement, conjugate, dual_basis, least_energy
+from kinetostat.algebra.solve import complement, conjugate, dual_basis, least_energy, right_inverse
 from numeric import U
 
 STABLE = 50 * U
@@ -44,12 +44,25 @@ def test_dual_basis_is_the_inverse(sparse, data):
     assert 0.0 < regularity <= 1.0
 
 
-@given(matrices())
-def test_regularity_is_the_least_distance_from_the_span_of_the_others_before(basis):
-    """Dense vectors are taken in the order given, so that R of NumPy's QR holds the same distances."""
-    _, regularity = dual_basis(basis)
-    distances = abs(np.diag(np.linalg.qr(np.array(basis).T).R))
-    assert regularity == pytest.approx(min(1.0, *distances), rel=1e-6, abs=STABLE)
+@pytest.mark.parametrize("sparse", [False, True])
+@given(data=st.data())
+def test_regularity_is_a_reciprocal_condition_number_in_any_order_of_the_vectors(sparse, data):
+    basis = np.array(data.draw(matrices(sparse=sparse)))
+    assume(np.linalg.cond(basis) < 1e6)
+    sizes = np.linalg.norm(basis) * np.linalg.norm(np.linalg.inv(basis))
+    for order in (basis, data.draw(st.permutations(basis.tolist()))):
+        _, regularity = dual_basis([*map(list, order)])
+        assert regularity == pytest.approx(len(basis) / sizes, rel=1e-8)
+
+
+@given(matrices(st.just(6), columns=8))
+def test_regularity_of_fewer_or_more_vectors_is_that_of_their_pseudo_inverse(vectors):
+    assume(np.linalg.cond(np.array(vectors)) < 1e6)
+    few, wide = vectors[:4], np.array(vectors).T.tolist()
+    for given_vectors, found in ((few, complement(few)[-1]), (wide, right_inverse(wide)[-1])):
+        matrix = np.array(given_vectors)
+        sizes = np.linalg.norm(matrix) * np.linalg.norm(np.linalg.pinv(matrix))
+        assert found == pytest.approx(len(matrix) / sizes, rel=1e-8)
 
 
 @given(matrices(st.integers(2, 6)), st.lists(st.floats(-8, 8), min_size=6, max_size=6))
@@ -99,7 +112,7 @@ def test_complement_of_axes_is_made_of_axes_and_structural_zeros():
     found, regularity = complement([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 2.0]])
     assert found == [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]
     assert all(is_zero(c) for row in found for c in row if c == 0.0)
-    assert regularity == 1.0
+    assert regularity == pytest.approx(0.8), "2 / (|1 2| |1 1/2|)"
 
 
 def test_complement_of_nothing_new_has_regularity_zero():

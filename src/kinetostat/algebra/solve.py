@@ -6,6 +6,7 @@ zeros are used: sparse vectors are taken first and only their non-zero rows are 
 Source: theory (1), (6), (7) and (9); G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed. (2013), section 5.2.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,6 +25,9 @@ from kinetostat.algebra.scalar import (
 
 Row = list[Scalar]
 
+SMALLEST = 1e-100
+"""Size below which a pivot is zero: its inverse would have no square."""
+
 DEPENDENT = 1e-24
 """Square of 1e-12: share of its square below which what is left of a column is the rounding of nothing."""
 
@@ -33,7 +37,7 @@ class _Triangular:
     """Q^T V = R for given vectors V: `vectors` holds R and `turned` Q^T, both by columns.
 
     Vector `order[k]` ends in row `pivots[k]`; `free` are the rows without a pivot. Q is the
-    product of as many reflections.
+    product of as many reflections. `least` is the smallest pivot, 0 where the vectors are dependent.
     """
 
     vectors: list[Row]
@@ -41,8 +45,21 @@ class _Triangular:
     order: list[int]
     pivots: list[int]
     free: list[int]
-    regularity: Scalar
+    least: Scalar
     reflections: int
+
+    def inverse(self) -> list[Row]:
+        """R^-T: row k holds what of each vector's coefficient is in the component along pivot k."""
+        size = range(len(self.order))
+        steps: list[Row] = [[] for _ in size]
+        for k in size:
+            here, pivot = self.order[k], self.pivots[k]
+            shrink = reciprocal(self.vectors[here][pivot])
+            above = [(self.vectors[here][self.pivots[i]], steps[i]) for i in range(k)]
+            for j in size:
+                known = total([times(factor, step[j]) for factor, step in above])
+                steps[k].append(times(minus(1.0 if j == here else 0.0, known), shrink))
+        return steps
 
 
 def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
@@ -54,9 +71,8 @@ def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
         basis: the vectors w_b, each of n scalars; components of comparable size (scale rows before).
 
     Returns:
-        The n dual vectors, and the regularity: the smallest distance of a w_b from the span of those taken before it
-        (at most 1), 0 where the w_b are dependent and the dual vectors meaningless. It tells how far dependence is to
-        within a small factor: the order, sparse vectors first, changes with what is zero by form.
+        The n dual vectors, and the regularity n / (|W| |W^-1|), Frobenius norms: the reciprocal of a condition number,
+        1 where the w_b are orthogonal and of one size, 0 where they are dependent and the dual vectors meaningless.
     """
     solved = _triangularise(basis)
     dual: list[Row] = [[] for _ in basis]
@@ -67,7 +83,7 @@ def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
         for column, turned in enumerate(solved.turned):
             known = total([times(solved.vectors[j][row], dual[j][column]) for j in later])
             dual[here].append(times(minus(turned[row], known), inverse))
-    return dual, solved.regularity
+    return dual, _regularity(basis, dual, solved.least)
 
 
 def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row], Scalar]:
@@ -75,34 +91,34 @@ def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row
 
     Returns:
         A+ as m rows of n scalars (the solution of least norm); the m - n orthonormal null vectors of m scalars; and the
-        regularity of the rows as in `dual_basis`.
+        regularity n / (|A| |A+|), as in `dual_basis`.
     """
     solved = _triangularise(rows)
-    size, wide = len(rows), len(rows[0])
-    steps: list[Row] = [[] for _ in rows]  # R^-T: steps[k][j] multiplies b_j in the solution's component k
-    for k in range(size):
-        here, pivot = solved.order[k], solved.pivots[k]
-        inverse = reciprocal(solved.vectors[here][pivot])
-        above = [(solved.vectors[here][solved.pivots[i]], steps[i]) for i in range(k)]
-        for j in range(size):
-            known = total([times(factor, step[j]) for factor, step in above])
-            steps[k].append(times(minus(1.0 if j == here else 0.0, known), inverse))
+    size, wide, steps = len(rows), len(rows[0]), solved.inverse()
     solution = [
         [total([times(column[p], steps[k][j]) for k, p in enumerate(solved.pivots)]) for j in range(size)]
         for column in solved.turned
     ]
     null = [[solved.turned[i][row] for i in range(wide)] for row in solved.free]
-    return solution, null, solved.regularity
+    return solution, null, _regularity(rows, steps, solved.least)
 
 
 def complement(vectors: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
     """An orthonormal basis of what is orthogonal to a independent vectors of n components, a < n.
 
     Returns:
-        The n - a basis vectors, and the regularity of the given ones as in `dual_basis`.
+        The n - a basis vectors, and the regularity a / (|V| |V+|) of the given ones, as in `dual_basis`.
     """
     solved = _triangularise(vectors)
-    return [[column[row] for column in solved.turned] for row in solved.free], solved.regularity
+    basis = [[column[row] for column in solved.turned] for row in solved.free]
+    return basis, _regularity(vectors, solved.inverse(), solved.least)
+
+
+def _regularity(vectors: Sequence[Sequence[Scalar]], inverse: Sequence[Sequence[Scalar]], least: Scalar) -> Scalar:
+    """n / (|V| |V+|) for n vectors and anything of the size of their inverse, at most 1; 0 where they are dependent."""
+    squares = [total([times(c, c) for row in rows for c in row]) for rows in (vectors, inverse)]
+    found = times(float(len(vectors)), reciprocal(sqrt(times(*squares))))
+    return where(least > SMALLEST, smaller(1.0, found), 0.0)
 
 
 def handedness(vectors: Sequence[Sequence[Scalar]]) -> Scalar:
@@ -129,7 +145,7 @@ def _triangularise(vectors: Sequence[Sequence[Scalar]]) -> _Triangular:
     waiting, free = list(range(len(vectors))), list(range(size))
     order: list[int] = []
     pivots: list[int] = []
-    regularity: Scalar = 1.0
+    least: Scalar = math.inf
     reflections = 0
     while waiting:
         here = min(waiting, key=lambda j: sum(not is_zero(reduced[j][i]) for i in free))
@@ -140,8 +156,8 @@ def _triangularise(vectors: Sequence[Sequence[Scalar]]) -> _Triangular:
         order.append(here)
         pivots.append(filled[0])
         free.remove(filled[0])
-        regularity = smaller(regularity, abs(reduced[here][filled[0]]))
-    return _Triangular(reduced, turned, order, pivots, free, regularity, reflections)
+        least = smaller(least, abs(reduced[here][filled[0]]))
+    return _Triangular(reduced, turned, order, pivots, free, least, reflections)
 
 
 def _reflect(column: Row, others: list[Row], rows: list[int]) -> None:
