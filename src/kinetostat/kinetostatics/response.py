@@ -39,7 +39,8 @@ class Response:
         statics: how the springs share loads.
         stiffness, compliance: K (N·m/rad, N/rad, N/m) and C (rad/(N·m), rad/N, m/N) at T, base axes; of a planar
             machine only rz, x, y have a meaning, and the other entries are 0.
-        regularity: 0 at a singularity to 1 (dimensionless): the least of the legs' and the platform's (theory section 2).
+        regularity: 0 at a singularity, at most 1 (dimensionless): the least of the legs' and the platform's (theory
+            section 2).
         status: a `Status` code.
         load: the wrench of the machine's table [load], at T, base axes (N·m, N).
         checks: the limits of the machine that are set, each with what it is compared with.
