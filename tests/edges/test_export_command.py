@@ -7,6 +7,7 @@ import pytest
 
 from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
 from kinetostat.commands.export import FORMATS
+from kinetostat.exchange import step
 from kinetostat.exchange.formats import KNOWN
 from kinetostat.machine.loading import bundled
 
@@ -42,11 +43,26 @@ def test_glb_is_gltf_binary(tmp_path):
     assert (magic, version, length) == (b"glTF", 2, len(data))
 
 
+def test_step_is_for_cad_programs_by_either_suffix(tmp_path, capfd):
+    for name in ("machine.step", "machine.STP"):
+        assert main(["export", MACHINE, "-o", str(tmp_path / name)]) == DONE
+        assert capfd.readouterr().out.count("\n") < 3, "the writer itself says nothing"
+    assert (tmp_path / "machine.step").read_bytes() == (tmp_path / "machine.STP").read_bytes()
+    assert "AUTOMOTIVE_DESIGN" in (tmp_path / "machine.step").read_text("ascii")
+
+
+def test_step_without_its_extra_is_one_sentence(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(step, "find_spec", lambda _: None)
+    assert main(["export", MACHINE, "-o", str(tmp_path / "machine.step")]) == BAD_INPUT
+    assert "pip install 'kinetostat[cad]'" in " ".join(capsys.readouterr().err.split())
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
         ([MACHINE], BAD_INPUT, "give --to"),
-        ([MACHINE, "--to", "step"], BAD_INPUT, "choose from mjcf, urdf"),
+        ([MACHINE, "--to", "iges"], BAD_INPUT, "choose from mjcf, urdf"),
         ([MACHINE, "-o", "a.docx"], BAD_INPUT, "ends as one of"),
         (["nope", "--to", "csv"], BAD_INPUT, "neither a file nor a bundled machine"),
         ([MACHINE, "--to", "csv", "--set", "pose.z=3 m"], NO_ANSWER, "span 3 m"),
@@ -79,7 +95,7 @@ def test_a_machine_written_out_is_read_in(tmp_path, capsys):
     assert "legs.z.slide.stiffness" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("to", ["mjcf", "urdf", "nastran", "abaqus", "ansys"])
+@pytest.mark.parametrize("to", ["mjcf", "urdf", "step", "nastran", "abaqus", "ansys"])
 def test_a_name_stays_a_name(to, tmp_path):
     """Whatever people call their machine, it adds no line and no element to a file."""
     own, path = tmp_path / "own.toml", tmp_path / "out"

@@ -10,7 +10,7 @@ from kinetostat.commands.common import DONE, add_command, load_machine, no_answe
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
 
-FORMATS = "mjcf, urdf, glb, csv, netcdf, mat, nastran, abaqus or ansys"
+FORMATS = "mjcf, urdf, glb, step, csv, netcdf, mat, nastran, abaqus or ansys"
 
 
 def add_export_command(commands: "Commands") -> None:

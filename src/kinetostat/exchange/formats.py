@@ -20,12 +20,14 @@ class Format:
         suffix: of its files.
         writer: our module whose `write(analysis, path)` makes a file of it and returns the files that it made.
         summary: what is in it, for lists.
+        other_suffixes: of its files, as some write them.
     """
 
     name: str
     suffix: str
     writer: str
     summary: str
+    other_suffixes: tuple[str, ...] = ()
 
     def write(self, analysis: Analysis, path: Path) -> list[Path]:
         """Write the machine, or its results at the pose, whole or not at all; returns what was written.
@@ -45,6 +47,7 @@ KNOWN = (
     Format("mjcf", ".xml", "mjcf", "machine for MuJoCo: bodies, joints, springs, closed loops"),
     Format("urdf", ".urdf", "urdf", "machine as URDF with closed loops and stiffnesses; read back by new --from"),
     Format("glb", ".glb", "glb", "solids of the machine at its pose, for any 3-D viewer"),
+    Format("step", ".step", "step", "the same as exact bodies in an assembly, for CAD programs", (".stp",)),
     Format("csv", ".csv", "results_csv", "results at the pose, a number a line with its unit"),
     Format("netcdf", ".nc", "results", "results at the pose, labelled, with units"),
     Format("mat", ".mat", "mat", "K, C, pose and reference point for MATLAB"),
@@ -65,7 +68,7 @@ def choose(name: str | None, path: Path | None) -> Format:
         known = {one.name: one for one in KNOWN}
         return known[choice(name, known, "--to")]
     suffix = "" if path is None else path.suffix.lower()
-    found = [one for one in KNOWN if one.suffix == suffix]
+    found = [one for one in KNOWN if suffix in (one.suffix, *one.other_suffixes)]
     if not found:
         names = ", ".join(f"{one.name} ({one.suffix})" for one in KNOWN)
         raise InputError(f"No format is named; give --to, or a file with -o that ends as one of: {names}.")

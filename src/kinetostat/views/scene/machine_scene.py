@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.vector import Displacement, Vector
@@ -120,7 +120,8 @@ def _leg_solids(leg: Anatomy, base: Plate | None, platform: Plate, sizes: Propor
         found += joints.joint_solids(joint, _sides(joint, leg, base, platform), radius, material)
     for rail in leg.rails:
         found += joints.rail_solids(rail, sizes, radius, _next_point(leg) - rail.point)
-    return found + [joints.spring_solid(spring, radius) for spring in leg.springs if joints.visible(spring)]
+    found += [joints.spring_solid(spring, radius) for spring in leg.springs if joints.visible(spring)]
+    return [replace(solid, leg=leg.leg) for solid in found]
 
 
 def _radius(leg: Anatomy, sizes: Proportions) -> float:

@@ -85,6 +85,7 @@ class Solid:
         place: from its own axes to the base frame.
         scale: along its own axes.
         layer: one of `LAYERS`.
+        leg: of which it is a part; empty if of none.
     """
 
     name: str
@@ -93,6 +94,7 @@ class Solid:
     place: Displacement = BASE
     scale: Point3 = (1.0, 1.0, 1.0)
     layer: str = "machine"
+    leg: str = ""
 
     def moved(self, motion: Displacement, **changes: Any) -> "Solid":
         """The solid after a displacement, with some attributes replaced."""
