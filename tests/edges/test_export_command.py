@@ -58,6 +58,15 @@ def test_step_without_its_extra_is_one_sentence(tmp_path, monkeypatch, capsys):
     assert not list(tmp_path.iterdir())
 
 
+def test_step_says_which_library_of_the_system_it_lacks(tmp_path, monkeypatch, capsys):
+    def failing(name):
+        raise ImportError("libGL.so.1: cannot open shared object file")
+
+    monkeypatch.setattr(step, "import_module", failing)
+    assert main(["export", MACHINE, "-o", str(tmp_path / "machine.step")]) == BAD_INPUT
+    assert "libGL.so.1: cannot open shared object file. On Debian" in " ".join(capsys.readouterr().err.split())
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [

@@ -10,19 +10,27 @@ from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import replacing
 from kinetostat.views.scene.machine_scene import scene_of
 
-INSTALL = "STEP needs Open CASCADE, which is not installed; install it with: pip install 'kinetostat[cad]'."
+NEEDED = "STEP needs Open CASCADE, which "
+MISSING = "is not installed; install it with: pip install 'kinetostat[cad]'."
+BROKEN = "does not start: {reason}. On Debian and Ubuntu: apt-get install libgl1 libx11-6."
 
 
 def write(analysis: Analysis, path: Path) -> list[Path]:
     """Write the machine at its pose, in mm, z up.
 
     Raises:
-        InputError: Open CASCADE is not installed.
+        InputError: Open CASCADE is not installed, or lacks a library of the system.
     """
-    if find_spec("OCP") is None:
-        raise InputError(INSTALL)
-    writer: Any = import_module("kinetostat.exchange.step_file")
-    content = writer.step_bytes(scene_of(analysis.machine), analysis.machine.name)
+    content = _writer().step_bytes(scene_of(analysis.machine), analysis.machine.name)
     with replacing(path) as temporary:
         temporary.write_bytes(content)
     return [path]
+
+
+def _writer() -> Any:
+    if find_spec("OCP") is None:
+        raise InputError(NEEDED + MISSING)
+    try:
+        return import_module("kinetostat.exchange.step_file")
+    except ImportError as error:
+        raise InputError(NEEDED + BROKEN.format(reason=error)) from None
