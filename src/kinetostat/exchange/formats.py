@@ -47,7 +47,7 @@ KNOWN = (
     Format("mjcf", ".xml", "mjcf", "machine for MuJoCo: bodies, joints, springs, closed loops"),
     Format("urdf", ".urdf", "urdf", "machine as URDF with closed loops and stiffnesses; read back by new --from"),
     Format("glb", ".glb", "glb", "solids of the machine at its pose, for any 3-D viewer"),
-    Format("step", ".step", "step", "the same as exact bodies in an assembly, for CAD programs", (".stp",)),
+    Format("step", ".step", "step", "solids of the machine as exact bodies, an assembly for CAD programs", (".stp",)),
     Format("csv", ".csv", "results_csv", "results at the pose, a number a line with its unit"),
     Format("netcdf", ".nc", "results", "results at the pose, labelled, with units"),
     Format("mat", ".mat", "mat", "K, C, pose and reference point for MATLAB"),
