@@ -5,6 +5,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from cad import needs_cad
 from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
 from kinetostat.commands.export import FORMATS
 from kinetostat.exchange import step
@@ -14,7 +15,10 @@ from kinetostat.machine.loading import bundled
 MACHINE = "zhang-gosselin-4dof"
 
 
-@pytest.mark.parametrize("one", KNOWN, ids=lambda one: one.name)
+FORMS = [pytest.param(one, marks=needs_cad if one.name == "step" else (), id=one.name) for one in KNOWN]
+
+
+@pytest.mark.parametrize("one", FORMS)
 def test_every_format_is_written(one, tmp_path, capsys):
     path = tmp_path / f"out{one.suffix}"
     assert main(["export", MACHINE, "--to", one.name, "-o", str(path)]) == DONE
@@ -43,6 +47,7 @@ def test_glb_is_gltf_binary(tmp_path):
     assert (magic, version, length) == (b"glTF", 2, len(data))
 
 
+@needs_cad
 def test_step_is_for_cad_programs_by_either_suffix(tmp_path, capfd):
     for name in ("machine.step", "machine.STP"):
         assert main(["export", MACHINE, "-o", str(tmp_path / name)]) == DONE
@@ -104,7 +109,7 @@ def test_a_machine_written_out_is_read_in(tmp_path, capsys):
     assert "legs.z.slide.stiffness" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("to", ["mjcf", "urdf", "step", "nastran", "abaqus", "ansys"])
+@pytest.mark.parametrize("to", ["mjcf", "urdf", pytest.param("step", marks=needs_cad), "nastran", "abaqus", "ansys"])
 def test_a_name_stays_a_name(to, tmp_path):
     """Whatever people call their machine, it adds no line and no element to a file."""
     own, path = tmp_path / "own.toml", tmp_path / "out"

@@ -12,7 +12,7 @@ from kinetostat.views.scene.mesh import placed
 from kinetostat.views.scene.solids import BASE, Scene, Solid
 from machines import one_of_each
 
-pytest.importorskip("OCP", reason="the extra kinetostat[cad] is not installed")
+pytest.importorskip("OCP.STEPCAFControl", reason="Open CASCADE does not start", exc_type=ImportError)
 
 from OCP.Interface import Interface_Static
 

@@ -8,7 +8,7 @@ from kinetostat.views.scene import shapes
 from kinetostat.views.scene.mesh import mesh_of
 from kinetostat.views.scene.solids import Extruded, Swept, Turned
 
-pytest.importorskip("OCP", reason="the extra kinetostat[cad] is not installed")
+pytest.importorskip("OCP.STEPCAFControl", reason="Open CASCADE does not start", exc_type=ImportError)
 
 from kinetostat.exchange.step_solids import solid_of
 from step_files import box, is_valid, surfaces, volume
