@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from report_pages import small_pictures
 
 from cad import starts
 from kinetostat.cli import main
@@ -123,11 +124,14 @@ def placed(document, path, table):
 
 @pytest.fixture
 def reader(tmp_path, monkeypatch):
-    """A reader in an empty folder. Figures are drawn once each; a studio starts up to where it would listen."""
+    """A reader in an empty folder. Figures are drawn once each, machines in reports small; a studio starts up to where it
+    would listen.
+    """
     assert saving.FORMATS is figures.FORMATS, "files that are named have any format"
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(figures, "FORMATS", DrawnOnce(figures.FORMATS))
     monkeypatch.setattr(serving, "serve", lambda *_: None)
+    small_pictures(monkeypatch)
     return Reader(tmp_path)
 
 
