@@ -124,7 +124,7 @@ def placed(document, path, table):
 
 @pytest.fixture
 def reader(tmp_path, monkeypatch):
-    """A reader in an empty folder. Figures are drawn once, reports have small pictures, a studio stops before it listens."""
+    """A reader in an empty folder. Figures are drawn once, reports have small pictures, a studio does not listen."""
     assert saving.FORMATS is figures.FORMATS, "files that are named have any format"
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(figures, "FORMATS", DrawnOnce(figures.FORMATS))
