@@ -111,7 +111,7 @@ def _counts(family: Family) -> dict[str, int]:
         f"{name}.{field}": quantity.count
         for name, section in family.every_section.items()
         for field, quantity in quantities(section).items()
-        if quantity.count is not None
+        if quantity.count is not None and not quantity.apart
     }
 
 

@@ -110,7 +110,12 @@ class Tool:
 
     offset: Annotated[
         tuple[float, float, float],
-        Quantity("length", "tool point T from P in platform axes: x, y, z; K, C and the load are given at T", count=3),
+        Quantity(
+            "length",
+            "tool point T from P in platform axes: x, y, z; K, C and the load are given at T",
+            count=3,
+            apart=True,
+        ),
     ] = (0.0, 0.0, 0.0)
     mass: Annotated[float, Quantity("mass", "of the platform and the tool together; 0: not counted")] = 0.0
 
@@ -119,8 +124,16 @@ class Tool:
 class Load:
     """Table [load], in any machine file: a wrench on the platform at the tool point, base axes."""
 
-    moment: Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3)] = (0.0, 0.0, 0.0)
-    force: Annotated[tuple[float, float, float], Quantity("force", "force along x, y, z", count=3)] = (0.0, 0.0, 0.0)
+    moment: Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3, apart=True)] = (
+        0.0,
+        0.0,
+        0.0,
+    )
+    force: Annotated[tuple[float, float, float], Quantity("force", "force along x, y, z", count=3, apart=True)] = (
+        0.0,
+        0.0,
+        0.0,
+    )
 
 
 COMMON = {"tool": Tool, "load": Load, "limits": Limits}

@@ -40,8 +40,17 @@ def find(family: Family, text: str) -> Parameter:
     """The parameter people mean: its path, or the end of its path where only one parameter ends so.
 
     Raises:
-        InputError: none or several; the message lists what is near.
+        InputError: none, several, or several numbers that are never alike; the message lists what is near.
     """
+    found = _find(family, text)
+    if found.quantity.apart and len(found.leaves) > 1:
+        raise InputError(
+            f"{found.path} holds {len(found.leaves)} numbers; name one of them: {', '.join(found.leaves)}."
+        )
+    return found
+
+
+def _find(family: Family, text: str) -> Parameter:
     known = {parameter.path: parameter for parameter in parameters(family)}
     if text in known:
         return known[text]
