@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
-from kinetostat.machine.loading import load
+from kinetostat.machine.loading import bundled, load
 
 MACHINE = "zhang-gosselin-4dof"
 
@@ -59,6 +59,27 @@ def test_answers(arguments, expected, capsys):
     assert output.err == ""
     for words in expected:
         assert words in output.out
+
+
+@pytest.mark.parametrize("command", ["check", "analyze", "sweep", "map", "sensitivity", "guidelines", "compare"])
+@pytest.mark.parametrize("name", ["Bad [/foo] name", "A [red]b[/red] [load] :smile:"])
+def test_names_are_shown_as_they_are_written(command, name, tmp_path, capsys):
+    file = tmp_path / "own.toml"
+    file.write_text(bundled()["tripteron"].replace('name = "x"', 'name = "[x]"'))
+    more = {
+        "sweep": ["--vary", "pose.x=0:1 cm:2"],
+        "map": ["--over", "pose.x=0:1 cm:2", "--over", "pose.y=0:1 cm:2"],
+        "compare": [str(file)],
+    }
+    assert main([command, str(file), *more.get(command, []), "--set", f"name={name}"]) == DONE
+    shown = " ".join(capsys.readouterr().out.split())
+    assert name in shown
+    assert "[x]" in shown or command in ("sweep", "map", "compare")
+
+
+def test_our_own_brackets_are_shown(capsys):
+    assert main(["check", MACHINE]) == DONE
+    assert "under [load]" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("arguments", "expected"), REFUSED, ids=lambda part: " ".join(part)[:50])

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from kinetostat.kinetostatics.eigenscrews import Eigenscrew
 from kinetostat.kinetostatics.indices import PrincipalStiffness
@@ -23,7 +24,7 @@ MOST_NAMED = 4
 def print_analysis(console: Console, analysis: Analysis, along: Sequence[Along] = (), full: bool = False) -> None:
     """K, C, attribution, indices, mobility and loads at one pose; all springs and eigenscrews if `full`."""
     machine, names = analysis.machine, analysis.components
-    console.print(f"[bold]{machine.name}[/bold]  {analysis.status.word}")
+    console.print(Text.assemble((machine.name, "bold"), f"  {analysis.status.word}"))
     console.print(analysis.message, highlight=False)
     point = "the tool point T" if any(machine.sections["tool"].offset) else "the platform point P"
     about = f"Components {' '.join(names)} at {point}, {analysis.axes} axes. Rank {analysis.rank}."
@@ -40,7 +41,7 @@ def print_analysis(console: Console, analysis: Analysis, along: Sequence[Along] 
         if table.row_count:
             console.print(table)
     for line in remarks(analysis):
-        console.print(line, highlight=False, markup=False)
+        console.print(line, highlight=False)
 
 
 def stiffness_table(analysis: Analysis) -> Table:

@@ -70,8 +70,11 @@ def _readable(value: float, quantity: Quantity) -> str:
 
 
 def terminal() -> Console:
-    """The console of this process: as wide as the terminal, wide enough for six columns where there is none."""
-    return Console() if sys.stdout.isatty() else Console(width=100)
+    """The console of this process: as wide as the terminal, wide enough for six columns where there is none.
+
+    Texts are shown as they are, whatever brackets and colons are in them; what is styled is a `Text`.
+    """
+    return Console(width=None if sys.stdout.isatty() else 100, markup=False, emoji=False)
 
 
 def number(value: Number, endless: str = "∞") -> str:
