@@ -26,12 +26,15 @@ from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Configuration, Machine, springs
 from kinetostat.machine.mass import Mass, moving_masses
 from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.spec.errors import choice
 from kinetostat.studies.indices import Along, Indices, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
 from kinetostat.studies.refusal import why_not
 
 Rows = list[list[float]]
 
+AXES = ("base", "platform")
+"""In which results are given."""
 NEGLIGIBLE = 1e-12
 """Share of a screw's size below which one of its components is rounding."""
 INDEPENDENT = 1e-9
@@ -133,7 +136,11 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     Args:
         machine: with its pose, tool and load.
         axes: "base", or "platform" for results in platform axes.
+
+    Raises:
+        InputError: other axes.
     """
+    choice(axes, AXES, "axes")
     response = respond(machine)
     status = Status(int(response.status))
     configuration = response.configuration
