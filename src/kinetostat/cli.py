@@ -97,9 +97,10 @@ def _parser() -> Parser:
         "kinetostat schema machine > machine.schema.json",
     )
     schema.add_argument("what", choices=["machine", "study"], help="kind of file")
-    takes_machine(
-        add_command(commands, "check", _check, "read a machine and show what it says", "kinetostat check mine.toml")
+    check = add_command(
+        commands, "check", _check, "read a machine or a study and show what it says", "kinetostat check mine.toml"
     )
+    takes_machine(check, "a machine or study file, or the name of a bundled one (see `kinetostat list`)")
     analyze = add_command(
         commands, "analyze", _analyze, "K, C, attribution and indices at a pose",
         'kinetostat analyze mine.toml --set pose.x="5 mm" --json',
@@ -197,12 +198,24 @@ def _schema(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
     from kinetostat.studies.analysis import analyze
+    from kinetostat.studies.bundled import is_study
     from kinetostat.views.tables import print_machine, terminal
 
+    if is_study(options.machine):
+        return _check_study(options)
     machine = load_machine(options)
     print_machine(terminal(), machine)
     found = analyze(machine)
     return no_answer(found.message) if found.status is not Status.OK else DONE
+
+
+def _check_study(options: argparse.Namespace) -> int:
+    from kinetostat.studies.optimisation.problem import load_problem
+    from kinetostat.views.study_tables import print_study
+    from kinetostat.views.tables import terminal
+
+    print_study(terminal(), load_problem(options.machine, options.settings))
+    return DONE
 
 
 def _analyze(options: argparse.Namespace) -> int:
@@ -227,14 +240,13 @@ def _analyze(options: argparse.Namespace) -> int:
 
 def _validate(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
-    from kinetostat.machine.loading import load
     from kinetostat.studies.analysis import analyze
     from kinetostat.validation.comparison import AGREED, as_json, validate
     from kinetostat.views.tables import terminal
     from kinetostat.views.validation_tables import print_validation
 
     poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]
-    machines = [load(options.machine, [*options.settings, *pose]) for pose in poses]
+    machines = [load_machine(options, pose) for pose in poses]
     for machine in machines:
         answer = analyze(machine)
         if answer.status is not Status.OK:

@@ -16,6 +16,7 @@ ANSWERED = [
     (["new", "passive-leg-4dof"], ["[geometry]", 'base_radius        = "22 cm"']),
     (["schema", "machine"], ["json-schema.org", "platform_radius"]),
     (["check", MACHINE], ["geometry.base_radius", "0.22 m", "-60 deg"]),
+    (["check", "zhang-gosselin-2002"], ["Objective: minimize compliance sum", "geometry.base_radius", "0.26 m"]),
     (["analyze", MACHINE], ["3628.32", "leg 3 actuator", "rad/(N·m)"]),
     (["analyze", MACHINE, "--set", "stiffness.passive_links=rigid"], ["Rigid: passive link 1", "0.516397", "rigid"]),
     (["analyze", MACHINE, "--set", "stiffness.actuator.0=0"], ["Free: leg 1 actuator", "free"]),
@@ -33,6 +34,9 @@ REFUSED = [
     (["analyze"], ["MACHINE", "--help"]),
     (["analyse"], ["invalid choice: 'analyse'", "analyze"]),
     (["analyze", "nope"], ['"nope"', "zhang-gosselin-4dof"]),
+    (["analyze", "zhang-gosselin-2002"], ['"zhang-gosselin-2002" is a study', "`kinetostat check`", "machine = ..."]),
+    (["validate", "zhang-gosselin-2002"], ["is a study"]),
+    (["optimize", "hexapod"], ['"hexapod" is a machine', "`kinetostat new study`"]),
     (["analyze", "zhang-gosselin-4dfo"], ['did you mean "zhang-gosselin-4dof"?']),
     (["analyze", MACHINE, "--set", "pose.x=2 kg"], ["pose.x", '"2 kg"', "length", '"12 cm"']),
     (["new", "hexapd"], ['"hexapd"', 'did you mean "hexapod"?']),
@@ -75,6 +79,21 @@ def test_names_are_shown_as_they_are_written(command, name, tmp_path, capsys):
     shown = " ".join(capsys.readouterr().out.split())
     assert name in shown
     assert "[x]" in shown or command in ("sweep", "map", "compare")
+
+
+def test_the_wrong_kind_of_file_is_told_in_one_sentence(tmp_path, capsys):
+    study, machine = tmp_path / "study.toml", tmp_path / "machine.toml"
+    main(["new", "study"])
+    study.write_text(capsys.readouterr().out)
+    machine.write_text(bundled()["hexapod"])
+    for command, file, kind in (("analyze", study, "is a study"), ("optimize", machine, "is a machine")):
+        assert main([command, str(file)]) == BAD_INPUT
+        message = capsys.readouterr().err
+        assert f'"{file}" {kind}, and here ' in message
+        assert "missing" not in message
+    assert main(["check", str(study), "--set", "variables.0.to=9 m"]) == DONE
+    assert " 9.0 m " in capsys.readouterr().out
+    assert main(["check", str(study), "--set", "objectives.0.quantity=stiff"]) == BAD_INPUT
 
 
 def test_our_own_brackets_are_shown(capsys):

@@ -3,10 +3,11 @@
 import argparse
 import json
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from typing import TypeAlias
 
     from kinetostat.machine.machine import Machine
@@ -40,9 +41,9 @@ def add_command(commands: "Commands", name: str, run: object, text: str, example
     return command
 
 
-def takes_machine(command: Parser) -> None:
+def takes_machine(command: Parser, what: str = MACHINE) -> None:
     """Give a command the machine and `--set`."""
-    command.add_argument("machine", metavar="MACHINE", help=MACHINE)
+    command.add_argument("machine", metavar="MACHINE", help=what)
     command.add_argument(
         "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",
         help='override a field, e.g. --set geometry.base_radius="26 cm"; repeatable',
@@ -54,15 +55,22 @@ def takes_json(command: Parser) -> None:
     command.add_argument("--json", action="store_true", help="machine-readable output on stdout and nothing else")
 
 
-def load_machine(options: argparse.Namespace) -> "Machine":
-    """The machine that the options name, with their overrides.
+def load_machine(options: argparse.Namespace, more: "Sequence[str]" = ()) -> "Machine":
+    """The machine that the options name, with their overrides and then more of them.
 
     Raises:
         InputError: no such machine, or a mistake in the file or an override.
     """
-    from kinetostat.machine.loading import load
+    from kinetostat.machine.loading import STUDY, bundled, load
+    from kinetostat.spec.document import exists
+    from kinetostat.spec.errors import InputError
 
-    return load(options.machine, options.settings)
+    if options.machine not in bundled() and not exists(Path(options.machine)):
+        from kinetostat.studies.bundled import bundled_studies
+
+        if options.machine in bundled_studies():
+            raise InputError(f'"{options.machine}" {STUDY}')
+    return load(options.machine, [*options.settings, *more])
 
 
 def print_json(data: object) -> None:

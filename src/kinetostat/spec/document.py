@@ -19,6 +19,11 @@ DEEPEST = 8
 Document = dict[str, Any]
 
 
+def is_study(document: Document) -> bool:
+    """Whether a document is meant as a study, not as a machine."""
+    return "family" not in document and bool({"machine", "variables", "objectives"} & document.keys())
+
+
 def exists(path: Path) -> bool:
     """Whether there is a file or folder of that name; not where no file can have it."""
     try:
