@@ -16,6 +16,7 @@ from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.leg import Joint, Leg, Spring, Turn
 from kinetostat.machine.limits import Limits
 from kinetostat.machine.links import LinkKind, density_section
+from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, section
 
 
@@ -262,6 +263,16 @@ class Machine:
     def tool_point(self, platform: Displacement) -> Vector:
         """The tool point T in the base frame, m: P itself unless the file has a table [tool]."""
         return platform.apply(Vector(*self.sections["tool"].offset))
+
+
+def need_machine(given: object) -> None:
+    """Refuse what is no machine.
+
+    Raises:
+        InputError: says how to get one.
+    """
+    if not isinstance(given, Machine):
+        raise InputError(f"machine is {shorten(given)}; give a machine, as load(...) and build(...) return one.")
 
 
 def springs(configuration: Configuration) -> list[Spring]:

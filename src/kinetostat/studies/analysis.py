@@ -22,10 +22,10 @@ from kinetostat.kinetostatics.conditioning import twist_condition
 from kinetostat.kinetostatics.internal import InternalLoads, internal_loads
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.leg import Spring
-from kinetostat.machine.machine import Configuration, Machine, springs
+from kinetostat.machine.machine import Configuration, Machine, need_machine, springs
 from kinetostat.machine.mass import Mass, moving_masses
 from kinetostat.machine.parameters import parameters, values, with_values
-from kinetostat.spec.errors import choice
+from kinetostat.spec.errors import InputError, choice
 from kinetostat.studies.indices import Along, Indices, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
 from kinetostat.studies.refusal import why_not
@@ -121,8 +121,10 @@ class Analysis:
         """Stiffness along and about a direction, in the axes of K and C.
 
         Raises:
-            InputError: if the machine has no such direction.
+            InputError: if the machine has no such direction, or the pose no answer.
         """
+        if self.status is not Status.OK:
+            raise InputError(f"There is no stiffness along any direction here. {self.message}")
         return stiffness_along(direction, self.stiffness, self.compliance, self.machine.family.components)
 
 
@@ -136,8 +138,9 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
         axes: "base", or "platform" for results in platform axes.
 
     Raises:
-        InputError: other axes.
+        InputError: other axes, or no machine.
     """
+    need_machine(machine)
     choice(axes, AXES, "axes")
     response = respond(machine)
     status = Status(int(response.status))

@@ -15,7 +15,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
-from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.machine import Configuration, Machine, need_machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studies.rounding import ROUNDING, clean_matrix
@@ -177,6 +177,7 @@ def validate(machine: Machine, engine: str | None = None) -> Validation:
     Raises:
         InputError: if there is no such engine, no compliance to compare, or a part that the engine cannot have.
     """
+    need_machine(machine)
     chosen = choose(engine)
     response = respond(machine)
     ours = _our_compliance(response)

@@ -18,7 +18,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, parameters, values
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, several
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.comparison.design_rows import Row, rows_at_poses, rows_over
 
@@ -132,6 +132,7 @@ def compare(
     Raises:
         InputError: fewer than two designs or too many, or a range that one of them does not take.
     """
+    designs, ranges = [designs] if isinstance(designs, str) else designs, several(ranges)
     if not 2 <= len(designs) <= MOST_DESIGNS:
         raise InputError(
             f"compare takes 2 to {MOST_DESIGNS} designs, not {len(designs)}; give files, names or NAME:path=value."

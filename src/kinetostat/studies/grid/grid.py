@@ -16,9 +16,9 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, PARTS, QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import as_toml
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import Parameter, find
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.ranges import Range, parse_range
 from kinetostat.units import KINDS
 
@@ -57,6 +57,8 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
     Raises:
         InputError: an unknown field or quantity, a bad range, a field twice, or more than six dimensions.
     """
+    need_machine(machine)
+    ranges = several(ranges)
     if len(ranges) > MOST_DIMENSIONS:
         raise InputError(
             f"the grid has {len(ranges)} dimensions; at most {MOST_DIMENSIONS} are allowed: "
@@ -160,7 +162,7 @@ def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONE
     """
     groups = {group: [name for name in members if _exists(name, components)] for group, members in GROUPS.items()}
     found: list[str] = []
-    for name in names:
+    for name in several(names):
         if name not in GROUPS and not (name in QUANTITIES and _exists(name, components)):
             others = (name for name, quantity in QUANTITIES.items() if not quantity.components)
             known = ", ".join([*GROUPS, *(n for group in groups.values() for n in group), *others])
