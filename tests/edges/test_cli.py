@@ -34,6 +34,12 @@ REFUSED = [
     (["analyze"], ["MACHINE", "--help"]),
     (["analyse"], ["invalid choice: 'analyse'", "analyze"]),
     (["analyze", "nope"], ['"nope"', "zhang-gosselin-4dof"]),
+    (["sweep", "hexapod", "--vary", "q=0:1:3"], ['"q" is not a field', "pose.yaw, and `kinetostat check`"]),
+    (["sweep", MACHINE, "--vary", "x=0:1:3", "--quantity", "stifness_z"], ["did you mean stiffness_z?"]),
+    (
+        ["compare", "hexapod", "tripteron", "--over", "roll=0:1:3"],
+        ['tripteron: "roll" is not a field', "pose.x, pose.y"],
+    ),
     (["analyze", "zhang-gosselin-2002"], ['"zhang-gosselin-2002" is a study', "`kinetostat check`", "machine = ..."]),
     (["validate", "zhang-gosselin-2002"], ["is a study"]),
     (["optimize", "hexapod"], ['"hexapod" is a machine', "`kinetostat new study`"]),

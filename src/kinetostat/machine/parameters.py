@@ -60,7 +60,9 @@ def _find(family: Family, text: str) -> Parameter:
     if ends:
         raise InputError(f'"{text}" may be {" or ".join(ends)}; write one of them.')
     near = difflib.get_close_matches(text, [*known, *(path.split(".", 1)[1] for path in known)], 1)
-    hint = f"did you mean {near[0]}?" if near else f"the fields are {', '.join(known)}."
+    pose = ", ".join(path for path in known if path.startswith("pose."))
+    rest = f"coordinates of its pose are {pose}, and `kinetostat check` shows every field."
+    hint = f"did you mean {near[0]}?" if near else rest
     raise InputError(f'"{text}" is not a field of family {family.name}; {hint}')
 
 

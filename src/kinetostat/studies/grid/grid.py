@@ -1,6 +1,7 @@
 """Sweeps and maps: quantities of a machine over a grid of any of its parameters, as a labelled dataset."""
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
@@ -164,12 +165,18 @@ def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONE
     found: list[str] = []
     for name in several(names):
         if name not in GROUPS and not (name in QUANTITIES and _exists(name, components)):
-            others = (name for name, quantity in QUANTITIES.items() if not quantity.components)
-            known = ", ".join([*GROUPS, *(n for group in groups.values() for n in group), *others])
-            example = f"compliance_{components[0]}_{components[-1]}"
-            raise InputError(f'"{name}" is not a quantity; choose from {known}, or an entry such as {example}.')
+            raise InputError(_no_quantity(name, groups, components))
         found += groups.get(name, [name])
     return list(dict.fromkeys(found))
+
+
+def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Sequence[str]) -> str:
+    """The sentence about an unknown quantity: which was probably meant, or all that there are."""
+    others = (other for other, quantity in QUANTITIES.items() if not quantity.components)
+    known = [*groups, *(member for group in groups.values() for member in group), *others]
+    near = difflib.get_close_matches(name, known, 1)
+    every = f"choose from {', '.join(known)}, or an entry such as compliance_{components[0]}_{components[-1]}."
+    return f'"{name}" is not a quantity; ' + (f"did you mean {near[0]}?" if near else every)
 
 
 def refuse_absent(machine: Machine, names: Sequence[str]) -> None:
