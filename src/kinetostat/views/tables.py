@@ -13,6 +13,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.study import StudyFile
+from kinetostat.units import KINDS
 
 Number = float | None
 
@@ -84,6 +85,13 @@ def number(value: Number, endless: str = "∞") -> str:
     if math.isinf(value):
         return endless
     return f"{value:.6g}" if value == 0.0 or 1e-2 <= abs(value) < 1e6 else f"{value:.4g}"
+
+
+def measured(value: float, kind: str) -> str:
+    """A value with its unit for a table: angles in degrees, all else in SI."""
+    if kind == "angle":
+        return f"{number(math.degrees(value) + 0.0)} deg"
+    return f"{number(value + 0.0)} {KINDS[kind].unit}".rstrip()
 
 
 def text_table(title: str, *columns: str) -> Table:
