@@ -18,6 +18,7 @@ from kinetostat.commands.common import (
     load_machine,
     no_answer,
     print_json,
+    stopped,
     takes_json,
     takes_machine,
 )
@@ -43,6 +44,8 @@ EXAMPLES = """examples:
   kinetostat report tripteron -o report.html
   kinetostat reproduce
   kinetostat doctor
+
+exit codes: 0 done, 1 the question has no answer, 2 bad input, 130 stopped by Ctrl-C
 """
 
 
@@ -50,7 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command.
 
     Returns:
-        0 done; 1 the question has no answer (infeasible pose, singular, a figure that differs); 2 bad input.
+        0 done; 1 the question has no answer (infeasible pose, singular, a figure that differs); 2 bad input; 130
+        stopped by Ctrl-C.
     """
     options = _parser().parse_args(arguments)
     from kinetostat.spec.errors import InputError
@@ -61,8 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"kinetostat: {error}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
-        print("\nkinetostat: stopped; files that were already written are complete.", file=sys.stderr)
-        return NO_ANSWER
+        return stopped("files that were already written are complete.")
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE

@@ -1,13 +1,16 @@
 """The commands as a new user types them: exit codes, messages, output."""
 
 import json
+import signal
 import subprocess
 import sys
 
 import pytest
 
 from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
+from kinetostat.commands.common import STOPPED
 from kinetostat.machine.loading import bundled, load
+from kinetostat.studies import analysis
 
 MACHINE = "zhang-gosselin-4dof"
 
@@ -100,6 +103,18 @@ def test_the_wrong_kind_of_file_is_told_in_one_sentence(tmp_path, capsys):
     assert main(["check", str(study), "--set", "variables.0.to=9 m"]) == DONE
     assert " 9.0 m " in capsys.readouterr().out
     assert main(["check", str(study), "--set", "objectives.0.quantity=stiff"]) == BAD_INPUT
+
+
+def test_ctrl_c_is_an_exit_code_of_its_own(monkeypatch, capsys):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(analysis, "analyze", interrupt)
+    assert main(["analyze", MACHINE]) == STOPPED == 128 + signal.SIGINT
+    assert "stopped" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert f"{STOPPED} stopped by Ctrl-C" in capsys.readouterr().out
 
 
 def test_our_own_brackets_are_shown(capsys):

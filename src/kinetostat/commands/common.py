@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     Commands: TypeAlias = argparse._SubParsersAction["Parser"]
 
-DONE, NO_ANSWER, BAD_INPUT = 0, 1, 2
-"""Exit codes."""
+DONE, NO_ANSWER, BAD_INPUT, STOPPED = 0, 1, 2, 130
+"""Exit codes; the last is that of shells for what Ctrl-C has ended."""
 
 MACHINE = "a machine file, or the name of a bundled machine (see `kinetostat list`)"
 
@@ -99,3 +99,9 @@ def no_answer(message: str) -> int:
     """Say why there is no answer; returns the exit code."""
     print(f"kinetostat: {message}", file=sys.stderr)
     return NO_ANSWER
+
+
+def stopped(message: str) -> int:
+    """Say what remains of a command that was stopped; returns the exit code."""
+    print(f"\nkinetostat: stopped; {message}", file=sys.stderr)
+    return STOPPED

@@ -10,8 +10,8 @@ from kinetostat.commands.common import (
     NO_ANSWER,
     add_command,
     load_machine,
-    no_answer,
     print_json,
+    stopped,
     takes_json,
     takes_machine,
 )
@@ -165,7 +165,7 @@ def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) ->
         with hired(_crew(options)) as compute, progress_bar("computing") as progress:
             found = answer_into(question, options.output, stem, progress, compute, options.resume)
     except KeyboardInterrupt:
-        return no_answer(f"stopped; what was computed is in {options.output}: the same command goes on from there.")
+        return stopped(f"what was computed is in {options.output}: the same command goes on from there.")
     if options.json:
         from kinetostat.studies.grid.grid_data import as_summary
 
