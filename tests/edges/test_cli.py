@@ -1,6 +1,7 @@
 """The commands as a new user types them: exit codes, messages, output."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import pytest
 
 from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
 from kinetostat.commands.common import STOPPED
+from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studies import analysis
 
@@ -115,6 +117,16 @@ def test_ctrl_c_is_an_exit_code_of_its_own(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         main(["--help"])
     assert f"{STOPPED} stopped by Ctrl-C" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["sweep", "map", "sensitivity"])
+def test_help_names_every_quantity(command, capsys):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    shown = " ".join(capsys.readouterr().out.split())
+    single = {name for name, quantity in QUANTITIES.items() if not quantity.components}
+    assert all(re.search(rf"\b{name}\b", shown) for name in {*GROUPS, *single})
+    assert "repeatable" in shown
 
 
 def test_our_own_brackets_are_shown(capsys):

@@ -17,6 +17,14 @@ if TYPE_CHECKING:
 DONE, NO_ANSWER, BAD_INPUT, STOPPED = 0, 1, 2, 130
 """Exit codes; the last is that of shells for what Ctrl-C has ended."""
 
+QUANTITIES = (
+    "compliance, stiffness (their diagonal entries; default: {default}); one entry: compliance_rx, stiffness_x_z, ...; "
+    "least_translational_stiffness, greatest_translational_stiffness, least_rotational_stiffness, "
+    "greatest_rotational_stiffness, condition (of K), regularity (0 at a singularity), side (of the singularities: 1 "
+    "or -1), shortest_leg, longest_leg, actuator_force and actuator_moment (the greatest under [load]), mass (moving); "
+    "repeatable"
+)
+"""Of what sweeps, maps and sensitivities are."""
 MACHINE = "a machine file, or the name of a bundled machine (see `kinetostat list`)"
 
 
@@ -48,6 +56,13 @@ def takes_machine(command: Parser, what: str = MACHINE) -> None:
         "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",
         help='override a field, e.g. --set geometry.base_radius="26 cm"; repeatable',
     )  # fmt: skip
+
+
+def takes_quantities(command: Parser, default: str) -> None:
+    """Give a command `--quantity`."""
+    command.add_argument(
+        "--quantity", metavar="NAME", action="append", dest="quantities", help=QUANTITIES.format(default=default)
+    )
 
 
 def takes_json(command: Parser) -> None:

@@ -14,6 +14,7 @@ from kinetostat.commands.common import (
     stopped,
     takes_json,
     takes_machine,
+    takes_quantities,
 )
 
 if TYPE_CHECKING:
@@ -45,10 +46,7 @@ def add_grid_commands(commands: "Commands") -> None:
     mapping.set_defaults(default_quantity="compliance")
     for command in (sweep, mapping):
         takes_machine(command)
-        command.add_argument(
-            "--quantity", metavar="NAME", action="append", dest="quantities",
-            help="compliance, stiffness (their six diagonal entries), compliance_rx, ..., compliance_rx_z, regularity",
-        )  # fmt: skip
+        takes_quantities(command, command.get_default("default_quantity"))
         command.add_argument("-o", "--output", type=Path, help="folder for NetCDF and figures (PNG, SVG, PDF)")
         command.add_argument(
             "--resume", action="store_true",
