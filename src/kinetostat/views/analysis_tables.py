@@ -13,7 +13,7 @@ from kinetostat.studies.analysis import Analysis, Rows, SpringShare
 from kinetostat.studies.indices import Along
 from kinetostat.studies.loads import LoadCase
 from kinetostat.studies.rounding import ROUNDING
-from kinetostat.views.tables import number, numeric_table
+from kinetostat.views.tables import number, numeric_table, print_doubts
 
 UNITS_OF_K = "N·m/rad, N/rad, N/m"
 UNITS_OF_C = "rad/(N·m), rad/N, m/N"
@@ -26,6 +26,7 @@ def print_analysis(console: Console, analysis: Analysis, along: Sequence[Along] 
     machine, names = analysis.machine, analysis.components
     console.print(Text.assemble((machine.name, "bold"), f"  {analysis.status.word}"))
     console.print(analysis.message, highlight=False)
+    print_doubts(console, machine)
     point = "the tool point T" if any(machine.sections["tool"].offset) else "the platform point P"
     about = f"Components {' '.join(names)} at {point}, {analysis.axes} axes. Rank {analysis.rank}."
     console.print(about, style="dim", highlight=False)

@@ -11,6 +11,7 @@ from rich.table import Table
 from kinetostat.machine.loading import kinds_of_machine
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
+from kinetostat.machine.plausible import doubts
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.study import StudyFile
 from kinetostat.units import KINDS
@@ -39,8 +40,15 @@ def print_studies(console: Console, studies: Mapping[str, StudyFile]) -> None:
 
 
 def print_machine(console: Console, machine: Machine) -> None:
-    """Every value of a machine with its meaning."""
+    """Every value of a machine with its meaning, and those that are hardly meant."""
     console.print(machine_table(machine))
+    print_doubts(console, machine)
+
+
+def print_doubts(console: Console, machine: Machine) -> None:
+    """Values that are hardly meant, a line each."""
+    for doubt in doubts(machine):
+        console.print(f"Note: {doubt}", style="yellow", highlight=False)
 
 
 def machine_table(machine: Machine) -> Table:
