@@ -21,7 +21,7 @@ ANSWERED = [
     (["new", "passive-leg-4dof"], ["[geometry]", 'base_radius        = "22 cm"']),
     (["schema", "machine"], ["json-schema.org", "platform_radius"]),
     (["check", MACHINE], ["geometry.base_radius", "0.22 m", "-60 deg"]),
-    (["check", "zhang-gosselin-2002"], ["Objective: minimize compliance sum", "geometry.base_radius", "0.26 m"]),
+    (["check", "zhang-gosselin-2002"], ["Objective: minimise compliance sum", "geometry.base_radius", "0.26 m"]),
     (["analyze", MACHINE], ["3628.32", "leg 3 actuator", "rad/(N·m)"]),
     (["analyze", MACHINE, "--set", "stiffness.passive_links=rigid"], ["Rigid: passive link 1", "0.516397", "rigid"]),
     (["analyze", MACHINE, "--set", "stiffness.actuator.0=0"], ["Free: leg 1 actuator", "free"]),

@@ -200,7 +200,7 @@ def test_a_folder_with_another_study_is_refused(changed, named, undisturbed, tmp
     capsys.readouterr()
     assert main([*command, *changed]) == BAD_INPUT
     error = capsys.readouterr().err
-    assert f"another study (its {named} differ)" in error
+    assert f"another study (different: {named})" in error
     assert "choose another folder" in error
     assert_same_study(folder, undisturbed)
 

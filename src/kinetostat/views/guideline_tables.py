@@ -149,7 +149,7 @@ def left_out(found: Guidelines, count: int) -> Iterator[str]:
     """What the table of the first parameters does not show, in sentences."""
     hidden = len(found.moves) - count
     if hidden:
-        yield f"{hidden} more do less; `kinetostat guidelines --full` has all."
+        yield f"{hidden} more {'does' if hidden == 1 else 'do'} less; guidelines --full has all."
     if found.idle:
         yield f"No direction depends on {_few(found.idle)}."
     for reason in dict.fromkeys(why for _, why in found.skipped):

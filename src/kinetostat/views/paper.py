@@ -96,11 +96,18 @@ def verdict(found: Reproduction) -> str:
     claims = (*found.claims, *found.search_claims)
     statements = Counter(claim.finding.value for claim in claims)
     holding = sum(check.holds for check in found.checks)
+    findings = ", ".join(f"{count} {held(word, count)}" for word, count in statements.items())
     return (
         f"{len(found.comparisons)} numbers: {numbers[Verdict.EQUAL]} equal to print, {numbers[Verdict.MISPRINT]} known "
         f"misprints, {numbers[Verdict.DIFFERS]} differ. {len(found.checks)} groups of equations: {holding} hold. "
-        f"{len(claims)} statements: {', '.join(f'{count} {word}' for word, count in statements.items())}."
+        f"{len(claims)} statements: {findings}."
     )
+
+
+def held(finding: str, count: int) -> str:
+    """What so many statements do, from what one does: it holds, they hold."""
+    verb, space, rest = finding.partition(" ")
+    return (verb if count == 1 else verb.removesuffix("s")) + space + rest
 
 
 def _numbers_table(comparisons: Sequence[Comparison]) -> Any:

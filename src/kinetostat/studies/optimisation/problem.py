@@ -45,7 +45,7 @@ class Objective:
     @property
     def goal(self) -> str:
         """In a word."""
-        return "minimize" if self.sign > 0 else "maximize"
+        return "minimise" if self.sign > 0 else "maximise"
 
 
 @dataclass(frozen=True)
