@@ -21,6 +21,7 @@ ANSWERED = [
     (["new", "passive-leg-4dof"], ["[geometry]", 'base_radius        = "22 cm"']),
     (["schema", "machine"], ["json-schema.org", "platform_radius"]),
     (["check", MACHINE], ["geometry.base_radius", "0.22 m", "-60 deg"]),
+    (["check", "hexapod-cubic", "--set", "stiffness.actuator=45 N/um"], [" 6 x 4.5e7 N/m ", "0 m "]),
     (["check", "zhang-gosselin-2002"], ["Objective: minimise compliance sum", "geometry.base_radius", "0.26 m"]),
     (["analyze", MACHINE], ["3628.32", "leg 3 actuator", "rad/(N·m)"]),
     (["analyze", MACHINE, "--set", "stiffness.passive_links=rigid"], ["Rigid: passive link 1", "0.516397", "rigid"]),

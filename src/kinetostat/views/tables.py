@@ -18,6 +18,9 @@ from kinetostat.units import KINDS
 
 Number = float | None
 
+LARGE = 1e6
+"""From which on a value of a machine is written with a power of ten."""
+
 
 def print_machines(console: Console, bundled: Sequence[Machine], names: Sequence[str]) -> None:
     """The bundled machines, and the families a file can name."""
@@ -72,10 +75,14 @@ def readable(values: Sequence[float], quantity: Quantity) -> str:
 
 
 def _readable(value: float, quantity: Quantity) -> str:
-    """A value for a table: ten digits, angles in degrees."""
+    """A value for a table: ten digits, a power of ten where it is large, angles in degrees."""
     if quantity.kind == "angle" and value != quantity.unset:
         return f"{math.degrees(value):.10g} deg"
-    return quantity.show(float(f"{value:.10g}"))
+    if math.isinf(value):
+        return quantity.show(value)
+    digits, _, power = f"{value:.9e}".partition("e")
+    large = f"{digits.rstrip('0').rstrip('.')}e{int(power)}"
+    return f"{large if abs(value) >= LARGE else f'{value:.10g}'} {KINDS[quantity.kind].unit}".rstrip()
 
 
 def terminal() -> Console:
