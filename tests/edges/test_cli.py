@@ -132,7 +132,7 @@ def test_help_names_every_quantity(command, capsys):
 
 def test_our_own_brackets_are_shown(capsys):
     assert main(["check", MACHINE]) == DONE
-    assert "under [load]" in capsys.readouterr().out
+    assert "[load]" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("arguments", "expected"), REFUSED, ids=lambda part: " ".join(part)[:50])
