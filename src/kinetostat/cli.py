@@ -18,6 +18,7 @@ from kinetostat.commands.common import (
     load_machine,
     no_answer,
     print_json,
+    stopped,
     takes_json,
     takes_machine,
 )
@@ -43,6 +44,8 @@ EXAMPLES = """examples:
   kinetostat report tripteron -o report.html
   kinetostat reproduce
   kinetostat doctor
+
+exit codes: 0 done, 1 the question has no answer, 2 bad input, 130 stopped by Ctrl-C
 """
 
 
@@ -50,7 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command.
 
     Returns:
-        0 done; 1 the question has no answer (infeasible pose, singular, a figure that differs); 2 bad input.
+        0 done; 1 the question has no answer (infeasible pose, singular, a figure that differs); 2 bad input; 130
+        stopped by Ctrl-C.
     """
     options = _parser().parse_args(arguments)
     from kinetostat.spec.errors import InputError
@@ -61,8 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"kinetostat: {error}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
-        print("\nkinetostat: stopped; files that were already written are complete.", file=sys.stderr)
-        return NO_ANSWER
+        return stopped("files that were already written are complete.")
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
@@ -97,9 +100,10 @@ def _parser() -> Parser:
         "kinetostat schema machine > machine.schema.json",
     )
     schema.add_argument("what", choices=["machine", "study"], help="kind of file")
-    takes_machine(
-        add_command(commands, "check", _check, "read a machine and show what it says", "kinetostat check mine.toml")
+    check = add_command(
+        commands, "check", _check, "read a machine or a study and show what it says", "kinetostat check mine.toml"
     )
+    takes_machine(check, "a machine or study file, or the name of a bundled one (see `kinetostat list`)")
     analyze = add_command(
         commands, "analyze", _analyze, "K, C, attribution and indices at a pose",
         'kinetostat analyze mine.toml --set pose.x="5 mm" --json',
@@ -197,12 +201,24 @@ def _schema(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
     from kinetostat.studies.analysis import analyze
+    from kinetostat.studies.bundled import is_study
     from kinetostat.views.tables import print_machine, terminal
 
+    if is_study(options.machine):
+        return _check_study(options)
     machine = load_machine(options)
     print_machine(terminal(), machine)
     found = analyze(machine)
     return no_answer(found.message) if found.status is not Status.OK else DONE
+
+
+def _check_study(options: argparse.Namespace) -> int:
+    from kinetostat.studies.optimisation.problem import load_problem
+    from kinetostat.views.study_tables import print_study
+    from kinetostat.views.tables import terminal
+
+    print_study(terminal(), load_problem(options.machine, options.settings))
+    return DONE
 
 
 def _analyze(options: argparse.Namespace) -> int:
@@ -227,14 +243,13 @@ def _analyze(options: argparse.Namespace) -> int:
 
 def _validate(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
-    from kinetostat.machine.loading import load
     from kinetostat.studies.analysis import analyze
     from kinetostat.validation.comparison import AGREED, as_json, validate
     from kinetostat.views.tables import terminal
     from kinetostat.views.validation_tables import print_validation
 
     poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]
-    machines = [load(options.machine, [*options.settings, *pose]) for pose in poses]
+    machines = [load_machine(options, pose) for pose in poses]
     for machine in machines:
         answer = analyze(machine)
         if answer.status is not Status.OK:

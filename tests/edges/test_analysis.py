@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import with_values
+from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.analysis_data import as_json
 from machines import CASES, CONTRASTING, every_machine, machines
@@ -18,6 +19,12 @@ from machines import CASES, CONTRASTING, every_machine, machines
 NAME = "zhang-gosselin-4dof"
 RIGID_LINKS = "stiffness.passive_links=rigid"
 FREE_LEG = "stiffness.actuator.0=0"
+
+
+@pytest.mark.parametrize("axes", ["tool", "Base", "", None])
+def test_axes_that_there_are_not_are_refused(axes):
+    with pytest.raises(InputError, match=r"^axes is .*(base|platform)"):
+        analyze(load(NAME), axes=axes)
 
 
 def at(*settings):

@@ -1,13 +1,18 @@
 """The commands as a new user types them: exit codes, messages, output."""
 
 import json
+import re
+import signal
 import subprocess
 import sys
 
 import pytest
 
 from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
-from kinetostat.machine.loading import load
+from kinetostat.commands.common import STOPPED
+from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
+from kinetostat.machine.loading import bundled, load
+from kinetostat.studies import analysis
 
 MACHINE = "zhang-gosselin-4dof"
 
@@ -16,6 +21,8 @@ ANSWERED = [
     (["new", "passive-leg-4dof"], ["[geometry]", 'base_radius        = "22 cm"']),
     (["schema", "machine"], ["json-schema.org", "platform_radius"]),
     (["check", MACHINE], ["geometry.base_radius", "0.22 m", "-60 deg"]),
+    (["check", "hexapod-cubic", "--set", "stiffness.actuator=45 N/um"], [" 6 x 4.5e7 N/m ", "0 m "]),
+    (["check", "zhang-gosselin-2002"], ["Objective: minimise compliance sum", "geometry.base_radius", "0.26 m"]),
     (["analyze", MACHINE], ["3628.32", "leg 3 actuator", "rad/(N·m)"]),
     (["analyze", MACHINE, "--set", "stiffness.passive_links=rigid"], ["Rigid: passive link 1", "0.516397", "rigid"]),
     (["analyze", MACHINE, "--set", "stiffness.actuator.0=0"], ["Free: leg 1 actuator", "free"]),
@@ -33,6 +40,15 @@ REFUSED = [
     (["analyze"], ["MACHINE", "--help"]),
     (["analyse"], ["invalid choice: 'analyse'", "analyze"]),
     (["analyze", "nope"], ['"nope"', "zhang-gosselin-4dof"]),
+    (["sweep", "hexapod", "--vary", "q=0:1:3"], ['"q" is not a field', "pose.yaw, and `kinetostat check`"]),
+    (["sweep", MACHINE, "--vary", "x=0:1:3", "--quantity", "stifness_z"], ["did you mean stiffness_z?"]),
+    (
+        ["compare", "hexapod", "tripteron", "--over", "roll=0:1:3"],
+        ['tripteron: "roll" is not a field', "pose.x, pose.y"],
+    ),
+    (["analyze", "zhang-gosselin-2002"], ['"zhang-gosselin-2002" is a study', "`kinetostat check`", "machine = ..."]),
+    (["validate", "zhang-gosselin-2002"], ["is a study"]),
+    (["optimize", "hexapod"], ['"hexapod" is a machine', "`kinetostat new study`"]),
     (["analyze", "zhang-gosselin-4dfo"], ['did you mean "zhang-gosselin-4dof"?']),
     (["analyze", MACHINE, "--set", "pose.x=2 kg"], ["pose.x", '"2 kg"', "length", '"12 cm"']),
     (["new", "hexapd"], ['"hexapd"', 'did you mean "hexapod"?']),
@@ -59,6 +75,64 @@ def test_answers(arguments, expected, capsys):
     assert output.err == ""
     for words in expected:
         assert words in output.out
+
+
+@pytest.mark.parametrize("command", ["check", "analyze", "sweep", "map", "sensitivity", "guidelines", "compare"])
+@pytest.mark.parametrize("name", ["Bad [/foo] name", "A [red]b[/red] [load] :smile:"])
+def test_names_are_shown_as_they_are_written(command, name, tmp_path, capsys):
+    file = tmp_path / "own.toml"
+    file.write_text(bundled()["tripteron"].replace('name = "x"', 'name = "[x]"'))
+    more = {
+        "sweep": ["--vary", "pose.x=0:1 cm:2"],
+        "map": ["--over", "pose.x=0:1 cm:2", "--over", "pose.y=0:1 cm:2"],
+        "compare": [str(file)],
+    }
+    assert main([command, str(file), *more.get(command, []), "--set", f"name={name}"]) == DONE
+    shown = " ".join(capsys.readouterr().out.split())
+    assert name in shown
+    assert "[x]" in shown or command in ("sweep", "map", "compare")
+
+
+def test_the_wrong_kind_of_file_is_told_in_one_sentence(tmp_path, capsys):
+    study, machine = tmp_path / "study.toml", tmp_path / "machine.toml"
+    main(["new", "study"])
+    study.write_text(capsys.readouterr().out)
+    machine.write_text(bundled()["hexapod"])
+    for command, file, kind in (("analyze", study, "is a study"), ("optimize", machine, "is a machine")):
+        assert main([command, str(file)]) == BAD_INPUT
+        message = capsys.readouterr().err
+        assert f'"{file}" {kind}, and here ' in message
+        assert "missing" not in message
+    assert main(["check", str(study), "--set", "variables.0.to=9 m"]) == DONE
+    assert " 9.0 m " in capsys.readouterr().out
+    assert main(["check", str(study), "--set", "objectives.0.quantity=stiff"]) == BAD_INPUT
+
+
+def test_ctrl_c_is_an_exit_code_of_its_own(monkeypatch, capsys):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(analysis, "analyze", interrupt)
+    assert main(["analyze", MACHINE]) == STOPPED == 128 + signal.SIGINT
+    assert "stopped" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert f"{STOPPED} stopped by Ctrl-C" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["sweep", "map", "sensitivity"])
+def test_help_names_every_quantity(command, capsys):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    shown = " ".join(capsys.readouterr().out.split())
+    single = {name for name, quantity in QUANTITIES.items() if not quantity.components}
+    assert all(re.search(rf"\b{name}\b", shown) for name in {*GROUPS, *single})
+    assert "repeatable" in shown
+
+
+def test_our_own_brackets_are_shown(capsys):
+    assert main(["check", MACHINE]) == DONE
+    assert "[load]" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("arguments", "expected"), REFUSED, ids=lambda part: " ".join(part)[:50])

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
+from kinetostat.cli import BAD_INPUT, DONE, main
+from kinetostat.commands.common import STOPPED
 from kinetostat.engine import chunks, cluster
 from kinetostat.engine.batch import NATIVE_SLAB
 from kinetostat.machine.loading import load
@@ -170,7 +171,7 @@ def test_ctrl_c_keeps_what_was_computed_and_the_same_command_goes_on(tmp_path, m
     command = [*WORDS, "-o", str(tmp_path / "study")]
     with monkeypatch.context() as patch:
         patch.setattr(cluster, "here", interrupted)
-        assert main(command) == NO_ANSWER
+        assert main(command) == STOPPED
     assert "same command goes on" in capsys.readouterr().err
     assert history(tmp_path / "study") == [0, 1]
     assert main(command) == DONE
@@ -199,7 +200,7 @@ def test_a_folder_with_another_study_is_refused(changed, named, undisturbed, tmp
     capsys.readouterr()
     assert main([*command, *changed]) == BAD_INPUT
     error = capsys.readouterr().err
-    assert f"another study (its {named} differ)" in error
+    assert f"another study (different: {named})" in error
     assert "choose another folder" in error
     assert_same_study(folder, undisturbed)
 

@@ -170,3 +170,26 @@ def test_machines_with_one_plan_are_one_family():
     model = build(document.parse(GOOD.replace('model = "beam"', 'model = "rigid"', 1), "stiff"), "stiff")
     assert numbers.family is load("tripteron").family
     assert model.family is not numbers.family
+
+
+SLIDE = 'actuated = true, stiffness = "1e6 N/m"'
+
+
+@pytest.mark.parametrize(
+    ("count", "words"),
+    [
+        (1, ["2 for 3 freedoms; none is in z", "by the twist z ", "give another joint an actuator"]),
+        (3, ["0 for 3 freedoms. "]),
+    ],
+)
+def test_a_missing_actuator_is_no_singularity(count, words):
+    found = analyze(build(GOOD.replace(f", {SLIDE}", "", count)))
+    assert found.message.startswith("Actuators are missing: ")
+    assert "singular" not in found.message
+    for word in words:
+        assert word in found.message
+
+
+def test_a_flexure_that_holds_a_slide_stands_for_an_actuator():
+    found = analyze(build(GOOD.replace(SLIDE, 'stiffness = "1e6 N/m"', 1)))
+    assert found.compliance_diagonal == pytest.approx(analyze(build(GOOD)).compliance_diagonal)

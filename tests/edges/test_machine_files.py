@@ -95,6 +95,31 @@ BAD_FILES = [
 ]
 
 
+TOGETHER = {
+    "delta": "geometry.leg_angles",
+    "hexapod": "geometry.platform_angles",
+    "passive-leg-5dof": "geometry.base_angles",
+    "tricept": "geometry.base_angles",
+    "tripteron": "legs.x.slide.axis",
+}
+
+
+@pytest.mark.parametrize(("name", "field"), TOGETHER.items())
+def test_one_number_is_no_direction_and_no_place_of_all_legs(name, field):
+    assert "must be a list of " in refusal(name, f"{field}=0.3")
+
+
+def test_one_turn_may_stand_for_all_cranks():
+    assert set(load("hexapod-rus", ["geometry.crank_turn=0.1"]).sections["geometry"].crank_turn) == {0.1}
+
+
+def test_the_advice_for_missing_angles_is_a_list_and_a_file_that_works(written):
+    text = "\n".join(line for line in bundled()["hexapod"].splitlines() if not line.startswith("base_angles"))
+    message = refusal(written(text))
+    for word in ("base_angles is missing", "a list of 6", "`kinetostat new hexapod` prints a complete file"):
+        assert word in message
+
+
 @pytest.fixture
 def written(tmp_path):
     def write(text):

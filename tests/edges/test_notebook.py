@@ -77,6 +77,11 @@ def test_an_analysis_shows_the_numbers_of_the_terminal_with_their_units(shown):
     assert len(page.images) == 1
 
 
+def test_brackets_are_no_markup(shown):
+    page = Reader(shown(analyze(load("planar-3rpr", ["name=a [/b] [bold]c"])))["text/html"])
+    assert "a [/b] [bold]c" in " ".join(page.words)
+
+
 def test_a_pose_without_an_answer_says_why_and_has_no_picture(shown):
     page = Reader(shown(analyze(load("delta", ["pose.z=-30 m"])))["text/html"])
     assert "out_of_reach" in " ".join(page.words)

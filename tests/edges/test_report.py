@@ -10,6 +10,7 @@ from pypdf import PdfReader
 from report_pages import MACHINE, QUICK, Page, no_pictures, number, reported, small_pictures
 
 from kinetostat.cli import main
+from kinetostat.commands.common import STOPPED
 from kinetostat.commands.report import WITHOUT
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values
@@ -232,7 +233,7 @@ def test_a_report_that_is_stopped_leaves_the_old_file(tmp_path, capsys, monkeypa
     kept = tmp_path / "r.html"
     kept.write_text("old")
     monkeypatch.setattr(answers, "sensitivity", stop)
-    assert main(["report", MACHINE, "-o", str(kept)]) == 1
+    assert main(["report", MACHINE, "-o", str(kept)]) == STOPPED
     assert [path.name for path in tmp_path.iterdir()] == ["r.html"]
     assert kept.read_text() == "old"
 

@@ -69,6 +69,13 @@ def test_what_the_legs_of_a_machine_forbid_has_no_derivative():
     assert "legs.z.elbow.point.0" not in found
 
 
+def test_angles_are_in_degrees_as_everywhere_on_a_terminal(capsys):
+    assert main(["sensitivity", MACHINE]) == 0
+    printed = capsys.readouterr().out
+    assert " 120 deg " in printed
+    assert "2.0944" not in printed
+
+
 def test_it_prints_a_table_with_notes(capsys):
     assert main(["sensitivity", MACHINE, "--quantity", "compliance_z"]) == 0
     printed = capsys.readouterr().out

@@ -112,7 +112,7 @@ def test_a_front_of_three_objectives_is_seen_along_any_of_them(tmp_path):
         shown = page.shown("FrontView", "show")
         assert (shown["axes"], shown["coloured"]) == ([2, 1], None)
         table = page.one("front-table")._props
-        assert table["names"][2:4] == ["maximize stiffness x (N/m)", "base radius"]
+        assert table["names"][2:4] == ["maximise stiffness x (N/m)", "base radius"]
         assert [row[:3] for row in table["values"]] == shown["points"]
         await page.send("front-table", "pick", 1)
         assert page.one("front-table")._props["chosen"] == page.shown("FrontView", "show")["chosen"] == 1

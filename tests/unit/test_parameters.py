@@ -25,6 +25,12 @@ def test_every_scalar_is_listed_once_and_replaced_alone(case):
     assert values(machine) == before
 
 
+@pytest.mark.parametrize("text", ["tool.offset", "offset", "load.force"])
+def test_components_are_not_varied_as_one(text):
+    with pytest.raises(InputError, match=r"holds 3 numbers; name one of them: \w+\.\w+\.0"):
+        find(MACHINE.family, text)
+
+
 @every_machine
 def test_a_field_stands_for_all_of_its_entries(case):
     for parameter in parameters(load(case.name).family):

@@ -3,19 +3,28 @@
 import argparse
 import json
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from typing import TypeAlias
 
     from kinetostat.machine.machine import Machine
 
     Commands: TypeAlias = argparse._SubParsersAction["Parser"]
 
-DONE, NO_ANSWER, BAD_INPUT = 0, 1, 2
-"""Exit codes."""
+DONE, NO_ANSWER, BAD_INPUT, STOPPED = 0, 1, 2, 130
+"""Exit codes; the last is that of shells for what Ctrl-C has ended."""
 
+QUANTITIES = (
+    "compliance, stiffness (their diagonal entries; default: {default}); one entry: compliance_rx, stiffness_x_z, ...; "
+    "least_translational_stiffness, greatest_translational_stiffness, least_rotational_stiffness, "
+    "greatest_rotational_stiffness, condition (of K), regularity (0 at a singularity), side (of the singularities: 1 "
+    "or -1), shortest_leg, longest_leg, actuator_force and actuator_moment (the greatest under [load]), mass (moving); "
+    "repeatable"
+)
+"""Of what sweeps, maps and sensitivities are."""
 MACHINE = "a machine file, or the name of a bundled machine (see `kinetostat list`)"
 
 
@@ -40,13 +49,20 @@ def add_command(commands: "Commands", name: str, run: object, text: str, example
     return command
 
 
-def takes_machine(command: Parser) -> None:
+def takes_machine(command: Parser, what: str = MACHINE) -> None:
     """Give a command the machine and `--set`."""
-    command.add_argument("machine", metavar="MACHINE", help=MACHINE)
+    command.add_argument("machine", metavar="MACHINE", help=what)
     command.add_argument(
         "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",
         help='override a field, e.g. --set geometry.base_radius="26 cm"; repeatable',
     )  # fmt: skip
+
+
+def takes_quantities(command: Parser, default: str) -> None:
+    """Give a command `--quantity`."""
+    command.add_argument(
+        "--quantity", metavar="NAME", action="append", dest="quantities", help=QUANTITIES.format(default=default)
+    )
 
 
 def takes_json(command: Parser) -> None:
@@ -54,15 +70,22 @@ def takes_json(command: Parser) -> None:
     command.add_argument("--json", action="store_true", help="machine-readable output on stdout and nothing else")
 
 
-def load_machine(options: argparse.Namespace) -> "Machine":
-    """The machine that the options name, with their overrides.
+def load_machine(options: argparse.Namespace, more: "Sequence[str]" = ()) -> "Machine":
+    """The machine that the options name, with their overrides and then more of them.
 
     Raises:
         InputError: no such machine, or a mistake in the file or an override.
     """
-    from kinetostat.machine.loading import load
+    from kinetostat.machine.loading import STUDY, bundled, load
+    from kinetostat.spec.document import exists
+    from kinetostat.spec.errors import InputError
 
-    return load(options.machine, options.settings)
+    if options.machine not in bundled() and not exists(Path(options.machine)):
+        from kinetostat.studies.bundled import bundled_studies
+
+        if options.machine in bundled_studies():
+            raise InputError(f'"{options.machine}" {STUDY}')
+    return load(options.machine, [*options.settings, *more])
 
 
 def print_json(data: object) -> None:
@@ -91,3 +114,9 @@ def no_answer(message: str) -> int:
     """Say why there is no answer; returns the exit code."""
     print(f"kinetostat: {message}", file=sys.stderr)
     return NO_ANSWER
+
+
+def stopped(message: str) -> int:
+    """Say what remains of a command that was stopped; returns the exit code."""
+    print(f"\nkinetostat: stopped; {message}", file=sys.stderr)
+    return STOPPED

@@ -31,7 +31,7 @@ def _doctor(options: argparse.Namespace) -> int:
 
         from kinetostat.views.diagnosis_tables import print_checks, print_verdict
 
-        console = Console()
+        console = Console(markup=False, emoji=False)
         found = print_checks(console, _checks())
         print_verdict(console, found)
     return DONE if healthy(found) else NO_ANSWER

@@ -10,10 +10,11 @@ from kinetostat.commands.common import (
     NO_ANSWER,
     add_command,
     load_machine,
-    no_answer,
     print_json,
+    stopped,
     takes_json,
     takes_machine,
+    takes_quantities,
 )
 
 if TYPE_CHECKING:
@@ -45,10 +46,7 @@ def add_grid_commands(commands: "Commands") -> None:
     mapping.set_defaults(default_quantity="compliance")
     for command in (sweep, mapping):
         takes_machine(command)
-        command.add_argument(
-            "--quantity", metavar="NAME", action="append", dest="quantities",
-            help="compliance, stiffness (their six diagonal entries), compliance_rx, ..., compliance_rx_z, regularity",
-        )  # fmt: skip
+        takes_quantities(command, command.get_default("default_quantity"))
         command.add_argument("-o", "--output", type=Path, help="folder for NetCDF and figures (PNG, SVG, PDF)")
         command.add_argument(
             "--resume", action="store_true",
@@ -165,7 +163,7 @@ def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) ->
         with hired(_crew(options)) as compute, progress_bar("computing") as progress:
             found = answer_into(question, options.output, stem, progress, compute, options.resume)
     except KeyboardInterrupt:
-        return no_answer(f"stopped; what was computed is in {options.output}: the same command goes on from there.")
+        return stopped(f"what was computed is in {options.output}: the same command goes on from there.")
     if options.json:
         from kinetostat.studies.grid.grid_data import as_summary
 

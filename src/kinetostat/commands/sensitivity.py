@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinetostat.commands.common import add_command, give, load_machine, takes_json, takes_machine
+from kinetostat.commands.common import add_command, give, load_machine, takes_json, takes_machine, takes_quantities
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
@@ -19,10 +19,7 @@ def add_sensitivity_command(commands: "Commands") -> None:
         "kinetostat sensitivity zhang-gosselin-4dof --quantity compliance_z -o sensitivity",
     )  # fmt: skip
     takes_machine(command)
-    command.add_argument(
-        "--quantity", metavar="NAME", action="append", dest="quantities",
-        help="compliance (default), stiffness (their six diagonal entries), compliance_rx, ..., regularity; repeatable",
-    )  # fmt: skip
+    takes_quantities(command, "compliance")
     command.add_argument("-o", "--output", type=Path, help="folder for the figure (PNG, SVG, PDF) and JSON")
     takes_json(command)
 

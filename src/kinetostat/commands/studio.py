@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinetostat.commands.common import DONE, MACHINE, add_command
+from kinetostat.commands.common import DONE, MACHINE, add_command, load_machine
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
@@ -49,10 +49,10 @@ def _port(text: str) -> int:
 
 
 def _studio(options: argparse.Namespace) -> int:
-    from kinetostat.machine.loading import bundled, load
+    from kinetostat.machine.loading import bundled
     from kinetostat.spec.errors import InputError
 
-    machine = load(options.machine, options.settings)
+    machine = load_machine(options)
     if find_spec(EXTRA) is None:
         raise InputError("the studio is not installed; install it with `pip install 'kinetostat[studio]'`.")
     from kinetostat.studio.design.place import usual_state

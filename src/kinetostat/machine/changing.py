@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from kinetostat.machine.loading import as_toml, build
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import find, with_values
 from kinetostat.spec.document import parse as parse_document
 from kinetostat.spec.errors import InputError, shorten
@@ -36,9 +36,12 @@ def changed(machine: Machine, values: Mapping[str, float | str]) -> Machine:
     Raises:
         InputError: an unknown field, no quantity, or a value out of bounds.
     """
+    need_machine(machine)
     leaves: dict[str, float] = {}
     for path, given in values.items():
         parameter = find(machine.family, path)
+        if isinstance(given, list | tuple):
+            raise InputError(f"{path} is {shorten(given)}; give one value for each path, as {parameter.leaves[0]}.")
         value = read_value(machine, path, given) if isinstance(given, str) else given
         _check(parameter.path, parameter.quantity, value)
         leaves.update(dict.fromkeys(parameter.leaves, value))

@@ -30,6 +30,11 @@ from kinetostat.spec.validation import SCHEMA_VERSION, file_model, sections_in, 
 from kinetostat.units import RIGID
 
 SUFFIX = ".toml"
+STUDY = (
+    "is a study, and here a machine is wanted; `kinetostat check`, `optimize` and `report` take studies, and the "
+    "machine that it is about stands in it as machine = ..."
+)
+"""What is said of a study in the place of a machine."""
 
 
 @cache
@@ -75,6 +80,8 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
     """
     if isinstance(document, str):
         document = documents.parse(document, origin)
+    if documents.is_study(document):
+        raise InputError(f'"{origin}" {STUDY}')
     if document.get("family") == written.NAME:
         return _build_written(document, origin, settings)
     family = _family(document.get("family"), origin)
@@ -111,7 +118,7 @@ def _counts(family: Family) -> dict[str, int]:
         f"{name}.{field}": quantity.count
         for name, section in family.every_section.items()
         for field, quantity in quantities(section).items()
-        if quantity.count is not None
+        if quantity.count is not None and not quantity.apart
     }
 
 

@@ -16,6 +16,7 @@ from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.leg import Joint, Leg, Spring, Turn
 from kinetostat.machine.limits import Limits
 from kinetostat.machine.links import LinkKind, density_section
+from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, section
 
 
@@ -110,7 +111,12 @@ class Tool:
 
     offset: Annotated[
         tuple[float, float, float],
-        Quantity("length", "tool point T from P in platform axes: x, y, z; K, C and the load are given at T", count=3),
+        Quantity(
+            "length",
+            "tool point T from P in platform axes: x, y, z; K, C and the load are given at T",
+            count=3,
+            apart=True,
+        ),
     ] = (0.0, 0.0, 0.0)
     mass: Annotated[float, Quantity("mass", "of the platform and the tool together; 0: not counted")] = 0.0
 
@@ -119,8 +125,16 @@ class Tool:
 class Load:
     """Table [load], in any machine file: a wrench on the platform at the tool point, base axes."""
 
-    moment: Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3)] = (0.0, 0.0, 0.0)
-    force: Annotated[tuple[float, float, float], Quantity("force", "force along x, y, z", count=3)] = (0.0, 0.0, 0.0)
+    moment: Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3, apart=True)] = (
+        0.0,
+        0.0,
+        0.0,
+    )
+    force: Annotated[tuple[float, float, float], Quantity("force", "force along x, y, z", count=3, apart=True)] = (
+        0.0,
+        0.0,
+        0.0,
+    )
 
 
 COMMON = {"tool": Tool, "load": Load, "limits": Limits}
@@ -249,6 +263,16 @@ class Machine:
     def tool_point(self, platform: Displacement) -> Vector:
         """The tool point T in the base frame, m: P itself unless the file has a table [tool]."""
         return platform.apply(Vector(*self.sections["tool"].offset))
+
+
+def need_machine(given: object) -> None:
+    """Refuse what is no machine.
+
+    Raises:
+        InputError: says how to get one.
+    """
+    if not isinstance(given, Machine):
+        raise InputError(f"machine is {shorten(given)}; give a machine, as load(...) and build(...) return one.")
 
 
 def springs(configuration: Configuration) -> list[Spring]:

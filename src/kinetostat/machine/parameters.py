@@ -40,8 +40,17 @@ def find(family: Family, text: str) -> Parameter:
     """The parameter people mean: its path, or the end of its path where only one parameter ends so.
 
     Raises:
-        InputError: none or several; the message lists what is near.
+        InputError: none, several, or several numbers that are never alike; the message lists what is near.
     """
+    found = _find(family, text)
+    if found.quantity.apart and len(found.leaves) > 1:
+        raise InputError(
+            f"{found.path} holds {len(found.leaves)} numbers; name one of them: {', '.join(found.leaves)}."
+        )
+    return found
+
+
+def _find(family: Family, text: str) -> Parameter:
     known = {parameter.path: parameter for parameter in parameters(family)}
     if text in known:
         return known[text]
@@ -51,7 +60,9 @@ def find(family: Family, text: str) -> Parameter:
     if ends:
         raise InputError(f'"{text}" may be {" or ".join(ends)}; write one of them.')
     near = difflib.get_close_matches(text, [*known, *(path.split(".", 1)[1] for path in known)], 1)
-    hint = f"did you mean {near[0]}?" if near else f"the fields are {', '.join(known)}."
+    pose = ", ".join(path for path in known if path.startswith("pose."))
+    rest = f"coordinates of its pose are {pose}, and `kinetostat check` shows every field."
+    hint = f"did you mean {near[0]}?" if near else rest
     raise InputError(f'"{text}" is not a field of family {family.name}; {hint}')
 
 

@@ -30,8 +30,12 @@ class Rings:
 class ThreeLegs(Rings):
     """Part of a table [geometry]: rings of three legs."""
 
-    base_angles: Annotated[Three, Quantity("angle", "angles of the base joints from x, leg by leg", count=3)]
-    platform_angles: Annotated[Three, Quantity("angle", "angles of the platform joints from x, leg by leg", count=3)]
+    base_angles: Annotated[
+        Three, Quantity("angle", "angles of the base joints from x, leg by leg", count=3, apart=True)
+    ]
+    platform_angles: Annotated[
+        Three, Quantity("angle", "angles of the platform joints from x, leg by leg", count=3, apart=True)
+    ]
 
 
 def ends(

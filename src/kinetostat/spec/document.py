@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.errors import InputError, several, shorten
 
 LARGEST_FILE = 1 << 20
 """Bytes. A machine file has a few hundred; a megabyte is a mistake or an attack."""
@@ -17,6 +17,11 @@ DEEPEST = 8
 """Levels of tables and lists; a machine file has three or four."""
 
 Document = dict[str, Any]
+
+
+def is_study(document: Document) -> bool:
+    """Whether a document is meant as a study, not as a machine."""
+    return "family" not in document and bool({"machine", "variables", "objectives"} & document.keys())
 
 
 def exists(path: Path) -> bool:
@@ -82,7 +87,7 @@ def override(document: Document, settings: Sequence[str], counts: Mapping[str, i
 
     Args:
         document: what was written.
-        settings: the overrides, in order.
+        settings: the overrides, in order, or one of them.
         counts: entries of each field that holds a list; where one value was written for all and an override names
             an entry, the value is first repeated.
 
@@ -90,7 +95,7 @@ def override(document: Document, settings: Sequence[str], counts: Mapping[str, i
         InputError: no "=", an empty path, or a path that leads through something that is not a table or list.
     """
     result = copy.deepcopy(document)
-    for setting in settings:
+    for setting in several(settings):
         path, equals, text = setting.partition("=")
         if not equals or not path.strip():
             raise InputError(f'--set {shorten(setting)} must be path=value, e.g. --set geometry.base_radius="26 cm".')

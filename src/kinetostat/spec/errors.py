@@ -23,6 +23,11 @@ def shorten(value: object, longest: int = 60) -> str:
     return text if len(text) <= longest else f"{text[: longest - 1]}…"
 
 
+def several(given: str | Iterable[str]) -> list[str]:
+    """Texts as a list; one text alone stands for a list of it."""
+    return [given] if isinstance(given, str) else list(given)
+
+
 def choice(value: object, known: Iterable[str], what: str) -> str:
     """The value, if it is one of the known names.
 

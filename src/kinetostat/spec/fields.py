@@ -44,7 +44,8 @@ class Quantity:
         kind: a key of `units.KINDS`.
         meaning: one phrase for people, also the comment in templates.
         positive: zero and negative values are refused; stiffness may be zero (free) but never negative.
-        count: how many values; one value in the file stands for all of them.
+        count: how many values.
+        apart: whether each of them must be written, as components and angles; otherwise one may stand for all.
         most: the largest value that is allowed, SI.
         unset: of a limit, the infinity that stands for "none"; None for what is no limit.
     """
@@ -53,6 +54,7 @@ class Quantity:
     meaning: str
     positive: bool = False
     count: int | None = None
+    apart: bool = False
     most: float = math.inf
     unset: float | None = None
 
@@ -60,6 +62,11 @@ class Quantity:
     def stiff(self) -> bool:
         """Whether it is a stiffness or a rigidity: from 0 (free) to "rigid"."""
         return KINDS[self.kind].stiff
+
+    @property
+    def entries(self) -> str:
+        """How several values are written, for people."""
+        return f'a list of {self.count}, each such as "{KINDS[self.kind].example}"'
 
     def read(self, value: object) -> float | tuple[float, ...]:
         """Validate what was written: SI value, or a tuple of `count` of them.
@@ -70,12 +77,15 @@ class Quantity:
         if self.count is None:
             return self._read_one(value)
         if not isinstance(value, list | tuple):
+            if self.apart:
+                raise PydanticCustomError("count", "it must be {entries}", {"entries": self.entries})
             return (self._read_one(value),) * self.count
         if len(value) != self.count:
+            alike = "" if self.apart else ", or one value for all"
             raise PydanticCustomError(
                 "count",
-                "it has {found} entries; give {count}, or one value for all",
-                {"found": len(value), "count": self.count},
+                "it has {found} entries; give {count}{alike}",
+                {"found": len(value), "count": self.count, "alike": alike},
             )
         return tuple(self._read_one(entry, f"entry {i}: ") for i, entry in enumerate(value))
 
@@ -131,6 +141,8 @@ class Quantity:
         if self.count is None:
             return {**one, "description": rule}
         many = {"type": "array", "items": one, "minItems": self.count, "maxItems": self.count}
+        if self.apart:
+            return {**many, "description": f"{rule}; a list of {self.count}"}
         return {"anyOf": [one, many], "description": f"{rule}; one for all, or a list of {self.count}"}
 
 

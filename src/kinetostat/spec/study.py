@@ -75,7 +75,7 @@ class ObjectiveTable(TermTable):
 
     goal: Literal["minimize", "maximize"] | None = Field(
         default=None,
-        description="stiffness and regularity are maximized unless this says otherwise, all else is minimized",
+        description="stiffness and regularity are maximised unless this says otherwise, all else is minimised",
     )
 
 

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.spec.fields import optional, quantities
+from kinetostat.spec.fields import Quantity, optional, quantities
 from kinetostat.units import KINDS
 
 SCHEMA_VERSION = 1
@@ -89,7 +89,7 @@ def _sentence(mistake: dict[str, Any], document: Document, sections: Mapping[str
     within = ".".join(path[:-1])
     known = quantities(sections[within]) if within in sections else {}
     if mistake["type"] in ("missing", "missing_argument"):
-        return _missing(within, name, last, known)
+        return _missing(within, name, last, known, document.get("family"))
     if mistake["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         allowed = list(known) or _tables_in(within, sections)
         close = difflib.get_close_matches(last, allowed, 1)
@@ -112,10 +112,14 @@ def _tables_in(within: str, sections: Mapping[str, type]) -> list[str]:
     return list(dict.fromkeys([*([] if within else ["schema", "name", "family"]), *tables]))
 
 
-def _missing(within: str, name: str, last: str, known: Mapping[str, Any]) -> str:
+def _missing(within: str, name: str, last: str, known: Mapping[str, Quantity], family: object) -> str:
     if last in known:
         quantity = known[last]
-        return f'{name} is missing ({quantity.meaning}); add {last} = "{KINDS[quantity.kind].example}" to [{within}].'
+        start = f"{name} is missing ({quantity.meaning}); add {last}"
+        if quantity.apart:
+            complete = f"`kinetostat new {family}` prints a complete file"
+            return f"{start} to [{within}], {quantity.entries}; {complete}."
+        return f'{start} = "{KINDS[quantity.kind].example}" to [{within}].'
     if name not in ("name", "family"):
         return f"the table [{name}] is missing; `kinetostat new` prints a complete file."
     return f'{name} is missing; add {last} = "..." at the top of the file.'

@@ -11,7 +11,7 @@ import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS, Screw
 from kinetostat.algebra.symmetric import Symmetric6
-from kinetostat.algebra.vector import IDENTITY, Rotation, Vector
+from kinetostat.algebra.vector import IDENTITY, Rotation
 from kinetostat.kinematics.jacobian import actuator_jacobian
 from kinetostat.kinematics.mobility import Mobility, mobility
 from kinetostat.kinematics.singularity import conditioning, describe, independent
@@ -20,20 +20,21 @@ from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, stiffn
 from kinetostat.kinetostatics.attribution import compliance_shares, stiffness_shares
 from kinetostat.kinetostatics.conditioning import twist_condition
 from kinetostat.kinetostatics.internal import InternalLoads, internal_loads
-from kinetostat.kinetostatics.leg import AnyScrew
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.leg import Spring
-from kinetostat.machine.machine import Configuration, Machine, springs
+from kinetostat.machine.machine import Configuration, Machine, need_machine, springs
 from kinetostat.machine.mass import Mass, moving_masses
 from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.spec.errors import InputError, choice
 from kinetostat.studies.indices import Along, Indices, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
 from kinetostat.studies.refusal import why_not
+from kinetostat.studies.rounding import clean_matrix, clean_screw
 
 Rows = list[list[float]]
 
-NEGLIGIBLE = 1e-12
-"""Share of a screw's size below which one of its components is rounding."""
+AXES = ("base", "platform")
+"""In which results are given."""
 INDEPENDENT = 1e-9
 """Relative size of a singular value below which the motions of springs are dependent."""
 NEARBY = 0.03
@@ -120,8 +121,10 @@ class Analysis:
         """Stiffness along and about a direction, in the axes of K and C.
 
         Raises:
-            InputError: if the machine has no such direction.
+            InputError: if the machine has no such direction, or the pose no answer.
         """
+        if self.status is not Status.OK:
+            raise InputError(f"There is no stiffness along any direction here. {self.message}")
         return stiffness_along(direction, self.stiffness, self.compliance, self.machine.family.components)
 
 
@@ -133,13 +136,19 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     Args:
         machine: with its pose, tool and load.
         axes: "base", or "platform" for results in platform axes.
+
+    Raises:
+        InputError: other axes, or no machine.
     """
+    need_machine(machine)
+    choice(axes, AXES, "axes")
     response = respond(machine)
     status = Status(int(response.status))
     configuration = response.configuration
     if status is not Status.OK:
         return Analysis(machine, status, why_not(machine, response, _around(machine)), machine.family.component_names)
     turn = IDENTITY if axes == "base" else configuration.platform.rotation.inverse()
+    response = replace(response, statics=_without_rounding(response.statics))
     statics = _without_rounding(_turned(response.statics, turn))
     stiffness, compliance = stiffness_matrix(statics), compliance_matrix(statics)
     kept = machine.family.components
@@ -184,9 +193,9 @@ def _jacobian_condition(response: Response, length: float) -> float | None:
 
 
 def _rows(matrix: Symmetric6, kept: tuple[int, ...]) -> Rows | None:
-    """The rows and columns that exist, or None where an entry is infinite."""
+    """The rows and columns that exist, without rounding, or None where an entry is infinite."""
     rows = [[float(matrix.entry(i, j)) for j in kept] for i in kept]
-    return rows if all(math.isfinite(entry) for row in rows for entry in row) else None
+    return clean_matrix(rows) if all(math.isfinite(entry) for row in rows for entry in row) else None
 
 
 def _placement(configuration: Configuration) -> tuple[tuple[float, ...], Rows]:
@@ -229,18 +238,11 @@ def _without_rounding(statics: Statics) -> Statics:
     length = statics.length
     return replace(
         statics,
-        flexibility=tuple(_rounded(twist, 1.0 / length) for twist in statics.flexibility),
-        resistance=tuple(_rounded(wrench, length) for wrench in statics.resistance),
-        motions=tuple((_rounded(twist, 1.0 / length), s) for twist, s in statics.motions),
-        actions=tuple((_rounded(wrench, length), k) for wrench, k in statics.actions),
+        flexibility=tuple(clean_screw(twist, 1.0 / length) for twist in statics.flexibility),
+        resistance=tuple(clean_screw(wrench, length) for wrench in statics.resistance),
+        motions=tuple((clean_screw(twist, 1.0 / length), s) for twist, s in statics.motions),
+        actions=tuple((clean_screw(wrench, length), k) for wrench, k in statics.actions),
     )
-
-
-def _rounded(screw: AnyScrew, length: float) -> AnyScrew:
-    """The screw without components that rounding alone explains, translations compared through `length`."""
-    sizes = [abs(c) * scale for c, scale in zip(screw.components(), [1.0] * 3 + [length] * 3, strict=True)]
-    kept = [c if size > NEGLIGIBLE * max(sizes) else 0.0 for c, size in zip(screw.components(), sizes, strict=True)]
-    return type(screw)(Vector(*kept[:3]), Vector(*kept[3:]))
 
 
 def _rank(statics: Statics, endless: bool) -> int:

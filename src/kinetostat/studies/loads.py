@@ -1,11 +1,15 @@
 """What the [load] of a machine does: deflection of the tool point, loads in springs and actuators, joint reactions."""
 
+import math
 from dataclasses import dataclass, replace
 
+from kinetostat.algebra.screw import Wrench
+from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import Rotation
 from kinetostat.kinetostatics.loading import JointReaction, deflection, joint_reactions, spring_loads
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine, springs
+from kinetostat.studies.rounding import ROUNDING, clean_screw
 
 
 @dataclass(frozen=True)
@@ -54,11 +58,13 @@ def load_case(machine: Machine, response: Response, turn: Rotation) -> LoadCase 
     wrench = machine.load
     if not any(wrench.components()):
         return None
-    seen = wrench.rotated(turn)
+    length = float(response.configuration.length)
+    seen = clean_screw(wrench.rotated(turn), length)
+    size = float(wrench.rotational.norm() + wrench.translational.norm() * length)
     loads = zip(springs(response.configuration), spring_loads(response, wrench), strict=True)
     return LoadCase(
-        tuple(float(c) for c in seen.components()),
-        tuple(float(c) for c in deflection(response.compliance, seen).components()),
+        seen.components(),
+        _deflection(response.compliance, seen),
         tuple(
             SpringLoad(
                 s.name, s.actuated, s.joint.point is not None, float(load), _give(float(load), float(s.stiffness))
@@ -66,9 +72,19 @@ def load_case(machine: Machine, response: Response, turn: Rotation) -> LoadCase 
             for s, load in loads
         ),
         tuple(
-            replace(reaction, wrench=reaction.wrench.rotated(turn)) for reaction in joint_reactions(response, wrench)
+            replace(reaction, wrench=clean_screw(reaction.wrench.rotated(turn), length, size))
+            for reaction in joint_reactions(response, wrench)
         ),
     )
+
+
+def _deflection(compliance: Symmetric6, load: Wrench) -> tuple[float, ...]:
+    """C w without rounding: no component i can exceed sqrt(C_ii w C w), as C is positive semidefinite."""
+    twist = deflection(compliance, load)
+    energy = float(load.work(twist))
+    moved = zip(twist.components(), compliance.diagonal(), strict=True)
+    bounds = [(float(c), math.sqrt(max(energy * float(own), 0.0)) if own else 0.0) for c, own in moved]
+    return tuple(0.0 if abs(c) < ROUNDING * bound < math.inf else c for c, bound in bounds)
 
 
 def _give(load: float, stiffness: float) -> float:

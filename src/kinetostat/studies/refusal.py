@@ -5,13 +5,14 @@ from collections.abc import Sequence
 
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.limits import why_beyond
-from kinetostat.kinematics.mobility import Kind, mobility
+from kinetostat.kinematics.mobility import Kind, Mobility, mobility
 from kinetostat.kinematics.nearest import nearest_pose
 from kinetostat.kinematics.reach import why_out_of_reach
-from kinetostat.kinematics.singularity import why_singular
+from kinetostat.kinematics.singularity import describe, why_singular
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import SINGULAR, Response
-from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.leg import Spring
+from kinetostat.machine.machine import Configuration, Machine, springs
 
 
 def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration]) -> str:
@@ -28,18 +29,41 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
         return why_out_of_reach(configuration)
     if status is Status.JOINT_LIMIT:
         return why_beyond(response.checks)
+    found = _mobility(response, nearby)
+    if found and not nearby and _held(configuration) < found.full_cycle:
+        return _lacks_actuators(configuration, found)
     names = [leg.name for leg in configuration.legs]
     reason = why_singular(names, response.legs, configuration.length, SINGULAR)
-    return f"The pose is singular{_kind(response, nearby)}. {reason}"
+    kind = f" ({found.kind})" if found and found.kind is not Kind.REGULAR else ""
+    return f"The pose is singular{kind}. {reason}"
 
 
-def _kind(response: Response, nearby: Sequence[Configuration]) -> str:
-    """What sort of singularity it is, in brackets; nothing where the joints have no place."""
+def _mobility(response: Response, nearby: Sequence[Configuration]) -> Mobility | None:
+    """What can move, and what sort of singularity it is; None where the joints have no place."""
     screws = [screw for leg in response.legs for screw in (*leg.passive, *leg.elastic, *leg.wrenches)]
     if not all(math.isfinite(c) for screw in screws for c in screw.components()):
-        return ""
-    found = mobility(response.configuration, nearby, response.reference)
-    return "" if found.kind is Kind.REGULAR else f" ({found.kind})"
+        return None
+    return mobility(response.configuration, nearby, response.reference)
+
+
+def _held(configuration: Configuration) -> int:
+    """How many joints are held: by actuators, or by a stiffness of their own."""
+    return sum(_holds(spring) for spring in springs(configuration))
+
+
+def _holds(spring: Spring) -> bool:
+    return (spring.actuated or spring.hinge) and float(spring.stiffness) > 0.0
+
+
+def _lacks_actuators(configuration: Configuration, found: Mobility) -> str:
+    """The sentence for a machine with fewer actuators than freedoms, which moves at every pose."""
+    idle = [leg.name for leg in configuration.legs if not any(_holds(spring) for spring in leg.springs)]
+    where = f"; none is in {', '.join(idle)}" if 0 < len(idle) < len(configuration.legs) else ""
+    motions = " or ".join(describe(twist, ("rad", "m")) for twist in found.twists)
+    return (
+        f"Actuators are missing: {found.actuators} for {found.full_cycle} freedoms{where}. With all of them locked the "
+        f"platform can still move, by the twist {motions}; give another joint an actuator."
+    )
 
 
 def _off_constraint(machine: Machine) -> str:

@@ -14,7 +14,7 @@ from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Table
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import Parameter, parameters, values
 from kinetostat.studies.analysis import analyze, machine_length
 from kinetostat.studies.grid.grid import resolve_quantities
@@ -105,6 +105,7 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     Raises:
         InputError: an unknown quantity.
     """
+    need_machine(machine)
     names = tuple(resolve_quantities(quantities, machine.family.component_names))
     asked = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(p, names)]
     held = values(machine)

@@ -15,9 +15,10 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
-from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.machine import Configuration, Machine, need_machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.studies.rounding import ROUNDING, clean_matrix
 from kinetostat.validation.answer import Answer, block_differences, difference
 
 Array = npt.NDArray[np.float64]
@@ -99,7 +100,7 @@ class Validation:
     Attributes:
         machine: what was asked about.
         engine, version: who answered beside us.
-        ours, theirs: C [6 x 6]; rows that a planar machine does not have are 0.
+        ours, theirs: C [6 x 6] without rounding; rows that a planar machine does not have are 0.
         differences: relative, by block: rotation, coupling, translation.
         uncertainty: how far the engine's two best answers differ, in the same measure; infinite if it has but one.
         varied: what the engine's trials vary, for people.
@@ -176,19 +177,22 @@ def validate(machine: Machine, engine: str | None = None) -> Validation:
     Raises:
         InputError: if there is no such engine, no compliance to compare, or a part that the engine cannot have.
     """
+    need_machine(machine)
     chosen = choose(engine)
     response = respond(machine)
     ours = _our_compliance(response)
     answer = chosen.solve(response.configuration, response.reference)
     length = float(response.configuration.length)
+    uncertainty = _uncertainty(answer, ours, length)
+    trusted = max(ROUNDING, uncertainty if uncertainty < AGREED else 0.0)
     return Validation(
         machine,
         chosen.name,
         chosen.version or "",
-        ours,
-        answer.compliance,
+        np.array(clean_matrix(ours.tolist())),
+        np.array(clean_matrix(answer.compliance.tolist(), trusted)),
         block_differences(answer.compliance, ours, length),
-        _uncertainty(answer, ours, length),
+        uncertainty,
         answer.varied,
         tuple((trial.scale, difference(trial.compliance, ours, length)) for trial in answer.trials),
     )

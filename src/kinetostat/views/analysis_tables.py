@@ -5,14 +5,15 @@ from collections.abc import Sequence
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from kinetostat.kinetostatics.eigenscrews import Eigenscrew
 from kinetostat.kinetostatics.indices import PrincipalStiffness
 from kinetostat.studies.analysis import Analysis, Rows, SpringShare
 from kinetostat.studies.indices import Along
 from kinetostat.studies.loads import LoadCase
-from kinetostat.views.display import ROUNDING, without_rounding
-from kinetostat.views.tables import number, numeric_table
+from kinetostat.studies.rounding import ROUNDING
+from kinetostat.views.tables import number, numeric_table, print_doubts
 
 UNITS_OF_K = "N·m/rad, N/rad, N/m"
 UNITS_OF_C = "rad/(N·m), rad/N, m/N"
@@ -23,8 +24,9 @@ MOST_NAMED = 4
 def print_analysis(console: Console, analysis: Analysis, along: Sequence[Along] = (), full: bool = False) -> None:
     """K, C, attribution, indices, mobility and loads at one pose; all springs and eigenscrews if `full`."""
     machine, names = analysis.machine, analysis.components
-    console.print(f"[bold]{machine.name}[/bold]  {analysis.status.word}")
+    console.print(Text.assemble((machine.name, "bold"), f"  {analysis.status.word}"))
     console.print(analysis.message, highlight=False)
+    print_doubts(console, machine)
     point = "the tool point T" if any(machine.sections["tool"].offset) else "the platform point P"
     about = f"Components {' '.join(names)} at {point}, {analysis.axes} axes. Rank {analysis.rank}."
     console.print(about, style="dim", highlight=False)
@@ -40,7 +42,7 @@ def print_analysis(console: Console, analysis: Analysis, along: Sequence[Along] 
         if table.row_count:
             console.print(table)
     for line in remarks(analysis):
-        console.print(line, highlight=False, markup=False)
+        console.print(line, highlight=False)
 
 
 def stiffness_table(analysis: Analysis) -> Table:
@@ -62,7 +64,7 @@ def _matrix_table(
     if rows is None:
         table.add_row("diagonal", *(number(value, endless) for value in diagonal))
     else:
-        for name, row in zip(names, without_rounding(rows), strict=True):
+        for name, row in zip(names, rows, strict=True):
             table.add_row(name, *(number(value) for value in row))
     return table
 
@@ -142,8 +144,7 @@ def load_table(names: Sequence[str], load: LoadCase) -> Table:
     """The load and the deflection of the tool point."""
     kept = [("rx", "ry", "rz", "x", "y", "z").index(name) for name in names]
     table = numeric_table("Load at the tool point (N·m, N) and its deflection (rad, m)", "", names)
-    size = max(abs(c) for c in load.wrench)
-    table.add_row("load", *(number(load.wrench[i] if abs(load.wrench[i]) > ROUNDING * size else 0.0) for i in kept))
+    table.add_row("load", *(number(load.wrench[i]) for i in kept))
     table.add_row("deflection", *(number(load.deflection[i], "free") for i in kept))
     return table
 
@@ -164,9 +165,7 @@ def reaction_table(load: LoadCase) -> Table:
         "Load passed on towards the base, at the joint (N·m, N)", "joint", ["mx", "my", "mz", "fx", "fy", "fz"]
     )
     for reaction in load.reactions:
-        size = max(abs(float(c)) for c in reaction.wrench.components()) or 1.0
-        parts = [float(c) for c in reaction.wrench.components()]
-        table.add_row(reaction.joint, *(number(c if abs(c) > ROUNDING * size else 0.0) for c in parts))
+        table.add_row(reaction.joint, *(number(float(c)) for c in reaction.wrench.components()))
     return table
 
 

@@ -4,6 +4,7 @@ import string
 from collections.abc import Iterator, Sequence
 
 from rich.console import Console
+from rich.text import Text
 
 from kinetostat.studies.comparison.design_rows import Better, Row
 from kinetostat.studies.comparison.designs import Blame, Comparison
@@ -18,9 +19,9 @@ def print_comparison(console: Console, found: Comparison) -> None:
     """Legend, differences, numbers, what is to blame, and the grid; as many designs abreast as the terminal takes."""
     letters = string.ascii_uppercase[: len(found.designs)]
     for letter, design in zip(letters, found.designs, strict=True):
-        console.print(f"[bold]{letter}[/bold]  ", end="")
-        said = f"{design.label}  {design.machine.name}"
-        console.print(said if design.answered else f"{said}: {design.analysis.message}", highlight=False, markup=False)
+        said = f"  {design.label}  {design.machine.name}"
+        why = "" if design.answered else f": {design.analysis.message}"
+        console.print(Text.assemble((letter, "bold"), said, why))
     console.print("Percentages are against A; the best of each row is bold.", style="dim")
     _print_differences(console, found, letters)
     _print_rows(console, "At the pose of each design", letters, found.rows)
@@ -71,16 +72,16 @@ def _print_rows(console: Console, title: str, letters: str, rows: Sequence[Row],
         console.print(table)
 
 
-def _cell(row: Row, i: int) -> str:
+def _cell(row: Row, i: int) -> Text:
     """A value and its change against the first, green where it is better."""
     endless = "rigid" if row.better is Better.MORE else "free"
     value, percent = number(row.values[i], endless), row.percents[i]
-    shown = f"[bold]{value}[/bold]" if i in row.best else value
+    shown = Text(value, "bold" if i in row.best else "")
     if i == 0 or percent is None:
-        return shown if i == 0 else f"{shown}{' ' * 9}"
+        return Text.assemble(shown, "" if i == 0 else " " * 9)
     better = (percent < 0.0) == (row.better is Better.LESS)
     colour = "default" if abs(percent) < 0.05 else "green" if better else "red"
-    return f"{shown} [{colour}]{_percent(percent):>8}[/{colour}]"
+    return Text.assemble(shown, (f" {_percent(percent):>8}", colour))
 
 
 def _percent(percent: float) -> str:

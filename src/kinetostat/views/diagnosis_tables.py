@@ -28,9 +28,10 @@ def print_verdict(console: Console, checks: Iterable[Check]) -> None:
     """One sentence: sound, or what to see to."""
     failed = [check.name for check in checks if check.state is State.FAILED]
     if failed:
-        console.print(f"\n[bold red]See to:[/bold red] {', '.join(failed)}.", highlight=False)
+        console.print(Text.assemble(("\nSee to:", "bold red"), f" {', '.join(failed)}."))
     else:
-        console.print("\n[bold green]Sound.[/bold green] What is needed is there, and the known numbers come out.")
+        sound = " What is needed is there, and the known numbers come out."
+        console.print(Text.assemble(("\nSound.", "bold green"), sound))
 
 
 def _line(check: Check) -> Table:

@@ -13,10 +13,6 @@ PREFIXES = {1e-9: "n", 1e-6: "µ", 1e-3: "m", 1.0: "", 1e3: "k", 1e6: "M", 1e9: 
 """By factor."""
 
 
-ROUNDING = 1e-12
-"""Share of the geometric mean of its diagonal entries below which an entry is shown as zero."""
-
-
 @dataclass(frozen=True)
 class Scale:
     """How to show values of one unit: multiply by `factor`, write `unit`."""
@@ -57,12 +53,3 @@ def prefixed_scale(unit: str, values: npt.NDArray[np.float64]) -> Scale:
     factor = min(max(10.0**power, min(PREFIXES)), max(PREFIXES))
     nearest = min(PREFIXES, key=lambda known: abs(math.log10(known / factor)))
     return Scale(1.0 / nearest, PREFIXES[nearest] + unit)
-
-
-def without_rounding(rows: Sequence[Sequence[float]]) -> list[list[float]]:
-    """K or C as people read it: entries that are but rounding beside their diagonal ones are zero."""
-    sizes = [abs(row[i]) for i, row in enumerate(rows)]
-    return [
-        [0.0 if abs(c) < ROUNDING * math.sqrt(size * other) else c for c, other in zip(row, sizes, strict=True)]
-        for row, size in zip(rows, sizes, strict=True)
-    ]

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Table
+from rich.text import Text
 
 from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.guidelines.moves import Move
@@ -19,6 +20,8 @@ TOPICS = {
     "rigid": "What counts as rigid, within 1 %",
     "design": "What the design does",
 }
+MOST = 0.5
+"""Share from which on an element is printed in bold."""
 MOST_ROWS = 16
 """Parameters that are printed; all of them on demand."""
 MOST_NAMED = 8
@@ -30,12 +33,12 @@ ALIKE = "poses: at how many of them all arrows of the row point as they do here.
 
 def print_guidelines(console: Console, found: Guidelines, full: bool = False) -> None:
     """Sentences and tables; every parameter, and a sentence for those that matter most, if `full`."""
-    console.print(f"[bold]{found.machine.name}[/bold]  design guidelines")
+    console.print(Text.assemble((found.machine.name, "bold"), "  design guidelines"))
     answered, poses = found.poses
     about = f"Directions {' '.join(found.components)}: deflection under a load in the same direction, base axes."
     if poses:
         about += f" Over {', '.join(found.ranges)}: {answered:,} of {poses:,} poses have an answer."
-    console.print(about, style="dim", highlight=False, markup=False)
+    console.print(about, style="dim", highlight=False)
     if found.here is None:
         return
     _print_sentences(console, found, full)
@@ -51,10 +54,10 @@ def _print_sentences(console: Console, found: Guidelines, full: bool) -> None:
     for topic, title in TOPICS.items():
         own = [one for one in said if one.topic == topic]
         if own and (full or topic != "design"):
-            console.print(f"\n[bold]{title}[/bold]")
+            console.print(Text(f"\n{title}", "bold"))
             for one in own:
-                aside = "" if one.holds is None else f" \\[{over_poses(one.holds)}]"
-                console.print(Padding(f"- {one.text}[dim]{aside}[/dim]", (0, 0, 0, 1)), highlight=False)
+                aside = "" if one.holds is None else f" [{over_poses(one.holds)}]"
+                console.print(Padding(Text.assemble(f"- {one.text}", (aside, "dim")), (0, 0, 0, 1)))
     console.print()
 
 
@@ -67,9 +70,9 @@ def _print_equations(console: Console, found: Guidelines) -> None:
     """K as sums over elements, as the paper's equations 33-38."""
     if found.equations is None:
         return
-    console.print("[bold]K at this pose[/bold], by the stiffness k of one part of each element (SI)")
+    console.print(Text.assemble(("K at this pose", "bold"), ", by the stiffness k of one part of each element (SI)"))
     for line in equations(found):
-        console.print(f"  {line}", highlight=False, markup=False)
+        console.print(f"  {line}", highlight=False)
     console.print()
 
 
@@ -87,14 +90,14 @@ def element_table(found: Guidelines, here: Roles) -> Table:
     """What each element contributes to each direction."""
     table = numeric_table("Shares in the diagonal of C", "element", found.components)
     for element, row in zip(found.found, here.shares[:, :, 0].tolist(), strict=True):
-        cells = ["–" if math.isnan(p) else f"[bold]{100 * p:.1f} %[/bold]" if p >= 0.5 else _share(p) for p in row]
-        table.add_row(element.name, *cells)
+        table.add_row(element.name, *(_share(part) for part in row))
     return table
 
 
-def _share(part: float) -> str:
-    text = f"{100 * part:.1f} %"
-    return "·" if part == 0.0 else text if part >= MATTERS else f"[dim]{text}[/dim]"
+def _share(part: float) -> Text:
+    if math.isnan(part) or part == 0.0:
+        return Text("–" if part else "·")
+    return Text(f"{100 * part:.1f} %", "bold" if part >= MOST else "" if part >= MATTERS else "dim")
 
 
 def limit_table(found: Guidelines, here: Roles) -> Table:
@@ -146,7 +149,7 @@ def left_out(found: Guidelines, count: int) -> Iterator[str]:
     """What the table of the first parameters does not show, in sentences."""
     hidden = len(found.moves) - count
     if hidden:
-        yield f"{hidden} more do less; `kinetostat guidelines --full` has all."
+        yield f"{hidden} more {'does' if hidden == 1 else 'do'} less; guidelines --full has all."
     if found.idle:
         yield f"No direction depends on {_few(found.idle)}."
     for reason in dict.fromkeys(why for _, why in found.skipped):
@@ -159,13 +162,11 @@ def _few(paths: tuple[str, ...] | list[str]) -> str:
     return ", ".join(paths[:MOST_NAMED]) + more
 
 
-def _arrow(percent: float | None) -> str:
-    if percent is None:
-        return "–"
-    if abs(percent) < LEAST:
-        return "·"
+def _arrow(percent: float | None) -> Text:
+    if percent is None or abs(percent) < LEAST:
+        return Text("–" if percent is None else "·")
     size = f"{abs(percent):.2f}" if abs(percent) < 1.0 else f"{abs(percent):.2g}"
-    return f"[blue]▲{size}[/blue]" if percent > 0.0 else f"[red]▼{size}[/red]"
+    return Text(f"▲{size}", "blue") if percent > 0.0 else Text(f"▼{size}", "red")
 
 
 def _alike(move: Move) -> str:

@@ -100,23 +100,21 @@ class _Page(Console):
         self.parts: list[str] = []
         self._line = ""
 
-    def print(self, *objects: Any, end: str = "\n", style: str | Style | None = None, **how: Any) -> None:
+    def print(self, *objects: Any, end: str = "\n", style: str | Style | None = None, **_: Any) -> None:
         """Take what would be printed."""
         for thing in objects:
             whole = thing.renderable if isinstance(thing, Padding) else thing
             if isinstance(whole, Table):
                 self.parts.append(_table(whole))
             else:
-                self._line += _styled(_text(whole, how.get("markup", True)), style)
+                self._line += _styled(_text(whole), style)
         if end == "\n" and self._line.strip():
             self.parts += [f"<p>{line}</p>" for line in self._line.split("\n") if line.strip()]
             self._line = ""
 
 
-def _text(thing: object, markup: bool) -> Text:
-    if isinstance(thing, Text):
-        return thing
-    return Text.from_markup(str(thing)) if markup else Text(str(thing))
+def _text(thing: object) -> Text:
+    return thing if isinstance(thing, Text) else Text(str(thing))
 
 
 def _styled(text: Text, style: str | Style | None = None) -> str:
@@ -138,7 +136,7 @@ def _within(content: str, style: Style | None) -> str:
 
 def _table(table: Table) -> str:
     """A table of the terminal as one of HTML."""
-    caption = f"<caption>{_styled(_text(table.title, True))}</caption>" if table.title else ""
+    caption = f"<caption>{_styled(_text(table.title))}</caption>" if table.title else ""
     heads = "".join(_cell("th", column, column.header) for column in table.columns)
     rows = "".join(f"<tr>{row}</tr>" for row in _rows(table))
     shown = any(cell_len(str(column.header)) for column in table.columns)
@@ -153,4 +151,4 @@ def _rows(table: Table) -> Iterator[str]:
 
 def _cell(tag: str, column: Column, content: object, style: str | Style | None = None) -> str:
     numeric = ' class="num"' if column.justify == "right" else ""
-    return f"<{tag}{numeric}>{_styled(_text(content, True), style)}</{tag}>".replace("\n", "<br>")
+    return f"<{tag}{numeric}>{_styled(_text(content), style)}</{tag}>".replace("\n", "<br>")

@@ -73,10 +73,10 @@ def variable_table(found: Result) -> Table:
 def direction_table(found: Result) -> Table:
     """The compliance of each direction before and after."""
     worst = "" if found.problem.poses.count == 1 else ", the worst of all poses"
-    table = numeric_table(f"Compliance{worst}", "direction", ["initial", "best", "times stiffer", "unit"])
+    table = numeric_table(f"Compliance{worst}", "direction", ["initial", "best", "change", "unit"])
     for one in found.directions:
         name = one.name.removeprefix("compliance_")
-        table.add_row(name, number(one.before), number(one.after), _times(one.gain), one.unit)
+        table.add_row(name, number(one.before), number(one.after), times_stiffer(one.gain), one.unit)
     return table
 
 
@@ -135,6 +135,13 @@ def _exact(value: float) -> str:
 
 def _times(gain: float) -> str:
     return "–" if math.isnan(gain) else f"{gain:.4g}"
+
+
+def times_stiffer(gain: float) -> str:
+    """How many times stiffer, or softer, a direction has become."""
+    if not gain or not math.isfinite(gain):
+        return _times(gain)
+    return f"{_times(gain)} times stiffer" if gain >= 1.0 else f"{_times(1.0 / gain)} times softer"
 
 
 def _percent(value: float) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
+from rich.text import Text
 
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.studies.optimisation.result_data import as_dataset
@@ -77,11 +78,11 @@ def print_summary(found: Reproduction, written: Sequence[Path]) -> None:
     equations = text_table("Equations 1-32, by the paper's matrices and by ours", "eq.", "statement", "residual", "")
     for check in found.checks:
         equations.add_row(
-            check.equation, check.statement, f"{check.residual:.1e}", "holds" if check.holds else "[red]FAILS"
+            check.equation, check.statement, f"{check.residual:.1e}", "holds" if check.holds else Text("FAILS", "red")
         )
     console.print(equations)
     for claim in (*found.claims, *found.search_claims):
-        console.print(f"[bold]{claim.place}[/bold]  {claim.finding.value}", highlight=False)
+        console.print(Text.assemble((claim.place, "bold"), f"  {claim.finding.value}"))
         console.print(f"  {claim.statement}", highlight=False)
         console.print(f"  {claim.measured} {claim.limits}", highlight=False, style="dim")
     console.print()
@@ -95,18 +96,29 @@ def verdict(found: Reproduction) -> str:
     claims = (*found.claims, *found.search_claims)
     statements = Counter(claim.finding.value for claim in claims)
     holding = sum(check.holds for check in found.checks)
+    findings = ", ".join(f"{count} {held(word, count)}" for word, count in statements.items())
     return (
         f"{len(found.comparisons)} numbers: {numbers[Verdict.EQUAL]} equal to print, {numbers[Verdict.MISPRINT]} known "
         f"misprints, {numbers[Verdict.DIFFERS]} differ. {len(found.checks)} groups of equations: {holding} hold. "
-        f"{len(claims)} statements: {', '.join(f'{count} {word}' for word, count in statements.items())}."
+        f"{len(claims)} statements: {findings}."
     )
+
+
+def held(finding: str, count: int) -> str:
+    """What so many statements do, from what one does: it holds, they hold."""
+    verb, space, rest = finding.partition(" ")
+    return (verb if count == 1 else verb.removesuffix("s")) + space + rest
 
 
 def _numbers_table(comparisons: Sequence[Comparison]) -> Any:
     table = text_table("Numbers", "place", "", "printed", "computed", "unit", "verdict")
     place = ""
+    shown = {
+        Verdict.EQUAL: Text("equal"),
+        Verdict.MISPRINT: Text("misprint", "yellow"),
+        Verdict.DIFFERS: Text("DIFFERS", "red"),
+    }
     for one in comparisons:
-        shown = {Verdict.EQUAL: "equal", Verdict.MISPRINT: "[yellow]misprint", Verdict.DIFFERS: "[red]DIFFERS"}
         head = "" if one.place == place else one.place
         place = one.place
         table.add_row(head, one.component, one.printed, f"{one.computed:.7g}", one.unit, shown[one.verdict])

@@ -4,9 +4,8 @@ from rich.console import Console
 from rich.table import Table
 
 from kinetostat.studies.sensitivity import Sensitivity, notes
-from kinetostat.units import KINDS
 from kinetostat.views.display import family_of_names, spoken
-from kinetostat.views.tables import number, numeric_table
+from kinetostat.views.tables import measured, numeric_table
 
 MOST_ROWS = 40
 """Parameters that are printed; `--json` has all."""
@@ -32,8 +31,7 @@ def influence_table(answer: Sensitivity, count: int) -> Table:
     title = f"{answer.machine.name}: {group}, {MEASURE}" if group else f"{answer.machine.name}: {MEASURE}"
     table = numeric_table(title, "parameter", ["value", *heads])
     for one in answer.influences[:count]:
-        value = f"{number(one.value)} {KINDS[one.kind].unit}".rstrip()
-        table.add_row(one.path, value, *(_percent(percent) for percent in one.percents))
+        table.add_row(one.path, measured(one.value, one.kind), *(_percent(percent) for percent in one.percents))
     return table
 
 

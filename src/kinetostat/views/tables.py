@@ -11,10 +11,15 @@ from rich.table import Table
 from kinetostat.machine.loading import kinds_of_machine
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
+from kinetostat.machine.plausible import doubts
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.study import StudyFile
+from kinetostat.units import KINDS
 
 Number = float | None
+
+LARGE = 1e6
+"""From which on a value of a machine is written with a power of ten."""
 
 
 def print_machines(console: Console, bundled: Sequence[Machine], names: Sequence[str]) -> None:
@@ -38,8 +43,15 @@ def print_studies(console: Console, studies: Mapping[str, StudyFile]) -> None:
 
 
 def print_machine(console: Console, machine: Machine) -> None:
-    """Every value of a machine with its meaning."""
+    """Every value of a machine with its meaning, and those that are hardly meant."""
     console.print(machine_table(machine))
+    print_doubts(console, machine)
+
+
+def print_doubts(console: Console, machine: Machine) -> None:
+    """Values that are hardly meant, a line each."""
+    for doubt in doubts(machine):
+        console.print(f"Note: {doubt}", style="yellow", highlight=False)
 
 
 def machine_table(machine: Machine) -> Table:
@@ -63,15 +75,22 @@ def readable(values: Sequence[float], quantity: Quantity) -> str:
 
 
 def _readable(value: float, quantity: Quantity) -> str:
-    """A value for a table: ten digits, angles in degrees."""
+    """A value for a table: ten digits, a power of ten where it is large, angles in degrees."""
     if quantity.kind == "angle" and value != quantity.unset:
         return f"{math.degrees(value):.10g} deg"
-    return quantity.show(float(f"{value:.10g}"))
+    if math.isinf(value):
+        return quantity.show(value)
+    digits, _, power = f"{value:.9e}".partition("e")
+    large = f"{digits.rstrip('0').rstrip('.')}e{int(power)}"
+    return f"{large if abs(value) >= LARGE else f'{value:.10g}'} {KINDS[quantity.kind].unit}".rstrip()
 
 
 def terminal() -> Console:
-    """The console of this process: as wide as the terminal, wide enough for six columns where there is none."""
-    return Console() if sys.stdout.isatty() else Console(width=100)
+    """The console of this process: as wide as the terminal, wide enough for six columns where there is none.
+
+    Texts are shown as they are, whatever brackets and colons are in them; what is styled is a `Text`.
+    """
+    return Console(width=None if sys.stdout.isatty() else 100, markup=False, emoji=False)
 
 
 def number(value: Number, endless: str = "∞") -> str:
@@ -81,6 +100,13 @@ def number(value: Number, endless: str = "∞") -> str:
     if math.isinf(value):
         return endless
     return f"{value:.6g}" if value == 0.0 or 1e-2 <= abs(value) < 1e6 else f"{value:.4g}"
+
+
+def measured(value: float, kind: str) -> str:
+    """A value with its unit for a table: angles in degrees, all else in SI."""
+    if kind == "angle":
+        return f"{number(math.degrees(value) + 0.0)} deg"
+    return f"{number(value + 0.0)} {KINDS[kind].unit}".rstrip()
 
 
 def text_table(title: str, *columns: str) -> Table:

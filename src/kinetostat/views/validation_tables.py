@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.validation.comparison import Array, Validation
@@ -14,9 +15,7 @@ from kinetostat.views.tables import number, numeric_table
 def print_validation(console: Console, validation: Validation, agreed: float) -> None:
     """Ours, theirs, the difference by block, and a verdict: it agrees where no block differs by more than `agreed`."""
     family = validation.machine.family
-    console.print(
-        f"[bold]{validation.machine.name}[/bold] beside {validation.engine} {validation.version}", highlight=False
-    )
+    console.print(Text.assemble((validation.machine.name, "bold"), f" beside {validation.engine} {validation.version}"))
     kept = list(family.components)
     titles = {"kinetostat": validation.ours, validation.engine: validation.theirs}
     for title, matrix in titles.items():

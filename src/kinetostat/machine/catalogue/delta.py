@@ -24,7 +24,9 @@ LEGS = 3
 class Geometry(Rings):
     """Table [geometry]; the base frame has its origin at the base centre, the platform's axes stay parallel to it."""
 
-    leg_angles: Annotated[Three, Quantity("angle", "angles of the legs from x, in base and platform", count=LEGS)]
+    leg_angles: Annotated[
+        Three, Quantity("angle", "angles of the legs from x, in base and platform", count=LEGS, apart=True)
+    ]
     arm_length: Annotated[
         float, Quantity("length", "from the actuated revolute to the middle of the elbow", positive=True)
     ]

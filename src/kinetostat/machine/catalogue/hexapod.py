@@ -20,8 +20,12 @@ Six = tuple[float, float, float, float, float, float]
 class Geometry(Rings):
     """Table [geometry]; the base frame has its origin at the base centre, the platform frame at P."""
 
-    base_angles: Annotated[Six, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS)]
-    platform_angles: Annotated[Six, Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS)]
+    base_angles: Annotated[
+        Six, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS, apart=True)
+    ]
+    platform_angles: Annotated[
+        Six, Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS, apart=True)
+    ]
     base_height: Annotated[float, Quantity("length", "z of the base joints, base frame")] = 0.0
     platform_height: Annotated[float, Quantity("length", "z of the platform joints, platform frame (from P)")] = 0.0
 

@@ -30,8 +30,12 @@ Five = tuple[float, float, float, float, float]
 class Geometry(PassiveLinks):
     """Table [geometry]; the base frame has its origin O at the foot of the passive leg, z up."""
 
-    base_angles: Annotated[Five, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS)]
-    platform_angles: Annotated[Five, Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS)]
+    base_angles: Annotated[
+        Five, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS, apart=True)
+    ]
+    platform_angles: Annotated[
+        Five, Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS, apart=True)
+    ]
 
 
 @section

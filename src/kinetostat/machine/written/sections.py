@@ -10,8 +10,8 @@ from kinetostat.machine.section import MATERIALS, Section, rectangular_section, 
 from kinetostat.machine.written.plan import SHAPES, JointPlan, Plan
 from kinetostat.spec.fields import Field, Quantity, made_section
 
-AXIS = Quantity("direction", "direction of the joint, of any length, base axes at the home pose", count=3)
-POINT = Quantity("length", "a point of the joint, base frame, at the home pose", count=3)
+AXIS = Quantity("direction", "direction of the joint, of any length, base axes at the home pose", count=3, apart=True)
+POINT = Quantity("length", "a point of the joint, base frame, at the home pose", count=3, apart=True)
 
 
 JOINT_FIELDS: Mapping[str, Mapping[str, Field]] = {
@@ -23,7 +23,9 @@ JOINT_FIELDS: Mapping[str, Mapping[str, Field]] = {
     "helical": {"point": Field(POINT), "axis": Field(AXIS), "pitch": Field(Quantity("length", "advance per radian"))},
     "parallelogram": {
         "point": Field(POINT),
-        "far": Field(Quantity("length", "middle of the far short side, base frame, at the home pose", count=3)),
+        "far": Field(
+            Quantity("length", "middle of the far short side, base frame, at the home pose", count=3, apart=True)
+        ),
         "axis": Field(AXIS),
         "width": Field(Quantity("length", "of the short sides", positive=True)),
         "bar_stiffness": Field(Quantity("linear stiffness", "axial stiffness of each bar"), RIGID),
@@ -48,7 +50,7 @@ POSE_KINDS = {"x": "length", "y": "length", "z": "length", "roll": "angle", "pit
 
 def sections_of(plan: Plan) -> dict[str, type]:
     """The sections of the plan's machine files, by dotted name."""
-    point = Quantity("length", "platform point P at the home pose, base frame", count=3)
+    point = Quantity("length", "platform point P at the home pose, base frame", count=3, apart=True)
     found = {"platform": made_section("Platform", {"point": Field(point)})}
     for name, shape in plan.shapes.items():
         found[f"sections.{name}"] = made_section("CrossSection", _shape_fields(shape, plan.materials[name]))

@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from functools import cache
 from importlib import resources
+from pathlib import Path
 
+from kinetostat.machine.loading import bundled
 from kinetostat.spec import document as documents
 from kinetostat.spec.study import StudyFile, read_study
 
@@ -17,6 +19,17 @@ def bundled_studies() -> dict[str, str]:
     found = resources.files("kinetostat.studies.bundled").iterdir()
     files = sorted((f for f in found if f.name.endswith(SUFFIX)), key=lambda f: f.name)
     return {f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files}
+
+
+def is_study(name: str) -> bool:
+    """Whether a name or path means a study: a bundled one, or a file that says so.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    if name in bundled_studies() or name in bundled() or not documents.exists(Path(name)):
+        return name in bundled_studies()
+    return documents.is_study(documents.read(Path(name)))
 
 
 def study_of(name: str, settings: Sequence[str] = ()) -> StudyFile:

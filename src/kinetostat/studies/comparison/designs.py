@@ -17,8 +17,9 @@ from kinetostat.kinetostatics.extremes import ROTATIONS, TRANSLATIONS
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import Parameter, parameters, values
-from kinetostat.spec.errors import InputError
+from kinetostat.machine.parameters import Parameter, find, parameters, values
+from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.ranges import parse_range
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.comparison.design_rows import Row, rows_at_poses, rows_over
 
@@ -132,11 +133,14 @@ def compare(
     Raises:
         InputError: fewer than two designs or too many, or a range that one of them does not take.
     """
+    designs, ranges = [designs] if isinstance(designs, str) else designs, several(ranges)
     if not 2 <= len(designs) <= MOST_DESIGNS:
         raise InputError(
             f"compare takes 2 to {MOST_DESIGNS} designs, not {len(designs)}; give files, names or NAME:path=value."
         )
     given = list(_designs(designs))
+    for design in given:
+        _refuse_absent(design, ranges)
     over, poses = rows_over([design.machine for design in given], ranges, progress) if ranges else ((), ())
     return Comparison(
         tuple(given),
@@ -147,6 +151,15 @@ def compare(
         poses,
         over,
     )
+
+
+def _refuse_absent(design: Design, ranges: Sequence[str]) -> None:
+    """Refuse ranges of fields that a design lacks, by its name."""
+    for text in ranges:
+        try:
+            find(design.machine.family, parse_range(text).field)
+        except InputError as error:
+            raise InputError(f"{design.label}: {error}") from None
 
 
 def _designs(given: Sequence[Design | Machine | str] | Mapping[str, Machine]) -> Iterator[Design]:

@@ -1,6 +1,7 @@
 """Sweeps and maps: quantities of a machine over a grid of any of its parameters, as a labelled dataset."""
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
@@ -16,9 +17,9 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, PARTS, QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import as_toml
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import Parameter, find
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.ranges import Range, parse_range
 from kinetostat.units import KINDS
 
@@ -57,6 +58,8 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
     Raises:
         InputError: an unknown field or quantity, a bad range, a field twice, or more than six dimensions.
     """
+    need_machine(machine)
+    ranges = several(ranges)
     if len(ranges) > MOST_DIMENSIONS:
         raise InputError(
             f"the grid has {len(ranges)} dimensions; at most {MOST_DIMENSIONS} are allowed: "
@@ -160,14 +163,20 @@ def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONE
     """
     groups = {group: [name for name in members if _exists(name, components)] for group, members in GROUPS.items()}
     found: list[str] = []
-    for name in names:
+    for name in several(names):
         if name not in GROUPS and not (name in QUANTITIES and _exists(name, components)):
-            others = (name for name, quantity in QUANTITIES.items() if not quantity.components)
-            known = ", ".join([*GROUPS, *(n for group in groups.values() for n in group), *others])
-            example = f"compliance_{components[0]}_{components[-1]}"
-            raise InputError(f'"{name}" is not a quantity; choose from {known}, or an entry such as {example}.')
+            raise InputError(_no_quantity(name, groups, components))
         found += groups.get(name, [name])
     return list(dict.fromkeys(found))
+
+
+def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Sequence[str]) -> str:
+    """The sentence about an unknown quantity: which was probably meant, or all that there are."""
+    others = (other for other, quantity in QUANTITIES.items() if not quantity.components)
+    known = [*groups, *(member for group in groups.values() for member in group), *others]
+    near = difflib.get_close_matches(name, known, 1)
+    every = f"choose from {', '.join(known)}, or an entry such as compliance_{components[0]}_{components[-1]}."
+    return f'"{name}" is not a quantity; ' + (f"did you mean {near[0]}?" if near else every)
 
 
 def refuse_absent(machine: Machine, names: Sequence[str]) -> None:

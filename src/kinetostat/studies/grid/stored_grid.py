@@ -113,7 +113,7 @@ def _taken_up(question: GridQuestion, study: StudyFolder, final: Path) -> Work:
     different = [key for key in asked if asked[key] != held.get(key)]
     if different:
         raise InputError(
-            f'"{study.path}" holds another study (its {" and ".join(different)} differ); choose another folder with '
+            f'"{study.path}" holds another study (different: {", ".join(different)}); choose another folder with '
             "-o, or remove that one."
         )
     if not final.exists() and not _partial(final).exists():

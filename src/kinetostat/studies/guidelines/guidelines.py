@@ -20,7 +20,7 @@ from kinetostat.kinetostatics.elements import (
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, several
 from kinetostat.studies.grid.grid import grid_question
 from kinetostat.studies.guidelines.moves import Move, axes_left_out, designed, moves_at, with_signs
 from kinetostat.studies.guidelines.roles import Roles, equations_of_k, roles_at, roles_over
@@ -86,6 +86,7 @@ def guidelines(machine: Machine, ranges: Sequence[str] = (), progress: Progress 
     Raises:
         InputError: a bad range, one that is no coordinate of the pose, or too many poses.
     """
+    ranges = several(ranges)
     grid = _grid(machine, ranges) if ranges else None
     answer = sensitivity(machine)
     names = machine.family.component_names

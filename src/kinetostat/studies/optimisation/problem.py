@@ -20,6 +20,11 @@ from kinetostat.studies.optimisation.terms import Term
 from kinetostat.studies.optimisation.variables import Space, read_space
 from kinetostat.studies.workspace.conditions import value_of
 
+MACHINE = (
+    "is a machine, and here a study is wanted, which says what may change and what is better; `kinetostat new study` "
+    "prints one to start from, and machine = ... in it names the machine."
+)
+"""What is said of a machine in the place of a study."""
 NOMINAL = "nominal"
 MOST_EVALUATIONS = 5_000_000
 """Designs of one study: their table then fits in half a gigabyte."""
@@ -40,7 +45,7 @@ class Objective:
     @property
     def goal(self) -> str:
         """In a word."""
-        return "minimize" if self.sign > 0 else "maximize"
+        return "minimise" if self.sign > 0 else "maximise"
 
 
 @dataclass(frozen=True)
@@ -127,11 +132,16 @@ def load_problem(study: str | Path, settings: Sequence[str] = ()) -> Problem:
     if name in shipped:
         return build_problem(study_of(name, settings))
     path = Path(study)
+    if name in bundled():
+        raise InputError(f'"{name}" {MACHINE}')
     if not documents.exists(path):
         near = difflib.get_close_matches(name, shipped, 1)
         hint = f'did you mean "{near[0]}"?' if near else f"bundled studies: {', '.join(shipped)}."
         raise InputError(f"{shorten(name)} is neither a file nor a bundled study; {hint}")
-    return build_problem(read_study(documents.read(path), name, settings), path.parent)
+    document = documents.read(path)
+    if "family" in document:
+        raise InputError(f'"{name}" {MACHINE}')
+    return build_problem(read_study(document, name, settings), path.parent)
 
 
 def build_problem(study: StudyFile, folder: Path = Path()) -> Problem:

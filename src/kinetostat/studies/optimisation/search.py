@@ -124,7 +124,7 @@ def _take_up(problem: Problem, study: StudyFolder, log: Log) -> None:
     different = [key for key in asked if asked[key] != held.get(key)]
     if different:
         raise InputError(
-            f'"{study.path}" holds another study (its {" and ".join(different)} differ); choose another folder with '
+            f'"{study.path}" holds another study (different: {", ".join(different)}); choose another folder with '
             "-o, or remove that one."
         )
 

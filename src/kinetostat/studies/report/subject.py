@@ -7,10 +7,9 @@ from pathlib import Path
 from kinetostat.machine.loading import as_toml, bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.spec import document as documents
-from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.study_text import study_toml
-from kinetostat.studies.bundled import bundled_studies
+from kinetostat.studies.bundled import bundled_studies, is_study
 from kinetostat.studies.optimisation.problem import Problem, load_problem
 from kinetostat.studies.optimisation.search import stored_problem
 from kinetostat.studies.study_folder import holds_study
@@ -50,15 +49,10 @@ def subject_of(name: str, settings: Sequence[str] = ()) -> Subject:
     shipped = name in bundled() or name in bundled_studies()
     if not shipped and documents.exists(path) and holds_study(path):
         return _stored(path, settings)
-    document = {} if shipped or not documents.exists(path) else documents.read(path)
-    if name in bundled_studies() or (name not in bundled() and _is_study(document)):
+    if is_study(name):
         return _study(name, path, settings)
     machine = load(name, settings)
     return Subject(machine, (_read(name, path),))
-
-
-def _is_study(document: Document) -> bool:
-    return "family" not in document and bool({"machine", "variables", "objectives"} & document.keys())
 
 
 def _stored(folder: Path, settings: Sequence[str]) -> Subject:

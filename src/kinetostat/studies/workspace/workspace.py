@@ -12,9 +12,9 @@ import xarray as xr
 
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.sampling import Cells
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import values
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, several
 from kinetostat.studies.grid.grid import IN_MEMORY, MOST_DIMENSIONS, GridQuestion, answer, grid_question
 from kinetostat.studies.workspace.conditions import Condition, parse_condition
 from kinetostat.studies.workspace.connected import connected_to
@@ -77,7 +77,8 @@ def workspace(
     Raises:
         InputError: a field that is no coordinate of the pose, a bad range or condition, too many points.
     """
-    judge = Judge(machine, tuple(parse_condition(text, machine.family.component_names) for text in conditions))
+    need_machine(machine)
+    judge = Judge(machine, tuple(parse_condition(text, machine.family.component_names) for text in several(conditions)))
     question = grid_question(machine, ranges, ["regularity", *judge.quantities])
     _check(question)
     total = question.grid.size + Cells(question.grid.axes).size

@@ -8,7 +8,6 @@ from kinetostat.studio.markup import paragraph, table
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import scientific
 from kinetostat.views.analysis_tables import UNITS_OF_C, UNITS_OF_K
-from kinetostat.views.display import without_rounding
 
 KINDS = {"C": "compliance", "K": "stiffness"}
 UNITS = {"C": UNITS_OF_C, "K": UNITS_OF_K}
@@ -59,8 +58,7 @@ def matrix_table(analysis: Analysis, kind: str) -> str:
     names, rows = analysis.components, _rows(analysis, kind)
     title = f"{KINDS[kind]} matrix {kind}"
     if rows is not None:
-        shown = without_rounding(rows)
-        body = [[name, *(scientific(entry) for entry in row)] for name, row in zip(names, shown, strict=True)]
+        body = [[name, *(scientific(entry) for entry in row)] for name, row in zip(names, rows, strict=True)]
         return table(title, ["", *names], body, "matrix") + paragraph(UNITS[kind])
     diagonal = analysis.compliance_diagonal if kind == "C" else analysis.stiffness_diagonal
     body = [[name, scientific(entry)] for name, entry in zip(names, diagonal, strict=True)]

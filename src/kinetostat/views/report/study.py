@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.result_data import message
-from kinetostat.studies.optimisation.variables import Variable
 from kinetostat.views.display import spoken
 from kinetostat.views.optimisation_figures import pictures
 from kinetostat.views.optimisation_tables import (
@@ -17,9 +16,10 @@ from kinetostat.views.optimisation_tables import (
     variable_table,
     worth_table,
 )
-from kinetostat.views.report.content import Block, Paragraph, Points, Section, Table
+from kinetostat.views.report.content import Block, Paragraph, Points, Section
 from kinetostat.views.report.pictures import drawn
 from kinetostat.views.report.typesetting import printed, typeset
+from kinetostat.views.study_tables import aims, bounds_table, not_searched
 from kinetostat.views.tables import number
 
 METHODS = {
@@ -59,31 +59,13 @@ def gains(found: Result) -> Iterator[str]:
 
 
 def _question(problem: Problem) -> tuple[Block, ...]:
-    aims = [f"{one.goal} {spoken(one.term.label)}{_unit(one.term.unit)}" for one in problem.objectives]
-    rules = [spoken(one.label) for one in problem.constraints]
-    points = [(f"Objective: {aim}", "") for aim in aims] + [(f"Constraint: {rule}", "") for rule in rules]
-    rows = tuple(
-        (one.name, typeset(one.shown(one.initial)), *_bounds(one), typeset(one.quantity.meaning))
-        for one in problem.space.searched
-    )
-    numeric = (False, True, True, True, False)
-    fixed = [one.name for one in problem.space.variables if one.fixed]
+    fixed = not_searched(problem)
     return (
         Paragraph(typeset(f"{problem.machine.name}, judged at {problem.poses.told}.")),
-        Points(tuple((typeset(text), aside) for text, aside in points)),
-        Table("Variables and their bounds.", ("variable", "initial", "from", "to", "meaning"), rows, numeric),
-        *([Paragraph(f"{', '.join(fixed)}.", "Not searched:")] if fixed else []),
+        Points(tuple((typeset(text), "") for text in aims(problem))),
+        printed(bounds_table(problem), "Variables and their bounds."),
+        *([Paragraph(f"{fixed}.", "Not searched:")] if fixed else []),
     )
-
-
-def _unit(unit: str) -> str:
-    return "" if unit == "1" else f" ({unit})"
-
-
-def _bounds(one: Variable) -> tuple[str, str]:
-    """Ends of a variable; of a catalogue its first and its last choice."""
-    low = 0.0 if one.choices is not None else one.low
-    return typeset(one.shown(low)), typeset(one.shown(one.high))
 
 
 def _search(found: Result) -> tuple[Block, ...]:

@@ -2,9 +2,7 @@
 
 import re
 
-from rich.errors import MarkupError
 from rich.table import Table as TerminalTable
-from rich.text import Text
 
 from kinetostat.views.report.content import Table
 
@@ -42,19 +40,11 @@ def printed(table: TerminalTable, caption: str, split: int = 0) -> Table:
         caption: in place of its title.
         split: see `content.Table`.
     """
-    columns = [[_plain(cell) for cell in column.cells] for column in table.columns]
+    columns = [[str(cell) for cell in column.cells] for column in table.columns]
     numeric = tuple(column.justify == "right" for column in table.columns)
     shown = [
         [typeset(cell) if i or other or _NUMBER.fullmatch(cell) else cell for cell in column]
         for i, (column, other) in enumerate(zip(columns, numeric, strict=True))
     ]
-    heads = tuple(_plain(column.header).replace("\n", " ") for column in table.columns)
+    heads = tuple(str(column.header).replace("\n", " ") for column in table.columns)
     return Table(caption, heads, tuple(zip(*shown, strict=True)), numeric, split)
-
-
-def _plain(cell: object) -> str:
-    """A cell without the terminal's colours."""
-    try:
-        return Text.from_markup(str(cell)).plain
-    except MarkupError:
-        return str(cell)
