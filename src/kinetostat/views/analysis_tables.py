@@ -35,7 +35,8 @@ def print_analysis(console: Console, analysis: Analysis, along: Sequence[Along] 
     if full and analysis.indices:
         shown.append(eigenscrew_table(analysis.indices.eigenscrews))
     if analysis.load:
-        shown += [load_table(names, analysis.load), actuator_table(analysis.load), reaction_table(analysis.load)]
+        shown += [load_table(names, analysis.load), actuator_table(analysis.load)]
+        shown.append(reaction_table(analysis.load, analysis.axes))
     for table in shown:
         if table.row_count:
             console.print(table)
@@ -158,11 +159,10 @@ def actuator_table(load: LoadCase) -> Table:
     return table
 
 
-def reaction_table(load: LoadCase) -> Table:
-    """The wrench in each passive joint."""
-    table = numeric_table(
-        "Load passed on towards the base, at the joint (N·m, N)", "joint", ["mx", "my", "mz", "fx", "fy", "fz"]
-    )
+def reaction_table(load: LoadCase, axes: str) -> Table:
+    """The wrench in each joint, in base or platform axes."""
+    title = f"Load passed on towards the base, at the joint (N·m, N; {axes} axes)"
+    table = numeric_table(title, "joint", ["mx", "my", "mz", "fx", "fy", "fz"])
     for reaction in load.reactions:
         size = max(abs(float(c)) for c in reaction.wrench.components()) or 1.0
         parts = [float(c) for c in reaction.wrench.components()]
