@@ -14,6 +14,31 @@ from kinetostat.studies.sensitivity import as_json, notes, sensitivity
 MACHINE = "zhang-gosselin-4dof"
 
 
+def upu_leg(name, turn):
+    """A leg U-P-U at `turn` degrees, its outer axes along one tangent and its inner ones parallel."""
+    s, c = math.sin(math.radians(turn)), math.cos(math.radians(turn))
+    size = math.hypot(0.15, 0.5)
+    along, across = [-0.15 * c / size, -0.15 * s / size, 0.5 / size], [-0.5 * c / size, -0.5 * s / size, -0.15 / size]
+    low, top = [0.3 * c, 0.3 * s, 0.0], [0.15 * c, 0.15 * s, 0.5]
+    return f"""
+[[legs]]
+name = "{name}"
+joints = [
+  {{ name = "low", type = "universal", joins = ["base", "tube"], point = {low}, first_axis = {[-s, c, 0.0]}, second_axis = {across} }},
+  {{ name = "ram", type = "prismatic", joins = ["tube", "rod"], point = {low}, axis = {along}, actuated = true, stiffness = "30 N/um" }},
+  {{ name = "top", type = "universal", joins = ["rod", "platform"], point = {top}, first_axis = {across}, second_axis = {[-s, c, 0.0]} }},
+]
+"""  # noqa: E501
+
+
+THREE_UPU = """schema = 1
+name = "3-UPU"
+family = "legs"
+platform.point = [0, 0, 0.5]
+pose = { x = 0.02, y = 0.01, z = 0.52 }
+""" + "".join(upu_leg(name, turn) for name, turn in (("a", 90), ("b", 210), ("c", 330)))
+
+
 def rows(machine=MACHINE, *settings):
     return {row["path"]: row for row in as_json(sensitivity(load(machine, settings)))["parameters"]}
 
@@ -60,6 +85,25 @@ def test_an_index_that_is_zero_has_derivatives_but_no_percentage():
         assert one.percents[0] is None
         assert one.derivatives[0] == 0.0
         assert one.percents[1] is not None
+
+
+def test_rounding_of_a_rigid_direction_is_no_index(tmp_path, capsys):
+    """Three U-P-U legs, rigid but for their rams, hold every rotation: C_rr is 0, and what is computed is rounding."""
+    path = tmp_path / "upu.toml"
+    path.write_text(THREE_UPU, "utf-8")
+    found = as_json(sensitivity(load(path)))
+    for name in ("rx", "ry", "rz"):
+        assert found["indices"][f"compliance_{name}"]["value"] == 0.0
+        assert {row["percent_per_percent"][f"compliance_{name}"] for row in found["parameters"]} == {None}
+    assert found["indices"]["compliance_x"]["value"] == analyze(load(path)).compliance_diagonal[3]
+    assert max(abs(row["percent_per_percent"]["compliance_z"]) for row in found["parameters"]) < 100.0
+    coupled = sensitivity(load("hexapod-cubic"), ["compliance_rx_y", "stiffness_x_y", "compliance_x"])
+    assert coupled.found[:2] == (0.0, 0.0)
+    assert coupled.found[2] > 0.0
+    assert main(["sensitivity", str(path), "--quantity", "compliance", "--quantity", "stiffness"]) == 0
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    assert all(row["path"] in printed for row in found["parameters"][:20])
 
 
 def test_what_the_legs_of_a_machine_forbid_has_no_derivative():

@@ -32,7 +32,7 @@ def influence_table(answer: Sensitivity, count: int) -> Table:
     title = f"{answer.machine.name}: {group}, {MEASURE}" if group else f"{answer.machine.name}: {MEASURE}"
     table = numeric_table(title, "parameter", ["value", *heads])
     for one in answer.influences[:count]:
-        value = f"{number(one.value)} {KINDS[one.kind].unit}".rstrip()
+        value = f"{number(one.value + 0.0)} {KINDS[one.kind].unit}".rstrip()
         table.add_row(one.path, value, *(_percent(percent) for percent in one.percents))
     return table
 

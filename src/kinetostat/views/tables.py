@@ -3,6 +3,7 @@
 import math
 import sys
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from rich import box
 from rich.console import Console
@@ -15,6 +16,11 @@ from kinetostat.spec.fields import Quantity
 from kinetostat.spec.study import StudyFile
 
 Number = float | None
+
+PIPED = 100
+"""Columns of text where there is no terminal."""
+UNBOUND = 10_000
+"""Columns that no table needs."""
 
 
 def print_machines(console: Console, bundled: Sequence[Machine], names: Sequence[str]) -> None:
@@ -69,9 +75,21 @@ def _readable(value: float, quantity: Quantity) -> str:
     return quantity.show(float(f"{value:.10g}"))
 
 
+class Piped(Console):
+    """The console where there is no terminal: as wide as six columns, and for tables of numbers as they need it."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print as `Console` does, but cut no number and no name."""
+        tables = [one for one in objects if isinstance(one, Table) and all(own.no_wrap for own in one.columns)]
+        unbound = self.options.update(width=UNBOUND)
+        self.width = max([PIPED, *(self.measure(table, options=unbound).maximum for table in tables)])
+        super().print(*objects, **options)
+        self.width = PIPED
+
+
 def terminal() -> Console:
-    """The console of this process: as wide as the terminal, wide enough for six columns where there is none."""
-    return Console() if sys.stdout.isatty() else Console(width=100)
+    """The console of this process: as wide as the terminal, or where there is none, as its tables need it."""
+    return Console() if sys.stdout.isatty() else Piped(width=PIPED)
 
 
 def number(value: Number, endless: str = "∞") -> str:
