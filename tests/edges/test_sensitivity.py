@@ -9,6 +9,8 @@ from kinetostat.cli import main
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.analysis import analyze
+from kinetostat.studies.guidelines.guidelines import guidelines
+from kinetostat.studies.guidelines.sentences import statements
 from kinetostat.studies.sensitivity import as_json, notes, sensitivity
 
 MACHINE = "zhang-gosselin-4dof"
@@ -58,11 +60,27 @@ def test_what_is_zero_is_compared_with_a_measure():
     length = analyze(load(MACHINE)).length
     assert found["pose.x"]["one_percent_of"] == {"measure": "length", "value": pytest.approx(length)}
     assert found["geometry.base_angle"]["one_percent_of"] == {"measure": "radian", "value": 1.0}
-    assert found["geometry.platform_angle"]["one_percent_of"] == {"measure": "itself", "value": math.pi / 3}
+    assert found["geometry.platform_angle"]["one_percent_of"] == {"measure": "radian", "value": 1.0}
+    assert found["geometry.base_radius"]["one_percent_of"] == {"measure": "itself", "value": 0.22}
     one = found["pose.x"]
     index = analyze(load(MACHINE, ["geometry.base_angle=0 deg"])).compliance_diagonal[5]
     expected = one["derivatives"]["compliance_z"] * one["one_percent_of"]["value"] / index
     assert one["percent_per_percent"]["compliance_z"] == pytest.approx(expected)
+
+
+def test_an_angle_counts_alike_however_it_is_written():
+    """One machine, one K: 252 deg and -108 deg."""
+    one, other = (load("hexapod-cubic", [f"geometry.base_angles.5={turn}"]) for turn in ("252 deg", "-108 deg"))
+    moves = [{m.path: m.percents for m in guidelines(machine).moves} for machine in (one, other)]
+    influences = [{i.path: i.percents for i in sensitivity(machine).influences} for machine in (one, other)]
+    for here, there in (moves, influences):
+        assert here.keys() == there.keys()
+        for path, percents in here.items():
+            assert there[path] == pytest.approx(percents, abs=1e-9)
+    said = [{s.text for s in statements(guidelines(m)) if "base_angles" in s.text} for m in (one, other)]
+    assert said[0] == said[1]
+    assert all(text.startswith("0.01 rad more geometry.base_angles") for text in said[0])
+    assert len(said[0]) > 0
 
 
 def test_the_greatest_comes_first():

@@ -34,6 +34,9 @@ ROUNDING = 1e-12
 MOST_NAMED = 12
 """Parameters without influence that are named."""
 
+PER = "percent per percent, of an angle per 0.01 rad"
+"""What the numbers are. An angle counts from an axis of choice, and with 360 deg more it is the same."""
+
 RIGID = "as rigid, so that no percent of it means anything"
 FREE = "as free, so that C is infinite or does not feel it"
 OPENS = "as the legs would no longer close if one of them changed alone"
@@ -52,8 +55,9 @@ class Influence:
         path: of the parameter.
         kind: a key of `units.KINDS`.
         value: SI.
-        percent_of: what one percent of a change is of, SI: the value itself, or where that is zero a `measure`.
-        measure: "itself", "length" (the machine's characteristic length), "radian" or "axis" (the direction's length).
+        percent_of: what one percent of a change is of, SI: the value itself, or a `measure`.
+        measure: "itself", "length" where a length is zero (the machine's characteristic length), "radian" of an angle
+            (whose percent is 0.01 rad), or "axis" (the direction's length).
         derivatives: of each index by it, SI; None where the index is infinite.
         percents: percent by which each index changes per percent of a change; None where the index is infinite, or 0 up
             to rounding.
@@ -190,7 +194,7 @@ def _one_percent_of(parameter: Parameter, held: dict[str, float], length: float)
         return math.hypot(*(held[f"{field}.{i}"] for i in range(3))), "axis"
     if kind == "length" and value <= ZERO * length:
         return length, "length"
-    if kind == "angle" and value <= ZERO:
+    if kind == "angle":
         return 1.0, "radian"
     return value, "itself"
 
@@ -229,7 +233,7 @@ def notes(answer: Sensitivity) -> Iterator[str]:
     used = {one.measure for one in answer.influences}
     meanings = {
         "length": f"where a length is 0, a percent is one of the characteristic length, {answer.length:.4g} m",
-        "radian": "where the angle is 0, a percent is 0.01 rad (0.57 deg)",
+        "radian": "of an angle, a percent is 0.01 rad (0.57 deg), whatever its value",
         "axis": "of a direction, a percent is one of its length",
     }
     said = [meaning for measure, meaning in meanings.items() if measure in used]

@@ -44,7 +44,10 @@ def limit_figure(found: Guidelines) -> Figure | None:
 def design_figure(found: Guidelines) -> Figure:
     """Parameters against directions: blue where one percent more makes a direction stiffer, red where softer."""
     rows = {move.path: move.percents for move in found.moves}
-    title, label = f"{found.machine.name}: what the design does", "percent stiffer per percent more"
+    title, label = (
+        f"{found.machine.name}: what the design does",
+        "percent stiffer per percent more, of an angle per 0.01 rad",
+    )
     return coloured_table(title, rows, found.components, "RdBu", label)
 
 

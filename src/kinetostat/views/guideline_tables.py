@@ -136,7 +136,8 @@ def move_table(found: Guidelines, count: int) -> Table:
     """What each of the first parameters does to each direction."""
     grid = bool(found.poses[0])
     heads = ["parameter", *found.components, *(["poses"] if grid else [])]
-    table = numeric_table("What one percent more does: percent stiffer ▲ or softer ▼", heads[0], heads[1:])
+    title = "What one percent more does, of an angle 0.01 rad more: percent stiffer ▲ or softer ▼"
+    table = numeric_table(title, heads[0], heads[1:])
     for move in found.moves[:count]:
         table.add_row(move.path, *(_arrow(p) for p in move.percents), *([_alike(move)] if grid else []))
     return table

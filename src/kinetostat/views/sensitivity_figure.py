@@ -10,7 +10,7 @@ from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.studies.sensitivity import Sensitivity
+from kinetostat.studies.sensitivity import PER, Sensitivity
 from kinetostat.views.figures import STYLE, fix_layout
 
 MOST_ROWS = 30
@@ -27,7 +27,7 @@ def sensitivity_figure(answer: Sensitivity) -> Figure:
     """A table of coloured cells: red where the index grows with the parameter, blue where it falls."""
     rows = {one.path: one.percents for one in answer.influences}
     heads = [QUANTITIES[name].symbol for name in answer.quantities]
-    return coloured_table(answer.machine.name, rows, heads, "RdBu_r", "percent per percent")
+    return coloured_table(answer.machine.name, rows, heads, "RdBu_r", PER)
 
 
 def coloured_table(

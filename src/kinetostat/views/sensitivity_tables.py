@@ -3,14 +3,13 @@
 from rich.console import Console
 from rich.table import Table
 
-from kinetostat.studies.sensitivity import Sensitivity, notes
+from kinetostat.studies.sensitivity import PER, Sensitivity, notes
 from kinetostat.units import KINDS
 from kinetostat.views.display import family_of_names, spoken
 from kinetostat.views.tables import number, numeric_table
 
 MOST_ROWS = 40
 """Parameters that are printed; `--json` has all."""
-MEASURE = "percent per percent"
 LEAST = 0.0005
 """Percent per percent below which a 0 is printed."""
 
@@ -29,7 +28,7 @@ def influence_table(answer: Sensitivity, count: int) -> Table:
     """The first parameters by rank, with their values and what they do to each index."""
     group = family_of_names(answer.quantities)
     heads = [spoken(name.removeprefix(f"{group}_")) for name in answer.quantities]
-    title = f"{answer.machine.name}: {group}, {MEASURE}" if group else f"{answer.machine.name}: {MEASURE}"
+    title = f"{answer.machine.name}: {group}, {PER}" if group else f"{answer.machine.name}: {PER}"
     table = numeric_table(title, "parameter", ["value", *heads])
     for one in answer.influences[:count]:
         value = f"{number(one.value + 0.0)} {KINDS[one.kind].unit}".rstrip()

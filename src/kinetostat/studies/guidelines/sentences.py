@@ -155,7 +155,8 @@ def _design(found: Guidelines) -> Iterator[Statement]:
             if pairs
         ]
         aside = f"; nothing in {', '.join(none)}" if none else ""
-        yield Statement("design", f"More {move.path}: {'; '.join(said)}{aside}.", _same_signs(found, move))
+        more = f"0.01 rad more {move.path}" if move.turning else f"More {move.path}"
+        yield Statement("design", f"{more}: {'; '.join(said)}{aside}.", _same_signs(found, move))
 
 
 def _same_signs(found: Guidelines, move: Move) -> float | None:

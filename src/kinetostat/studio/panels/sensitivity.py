@@ -13,7 +13,7 @@ MOST = 24
 
 
 class SensitivityPanel:
-    """Bars in percent per percent, the greatest first."""
+    """Bars in percent per percent, of an angle per 0.01 rad, the greatest first."""
 
     name = "Sensitivity"
 
@@ -54,6 +54,6 @@ def ranking_text(found: Sensitivity) -> str:
     rows = [(path, percent / largest, f"{percent:+.3f}") for path, percent in known[:MOST]]
     if not rows:
         return paragraph(found.message or "No parameter has an influence here.")
-    note = "Percent by which the index changes per percent of the parameter."
+    note = "Percent by which the index changes per percent of the parameter, of an angle per 0.01 rad."
     more = f" {len(known) - MOST} more have less." if len(known) > MOST else ""
     return bars("sensitivities", rows) + paragraph(note + more)
