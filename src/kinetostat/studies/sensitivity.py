@@ -19,6 +19,7 @@ from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, parameters, values
 from kinetostat.studies.analysis import analyze
+from kinetostat.studies.grid.absent import refuse_absent
 from kinetostat.studies.grid.grid import resolve_quantities
 from kinetostat.units import KINDS
 
@@ -112,9 +113,10 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
         quantities: names of quantities or groups.
 
     Raises:
-        InputError: an unknown quantity.
+        InputError: an unknown quantity, or one that the machine cannot have.
     """
     names = tuple(resolve_quantities(quantities, machine.family.component_names))
+    refuse_absent(machine, names)
     asked = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(p, names)]
     held = values(machine)
     by = [p.path for p in asked if not math.isinf(held[p.path])]
