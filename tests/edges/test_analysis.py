@@ -83,7 +83,7 @@ def test_json_has_its_shape_and_no_number_that_json_lacks(settings, status, word
 @pytest.mark.parametrize("state", [state for state, row in STATES.items() if row[1] != "ok"])
 def test_a_pose_without_answer_has_no_numbers(state):
     data = as_json(at(*STATES[state][0]))
-    answers = ("stiffness", "compliance", "stiffness_diagonal", "compliance_diagonal", "rank", "condition")
+    answers = ("stiffness", "compliance", "stiffness_diagonal", "compliance_diagonal", "rank", "wrench_condition")
     assert [data[key] for key in answers] == [None] * 6
     assert data["attribution"] == []
     assert data["principal_compliances"] is None

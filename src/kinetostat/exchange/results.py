@@ -119,9 +119,13 @@ def _indices(analysis: Analysis) -> dict[str, Variable]:
     """Scalars of the pose that have a number, and the principal compliances."""
     indices = analysis.indices
     scalars = {
-        "condition": (analysis.condition, "ratio of the extreme singular values of W", "1"),
+        "wrench_condition": (analysis.wrench_condition, "condition of W, of the leg wrenches", "1"),
         "jacobian_condition": (analysis.jacobian_condition, "condition of the actuators' Jacobian", "1"),
-        "stiffness_condition": (indices.condition if indices else None, "condition of K", "1"),
+        "stiffness_condition": (
+            indices.condition if indices else None,
+            "condition of K, by its extreme eigenvalues",
+            "1",
+        ),
         "characteristic_length": (analysis.length, "by which rotations are compared with translations", "m"),
         "moving_mass": (analysis.mass, "of what moves, as far as it is known", "kg"),
     }

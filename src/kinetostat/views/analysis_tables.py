@@ -193,7 +193,7 @@ def remarks(analysis: Analysis) -> list[str]:
             lines.append(f"Centre of stiffness: {_millimetres(centre)} mm from the point above.")
         lines.append(
             f"Condition of K: {number(analysis.indices.condition, 'infinite')}, of the leg wrenches: "
-            f"{number(analysis.condition)}, of the actuators' Jacobian: "
+            f"{number(analysis.wrench_condition)}, of the actuators' Jacobian: "
             f"{number(analysis.jacobian_condition, 'infinite')}; "
             f"rotations compared through {number(analysis.length)} m."
         )
