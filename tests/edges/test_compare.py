@@ -47,7 +47,20 @@ def test_machines_with_other_freedoms_have_gaps():
     assert by_name["C_rz"]["values"][1] == pytest.approx(analyze(load("planar-3rpr")).compliance_diagonal[0])
     assert by_name["moving mass"]["values"][:2] == [None, None]
     assert [one["order"][0] for one in found["designs"]] == ["rx", "rz", "rx"]
-    assert set(found["differences"]) <= {"pose.x", "pose.y"}
+    differences = found["differences"]
+    assert {"pose.x", "pose.y"} <= set(differences)
+    assert differences["stiffness.actuator"][2] is None, "the tripteron's are in its legs"
+    assert len(differences["stiffness.actuator"][0]) == 6
+    assert not any(path.startswith("legs.") for path in differences), "what only one of them has"
+
+
+def test_a_machine_of_another_kind_hides_no_difference_of_the_others(capsys):
+    """B is A with another radius; C, written leg by leg, has no radius."""
+    assert main(["compare", "hexapod", "hexapod:geometry.base_radius=13 cm", "tripteron"]) == 0
+    said = capsys.readouterr().out
+    row = next(line for line in said.splitlines() if line.startswith(" geometry.base_radius"))
+    assert row.split()[-5:] == ["0.115", "m", "0.13", "m", "–"]
+    assert "Fields that only one of them has are left out." in said
 
 
 def test_the_softest_direction_and_who_is_to_blame():
