@@ -11,6 +11,7 @@ from kinetostat.studies.analysis import analyze
 from kinetostat.studies.comparison.designs import compare, read_design
 from kinetostat.studies.comparison.designs_data import as_json
 from kinetostat.studies.grid.grid import evaluate_grid
+from kinetostat.views.design_figure import comparison_figure
 
 PAPER = "zhang-gosselin-4dof"
 BEST = (
@@ -144,3 +145,16 @@ def test_settings_are_for_all(capsys):
 def test_what_it_refuses(arguments, said, capsys):
     assert main(["compare", *arguments]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_bars_start_at_zero_and_what_is_not_known_is_said():
+    """A logarithmic axis has no 0 for bars to stand on: it has marks."""
+    figure = comparison_figure(compare(["hexapod", "hexapod:tool.mass=12 kg", "tripteron"]))
+    panels = {panel.get_ylabel().split(" (")[0]: panel for panel in figure.axes}
+    assert panels["compliance along axes"].get_yscale() == "log"
+    assert not panels["compliance along axes"].patches
+    assert len(panels["compliance along axes"].lines) > 0
+    for name in ("compliance about axes", "regularity", "moving mass"):
+        assert panels[name].get_ylim()[0] == 0.0
+    assert [text.get_text() for text in panels["moving mass"].texts] == ["not known"]
+    assert figure.legends[0].get_title().get_text() == "compliance in base axes at the platform point P"

@@ -20,6 +20,7 @@ from kinetostat.machine.parameters import Parameter, find
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.ranges import Range, parse_range
 from kinetostat.studies.grid.absent import refuse_absent
+from kinetostat.studies.setting import frame_of, pose_of
 from kinetostat.units import KINDS
 
 IN_MEMORY = 5_000_000
@@ -74,7 +75,7 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
     names = resolve_quantities(quantities, machine.family.component_names)
     refuse_absent(machine, names, chosen)
     origin = {"machine": machine.name, "machine_file": as_toml(machine), "kinetostat": version("kinetostat")}
-    attributes = {**origin, "frame": "base axes at the platform point P"}
+    attributes = {**origin, "frame": frame_of(machine), "pose": pose_of(machine, taken)}
     labels = xr.Dataset({}, _coordinates(grid, pairs), attributes)
     return GridQuestion(machine, grid, tuple(parameter.path for parameter in chosen), tuple(names), labels)
 
