@@ -7,7 +7,7 @@ import pytest
 
 from kinetostat.cli import main
 from kinetostat.machine.loading import load
-from kinetostat.machine.parameters import values, with_values
+from kinetostat.machine.parameters import values, with_leg, with_values
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.guidelines.guidelines import guidelines
 from kinetostat.studies.guidelines.sentences import statements
@@ -168,3 +168,15 @@ def test_out_of_reach_there_is_no_answer(capsys):
 def test_an_unknown_quantity_is_refused(capsys):
     assert main(["sensitivity", MACHINE, "--quantity", "weight"]) == 2
     assert '"weight" is not a quantity' in capsys.readouterr().err
+
+
+def test_people_are_told_which_leg_an_entry_is_of(capsys):
+    """Entries count from 0, as --set takes them; JSON has the bare path."""
+    assert main(["sensitivity", "hexapod"]) == 0
+    printed = capsys.readouterr().out
+    assert "geometry.base_angles.5 (leg 6)" in printed
+    assert "stiffness.actuator.0 (leg 1)" in printed
+    assert "tool.offset.2 " in printed
+    assert with_leg(load("orthoglide"), "stiffness.actuator.1") == "stiffness.actuator.1 (leg y)"
+    assert with_leg(load(MACHINE), "stiffness.passive_links.0") == "stiffness.passive_links.0"
+    assert "geometry.base_angles.5" in rows("hexapod")

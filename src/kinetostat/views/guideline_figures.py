@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from kinetostat.kinetostatics.elements import Element
+from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.guidelines.roles import EXCESS, stiffening
 from kinetostat.studies.guidelines.sentences import limit_of
@@ -44,7 +45,7 @@ def limit_figure(found: Guidelines) -> Figure | None:
 
 def design_figure(found: Guidelines) -> Figure:
     """Parameters against directions: blue where one percent more makes a direction stiffer, red where softer."""
-    rows = {move.path: move.percents for move in found.moves}
+    rows = {with_leg(found.machine, move.path): move.percents for move in found.moves}
     titles = f"{found.machine.name}: what the design does", setting_of(found.machine)
     label = "percent stiffer per percent more, of an angle per 0.01 rad"
     return coloured_table(titles, rows, found.components, "RdBu", label)

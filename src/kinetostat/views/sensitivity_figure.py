@@ -10,6 +10,7 @@ from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.sensitivity import PER, Sensitivity
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import STYLE, fix_layout, note_setting
@@ -26,7 +27,7 @@ DARK = 0.6
 
 def sensitivity_figure(answer: Sensitivity) -> Figure:
     """A table of coloured cells: red where the index grows with the parameter, blue where it falls."""
-    rows = {one.path: one.percents for one in answer.influences}
+    rows = {with_leg(answer.machine, one.path): one.percents for one in answer.influences}
     heads = [QUANTITIES[name].symbol for name in answer.quantities]
     return coloured_table((answer.machine.name, setting_of(answer.machine)), rows, heads, "RdBu_r", PER)
 

@@ -3,6 +3,7 @@
 from rich.console import Console
 from rich.table import Table
 
+from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.sensitivity import PER, Sensitivity, notes
 from kinetostat.units import KINDS
 from kinetostat.views.display import family_of_names, spoken
@@ -32,7 +33,7 @@ def influence_table(answer: Sensitivity, count: int) -> Table:
     table = numeric_table(title, "parameter", ["value", *heads])
     for one in answer.influences[:count]:
         value = f"{number(one.value + 0.0)} {KINDS[one.kind].unit}".rstrip()
-        table.add_row(one.path, value, *(_percent(percent) for percent in one.percents))
+        table.add_row(with_leg(answer.machine, one.path), value, *(_percent(percent) for percent in one.percents))
     return table
 
 

@@ -2,6 +2,7 @@
 
 from nicegui import ui
 
+from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.sensitivity import Sensitivity
 from kinetostat.studio.answers import RankingWish, Report, map_quantities, ranking
 from kinetostat.studio.lanes import Lane
@@ -48,7 +49,7 @@ class SensitivityPanel:
 
 def ranking_text(found: Sensitivity) -> str:
     """The parameters with an influence on the first index, as bars."""
-    percents = [(one.path, one.percents[0]) for one in found.influences if one.percents]
+    percents = [(with_leg(found.machine, one.path), one.percents[0]) for one in found.influences if one.percents]
     known = [(path, percent) for path, percent in percents if percent is not None]
     largest = max((abs(percent) for _, percent in known), default=1.0)
     rows = [(path, percent / largest, f"{percent:+.3f}") for path, percent in known[:MOST]]
