@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.cli import main
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import with_values
 from kinetostat.studies.analysis import analyze
@@ -186,3 +187,14 @@ def test_any_machine_has_an_answer_in_json(case, data):
     for path in data.draw(st.lists(st.sampled_from(sorted(case.ranges)), max_size=3)):
         machine = with_values(machine, {path: data.draw(st.floats(0.01, 2.0), label=path)})
     json.dumps(as_json(analyze(machine)), allow_nan=False)
+
+
+def test_directions_of_equal_stiffness_are_told_together(capsys):
+    """The hexapod is alike in x and y, the cubic one in all directions: no single direction is the softest."""
+    assert main(["analyze", "hexapod"]) == 0
+    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith(" force, rotations held"))
+    assert "any ⊥ +0.00 +0.00 +1.00" in row.replace("-1.00", "+1.00")
+    assert row.count("1.00") == 2, "the stiffest is along z"
+    assert main(["analyze", "hexapod-cubic"]) == 0
+    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith(" force, rotations held"))
+    assert row.split()[-2:] == ["any", "any"]

@@ -16,6 +16,8 @@ from kinetostat.views.tables import number, numeric_table
 
 UNITS_OF_K = "N·m/rad, N/rad, N/m"
 UNITS_OF_C = "rad/(N·m), rad/N, m/N"
+ALIKE = 1e-9
+"""Relative difference of principal stiffnesses below which they are one, and their directions a matter of rounding."""
 MOST_NAMED = 4
 """Parts of unknown mass that are named."""
 
@@ -116,8 +118,18 @@ def along_table(along: Sequence[Along]) -> Table:
 def _ellipsoid(found: PrincipalStiffness) -> list[str]:
     """Least and largest and their directions; once where there is but one."""
     values = [number(value, "rigid") for value in (found.stiffnesses[0], found.stiffnesses[-1])]
-    directions = [_direction(found.directions[0]), _direction(found.directions[-1])]
+    directions = [_directions(found, found.stiffnesses[0]), _directions(found, found.stiffnesses[-1])]
     return [*values, *directions] if len(found.stiffnesses) > 1 else [values[0], "", directions[0], ""]
+
+
+def _directions(found: PrincipalStiffness, stiffness: float) -> str:
+    """The direction of a principal stiffness; where several are alike, all that have it."""
+    pairs = list(zip(found.stiffnesses, found.directions, strict=True))
+    others = [way for k, way in pairs if not math.isclose(k, stiffness, rel_tol=ALIKE)]
+    alike = len(pairs) - len(others)
+    if alike == 1:
+        return next(_direction(way) for k, way in pairs if math.isclose(k, stiffness, rel_tol=ALIKE))
+    return f"any ⊥ {_direction(others[0])}" if others else "any"
 
 
 def _direction(vector: Sequence[float]) -> str:
