@@ -117,4 +117,4 @@ def test_an_unknown_format_is_refused(tmp_path):
     with pytest.raises(InputError, match='"mjfc"; did you mean "mjcf"'):
         choose("mjfc", None)
     with pytest.raises(InputError, match=r"ends as one of: mjcf \(\.xml\)"):
-        choose(None, tmp_path / "machine.step")
+        choose(None, tmp_path / "machine.sldprt")
