@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.cli import main
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.errors import InputError
@@ -90,7 +91,7 @@ def test_json_has_its_shape_and_no_number_that_json_lacks(settings, status, word
 @pytest.mark.parametrize("state", [state for state, row in STATES.items() if row[1] != "ok"])
 def test_a_pose_without_answer_has_no_numbers(state):
     data = as_json(at(*STATES[state][0]))
-    answers = ("stiffness", "compliance", "stiffness_diagonal", "compliance_diagonal", "rank", "condition")
+    answers = ("stiffness", "compliance", "stiffness_diagonal", "compliance_diagonal", "rank", "wrench_condition")
     assert [data[key] for key in answers] == [None] * 6
     assert data["attribution"] == []
     assert data["principal_compliances"] is None
@@ -193,3 +194,14 @@ def test_any_machine_has_an_answer_in_json(case, data):
     for path in data.draw(st.lists(st.sampled_from(sorted(case.ranges)), max_size=3)):
         machine = with_values(machine, {path: data.draw(st.floats(0.01, 2.0), label=path)})
     json.dumps(as_json(analyze(machine)), allow_nan=False)
+
+
+def test_directions_of_equal_stiffness_are_told_together(capsys):
+    """The hexapod is alike in x and y, the cubic one in all directions: no single direction is the softest."""
+    assert main(["analyze", "hexapod"]) == 0
+    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith(" force, rotations held"))
+    assert "any ⊥ +0.00 +0.00 +1.00" in row.replace("-1.00", "+1.00")
+    assert row.count("1.00") == 2, "the stiffest is along z"
+    assert main(["analyze", "hexapod-cubic"]) == 0
+    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith(" force, rotations held"))
+    assert row.split()[-2:] == ["any", "any"]

@@ -11,6 +11,7 @@ from kinetostat.studies.analysis import analyze
 from kinetostat.studies.comparison.designs import compare, read_design
 from kinetostat.studies.comparison.designs_data import as_json
 from kinetostat.studies.grid.grid import evaluate_grid
+from kinetostat.views.design_figure import comparison_figure
 
 PAPER = "zhang-gosselin-4dof"
 BEST = (
@@ -47,7 +48,20 @@ def test_machines_with_other_freedoms_have_gaps():
     assert by_name["C_rz"]["values"][1] == pytest.approx(analyze(load("planar-3rpr")).compliance_diagonal[0])
     assert by_name["moving mass"]["values"][:2] == [None, None]
     assert [one["order"][0] for one in found["designs"]] == ["rx", "rz", "rx"]
-    assert set(found["differences"]) <= {"pose.x", "pose.y"}
+    differences = found["differences"]
+    assert {"pose.x", "pose.y"} <= set(differences)
+    assert differences["stiffness.actuator"][2] is None, "the tripteron's are in its legs"
+    assert len(differences["stiffness.actuator"][0]) == 6
+    assert not any(path.startswith("legs.") for path in differences), "what only one of them has"
+
+
+def test_a_machine_of_another_kind_hides_no_difference_of_the_others(capsys):
+    """B is A with another radius; C, written leg by leg, has no radius."""
+    assert main(["compare", "hexapod", "hexapod:geometry.base_radius=13 cm", "tripteron"]) == 0
+    said = capsys.readouterr().out
+    row = next(line for line in said.splitlines() if line.startswith(" geometry.base_radius"))
+    assert row.split()[-5:] == ["0.115", "m", "0.13", "m", "–"]
+    assert "Fields that only one of them has are left out." in said
 
 
 def test_the_softest_direction_and_who_is_to_blame():
@@ -131,3 +145,16 @@ def test_settings_are_for_all(capsys):
 def test_what_it_refuses(arguments, said, capsys):
     assert main(["compare", *arguments]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_bars_start_at_zero_and_what_is_not_known_is_said():
+    """A logarithmic axis has no 0 for bars to stand on: it has marks."""
+    figure = comparison_figure(compare(["hexapod", "hexapod:tool.mass=12 kg", "tripteron"]))
+    panels = {panel.get_ylabel().split(" (")[0]: panel for panel in figure.axes}
+    assert panels["compliance along axes"].get_yscale() == "log"
+    assert not panels["compliance along axes"].patches
+    assert len(panels["compliance along axes"].lines) > 0
+    for name in ("compliance about axes", "regularity", "moving mass"):
+        assert panels[name].get_ylim()[0] == 0.0
+    assert [text.get_text() for text in panels["moving mass"].texts] == ["not known"]
+    assert figure.legends[0].get_title().get_text() == "compliance in base axes at the platform point P"

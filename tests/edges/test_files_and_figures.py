@@ -149,3 +149,13 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="cannot be written"):
         write_text(tmp_path / "file" / "result.txt", "text")
+
+
+def test_a_figure_says_where_its_numbers_hold():
+    """Reference point, axes, and the pose as far as it does not vary."""
+    grid = evaluate_grid(
+        load("hexapod", ["tool.offset=[0, 0, 0.08]", "pose.z=140 mm"]), ["x=-1 cm:1 cm:3"], ["compliance"]
+    )
+    said = curves(grid, ["compliance_x"], "one").get_supxlabel()
+    assert said.startswith("base axes at the tool point T; y 0 mm, z 140 mm, roll 0 deg")
+    assert "x 0 mm" not in said

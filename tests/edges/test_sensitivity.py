@@ -7,11 +7,38 @@ import pytest
 
 from kinetostat.cli import main
 from kinetostat.machine.loading import load
-from kinetostat.machine.parameters import values, with_values
+from kinetostat.machine.parameters import values, with_leg, with_values
 from kinetostat.studies.analysis import analyze
+from kinetostat.studies.guidelines.guidelines import guidelines
+from kinetostat.studies.guidelines.sentences import statements
 from kinetostat.studies.sensitivity import as_json, notes, sensitivity
 
 MACHINE = "zhang-gosselin-4dof"
+
+
+def upu_leg(name, turn):
+    """A leg U-P-U at `turn` degrees, its outer axes along one tangent and its inner ones parallel."""
+    s, c = math.sin(math.radians(turn)), math.cos(math.radians(turn))
+    size = math.hypot(0.15, 0.5)
+    along, across = [-0.15 * c / size, -0.15 * s / size, 0.5 / size], [-0.5 * c / size, -0.5 * s / size, -0.15 / size]
+    low, top = [0.3 * c, 0.3 * s, 0.0], [0.15 * c, 0.15 * s, 0.5]
+    return f"""
+[[legs]]
+name = "{name}"
+joints = [
+  {{ name = "low", type = "universal", joins = ["base", "tube"], point = {low}, first_axis = {[-s, c, 0.0]}, second_axis = {across} }},
+  {{ name = "ram", type = "prismatic", joins = ["tube", "rod"], point = {low}, axis = {along}, actuated = true, stiffness = "30 N/um" }},
+  {{ name = "top", type = "universal", joins = ["rod", "platform"], point = {top}, first_axis = {across}, second_axis = {[-s, c, 0.0]} }},
+]
+"""  # noqa: E501
+
+
+THREE_UPU = """schema = 1
+name = "3-UPU"
+family = "legs"
+platform.point = [0, 0, 0.5]
+pose = { x = 0.02, y = 0.01, z = 0.52 }
+""" + "".join(upu_leg(name, turn) for name, turn in (("a", 90), ("b", 210), ("c", 330)))
 
 
 def rows(machine=MACHINE, *settings):
@@ -33,11 +60,27 @@ def test_what_is_zero_is_compared_with_a_measure():
     length = analyze(load(MACHINE)).length
     assert found["pose.x"]["one_percent_of"] == {"measure": "length", "value": pytest.approx(length)}
     assert found["geometry.base_angle"]["one_percent_of"] == {"measure": "radian", "value": 1.0}
-    assert found["geometry.platform_angle"]["one_percent_of"] == {"measure": "itself", "value": math.pi / 3}
+    assert found["geometry.platform_angle"]["one_percent_of"] == {"measure": "radian", "value": 1.0}
+    assert found["geometry.base_radius"]["one_percent_of"] == {"measure": "itself", "value": 0.22}
     one = found["pose.x"]
     index = analyze(load(MACHINE, ["geometry.base_angle=0 deg"])).compliance_diagonal[5]
     expected = one["derivatives"]["compliance_z"] * one["one_percent_of"]["value"] / index
     assert one["percent_per_percent"]["compliance_z"] == pytest.approx(expected)
+
+
+def test_an_angle_counts_alike_however_it_is_written():
+    """One machine, one K: 252 deg and -108 deg."""
+    one, other = (load("hexapod-cubic", [f"geometry.base_angles.5={turn}"]) for turn in ("252 deg", "-108 deg"))
+    moves = [{m.path: m.percents for m in guidelines(machine).moves} for machine in (one, other)]
+    influences = [{i.path: i.percents for i in sensitivity(machine).influences} for machine in (one, other)]
+    for here, there in (moves, influences):
+        assert here.keys() == there.keys()
+        for path, percents in here.items():
+            assert there[path] == pytest.approx(percents, abs=1e-9)
+    said = [{s.text for s in statements(guidelines(m)) if "base_angles" in s.text} for m in (one, other)]
+    assert said[0] == said[1]
+    assert all(text.startswith("0.01 rad more geometry.base_angles") for text in said[0])
+    assert len(said[0]) > 0
 
 
 def test_the_greatest_comes_first():
@@ -60,6 +103,25 @@ def test_an_index_that_is_zero_has_derivatives_but_no_percentage():
         assert one.percents[0] is None
         assert one.derivatives[0] == 0.0
         assert one.percents[1] is not None
+
+
+def test_rounding_of_a_rigid_direction_is_no_index(tmp_path, capsys):
+    """Three U-P-U legs, rigid but for their rams, hold every rotation: C_rr is 0, and what is computed is rounding."""
+    path = tmp_path / "upu.toml"
+    path.write_text(THREE_UPU, "utf-8")
+    found = as_json(sensitivity(load(path)))
+    for name in ("rx", "ry", "rz"):
+        assert found["indices"][f"compliance_{name}"]["value"] == 0.0
+        assert {row["percent_per_percent"][f"compliance_{name}"] for row in found["parameters"]} == {None}
+    assert found["indices"]["compliance_x"]["value"] == analyze(load(path)).compliance_diagonal[3]
+    assert max(abs(row["percent_per_percent"]["compliance_z"]) for row in found["parameters"]) < 100.0
+    coupled = sensitivity(load("hexapod-cubic"), ["compliance_rx_y", "stiffness_x_y", "compliance_x"])
+    assert coupled.found[:2] == (0.0, 0.0)
+    assert coupled.found[2] > 0.0
+    assert main(["sensitivity", str(path), "--quantity", "compliance", "--quantity", "stiffness"]) == 0
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    assert all(row["path"] in printed for row in found["parameters"][:20])
 
 
 def test_what_the_legs_of_a_machine_forbid_has_no_derivative():
@@ -113,3 +175,15 @@ def test_out_of_reach_there_is_no_answer(capsys):
 def test_an_unknown_quantity_is_refused(capsys):
     assert main(["sensitivity", MACHINE, "--quantity", "weight"]) == 2
     assert '"weight" is not a quantity' in capsys.readouterr().err
+
+
+def test_people_are_told_which_leg_an_entry_is_of(capsys):
+    """Entries count from 0, as --set takes them; JSON has the bare path."""
+    assert main(["sensitivity", "hexapod"]) == 0
+    printed = capsys.readouterr().out
+    assert "geometry.base_angles.5 (leg 6)" in printed
+    assert "stiffness.actuator.0 (leg 1)" in printed
+    assert "tool.offset.2 " in printed
+    assert with_leg(load("orthoglide"), "stiffness.actuator.1") == "stiffness.actuator.1 (leg y)"
+    assert with_leg(load(MACHINE), "stiffness.passive_links.0") == "stiffness.passive_links.0"
+    assert "geometry.base_angles.5" in rows("hexapod")

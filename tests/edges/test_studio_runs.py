@@ -227,7 +227,7 @@ def test_a_sent_study_never_reads_files_of_the_server(tmp_path):
     text += '[[variables]]\npath = "base_radius"\nfrom = "20 cm"\nto = "26 cm"\n[[objectives]]\nquantity = "mass"\n'
     with pytest.raises(InputError, match="weighs"):
         sent_draft(text.encode(), "x.toml", load(MACHINE))
-    found = sent_draft(text.replace("mass", "condition").encode(), "x.toml", load(MACHINE))
+    found = sent_draft(text.replace("mass", "frobenius_condition").encode(), "x.toml", load(MACHINE))
     assert found.machine.sections["pose"].z == pytest.approx(0.7)
 
 

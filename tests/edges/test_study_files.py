@@ -72,7 +72,7 @@ MISTAKES = {
     "objectives.0.quantity=actuator_moment": "lacks an actuated revolute",
     'constraints=[{quantity="stiffness_z"}]': "either at_least or at_most",
     'constraints=[{quantity="stiffness_z", at_least="5 N*m"}]': "constraints.0.at_least",
-    'constraints=[{quantity="condition", at_most="5 mm"}]': "plain number",
+    'constraints=[{quantity="frobenius_condition", at_most="5 mm"}]': "plain number",
     "poses.over=[1]": "poses.over.0",
     'poses.over=["x=0:1"]': "is not a range",
     'poses.over=["platform_radius=10 cm:14 cm:3"]': "is a variable and varies over the poses too",

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from geometry import vectors
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.kinetostatics.loading import deflection, joint_reactions, leg_wrenches, spring_loads
+from kinetostat.machine.machine import springs
 from machines import every_machine, few, regular
 from numeric import array, motions, respring, screw, vector
 
@@ -128,15 +129,21 @@ def test_a_free_actuator_carries_nothing(case, data, load):
 @few
 @given(data=st.data(), load=loads)
 def test_joints_pass_on_what_they_can(case, data, load):
-    """No moment about the axis of a revolute, no force along a slide; from joint to joint a link only adds arms."""
+    """No moment about a free axis, no force along a free slide, its load in a held one; links only add arms."""
     response = data.draw(regular(case))
     load = that_exists(response, load)
     reactions = joint_reactions(response, load)
+    carried = dict(zip((s.name for s in springs(response.configuration)), spring_loads(response, load), strict=True))
     length, size = float(response.configuration.length), np.linalg.norm(in_newtons(response, load))
     largest = max([np.linalg.norm(in_newtons(response, reaction.wrench)) for reaction in reactions], default=0.0) + size
     for leg, wrench in zip(response.configuration.legs, leg_wrenches(response, load), strict=True):
         own = {reaction.joint: reaction for reaction in reactions if reaction.leg == leg.name}
-        assert set(own) == {joint.name for joint in leg.passive}
+        held = {s.joint.name or s.name: s for s in leg.springs if s.actuated or s.hinge}
+        assert set(own) == {joint.name for joint in leg.passive} | set(held)
+        for name, spring in held.items():
+            about = own[name].wrench.moved(response.reference - own[name].point)
+            carries = about.work(spring.joint.twist(response.reference))
+            assert carries == pytest.approx(carried[spring.name], abs=BALANCED * largest * max(length, 1.0))
         for joint in leg.passive:
             reaction = own[joint.name]
             moment, force = vector(reaction.wrench.rotational), vector(reaction.wrench.translational)

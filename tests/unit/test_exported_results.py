@@ -1,6 +1,7 @@
 """Results for other programs: CSV, NetCDF and MATLAB say what the analysis says, with units."""
 
 import csv
+from importlib.metadata import version
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import xarray as xr
 from scipy.io import loadmat
 
 from kinetostat.exchange.formats import KNOWN, choose
-from kinetostat.machine.loading import load
+from kinetostat.machine.loading import as_toml, load
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 
@@ -64,6 +65,21 @@ def test_csv_has_a_number_a_line_with_its_unit(name, tmp_path):
     assert told["spring_stiffness", drive.name, ""] == (repr(drive.stiffness), "N/m")
 
 
+def test_results_say_of_what_and_where_they_hold(tmp_path):
+    found = analyze(load("hexapod", ["tool.offset=[0, 0, 0.08]"]), axes="platform")
+    (table,) = choose("csv", tmp_path / "found.csv").write(found, tmp_path / "found.csv")
+    with table.open(encoding="utf-8", newline="") as file:
+        about = {row["row"]: row["column"] for row in csv.DictReader(file) if row["quantity"] == "about"}
+    assert about["machine"] == found.machine.name
+    assert about["frame"] == "platform axes at the tool point T"
+    assert about["kinetostat"] == version("kinetostat")
+    (file,) = choose("netcdf", tmp_path / "found.nc").write(found, tmp_path / "found.nc")
+    with xr.open_dataset(file) as told:
+        assert told.attrs["machine_file"] == as_toml(found.machine)
+        assert told.attrs["frame"] == about["frame"]
+        assert told.attrs["kinetostat"] == about["kinetostat"]
+
+
 def test_what_is_not_finite_is_left_out(tmp_path):
     _, path = written("zhang-gosselin-4dof", "csv", tmp_path, "stiffness.passive_links=rigid")
     text = path.read_text(encoding="utf-8")
@@ -101,4 +117,4 @@ def test_an_unknown_format_is_refused(tmp_path):
     with pytest.raises(InputError, match='"mjfc"; did you mean "mjcf"'):
         choose("mjfc", None)
     with pytest.raises(InputError, match=r"ends as one of: mjcf \(\.xml\)"):
-        choose(None, tmp_path / "machine.step")
+        choose(None, tmp_path / "machine.sldprt")

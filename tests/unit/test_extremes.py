@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from kinetostat.exchange.results import as_dataset
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.extremes import ROTATIONS, TRANSLATIONS
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
@@ -12,6 +13,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import analyze
+from kinetostat.studies.analysis_data import as_json
 from machines import every_machine
 
 CONDITION = 1e-8
@@ -49,7 +51,7 @@ def test_the_condition_is_at_least_one_and_below_the_ratio_of_eigenvalues(case):
     soft = block(response.compliance, there, range(6)) * np.outer(scale, scale)
     values = np.linalg.eigvalsh(soft)
     if np.isfinite(soft).all() and values[0] > 1e-12 * values[-1]:
-        found = value("condition", response)
+        found = value("frobenius_condition", response)
         assert 1.0 - CONDITION <= found <= values[-1] / values[0] * (1.0 + CONDITION)
         assert found == pytest.approx(np.sqrt(np.sum(values**2) * np.sum(values**-2.0)) / len(there), rel=CONDITION)
 
@@ -65,7 +67,7 @@ def test_a_machine_alike_in_all_directions_has_condition_one():
 def test_rigid_and_free_are_exact():
     rigid = respond(load("zhang-gosselin-4dof", ["stiffness.passive_links=rigid"]))
     assert value("greatest_rotational_stiffness", rigid) == math.inf
-    assert value("condition", rigid) == math.inf
+    assert value("frobenius_condition", rigid) == math.inf
     free = respond(load("zhang-gosselin-4dof", ["stiffness.passive_links=0"]))
     assert free.status != Status.OK or value("least_translational_stiffness", free) == 0.0
 
@@ -89,3 +91,15 @@ def test_actuator_loads_are_those_of_the_analysis():
     crank = load("hexapod-rus", ['load.force=["0 N","0 N","-500 N"]'])
     moments = [abs(one.load) for one in analyze(crank).load.springs if one.actuated]
     assert value("actuator_moment", respond(crank)) == pytest.approx(max(moments))
+
+
+def test_every_condition_has_a_name_of_its_own():
+    """Of K by its eigenvalues and in the Frobenius norm, of W, of the actuators' Jacobian: four numbers, four names."""
+    machine = load("hexapod", ["pose.x=50 mm"])
+    found = analyze(machine)
+    told, written = as_json(found), as_dataset(found)
+    names = ("stiffness_condition", "wrench_condition", "jacobian_condition")
+    assert [told[name] for name in names] == [float(written[name]) for name in names]
+    assert len({*(told[name] for name in names), value("frobenius_condition", respond(machine))}) == 4
+    assert "condition" not in {*told, *written, *QUANTITIES}
+    assert QUANTITIES["frobenius_condition"].symbol == "condition of K (Frobenius)"

@@ -17,6 +17,7 @@ from kinetostat.kinetostatics.loading import (
 )
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Joint, Leg, Spring, revolutes, two_force_leg
+from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Configuration, springs
 from numeric import answer, screw, vector
@@ -45,7 +46,7 @@ def test_the_legs_of_a_hexapod(tool):
     for wrench, line, force in zip(leg_wrenches(response, LOAD), lines, forces, strict=True):
         assert screw(wrench) == pytest.approx(force * line)
     reactions = joint_reactions(response, LOAD)
-    assert len(reactions) == 12
+    assert len(reactions) == 18
     for reaction in reactions:
         assert vector(reaction.wrench.rotational) == pytest.approx(np.zeros(3), abs=1e-9)
     heads = [reaction for reaction in reactions if reaction.joint.endswith("platform joint")]
@@ -128,14 +129,68 @@ def test_parallel_springs_share_by_stiffness(stiffness):
 
 
 def test_joints_by_name_with_a_point_of_each():
-    """A Hooke joint is one; a slide, which has no point of its own, is where the chain has come to."""
+    """A Hooke joint is one; a slide without a carriage is where the chain has come to; links are no joints."""
     leg = Leg(
         "leg",
         (
             *revolutes(X_AXIS, (Y_AXIS, Z_AXIS), "foot"),
-            Spring("actuator", Joint(X_AXIS), 1e3),
+            Spring("actuator", Joint(X_AXIS), 1e3, actuated=True),
+            Spring("rod", Joint(X_AXIS), 1e6),
             Joint(Z_AXIS, None, "slide"),
+            Spring("ball hinge", Joint(Z_AXIS, Z_AXIS, "ball"), 1e3, hinge=True),
             Joint(Z_AXIS, Y_AXIS, "head"),
+            Joint(Z_AXIS, None, "rail", carriage=Z_AXIS),
         ),
     )
-    assert joint_points(leg) == [("foot", X_AXIS), ("slide", X_AXIS), ("head", Y_AXIS)]
+    assert joint_points(leg) == [
+        ("foot", X_AXIS), ("actuator", X_AXIS), ("slide", X_AXIS), ("ball", Z_AXIS), ("head", Y_AXIS), ("rail", Z_AXIS),
+    ]  # fmt: skip
+
+
+def test_the_motor_shafts_of_a_delta():
+    """The platform cut free: two forces along the bars of each leg; the shaft bears them and their moment about it."""
+    response = respond(load("delta", ["pose.x=60 mm", "pose.y=-40 mm"]))
+    about, pulls = vector(response.reference), []
+    for leg in response.configuration.legs:
+        (bars,) = [part for part in leg.chain if isinstance(part, Parallelogram)]
+        for near, far in ([vector(end) for end in bar] for bar in bars.bars):
+            pulls.append((leg, near, (far - near) / np.linalg.norm(far - near)))
+    lines = np.array([line_wrench(along, near, about) for _, near, along in pulls])
+    pulls = list(zip(pulls, np.linalg.solve(lines.T, screw(LOAD)), strict=True))
+    loads = dict(zip((s.name for s in springs(response.configuration)), spring_loads(response, LOAD), strict=True))
+    shafts = {r.leg: r for r in joint_reactions(response, LOAD) if r.joint == f"{r.leg} actuator"}
+    assert len(shafts) == 3
+    for leg in response.configuration.legs:
+        motor = leg.springs[0].joint
+        cut = sum(f * line_wrench(u, near, vector(motor.point)) for (own, near, u), f in pulls if own is leg)
+        shaft = shafts[leg.name]
+        assert vector(shaft.point) == pytest.approx(vector(motor.point))
+        assert screw(shaft.wrench) == pytest.approx(cut, abs=1e-9)
+        assert cut[:3] @ vector(motor.axis) == pytest.approx(loads[f"{leg.name} actuator"])
+        assert np.linalg.norm(np.cross(cut[:3], vector(motor.axis))) > 1.0
+
+
+def test_the_slides_of_a_tripteron():
+    """Every leg takes the force along its own slide; forces and moments at the three slides hold the platform."""
+    response = respond(load("tripteron", ["pose.x=0.55 m", "pose.z=0.4 m"]))
+    slides = {r.leg: r for r in joint_reactions(response, LOAD) if r.joint.endswith("slide")}
+    forces = {"x": [40.0, 0.0, 0.0], "y": [0.0, 25.0, 0.0], "z": [0.0, 0.0, -90.0]}
+    points = {"x": [0.55, 1.0, 0.0], "y": [0.0, 0.5, 1.0], "z": [0.0, 0.0, 0.4]}
+    moment = -vector(LOAD.rotational)
+    for leg, slide in slides.items():
+        assert vector(slide.wrench.translational) == pytest.approx(forces[leg], abs=1e-9)
+        assert vector(slide.point) == pytest.approx(points[leg])
+        assert vector(slide.wrench.rotational)["xyz".index(leg)] == pytest.approx(0.0, abs=1e-9)
+        moment += vector(slide.wrench.rotational) + np.cross(np.array(points[leg]) - [0.55, 0.5, 0.4], forces[leg])
+    assert moment == pytest.approx(np.zeros(3), abs=1e-9)
+    assert len(slides) == 3
+
+
+def test_a_guide_is_loaded_at_its_carriage():
+    """10 cm beside the shoulder the force along the slide has an arm of 10 cm; the carriage goes where the leg goes."""
+    response = respond(load("tripteron", ["legs.z.slide.point=[0, -0.1, 0.5]", "pose.z=0.6 m"]))
+    slide, shoulder = (r for r in joint_reactions(response, LOAD) if r.joint in ("z slide", "z shoulder"))
+    assert vector(slide.point) == pytest.approx([0.0, -0.1, 0.6])
+    assert vector(shoulder.point) == pytest.approx([0.0, 0.0, 0.6])
+    more = vector(slide.wrench.rotational) - vector(shoulder.wrench.rotational)
+    assert more == pytest.approx([0.1 * -90.0, 0.0, 0.0])

@@ -15,6 +15,7 @@ from kinetostat.spec import document
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.workspace.verdicts import BEYOND, INSIDE
 from kinetostat.studies.workspace.workspace import workspace
+from kinetostat.views.answers import plot
 
 ERRORS = 4
 """Standard errors within which an estimate lies all but surely."""
@@ -218,3 +219,14 @@ def test_bad_questions_are_refused(ranges, conditions, words):
         workspace(load("planar-3rpr"), ranges, conditions)
     for word in words:
         assert word in str(refused.value)
+
+
+def test_sections_are_equally_spaced_and_the_legend_has_the_lines_that_are_drawn():
+    ranges = ["theta1=-40 deg:40 deg:9", "theta2=-40 deg:40 deg:9", "length=35 cm:60 cm:18"]
+    asked = ["stiffness_z > 5000 N/um", "compliance_z < 1 um/N"]
+    figure = plot(workspace(load("tricept"), ranges, asked))
+    lengths = [float(panel.get_title().split()[2]) for panel in figure.axes]
+    assert 5 <= len(lengths) <= 9
+    assert np.ptp(np.diff(lengths)) < 0.2
+    told = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert "stiffness_z = 5000 N/um" not in told, "no panel has that edge"

@@ -1,6 +1,7 @@
 """The results of an analysis as a labelled dataset, and as NetCDF. Nothing is computed here."""
 
 import math
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,11 @@ import xarray as xr
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Spring
+from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import springs
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.setting import frame_of
 from kinetostat.studies.storage import write_dataset
 from kinetostat.units import KINDS
 
@@ -43,6 +46,8 @@ def reference_point(analysis: Analysis) -> list[float]:
 
 def as_dataset(analysis: Analysis) -> xr.Dataset:
     """K, C, shares, indices and pose with named dimensions; `units` in the attributes of each variable, SI.
+
+    The attributes say of which machine, with its file, to which point and axes they refer, and who computed them.
 
     Dimensions: `row` and `column` of K and C, `component` of diagonals, `spring`, `axis`, and `base_axis`. What is not
     finite (K where the machine is rigid, C where it is free) is left out.
@@ -78,6 +83,9 @@ def as_dataset(analysis: Analysis) -> xr.Dataset:
         "status": analysis.status.word,
         "message": analysis.message,
         "axes": analysis.axes,
+        "frame": frame_of(machine, analysis.axes),
+        "machine_file": as_toml(machine),
+        "kinetostat": version("kinetostat"),
         "order": " ".join(names),
     }
     return xr.Dataset(found, coordinates, attributes)
@@ -119,9 +127,13 @@ def _indices(analysis: Analysis) -> dict[str, Variable]:
     """Scalars of the pose that have a number, and the principal compliances."""
     indices = analysis.indices
     scalars = {
-        "condition": (analysis.condition, "ratio of the extreme singular values of W", "1"),
+        "wrench_condition": (analysis.wrench_condition, "condition of W, of the leg wrenches", "1"),
         "jacobian_condition": (analysis.jacobian_condition, "condition of the actuators' Jacobian", "1"),
-        "stiffness_condition": (indices.condition if indices else None, "condition of K", "1"),
+        "stiffness_condition": (
+            indices.condition if indices else None,
+            "condition of K, by its extreme eigenvalues",
+            "1",
+        ),
         "characteristic_length": (analysis.length, "by which rotations are compared with translations", "m"),
         "moving_mass": (analysis.mass, "of what moves, as far as it is known", "kg"),
     }

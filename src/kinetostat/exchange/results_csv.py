@@ -14,6 +14,9 @@ from kinetostat.studies.storage import write_text
 
 HEADER = ("quantity", "row", "column", "value", "unit")
 
+ABOUT = ("machine", "family", "frame", "kinetostat")
+"""Attributes that are told first, in the columns of names: a line each, "about", with no value."""
+
 Line = tuple[str, str, str, float, str]
 
 
@@ -45,7 +48,10 @@ def write(analysis: Analysis, path: Path) -> list[Path]:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(HEADER)
-    for quantity, row, column, value, unit in lines_of(as_dataset(analysis)):
+    dataset = as_dataset(analysis)
+    for key in ABOUT:
+        writer.writerow(("about", key, dataset.attrs[key], "", ""))
+    for quantity, row, column, value, unit in lines_of(dataset):
         writer.writerow((quantity, row, column, "" if value != value else repr(value), unit))
     write_text(path, text.getvalue())
     return [path]

@@ -11,7 +11,7 @@ from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.symmetric import SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.leg import Leg
+from kinetostat.machine.leg import Element, Joint, Leg
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class JointReaction:
 
     Attributes:
         leg, joint: names.
-        point: where the moment is taken, base frame, m.
+        point: where the moment is taken, base frame, m: on the joint's axis, or the carriage of a slide.
         wrench: moment (N·m) and force (N) that the platform side exerts on the base side at that point, base axes.
     """
 
@@ -63,7 +63,11 @@ def sum_of(wrenches: Sequence[Wrench]) -> Wrench:
 
 
 def joint_reactions(response: Response, load: Wrench) -> list[JointReaction]:
-    """The wrench in every joint: that of its leg (links are without weight), referred to the joint's own point."""
+    """The wrench in every joint: that of its leg (links are without weight), referred to the joint's own point.
+
+    A joint that a servo or a flexure holds passes it on whole: along its freedom the load of that spring, and across it
+    what its bearings or its guide must carry.
+    """
     found = []
     for leg, wrench in zip(response.configuration.legs, leg_wrenches(response, load), strict=True):
         for name, point in joint_points(leg):
@@ -72,11 +76,20 @@ def joint_reactions(response: Response, load: Wrench) -> list[JointReaction]:
 
 
 def joint_points(leg: Leg) -> list[tuple[str, Vector]]:
-    """The passive joints of a leg by name, each with a point of it; a slide is where the chain has come to."""
+    """The joints of a leg by name, base to platform, each with a point of it.
+
+    That of a slide is its carriage's, or if that is not known, where the chain has come to.
+    """
     named: dict[str, Vector] = {}
     at = next(iter(leg.path), ZERO)
     for element in leg.chain:
-        for joint in element.freedoms:
-            named.setdefault(joint.name, joint.point or at)
+        for name, joint in _joints(element):
+            named.setdefault(name, joint.point or joint.carriage or at)
         at = element.path[-1] if element.path else at
     return list(named.items())
+
+
+def _joints(element: Element) -> list[tuple[str, Joint]]:
+    """The freedoms of an element, those that an actuator or a flexure holds among them, by the name of their joint."""
+    held = [s for s in element.springs if s.actuated or s.hinge]
+    return [(j.name, j) for j in element.freedoms] + [(s.joint.name or s.name, s.joint) for s in held]

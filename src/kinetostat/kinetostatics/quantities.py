@@ -101,14 +101,14 @@ QUANTITIES = {
         MapQuantity("mass", "kg", "moving mass", _mass),
         MapQuantity("side", "1", "side of singularities", side),
         *_extremes(),
-        MapQuantity("condition", "1", "condition of K", frobenius_condition),
+        MapQuantity("frobenius_condition", "1", "condition of K (Frobenius)", frobenius_condition),
         MapQuantity("shortest_leg", "m", "shortest leg", shortest_leg),
         MapQuantity("longest_leg", "m", "longest leg", longest_leg),
         MapQuantity("actuator_force", "N", "greatest actuator force", partial(actuator_load, sliding=True)),
         MapQuantity("actuator_moment", "N·m", "greatest actuator moment", partial(actuator_load, sliding=False)),
     )
 }
-"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., regularity, mass, condition, ..."""
+"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., regularity, mass, ..."""
 
 GROUPS = {
     "compliance": tuple(f"compliance_{name}" for name in COMPONENTS),

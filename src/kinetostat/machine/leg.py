@@ -39,12 +39,14 @@ class Joint:
         point: on the axis, m; None for a slide.
         name: of the joint it belongs to; a Hooke joint is two of these with one name, a spherical joint three.
         pitch: of a screw, m/rad; 0 for a revolute.
+        carriage: of a slide, a point that travels with it, base frame, m: where its load is given; None if not said.
     """
 
     axis: Vector
     point: Vector | None = None
     name: str = ""
     pitch: Scalar = 0.0
+    carriage: Vector | None = None
 
     @property
     def freedoms(self) -> tuple["Joint", ...]:
@@ -76,12 +78,15 @@ class Joint:
     def displaced(self, motion: Displacement) -> "Joint":
         """The joint after a rigid displacement of the whole machine."""
         point = None if self.point is None else motion.apply(self.point)
-        return replace(self, axis=motion.rotation.apply(self.axis), point=point)
+        carriage = None if self.carriage is None else motion.apply(self.carriage)
+        return replace(self, axis=motion.rotation.apply(self.axis), point=point, carriage=carriage)
 
     def moved(self, amount: "Scalar | Turn") -> tuple["Joint", Displacement]:
         """The joint once it has moved by `amount` (rad, or m of a slide), and how it displaces what follows it."""
         if self.point is None:
-            return self, Displacement(IDENTITY, self.axis * amount)
+            travel = self.axis * amount
+            carriage = None if self.carriage is None else self.carriage + travel
+            return replace(self, carriage=carriage), Displacement(IDENTITY, travel)
         angle = amount if isinstance(amount, Turn) else Turn(cos(amount), sin(amount))
         turn = rotation_along(self.axis, angle.cosine, angle.sine)
         shift = self.point - turn.apply(self.point)
@@ -141,7 +146,8 @@ class Spring:
 
     def moved(self, amount: Scalar | Turn) -> tuple["Spring", Displacement]:
         """The spring once its joint has moved by `amount` (rad or m), and how that displaces what follows it."""
-        return self, self.joint.moved(amount)[1]
+        joint, motion = self.joint.moved(amount)
+        return replace(self, joint=joint), motion
 
 
 class Element(Protocol):

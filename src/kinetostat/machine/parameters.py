@@ -10,6 +10,9 @@ from kinetostat.machine.machine import Family, Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Quantity, leaves, quantities
 
+LEG_BY_LEG = ("_angles", "crank_turn", "stiffness.actuator")
+"""Ends of the fields of families that have an entry for each leg."""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -88,3 +91,13 @@ def with_values(machine: Machine, changes: Mapping[str, Any]) -> Machine:
             made[name] = entries[0] if quantity.count is None else entries
         sections[section] = fields(**made)
     return replace(machine, sections=sections)
+
+
+def with_leg(machine: Machine, path: str) -> str:
+    """A path for people: "geometry.base_angles.5 (leg 6)", as entries count from 0 and legs have names."""
+    field, _, entry = path.rpartition(".")
+    if not entry.isdigit() or not field.endswith(LEG_BY_LEG):
+        return path
+    legs = [leg.name for leg in machine.configure().legs if leg.name.startswith("leg ")]
+    count = next(len(p.leaves) for p in parameters(machine.family) if p.path == field)
+    return f"{path} ({legs[int(entry)] if len(legs) == count else f'leg {int(entry) + 1}'})"

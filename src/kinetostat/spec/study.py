@@ -62,7 +62,9 @@ class VariableTable(Table):
 class TermTable(Table):
     """What objectives and constraints have in common: a quantity, and how it is taken over the poses."""
 
-    quantity: Path = Field(description="e.g. compliance_sum, stiffness_z, condition; docs/design.md lists all")
+    quantity: Path = Field(
+        description="e.g. compliance_sum, stiffness_z, frobenius_condition; docs/design.md lists all"
+    )
     weights: list[float] | None = Field(default=None, description="of a weighted sum, one for each of rx ry rz x y z")
     direction: Annotated[list[float], Field(min_length=3, max_length=3)] | None = Field(
         default=None, description="of a quantity along a direction: x, y, z in base axes"

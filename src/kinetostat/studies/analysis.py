@@ -82,7 +82,7 @@ class Analysis:
         internal: statically indeterminate loads.
         load: what the machine's [load] does, None without one.
         masses: of what moves, part by part.
-        condition: ratio of the extreme singular values of W, moments divided by the characteristic length.
+        wrench_condition: ratio of the extreme singular values of W, moments divided by the characteristic length.
         jacobian_condition: of the actuators' Jacobian, angles multiplied by that length; None where actuators are of
             two kinds, or there is none.
         length: that length, m.
@@ -107,7 +107,7 @@ class Analysis:
     internal: InternalLoads | None = None
     load: LoadCase | None = None
     masses: tuple[Mass, ...] = ()
-    condition: float | None = None
+    wrench_condition: float | None = None
     jacobian_condition: float | None = None
     length: float | None = None
 
@@ -177,7 +177,7 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
         internal=internal_loads([leg.name for leg in configuration.legs], response.legs, length, response.guide),
         load=load_case(machine, replace(response, compliance=compliance), turn),
         masses=tuple(moving_masses(machine, configuration)),
-        condition=float(extremes[0] / extremes[-1]),
+        wrench_condition=float(extremes[0] / extremes[-1]),
         jacobian_condition=_jacobian_condition(response, length),
         length=length,
     )

@@ -33,7 +33,7 @@ def as_json(analysis: Analysis, along: Sequence[Along] = ()) -> dict[str, Any]:
         "rank": analysis.rank,
         "rigid": list(analysis.rigid),
         "free": list(analysis.free),
-        "condition": analysis.condition,
+        "wrench_condition": analysis.wrench_condition,
         "jacobian_condition": analysis.jacobian_condition and _finite(analysis.jacobian_condition),
         "characteristic_length": analysis.length,
         **_indices(analysis.indices),

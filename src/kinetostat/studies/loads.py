@@ -38,7 +38,7 @@ class LoadCase:
         wrench: moment (N·m) and force (N) [6].
         deflection: rotation (rad) and displacement (m) of the tool point [6]; infinite where it is free.
         springs: loads in all springs.
-        reactions: wrenches in all passive joints.
+        reactions: wrenches in all joints of the legs, actuated ones among them.
     """
 
     wrench: tuple[float, ...]

@@ -10,13 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Table
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import Parameter, parameters, values
-from kinetostat.studies.analysis import analyze, machine_length
+from kinetostat.studies.analysis import analyze
+from kinetostat.studies.grid.absent import refuse_absent
 from kinetostat.studies.grid.grid import resolve_quantities
 from kinetostat.units import KINDS
 
@@ -26,9 +29,14 @@ ZERO = 1e-9
 """Share of what a number is compared with below which it counts as zero: it is then the rounding of one."""
 NEGLIGIBLE = 1e-9
 """Percent per percent below which a parameter has no influence: the rounding of zero."""
+ROUNDING = 1e-12
+"""Share of what its rows yield or hold beside others below which an entry of C or K is the rounding of zero."""
 
 MOST_NAMED = 12
 """Parameters without influence that are named."""
+
+PER = "percent per percent, of an angle per 0.01 rad"
+"""What the numbers are. An angle counts from an axis of choice, and with 360 deg more it is the same."""
 
 RIGID = "as rigid, so that no percent of it means anything"
 FREE = "as free, so that C is infinite or does not feel it"
@@ -48,10 +56,12 @@ class Influence:
         path: of the parameter.
         kind: a key of `units.KINDS`.
         value: SI.
-        percent_of: what one percent of a change is of, SI: the value itself, or where that is zero a `measure`.
-        measure: "itself", "length" (the machine's characteristic length), "radian" or "axis" (the direction's length).
+        percent_of: what one percent of a change is of, SI: the value itself, or a `measure`.
+        measure: "itself", "length" where a length is zero (the machine's characteristic length), "radian" of an angle
+            (whose percent is 0.01 rad), or "axis" (the direction's length).
         derivatives: of each index by it, SI; None where the index is infinite.
-        percents: percent by which each index changes per percent of a change; None where the index is 0 or infinite.
+        percents: percent by which each index changes per percent of a change; None where the index is infinite, or 0 up
+            to rounding.
     """
 
     path: str
@@ -77,7 +87,7 @@ class Sensitivity:
         status: of the pose; all that follows is empty unless it is OK.
         message: one readable paragraph.
         quantities: names of the indices.
-        found: their values, SI; infinite where rigid or free.
+        found: their values, SI; infinite where rigid or free, 0 where they are but rounding.
         length: characteristic length, m.
         influences: the parameters that have one, the greatest first.
         none: paths of those that have none.
@@ -103,10 +113,11 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
         quantities: names of quantities or groups.
 
     Raises:
-        InputError: an unknown quantity.
+        InputError: an unknown quantity, or one that the machine cannot have.
     """
     need_machine(machine)
     names = tuple(resolve_quantities(quantities, machine.family.component_names))
+    refuse_absent(machine, names)
     asked = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(p, names)]
     held = values(machine)
     by = [p.path for p in asked if not math.isinf(held[p.path])]
@@ -115,7 +126,9 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     status = Status(int(answer.status[0]))
     if status is not Status.OK:
         return Sensitivity(machine, status, analyze(machine).message)
-    length, found = machine_length(machine), tuple(answer.values[:, 0].tolist())
+    response = respond(machine)
+    length = float(response.configuration.length)
+    found = tuple(_felt(name, value, response) for name, value in zip(names, answer.values[:, 0].tolist(), strict=True))
     slopes = dict(zip(by, answer.gradients[:, :, 0].T.tolist(), strict=True))
     skipped = {path: reason for path, reason in ((p.path, _why_not(p, held, slopes)) for p in asked) if reason}
     every = [_influence(p, held, found, slopes[p.path], length) for p in asked if p.path not in skipped]
@@ -124,6 +137,22 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     return Sensitivity(
         machine, status, status.sentence, names, found, length, tuple(ranked), none, tuple(skipped.items())
     )
+
+
+def _felt(name: str, value: float, response: Response) -> float:
+    """An index, 0 where it is an entry of C or K that is but the rounding of zero: a rigid or a free direction."""
+    about = QUANTITIES[name].components
+    if not about or not math.isfinite(value):
+        return value
+    matrix = response.compliance if name.startswith("compliance") else response.stiffness
+    shrink = 1.0 / float(response.configuration.length)
+    arms = [1.0] * 3 + [shrink] * 3 if matrix is response.compliance else [shrink] * 3 + [1.0] * 3
+    diagonal = [abs(float(entry)) * arm * arm for entry, arm in zip(matrix.diagonal(), arms, strict=True)]
+    largest = max((size for size in diagonal if math.isfinite(size)), default=0.0)
+    first, last = (COMPONENTS.index(about[k]) for k in (0, -1))
+    seen = min(diagonal[first], diagonal[last]) > ROUNDING * ROUNDING * largest
+    compared = math.sqrt(diagonal[first]) * math.sqrt(diagonal[last])
+    return value if seen and abs(value) * arms[first] * arms[last] > ROUNDING * compared else 0.0
 
 
 def _decides(parameter: Parameter, names: Sequence[str]) -> bool:
@@ -168,7 +197,7 @@ def _one_percent_of(parameter: Parameter, held: dict[str, float], length: float)
         return math.hypot(*(held[f"{field}.{i}"] for i in range(3))), "axis"
     if kind == "length" and value <= ZERO * length:
         return length, "length"
-    if kind == "angle" and value <= ZERO:
+    if kind == "angle":
         return 1.0, "radian"
     return value, "itself"
 
@@ -207,7 +236,7 @@ def notes(answer: Sensitivity) -> Iterator[str]:
     used = {one.measure for one in answer.influences}
     meanings = {
         "length": f"where a length is 0, a percent is one of the characteristic length, {answer.length:.4g} m",
-        "radian": "where the angle is 0, a percent is 0.01 rad (0.57 deg)",
+        "radian": "of an angle, a percent is 0.01 rad (0.57 deg), whatever its value",
         "axis": "of a direction, a percent is one of its length",
     }
     said = [meaning for measure, meaning in meanings.items() if measure in used]

@@ -17,6 +17,8 @@ from kinetostat.views.tables import number, numeric_table, print_doubts
 
 UNITS_OF_K = "N·m/rad, N/rad, N/m"
 UNITS_OF_C = "rad/(N·m), rad/N, m/N"
+ALIKE = 1e-9
+"""Relative difference of principal stiffnesses below which they are one, and their directions a matter of rounding."""
 MOST_NAMED = 4
 """Parts of unknown mass that are named."""
 
@@ -37,7 +39,8 @@ def print_analysis(console: Console, analysis: Analysis, along: Sequence[Along] 
     if full and analysis.indices:
         shown.append(eigenscrew_table(analysis.indices.eigenscrews))
     if analysis.load:
-        shown += [load_table(names, analysis.load), actuator_table(analysis.load), reaction_table(analysis.load)]
+        shown += [load_table(names, analysis.load), actuator_table(analysis.load)]
+        shown.append(reaction_table(analysis.load, analysis.axes))
     for table in shown:
         if table.row_count:
             console.print(table)
@@ -117,8 +120,18 @@ def along_table(along: Sequence[Along]) -> Table:
 def _ellipsoid(found: PrincipalStiffness) -> list[str]:
     """Least and largest and their directions; once where there is but one."""
     values = [number(value, "rigid") for value in (found.stiffnesses[0], found.stiffnesses[-1])]
-    directions = [_direction(found.directions[0]), _direction(found.directions[-1])]
+    directions = [_directions(found, found.stiffnesses[0]), _directions(found, found.stiffnesses[-1])]
     return [*values, *directions] if len(found.stiffnesses) > 1 else [values[0], "", directions[0], ""]
+
+
+def _directions(found: PrincipalStiffness, stiffness: float) -> str:
+    """The direction of a principal stiffness; where several are alike, all that have it."""
+    pairs = list(zip(found.stiffnesses, found.directions, strict=True))
+    others = [way for k, way in pairs if not math.isclose(k, stiffness, rel_tol=ALIKE)]
+    alike = len(pairs) - len(others)
+    if alike == 1:
+        return next(_direction(way) for k, way in pairs if math.isclose(k, stiffness, rel_tol=ALIKE))
+    return f"any ⊥ {_direction(others[0])}" if others else "any"
 
 
 def _direction(vector: Sequence[float]) -> str:
@@ -159,11 +172,10 @@ def actuator_table(load: LoadCase) -> Table:
     return table
 
 
-def reaction_table(load: LoadCase) -> Table:
-    """The wrench in each passive joint."""
-    table = numeric_table(
-        "Load passed on towards the base, at the joint (N·m, N)", "joint", ["mx", "my", "mz", "fx", "fy", "fz"]
-    )
+def reaction_table(load: LoadCase, axes: str) -> Table:
+    """The wrench in each joint, in base or platform axes."""
+    title = f"Load passed on towards the base, at the joint (N·m, N; {axes} axes)"
+    table = numeric_table(title, "joint", ["mx", "my", "mz", "fx", "fy", "fz"])
     for reaction in load.reactions:
         table.add_row(reaction.joint, *(number(float(c)) for c in reaction.wrench.components()))
     return table
@@ -192,7 +204,7 @@ def remarks(analysis: Analysis) -> list[str]:
             lines.append(f"Centre of stiffness: {_millimetres(centre)} mm from the point above.")
         lines.append(
             f"Condition of K: {number(analysis.indices.condition, 'infinite')}, of the leg wrenches: "
-            f"{number(analysis.condition)}, of the actuators' Jacobian: "
+            f"{number(analysis.wrench_condition)}, of the actuators' Jacobian: "
             f"{number(analysis.jacobian_condition, 'infinite')}; "
             f"rotations compared through {number(analysis.length)} m."
         )

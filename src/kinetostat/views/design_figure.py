@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 
 from kinetostat.studies.comparison.design_rows import Row
 from kinetostat.studies.comparison.designs import Comparison
+from kinetostat.studies.setting import frame_of
 from kinetostat.views.display import prefixed_scale
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout
 
@@ -22,7 +23,11 @@ LONGEST = 100
 
 
 def comparison_figure(found: Comparison) -> Figure:
-    """Compliance about and along the axes, regularity and mass: a bar for each design; over a grid mean and worst."""
+    """Compliance about and along the axes, regularity and mass of each design; over a grid mean and worst.
+
+    Bars start at 0. Where the numbers of a panel are too far apart for that, its axis is logarithmic and has marks, as
+    the length of a bar would mean nothing.
+    """
     grid = bool(found.ranges)
     rows = found.over if grid else found.rows
     panels = [panel for panel in (*_compliance(rows, grid), *_scalars(found, rows, grid)) if panel[1]]
@@ -38,7 +43,9 @@ def comparison_figure(found: Comparison) -> Figure:
             Patch(color=_colour(i), label=f"{letter}  {_short(design.label)}")
             for i, (letter, design) in enumerate(styles)
         ]
-        figure.legend(handles=handles, loc="outside lower left")
+        frames = dict.fromkeys(frame_of(design.machine) for design in found.designs)
+        title = f"compliance in {' or '.join(frames)}"
+        figure.legend(handles=handles, loc="outside lower left", title=title, title_fontsize=6.5, alignment="left")
         what = f"mean (bars) and worst (dots) over {', '.join(found.ranges)}" if grid else "at the pose of each design"
         figure.suptitle(f"Designs compared, {what}", fontsize=10)
         fix_layout(figure)
@@ -79,18 +86,36 @@ def _bars(panel: Axes, title: str, bars: Bars, count: int) -> None:
     scale = prefixed_scale(unit, np.concatenate([heights, dots]))
     heights, dots = heights * scale.factor, dots * scale.factor
     width = 0.8 / count
+    seen = heights[np.isfinite(heights) & (heights > 0.0)]
+    apart = bool(seen.size) and seen.max() > WIDE * seen.min()
     for i in range(count):
         places = np.arange(len(bars)) + (i - (count - 1) / 2) * width
-        panel.bar(places, heights[:, i], width * 0.92, color=_colour(i))
+        if apart:
+            panel.plot(places, heights[:, i], "D", color=_colour(i), markersize=5.0)
+        else:
+            panel.bar(places, heights[:, i], width * 0.92, color=_colour(i))
         panel.plot(places, dots[:, i], "o", color="#333333", markersize=2.5)
-    seen = heights[np.isfinite(heights) & (heights > 0.0)]
-    if seen.size and seen.max() > WIDE * seen.min():
+        for place, (_, row, _) in zip(places, bars, strict=True):
+            _say_missing(panel, float(place), row, i)
+    panel.set_xlim(-0.5, len(bars) - 0.5)
+    if apart:
         panel.set_yscale("log")
+        panel.margins(y=0.15)
     panel.set_xticks(range(len(bars)), [label for label, _, _ in bars])
     panel.grid(visible=False, axis="x")
     panel.set_axisbelow(True)
     panel.tick_params(axis="x", length=0)
     panel.set_ylabel(scale.label(title) if unit != "1" else f"{title} (0 to 1)")
+
+
+def _say_missing(panel: Axes, place: float, row: Row, i: int) -> None:
+    """Where a design has no bar, why: nothing says its mass, it lacks the direction, or it is free there."""
+    value = row.values[i]
+    if value is None or not math.isfinite(value):
+        none = "not known" if row.unit == "kg" else "none"
+        text = none if value is None or math.isnan(value) else "infinite"
+        where = panel.get_xaxis_transform()
+        panel.text(place, 0.02, text, transform=where, rotation=90, ha="center", fontsize=6.5, color="#666666")
 
 
 def _numbers(row: Row) -> list[float]:

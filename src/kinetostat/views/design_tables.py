@@ -13,6 +13,8 @@ from kinetostat.views.tables import number, numeric_table, readable, text_table
 NAMED, CELL = 27, 20
 """Widths, in characters, of the first column and of one design: what fits is printed side by side."""
 MOST_SHARES = 3
+MISSING = "–"
+"""Of a design that has no such field."""
 
 
 def print_comparison(console: Console, found: Comparison) -> None:
@@ -37,7 +39,7 @@ def _print_differences(console: Console, found: Comparison, letters: str) -> Non
     rows = {"family": families} if len(set(families)) > 1 else {}
     for one in found.differences:
         pairs = zip(one.parameters, one.values, strict=True)
-        rows[one.parameters[0].path] = [readable(row, parameter.quantity) for parameter, row in pairs]
+        rows[one.path] = [readable(row, parameter.quantity) if parameter else MISSING for parameter, row in pairs]
     for abreast in _abreast(console, letters):
         table = text_table("Where the files differ", "field", *(letters[i] for i in abreast))
         for path, cells in rows.items():
@@ -48,7 +50,7 @@ def _print_differences(console: Console, found: Comparison, letters: str) -> Non
     if not rows:
         console.print("The files do not differ.")
     if len(set(families)) > 1:
-        console.print("Fields that not all of them have are left out.", style="dim")
+        console.print("Fields that only one of them has are left out.", style="dim")
 
 
 def _abreast(console: Console, letters: str) -> Iterator[list[int]]:

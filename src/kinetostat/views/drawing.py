@@ -5,6 +5,7 @@ import math
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.machine.leg import Leg
@@ -14,6 +15,9 @@ from kinetostat.views.figures import COLOURS, STYLE, fix_layout
 VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
 MILLIMETRES = 1e3
 LEG, CONSTRAINT, PLATE = COLOURS[0], COLOURS[1], "#555555"
+
+SAME = 1e-6
+"""Distance in mm below which two points of a view are one."""
 
 Loop = list[Vector]
 
@@ -58,11 +62,21 @@ def _draw_leg(panel: Axes, leg: Leg, across: str, up: str, actuated: bool) -> No
 
 
 def _number(panel: Axes, leg: Leg, x: float, y: float, colour: str) -> None:
-    """The leg's number, outside its base joint as seen from the origin."""
-    far = math.hypot(x, y) or 1.0
-    offset = (9 * x / far, 9 * y / far)
+    """The leg's name beside its base joint: away from where the leg goes, or if it goes up, from the origin."""
+    ends = list(zip(*_flat(list(leg.path), "x", "y"), strict=True))
+    ways = [*((x - end[0], y - end[1]) for end in ends[1:]), (x, y), (-1.0, 0.0)]
+    across, up = next((dx / far, dy / far) for dx, dy in ways if (far := math.hypot(dx, dy)) > SAME)
     text = leg.name.removeprefix("leg ")
-    panel.annotate(text, (x, y), textcoords="offset points", xytext=offset, color=colour, ha="center", va="center")
+    panel.annotate(
+        text, (x, y), textcoords="offset points", xytext=(6 * across, 6 * up), color=colour, zorder=5,
+        ha=_side(across, "right", "left"), va=_side(up, "top", "bottom"),
+        path_effects=[withStroke(linewidth=2.0, foreground="white")],
+    )  # fmt: skip
+
+
+def _side(part: float, low: str, high: str) -> str:
+    """On which side of a text its point is, so that none of it lies over the point."""
+    return "center" if abs(part) < 0.38 else high if part > 0.0 else low
 
 
 def _loop(points: Loop) -> Loop:

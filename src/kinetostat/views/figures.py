@@ -1,6 +1,7 @@
 """Figures for print: contour maps and curves of a dataset from `studies.grid`. Every axis has its unit."""
 
 import io
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -42,6 +43,8 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito: distinct for colour-blind readers and in grey."""
 DASHES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
 LEVELS = 12
+CHARACTERS = 19
+"""Of the small line below a figure, per inch."""
 MARGIN = 0.04
 """Inches around a figure that stands in a page."""
 FLAT = 1e-9
@@ -73,7 +76,7 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
         for unused in list(figure.axes)[len(names) : rows * columns]:
             unused.remove()
         figure.suptitle(title, fontsize=10)
-        _note_failures(figure, dataset)
+        note_setting(figure, *_setting(dataset))
         fix_layout(figure)
     return figure
 
@@ -94,7 +97,7 @@ def curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
             shown = [name for name in names if dataset[name].attrs["units"] == unit]
             _curve_panel(panel, dataset, str(across), shown)
         figure.suptitle(title, fontsize=10)
-        _note_failures(figure, dataset)
+        note_setting(figure, *_setting(dataset))
         fix_layout(figure)
     return figure
 
@@ -127,11 +130,18 @@ def fix_layout(figure: Figure) -> None:
     figure.set_layout_engine("none")
 
 
-def _note_failures(figure: Figure, dataset: xr.Dataset) -> None:
+def note_setting(figure: Figure, *lines: str) -> None:
+    """Small lines below a figure: where its numbers hold, and what is missing; wrapped to its width."""
+    room = int(CHARACTERS * figure.get_figwidth())
+    shown = [part for line in lines if line for part in textwrap.wrap(line, room)]
+    figure.supxlabel("\n".join(shown), fontsize=6.5, color="#555555")
+
+
+def _setting(dataset: xr.Dataset) -> tuple[str, str]:
+    """Frame and pose of a grid, and how many of its poses have no result."""
     counts = [f"{status.word.replace('_', ' ')}: {count:,}" for status, count in failures(dataset).items()]
-    if counts:
-        text = f"no result at {', '.join(counts)} of {dataset['status'].size:,} poses"
-        figure.supxlabel(text, fontsize=7, color="#555555")
+    missing = f"no result at {', '.join(counts)} of {dataset['status'].size:,} poses" if counts else ""
+    return "; ".join(text for text in (dataset.attrs.get("frame"), dataset.attrs.get("pose")) if text), missing
 
 
 def axis_values(dataset: xr.Dataset, name: str) -> tuple[Array, str]:

@@ -9,10 +9,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from kinetostat.kinetostatics.elements import Element
+from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.guidelines.roles import EXCESS, stiffening
 from kinetostat.studies.guidelines.sentences import limit_of
-from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout
+from kinetostat.studies.setting import setting_of
+from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting
 from kinetostat.views.sensitivity_figure import coloured_table
 
 MOST_PANELS = 6
@@ -43,9 +45,10 @@ def limit_figure(found: Guidelines) -> Figure | None:
 
 def design_figure(found: Guidelines) -> Figure:
     """Parameters against directions: blue where one percent more makes a direction stiffer, red where softer."""
-    rows = {move.path: move.percents for move in found.moves}
-    title, label = f"{found.machine.name}: what the design does", "percent stiffer per percent more"
-    return coloured_table(title, rows, found.components, "RdBu", label)
+    rows = {with_leg(found.machine, move.path): move.percents for move in found.moves}
+    titles = f"{found.machine.name}: what the design does", setting_of(found.machine)
+    label = "percent stiffer per percent more, of an angle per 0.01 rad"
+    return coloured_table(titles, rows, found.components, "RdBu", label)
 
 
 def rigid_figure(found: Guidelines, shown: list[tuple[Element, np.ndarray]]) -> Figure:
@@ -64,6 +67,7 @@ def rigid_figure(found: Guidelines, shown: list[tuple[Element, np.ndarray]]) -> 
         dot = Line2D([], [], color="#444444", marker="o", markersize=4, linestyle="", label="within 1 %")
         figure.legend(handles=[*lines, dot], loc="outside right center", title="direction")
         figure.suptitle(f"{found.machine.name}: from which stiffness on an element counts as rigid", fontsize=10)
+        note_setting(figure, setting_of(found.machine))
         fix_layout(figure)
     return figure
 

@@ -8,6 +8,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.guidelines.moves import Move
 from kinetostat.studies.guidelines.roles import Roles
@@ -139,9 +140,12 @@ def move_table(found: Guidelines, count: int) -> Table:
     """What each of the first parameters does to each direction."""
     grid = bool(found.poses[0])
     heads = ["parameter", *found.components, *(["poses"] if grid else [])]
-    table = numeric_table("What one percent more does: percent stiffer ▲ or softer ▼", heads[0], heads[1:])
+    title = "What one percent more does, of an angle 0.01 rad more: percent stiffer ▲ or softer ▼"
+    table = numeric_table(title, heads[0], heads[1:])
     for move in found.moves[:count]:
-        table.add_row(move.path, *(_arrow(p) for p in move.percents), *([_alike(move)] if grid else []))
+        table.add_row(
+            with_leg(found.machine, move.path), *(_arrow(p) for p in move.percents), *([_alike(move)] if grid else [])
+        )
     return table
 
 

@@ -4,12 +4,13 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from kinetostat.studies.optimisation.log import Log
 from kinetostat.studies.optimisation.problem import Objective
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.robustness import Scatter
-from kinetostat.views.display import Scale, prefixed_scale
+from kinetostat.views.display import Scale, prefixed_scale, spoken
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout
 
 BINS = 40
@@ -38,9 +39,10 @@ def convergence(log: Log, title: str) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(6.8, 3.0), layout="constrained")
         left, right = figure.subplots(1, 2)
-        left.plot(steps, mean, color=COLOURS[1], label="mean of the kept", linestyle="--")
-        left.plot(steps, best, color=COLOURS[0], label="best")
-        left.set(xlabel=across, ylabel=_axis(objective, Scale(1.0, objective.term.unit)))
+        scale = _scaled(objective, np.concatenate([best, mean]))
+        left.plot(steps, mean * scale.factor, color=COLOURS[1], label="mean of the kept", linestyle="--")
+        left.plot(steps, best * scale.factor, color=COLOURS[0], label="best")
+        left.set(xlabel=across, ylabel=_axis(objective, scale))
         left.legend()
         end = best[np.isfinite(best)][-1:] if np.isfinite(best).any() else np.array([np.nan])
         for values, colour, label, dash in ((mean, COLOURS[1], "mean", "--"), (best, COLOURS[0], "best", "-")):
@@ -107,7 +109,10 @@ def _places(panel: Axes, found: Result) -> None:
         for x, text, side in zip((0.0, 1.0), ends, ("left", "right"), strict=True):
             panel.annotate(text, (x, place), (0, 5), textcoords="offset points", ha=side, fontsize=5.5, color="#777777")
     panel.set_yticks(range(space.size), [variable.name for variable in space.searched])
-    panel.set(xlim=(-0.05, 1.45), xticks=[], xlabel="○ before   ● best, between its bounds")
+    panel.set(xlim=(-0.05, 1.45), xticks=[], xlabel="between its bounds")
+    was = Line2D([], [], color="white", marker="o", markeredgecolor="#444444", linestyle="", label="before")
+    best = Line2D([], [], color=COLOURS[0], marker="o", linestyle="", label="best")
+    panel.legend(handles=[was, best], loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     panel.set_ylim(space.size - 0.4, -0.7)
     panel.grid(visible=False)
     panel.spines[["top", "right", "bottom"]].set_visible(False)
@@ -176,7 +181,7 @@ def _scaled(objective: Objective, values: np.ndarray) -> Scale:
 
 
 def _axis(objective: Objective, scale: Scale) -> str:
-    return scale.label(objective.term.label)
+    return scale.label(spoken(objective.term.label))
 
 
 def _limits(front_values: np.ndarray, every: np.ndarray) -> tuple[float, float]:

@@ -57,7 +57,9 @@ def variable_table(found: Result) -> Table:
     """The variables before and after, where they meet bounds, and what they do to the objectives."""
     objectives = found.problem.objectives
     heads = ["% per %"] if len(objectives) == 1 else [f"% per % ({k + 1})" for k in range(len(objectives))]
-    table = numeric_table("The design", "variable", ["initial", "best", "at bound", *heads])
+    table = numeric_table(
+        "The design; % per %, of an angle per 0.01 rad", "variable", ["initial", "best", "at bound", *heads]
+    )
     influences = {one.name: one for one in found.influences}
     held = found.problem.space.values(found.genes)
     for variable, value in zip(found.problem.space.searched, held, strict=True):

@@ -10,8 +10,10 @@ from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.studies.sensitivity import Sensitivity
-from kinetostat.views.figures import STYLE, fix_layout
+from kinetostat.machine.parameters import with_leg
+from kinetostat.studies.sensitivity import PER, Sensitivity
+from kinetostat.studies.setting import setting_of
+from kinetostat.views.figures import STYLE, fix_layout, note_setting
 
 MOST_ROWS = 30
 """Parameters that are shown."""
@@ -25,18 +27,18 @@ DARK = 0.6
 
 def sensitivity_figure(answer: Sensitivity) -> Figure:
     """A table of coloured cells: red where the index grows with the parameter, blue where it falls."""
-    rows = {one.path: one.percents for one in answer.influences}
+    rows = {with_leg(answer.machine, one.path): one.percents for one in answer.influences}
     heads = [QUANTITIES[name].symbol for name in answer.quantities]
-    return coloured_table(answer.machine.name, rows, heads, "RdBu_r", "percent per percent")
+    return coloured_table((answer.machine.name, setting_of(answer.machine)), rows, heads, "RdBu_r", PER)
 
 
 def coloured_table(
-    title: str, rows: Mapping[str, Sequence[float | None]], heads: Sequence[str], colours: str, label: str
+    titles: tuple[str, str], rows: Mapping[str, Sequence[float | None]], heads: Sequence[str], colours: str, label: str
 ) -> Figure:
     """Numbers in cells coloured by sign and size; the first rows, as many as a page takes.
 
     Args:
-        title: of the figure.
+        titles: over the figure, and below it where its numbers hold.
         rows: percent per percent in each column, by parameter; None is grey.
         heads: of the columns.
         colours: name of a diverging colour map.
@@ -50,7 +52,8 @@ def coloured_table(
         _draw_cells(panel, cells, colours, label)
         panel.set_yticks(range(len(shown)), shown)
         panel.set_xticks(range(len(heads)), heads)
-        figure.suptitle(title, fontsize=10)
+        figure.suptitle(titles[0], fontsize=10)
+        note_setting(figure, titles[1])
         fix_layout(figure)
     return figure
 

@@ -3,13 +3,13 @@
 from rich.console import Console
 from rich.table import Table
 
-from kinetostat.studies.sensitivity import Sensitivity, notes
+from kinetostat.machine.parameters import with_leg
+from kinetostat.studies.sensitivity import PER, Sensitivity, notes
 from kinetostat.views.display import family_of_names, spoken
 from kinetostat.views.tables import measured, numeric_table
 
 MOST_ROWS = 40
 """Parameters that are printed; `--json` has all."""
-MEASURE = "percent per percent"
 LEAST = 0.0005
 """Percent per percent below which a 0 is printed."""
 
@@ -28,10 +28,11 @@ def influence_table(answer: Sensitivity, count: int) -> Table:
     """The first parameters by rank, with their values and what they do to each index."""
     group = family_of_names(answer.quantities)
     heads = [spoken(name.removeprefix(f"{group}_")) for name in answer.quantities]
-    title = f"{answer.machine.name}: {group}, {MEASURE}" if group else f"{answer.machine.name}: {MEASURE}"
+    title = f"{answer.machine.name}: {group}, {PER}" if group else f"{answer.machine.name}: {PER}"
     table = numeric_table(title, "parameter", ["value", *heads])
     for one in answer.influences[:count]:
-        table.add_row(one.path, measured(one.value, one.kind), *(_percent(percent) for percent in one.percents))
+        name = with_leg(answer.machine, one.path)
+        table.add_row(name, measured(one.value, one.kind), *(_percent(percent) for percent in one.percents))
     return table
 
 

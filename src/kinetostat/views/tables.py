@@ -3,6 +3,7 @@
 import math
 import sys
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from rich import box
 from rich.console import Console
@@ -20,6 +21,10 @@ Number = float | None
 
 LARGE = 1e6
 """From which on a value of a machine is written with a power of ten."""
+PIPED = 100
+"""Columns of text where there is no terminal."""
+UNBOUND = 10_000
+"""Columns that no table needs."""
 
 
 def print_machines(console: Console, bundled: Sequence[Machine], names: Sequence[str]) -> None:
@@ -85,12 +90,25 @@ def _readable(value: float, quantity: Quantity) -> str:
     return f"{large if abs(value) >= LARGE else f'{value:.10g}'} {KINDS[quantity.kind].unit}".rstrip()
 
 
+class Piped(Console):
+    """The console where there is no terminal: as wide as six columns, and for tables of numbers as they need it."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print as `Console` does, but cut no number and no name."""
+        tables = [one for one in objects if isinstance(one, Table) and all(own.no_wrap for own in one.columns)]
+        unbound = self.options.update(width=UNBOUND)
+        self.width = max([PIPED, *(self.measure(table, options=unbound).maximum for table in tables)])
+        super().print(*objects, **options)
+        self.width = PIPED
+
+
 def terminal() -> Console:
-    """The console of this process: as wide as the terminal, wide enough for six columns where there is none.
+    """The console of this process: as wide as the terminal, or where there is none, as its tables need it.
 
     Texts are shown as they are, whatever brackets and colons are in them; what is styled is a `Text`.
     """
-    return Console(width=None if sys.stdout.isatty() else 100, markup=False, emoji=False)
+    plain: dict[str, Any] = {"markup": False, "emoji": False}
+    return Console(**plain) if sys.stdout.isatty() else Piped(width=PIPED, **plain)
 
 
 def number(value: Number, endless: str = "∞") -> str:

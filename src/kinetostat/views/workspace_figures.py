@@ -58,11 +58,14 @@ def pictures(
 
 
 def _shown(dataset: xr.Dataset, dims: Sequence[str]) -> Array:
-    """Which values of the third coordinate have a section: evenly chosen, no further than a step beyond the inside."""
+    """Which values of the third coordinate have a section: equally spaced, no further than a step beyond the inside."""
     reached = np.flatnonzero((dataset["verdict"] == 0).any(dims[:2]).values)
     last = dataset.sizes[dims[2]] - 1
     first, final = (max(0, reached[0] - 1), min(last, reached[-1] + 1)) if reached.size else (0, last)
-    return np.unique(np.linspace(first, final, min(SECTIONS, final - first + 1)).round().astype(int))
+    span = final - first
+    finest = max(1, -(-span // (SECTIONS - 1)))
+    step = next((one for one in range(finest, 2 * finest) if span % one == 0), finest)
+    return np.arange(first + span % step // 2, final + 1, step)
 
 
 def _at(dataset: xr.Dataset, dim: str) -> str:
@@ -85,14 +88,19 @@ def _sections(cuts: Sequence[xr.Dataset], labels: Sequence[str], conditions: Seq
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(wide * columns + 0.3, 0.9 * wide * rows + 0.9), layout="constrained")
         panels = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
+        edges: set[Condition] = set()
         for panel, cut in zip(panels, cuts, strict=False):
-            _fill(panel, cut, labels, conditions)
+            edges |= _fill(panel, cut, labels, conditions)
             if len(cuts) > 1:
                 across = str(next(dim for dim in cut.coords if dim not in cut["verdict"].dims and cut[dim].attrs))
                 panel.set_title(_at(cut, _varied(cuts, across)))
         for panel in panels[len(cuts) :]:
             panel.remove()
-        figure.legend(handles=_legend(cuts, labels, conditions), loc="outside lower center", ncols=min(3, 1 + columns))
+        frame = cuts[0].attrs.get("frame", "") if conditions else ""
+        figure.legend(
+            handles=[*_patches(cuts, labels), *_lines(conditions, edges)],
+            loc="outside lower center", ncols=min(3, 1 + columns), title=frame, title_fontsize=6.5,
+        )  # fmt: skip
         figure.suptitle(title, fontsize=10)
         fix_layout(figure)
     return figure
@@ -104,7 +112,8 @@ def _varied(cuts: Sequence[xr.Dataset], fallback: str) -> str:
     return next((n for n in names if len({float(cut[n]) for cut in cuts}) > 1), fallback)
 
 
-def _fill(panel: Axes, cut: xr.Dataset, labels: Sequence[str], conditions: Sequence[Condition]) -> None:
+def _fill(panel: Axes, cut: xr.Dataset, labels: Sequence[str], conditions: Sequence[Condition]) -> set[Condition]:
+    """Fill one panel by verdict; the conditions of which it has an edge, drawn as a line."""
     across, up = (str(dim) for dim in cut["verdict"].dims)
     (x, x_label), (y, y_label) = axis_values(cut, across), axis_values(cut, up)
     verdict = cut["verdict"].transpose(up, across).values
@@ -115,28 +124,35 @@ def _fill(panel: Axes, cut: xr.Dataset, labels: Sequence[str], conditions: Seque
     if 0.0 < inside.mean() < 1.0:
         panel.contour(x, y, inside, levels=[0.5], colors="#1d6b55", linewidths=0.9)
     elsewhere = ~np.isin(verdict, [i for i, label in enumerate(labels) if label == INSIDE or label.startswith(FAILS)])
+    edges = set()
     for condition, colour in zip(conditions, COLOURS, strict=False):
         values = np.ma.masked_where(elsewhere, cut[condition.quantity].transpose(up, across).values)
         if values.count() and values.min() < condition.value < values.max():
             panel.contour(x, y, values, levels=[condition.value], colors=colour, linewidths=1.2, linestyles="--")
+            edges.add(condition)
     panel.set(xlabel=x_label, ylabel=y_label, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     set_axis_scales(panel, cut, across, up)
     panel.label_outer()
+    return edges
 
 
-def _legend(cuts: Sequence[xr.Dataset], labels: Sequence[str], conditions: Sequence[Condition]) -> list[Patch | Line2D]:
-    """What the colours mean that occur, and the lines."""
+def _patches(cuts: Sequence[xr.Dataset], labels: Sequence[str]) -> list[Patch]:
+    """What the colours mean that occur."""
     present = {int(code) for cut in cuts for code in np.unique(cut["verdict"].values)}
-    patches: list[Patch | Line2D] = [
+    return [
         Patch(facecolor=colour, edgecolor="#888888", linewidth=0.4, label=phrase(label))
         for code, (label, colour) in enumerate(zip(labels, _colours(labels), strict=True))
         if code in present
     ]
-    lines = [
+
+
+def _lines(conditions: Sequence[Condition], edges: set[Condition]) -> list[Line2D]:
+    """What the lines mean that are drawn."""
+    return [
         Line2D([], [], color=colour, linestyle="--", linewidth=1.2, label=_edge(condition))
         for condition, colour in zip(conditions, COLOURS, strict=False)
+        if condition in edges
     ]
-    return [*patches, *lines]
 
 
 def _edge(condition: Condition) -> str:

@@ -109,7 +109,8 @@ def _elements(title: str, joint: JointPlan, data: Any) -> list[Element]:
     if joint.kind == "cylindrical":
         return [Joint(axis, point, title), Joint(axis, None, title)]
     where_ = None if joint.kind == "prismatic" else point
-    freedom = Joint(axis, where_, title, data.pitch if joint.kind == "helical" else 0.0)
+    carriage = point if joint.kind == "prismatic" else None
+    freedom = Joint(axis, where_, title, data.pitch if joint.kind == "helical" else 0.0, carriage)
     if not joint.sprung:
         return [freedom]
     name = f"{title} actuator" if joint.actuated else f"{title} hinge"

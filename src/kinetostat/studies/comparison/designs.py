@@ -52,14 +52,16 @@ class Design:
 
 @dataclass(frozen=True)
 class Difference:
-    """A field that all designs have, and of which not all say the same.
+    """A field of which not all designs that have it say the same.
 
     Attributes:
-        parameters: of each design; the kind need not be the same.
-        values: SI, entry by entry.
+        path: of the field.
+        parameters: of each design; the kind need not be the same. None where it has no such field.
+        values: SI, entry by entry; empty likewise.
     """
 
-    parameters: tuple[Parameter, ...]
+    path: str
+    parameters: tuple[Parameter | None, ...]
     values: tuple[tuple[float, ...], ...]
 
 
@@ -82,7 +84,7 @@ class Comparison:
 
     Attributes:
         designs: in order; the first is what the others are compared with.
-        differences: fields that differ.
+        differences: fields that two designs have at least and that differ.
         rows: numbers at the pose of each design.
         softest: the softest rotation and translation of each design; fewer where it has none.
         ranges: of the grid, as written.
@@ -173,19 +175,25 @@ def _designs(given: Sequence[Design | Machine | str] | Mapping[str, Machine]) ->
 
 
 def _differences(designs: Sequence[Design]) -> tuple[Difference, ...]:
-    """Fields that all designs have, whole ones where they have entries, and of which not all say the same."""
+    """Fields that two designs have at least, whole ones where they have entries, and of which not all say the same."""
     held = [values(design.machine) for design in designs]
-    known = [{p.path: p for p in parameters(design.machine.family)} for design in designs]
-    entries = {leaf for parameter in known[0].values() if parameter.quantity.count for leaf in parameter.leaves}
+    known = [_whole_fields(design.machine) for design in designs]
     found = []
-    for path in known[0]:
-        if path in entries or not all(path in fields for fields in known):
-            continue
-        own = tuple(fields[path] for fields in known)
-        rows = tuple(tuple(numbers[leaf] for leaf in p.leaves) for numbers, p in zip(held, own, strict=True))
-        if len(set(zip((p.quantity.kind for p in own), rows, strict=True))) > 1:
-            found.append(Difference(own, rows))
+    for path in dict.fromkeys(path for fields in known for path in fields):
+        own = tuple(fields.get(path) for fields in known)
+        rows = tuple(
+            tuple(numbers[leaf] for leaf in p.leaves) if p else () for numbers, p in zip(held, own, strict=True)
+        )
+        if len({(p.quantity.kind, row) for p, row in zip(own, rows, strict=True) if p}) > 1:
+            found.append(Difference(path, own, rows))
     return tuple(found)
+
+
+def _whole_fields(machine: Machine) -> dict[str, Parameter]:
+    """The fields of a machine by path, those with entries as one."""
+    every = list(parameters(machine.family))
+    entries = {leaf for parameter in every if parameter.quantity.count for leaf in parameter.leaves}
+    return {parameter.path: parameter for parameter in every if parameter.path not in entries}
 
 
 def _softest(design: Design) -> tuple[Blame, ...]:

@@ -22,7 +22,11 @@ def as_json(found: Comparison) -> dict[str, Any]:
         for design, own in zip(found.designs, found.softest, strict=True)
     ]
     differences = {
-        one.parameters[0].path: [[_plain(value) for value in row] for row in one.values] for one in found.differences
+        one.path: [
+            [_plain(value) for value in row] if own else None
+            for own, row in zip(one.parameters, one.values, strict=True)
+        ]
+        for one in found.differences
     }
     over = None
     if found.ranges:

@@ -14,13 +14,14 @@ from kinetostat.engine.batch import Evaluation, Progress, evaluate, silent
 from kinetostat.engine.chunks import Compute, here, in_chunks
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import GROUPS, PARTS, QUANTITIES
-from kinetostat.kinetostatics.response import respond
+from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import Parameter, find
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.ranges import Range, parse_range
+from kinetostat.studies.grid.absent import refuse_absent
+from kinetostat.studies.setting import frame_of, pose_of
 from kinetostat.units import KINDS
 
 IN_MEMORY = 5_000_000
@@ -56,7 +57,8 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
     """A question about a grid, as people write it; see `evaluate_grid`.
 
     Raises:
-        InputError: an unknown field or quantity, a bad range, a field twice, or more than six dimensions.
+        InputError: an unknown field or quantity, one that the machine cannot have, a bad range, a field twice, or more
+            than six dimensions.
     """
     need_machine(machine)
     ranges = several(ranges)
@@ -74,9 +76,9 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
     pairs = list(zip(wanted, chosen, strict=True))
     grid = Grid([Axis(parameter.leaves, one.values(parameter.quantity)) for one, parameter in pairs])
     names = resolve_quantities(quantities, machine.family.component_names)
-    refuse_absent(machine, names)
+    refuse_absent(machine, names, chosen)
     origin = {"machine": machine.name, "machine_file": as_toml(machine), "kinetostat": version("kinetostat")}
-    attributes = {**origin, "frame": "base axes at the platform point P"}
+    attributes = {**origin, "frame": frame_of(machine), "pose": pose_of(machine, taken)}
     labels = xr.Dataset({}, _coordinates(grid, pairs), attributes)
     return GridQuestion(machine, grid, tuple(parameter.path for parameter in chosen), tuple(names), labels)
 
@@ -177,21 +179,6 @@ def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Seq
     near = difflib.get_close_matches(name, known, 1)
     every = f"choose from {', '.join(known)}, or an entry such as compliance_{components[0]}_{components[-1]}."
     return f'"{name}" is not a quantity; ' + (f"did you mean {near[0]}?" if near else every)
-
-
-def refuse_absent(machine: Machine, names: Sequence[str]) -> None:
-    """Refuse quantities of parts that a machine lacks.
-
-    Raises:
-        InputError: names the quantity and what the machine lacks.
-    """
-    wanted = [name for name in names if name in PARTS]
-    if not wanted:
-        return
-    response = respond(machine)
-    for name in wanted:
-        if np.isnan(QUANTITIES[name].value(response)) and response.status == Status.OK:
-            raise InputError(f'"{name}" has no meaning here: {machine.name} lacks {PARTS[name]}; leave it out.')
 
 
 def _exists(name: str, components: Sequence[str]) -> bool:

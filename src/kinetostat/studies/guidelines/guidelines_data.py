@@ -69,6 +69,7 @@ def _limits(names: tuple[str, ...], stiffness: float, factors: list[float]) -> d
 def _move(move: Move, names: tuple[str, ...]) -> dict[str, Any]:
     data: dict[str, Any] = {
         "path": move.path,
+        "one_percent": "0.01 rad" if move.turning else "1 %",
         "stiffer_percent_per_percent": dict(zip(names, move.percents, strict=True)),
     }
     if move.stiffer:

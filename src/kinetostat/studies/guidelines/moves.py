@@ -28,15 +28,17 @@ class Move:
 
     Attributes:
         path: of the parameter.
-        percents: percent by which each direction gets stiffer per percent more of the parameter; None where rigid or
-            free.
+        percents: percent by which each direction gets stiffer per percent more of the parameter, of an angle per 0.01
+            rad; None where rigid or free.
         stiffer, softer: share of the poses of the grid at which it does so by more than rounding; empty without a grid.
+        turning: whether the parameter is an angle.
     """
 
     path: str
     percents: tuple[float | None, ...]
     stiffer: tuple[float, ...] = ()
     softer: tuple[float, ...] = ()
+    turning: bool = False
 
     @property
     def felt(self) -> bool:
@@ -65,7 +67,11 @@ def moves_at(answer: Sensitivity, yielding: npt.NDArray[np.bool_]) -> list[Move]
     quiet = [_together(answer.machine, path) for path in answer.none if designed(answer.machine, path)]
     zero = np.where(yielding, 0.0, math.nan)
     rows |= {path: zero for path in quiet if path not in rows}
-    found = [Move(path, tuple(None if math.isnan(p) else float(p) for p in row)) for path, row in rows.items()]
+    kinds = _kinds(answer.machine)
+    found = [
+        Move(path, tuple(None if math.isnan(p) else float(p) for p in row), turning=kinds[path] == "angle")
+        for path, row in rows.items()
+    ]
     return sorted(found, key=lambda move: -move.greatest)
 
 
@@ -105,7 +111,7 @@ def with_signs(machine: Machine, grid: Points, moves: Sequence[Move]) -> list[Mo
     held, found = values(machine), []
     for move in moves:
         rows = [paths.index(leaf) for leaf in leaves[move.path]]
-        sizes = np.array([abs(held[path]) or 1.0 for path in leaves[move.path]])
+        sizes = np.array([1.0 if move.turning else abs(held[path]) or 1.0 for path in leaves[move.path]])
         with np.errstate(all="ignore"):
             change = -np.einsum("cpn,p->cn", answer.gradients[:, rows], sizes) / answer.values
         felt = np.where(np.abs(change) > FELT, np.sign(change), 0.0)[:, good]

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.kinetostatics.elements import LINKS_TOGETHER, Element
+from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.guidelines.moves import Move
 from kinetostat.studies.guidelines.roles import ROUNDING, Array, Roles
@@ -155,7 +156,8 @@ def _design(found: Guidelines) -> Iterator[Statement]:
             if pairs
         ]
         aside = f"; nothing in {', '.join(none)}" if none else ""
-        yield Statement("design", f"More {move.path}: {'; '.join(said)}{aside}.", _same_signs(found, move))
+        more = f"{'0.01 rad more' if move.turning else 'More'} {with_leg(found.machine, move.path)}"
+        yield Statement("design", f"{more}: {'; '.join(said)}{aside}.", _same_signs(found, move))
 
 
 def _same_signs(found: Guidelines, move: Move) -> float | None:

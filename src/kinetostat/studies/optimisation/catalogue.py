@@ -5,11 +5,10 @@ import math
 from collections.abc import Mapping, Sequence
 
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
-from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.study import TermTable
-from kinetostat.studies.grid.grid import refuse_absent
+from kinetostat.studies.grid.absent import refuse_absent
 from kinetostat.studies.optimisation.aggregate import parse_aggregate
 from kinetostat.studies.optimisation.poses import PoseSet
 from kinetostat.studies.optimisation.terms import PoseTerm, StrokeTerm, Term, VolumeTerm
@@ -24,7 +23,6 @@ ALONG = {
 }
 """Along (force) and about (moment) a direction, all else free to follow: matrix, first row, whether its reciprocal."""
 STROKE, VOLUME = "leg_stroke", "workspace_volume"
-MASS = "mass"
 AXES = "xyz"
 
 
@@ -73,8 +71,6 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
         weights = _direction_weights(machine, matrix, first, table.direction, where)
         return PoseTerm(label, unit, tuple(weights.items()), inverse, over, high_is_bad)
     refuse_absent(machine, [name])
-    if name == MASS and respond(machine).mass == 0.0:
-        raise InputError(f"{where}: nothing says what {machine.name} weighs; give a density or tool.mass.")
     return PoseTerm(label, QUANTITIES[name].unit, ((name, 1.0),), False, over, high_is_bad)
 
 

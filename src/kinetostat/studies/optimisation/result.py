@@ -51,7 +51,8 @@ class Influence:
     Attributes:
         name: of the variable.
         slopes: derivatives of each objective by it, SI; where an objective has a kink, of the part that decides.
-        percents: percent by which each objective changes per percent of the variable; NaN where one of them is 0.
+        percents: percent by which each objective changes per percent of the variable, of an angle per 0.01 rad; NaN
+            where one of them is 0.
         bound: "lower" or "upper" if the variable is at that bound, else nothing.
     """
 
@@ -212,8 +213,9 @@ def _influences(problem: Problem, survey: Surveyor, genes: Array) -> list[Influe
     for place, k in enumerate(survey.free):
         variable = problem.space.searched[k]
         slopes = tuple(float(slope[place]) / (variable.high - variable.low) for _, slope in numbers)
+        size = 1.0 if variable.quantity.kind == "angle" else float(held[k])
         percents = tuple(
-            slope * float(held[k]) / value if value and held[k] else float("nan")
+            slope * size / value if value and size else float("nan")
             for slope, (value, _) in zip(slopes, numbers, strict=True)
         )
         found.append(Influence(variable.name, slopes, percents, bounds[k]))

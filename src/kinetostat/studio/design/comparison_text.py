@@ -88,7 +88,7 @@ def _differences(found: Comparison, letters: str) -> str:
     rows = []
     for one in found.differences:
         pairs = zip(one.values, one.parameters, strict=True)
-        rows.append([one.parameters[0].path, *(readable(values, p.quantity) for values, p in pairs)])
+        rows.append([one.path, *(readable(values, p.quantity) if p else DASH for values, p in pairs)])
     families = [design.machine.family.name for design in found.designs]
     if len(set(families)) > 1:
         rows = [["family", *families], *rows]

@@ -68,7 +68,8 @@ def _design(problem: Problem, found: dict[str, Any]) -> str:
             before, after = (shown(variable.quantity, v) for v in (variable.initial, value))
         percents = slopes.get(path, {}).get("percent_per_percent", [])
         rows.append([path, before, after, bounds.get(path, ""), ", ".join(_percent(p) for p in percents)])
-    return heading("Design") + table("Design", ["", "initial", "best", "bound", "% per %"], rows, "design")
+    note = paragraph("% per %: of the objective per percent of the variable, of an angle per 0.01 rad.", "note")
+    return heading("Design") + table("Design", ["", "initial", "best", "bound", "% per %"], rows, "design") + note
 
 
 def _directions(found: dict[str, Any]) -> str:

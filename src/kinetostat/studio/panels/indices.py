@@ -48,7 +48,7 @@ def _pose(analysis: Analysis) -> str:
     found, indices = analysis.mobility, analysis.indices
     condition = engineering(analysis.jacobian_condition)
     rows = [
-        ["condition of W", engineering(analysis.condition)],
+        ["condition of W", engineering(analysis.wrench_condition)],
         ["condition of the actuators' Jacobian", condition],
         ["condition of K", engineering(indices.condition if indices else None)],
         ["rank", str(analysis.rank)],

@@ -2,6 +2,7 @@
 
 from nicegui import ui
 
+from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.sensitivity import Sensitivity
 from kinetostat.studio.answers import RankingWish, Report, map_quantities, ranking
 from kinetostat.studio.lanes import Lane
@@ -13,7 +14,7 @@ MOST = 24
 
 
 class SensitivityPanel:
-    """Bars in percent per percent, the greatest first."""
+    """Bars in percent per percent, of an angle per 0.01 rad, the greatest first."""
 
     name = "Sensitivity"
 
@@ -48,12 +49,12 @@ class SensitivityPanel:
 
 def ranking_text(found: Sensitivity) -> str:
     """The parameters with an influence on the first index, as bars."""
-    percents = [(one.path, one.percents[0]) for one in found.influences if one.percents]
+    percents = [(with_leg(found.machine, one.path), one.percents[0]) for one in found.influences if one.percents]
     known = [(path, percent) for path, percent in percents if percent is not None]
     largest = max((abs(percent) for _, percent in known), default=1.0)
     rows = [(path, percent / largest, f"{percent:+.3f}") for path, percent in known[:MOST]]
     if not rows:
         return paragraph(found.message or "No parameter has an influence here.")
-    note = "Percent by which the index changes per percent of the parameter."
+    note = "Percent by which the index changes per percent of the parameter, of an angle per 0.01 rad."
     more = f" {len(known) - MOST} more have less." if len(known) > MOST else ""
     return bars("sensitivities", rows) + paragraph(note + more)

@@ -63,7 +63,10 @@ def _tables(found: Guidelines, here: Roles) -> tuple[Block, ...]:
     blocks.append(printed(limit_table(found, here), f"Stiffness from which an element counts as rigid. {LEGEND}"))
     if count:
         poses = f" {ALIKE[0].upper()}{ALIKE[1:]}" if found.poses[0] else ""
-        caption = f"What one percent more of a parameter does: percent stiffer ▲ or softer ▼.{poses}"
+        arrows = (
+            "What one percent more of a parameter does, or 0.01 rad more of an angle: percent stiffer ▲ or softer ▼."
+        )
+        caption = arrows + poses
         blocks.append(printed(move_table(found, count), caption))
     blocks += [Paragraph(typeset(line)) for line in (found.meaning, *left_out(found, count))]
     limits = limit_figure(found)
@@ -83,7 +86,10 @@ def sensitivity_section(found: Sensitivity | None) -> Section:
     count = min(MOST_INFLUENCES, len(found.influences))
     rest = len(found.influences) - count
     more = f" {rest} more have less influence." if rest else ""
-    caption = f"Percent by which each entry of the diagonal of C changes per percent of a parameter.{more}"
+    about = (
+        "Percent by which each entry of the diagonal of C changes per percent of a parameter, of an angle per 0.01 rad."
+    )
+    caption = f"{about}{more}"
     return Section(
         title,
         (

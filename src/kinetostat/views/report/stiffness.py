@@ -85,7 +85,10 @@ def load_section(found: Analysis, pictures: Shown) -> Section:
     tables = [
         (load_table(found.components, found.load), "The load at the tool point (N·m, N) and its deflection (rad, m)."),
         (actuator_table(found.load), "Actuators under the load."),
-        (reaction_table(found.load), "Load that each joint passes on towards the base, at the joint (N·m, N)."),
+        (
+            reaction_table(found.load, found.axes),
+            f"Load that each joint passes on towards the base, at the joint (N·m, N; {found.axes} axes).",
+        ),
     ]
     blocks: list[Block] = [printed(table, caption) for table, caption in tables if table.row_count]
     if pictures.factor is not None:

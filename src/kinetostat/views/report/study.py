@@ -81,7 +81,10 @@ def _answer(found: Result) -> tuple[Block, ...]:
     best = "the knee of the front" if several else "the best design"
     blocks: list[Block] = [
         printed(worth_table(found), f"What it is worth: the machine as it was, and {best}."),
-        printed(variable_table(found), f"Variables of {best}; what one percent of each does to the objectives."),
+        printed(
+            variable_table(found),
+            f"Variables of {best}; what one percent of each does to the objectives, of an angle 0.01 rad.",
+        ),
         printed(direction_table(found), "Compliance before and after, the worst of all poses."),
         drawn(figures["comparison"], CAPTIONS["comparison"]),
     ]
