@@ -119,7 +119,7 @@ QUANTITIES = {
         MapQuantity("actuator_moment", "N·m", "greatest actuator moment", partial(actuator_load, sliding=False)),
     )
 }
-"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., free_stiffness_x, ..., regularity, ..."""
+"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., free_stiffness_x, regularity, ..."""
 
 GROUPS = {
     "compliance": tuple(f"compliance_{name}" for name in COMPONENTS),
