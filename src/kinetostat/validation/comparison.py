@@ -211,4 +211,6 @@ def _our_compliance(response: Response) -> Array:
     ours = np.array(response.compliance.rows(), dtype=float)
     if not np.all(np.isfinite(ours)):
         raise InputError("A spring without stiffness leaves the platform free: there is no compliance to compare.")
+    if not np.any(ours):
+        raise InputError("Every part is rigid: C is 0 in any engine, and there is nothing to compare.")
     return ours
