@@ -62,7 +62,7 @@ class Reproduction:
     def as_json(self) -> dict[str, Any]:
         """Numbers, equations and statements as plain data."""
         return {
-            "paper": "Zhang and Gosselin, Parallel kinematic machine design with kinetostatic model, 2002",
+            "paper": printed.CITATION,
             "explained": self.explained,
             "comparisons": [asdict(one) for one in self.comparisons],
             "equations": [asdict(check) | {"holds": check.holds} for check in self.checks],
