@@ -260,6 +260,11 @@ class Machine:
         given = self.sections["load"]
         return Wrench(Vector(*given.moment), Vector(*given.force))
 
+    @property
+    def reference(self) -> str:
+        """What K, C and the load are given at: "tool point T" if the file has a tool, else "platform point P"."""
+        return "tool point T" if any(self.sections["tool"].offset) else "platform point P"
+
     def tool_point(self, platform: Displacement) -> Vector:
         """The tool point T in the base frame, m: P itself unless the file has a table [tool]."""
         return platform.apply(Vector(*self.sections["tool"].offset))

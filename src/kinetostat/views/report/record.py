@@ -14,8 +14,8 @@ LIBRARIES = ("kinetostat", "numpy", "scipy", "llvmlite", "pymoo", "matplotlib")
 THEORY = (
     "Every elastic part is described by its compliance, which is 0 for a rigid one: rigid and flexible parts are one "
     "model, exact in the limit, and no large number stands in for infinity. Units are SI, in base axes; "
-    "a twist is (rotation, translation), a wrench (moment, force), both at the tool point. K and C are those of small "
-    "motions."
+    "a twist is (rotation, translation), a wrench (moment, force), both at the reference point. K and C are those of "
+    "small motions."
 )
 LEGS = (
     "A leg carries the wrenches W that do no work on its passive joints (unit twists J with index p) and yields by its "
