@@ -194,7 +194,7 @@ def remarks(analysis: Analysis) -> list[str]:
             f"Condition of K: {number(analysis.indices.condition, 'infinite')}, of the leg wrenches: "
             f"{number(analysis.condition)}, of the actuators' Jacobian: "
             f"{number(analysis.jacobian_condition, 'infinite')}; "
-            f"rotations compared through {number(analysis.length)} m."
+            f"rotations compared through the characteristic length, {number(analysis.length)} m."
         )
     if analysis.masses:
         lines.append(_moving(analysis))
