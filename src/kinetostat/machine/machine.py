@@ -238,6 +238,9 @@ class Machine:
     family: Family
     sections: Mapping[str, Any]
 
+    def __repr__(self) -> str:
+        return f"<Machine {self.name!r}, family {self.family.name}>"
+
     def configure(self, joints: Sequence[Scalar] = ()) -> Configuration:
         """The machine at its pose; `joints` are its coordinates where the family has no closed form for them."""
         placed = {"joints": joints} if self.family.chains else {}

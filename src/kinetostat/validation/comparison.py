@@ -117,6 +117,9 @@ class Validation:
     varied: str
     trials: tuple[tuple[float, float], ...]
 
+    def __repr__(self) -> str:
+        return f"<Validation of {self.machine.name!r} with {self.engine}: differs by {self.difference:.1e}>"
+
     @property
     def difference(self) -> float:
         """The largest of the blocks' relative differences."""

@@ -50,6 +50,9 @@ class Reproduction:
     search: Result
     search_claims: tuple[Claim, ...]
 
+    def __repr__(self) -> str:
+        return f"<Reproduction: {len(self.comparisons)} numbers, {'explained' if self.explained else 'NOT explained'}>"
+
     @property
     def explained(self) -> bool:
         """Whether nothing differs without an explanation."""
