@@ -201,16 +201,17 @@ def _link_length() -> Claim:
     fixed = _stiffness_over([(f"geometry.passive_links={length}",) for length in LENGTHS])
     grown = _stiffness_over([(f"geometry.passive_links={length}", f"pose.z={length}") for length in LENGTHS])
     steps = [np.diff(fixed, axis=0) < 0, np.diff(grown, axis=0) < 0]
-    always = np.logical_and(*(falls.all(axis=0) for falls in steps))
+    throughout = [np.asarray(falls.all(axis=0)) for falls in steps]
+    always = throughout[0] & throughout[1]
     rising = "; ".join(
-        f"{way} {', '.join(_course(i, found) for i in range(6) if not falls[:, i].all())}"
-        for way, found, falls in zip(("z fixed:", "z growing alike:"), (fixed, grown), steps, strict=True)
+        f"{way} {', '.join(_course(i, found) for i in range(6) if not falls[i])}"
+        for way, found, falls in zip(("z fixed:", "z growing alike:"), (fixed, grown), throughout, strict=True)
     )
     return Claim(
         "Further fact (i)",
         "For a given platform, longer links make every stiffness smaller.",
         f"Links 64 to 68 to 72 cm: with z fixed, K falls in {_count(steps[0][0])} then {_count(steps[0][1])} of six "
-        f"directions; with z growing alike, in {_count(steps[1].all(axis=0))} of six throughout.",
+        f"directions; with z growing alike, in {_count(throughout[1])} of six throughout.",
         _judge(bool(always.all()), bool(always.any())),
         f"Holds for {', '.join(COMPONENTS[i] for i in range(6) if always[i])} either way; fails with {rising}. Beyond "
         "the reference design, at fixed z, the platform pitches; with a higher machine the legs stand steeper.",
