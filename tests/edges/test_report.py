@@ -78,7 +78,7 @@ def test_its_matrices_are_those_of_analyze(paper):
 
 def test_its_loads_are_those_of_analyze(paper):
     load_case = paper.results["load"]
-    _, loaded, deflected = paper.table("The load at the tool point")
+    _, loaded, deflected = paper.table("The load at the ")
     assert [number(cell) for cell in loaded[1:]] == pytest.approx(load_case["wrench"])
     assert [number(cell) for cell in deflected[1:]] == pytest.approx(load_case["deflection"], rel=1e-3)
     actuators = [spring for spring in load_case["springs"] if spring["actuated"]]
