@@ -29,10 +29,11 @@ def machine_section(found: Analysis, pictures: Shown, live: bool) -> Section:
         caption += f" Deflections {pictures.factor:,.6g} times as large as they are."
     blocks: list[Block] = [
         Paragraph(_first_upper(machine.family.summary)),
+        *_mobility(found.mobility),
         Figure(caption, pictures.portrait(), SHARE, pictures.data if turning else None),
         _drawing(found),
     ]
-    return Section("The machine", (*blocks, *_mobility(found.mobility)))
+    return Section("The machine", tuple(blocks))
 
 
 def _drawing(found: Analysis) -> Figure:
