@@ -7,7 +7,7 @@ The convention, for every fenced block of README.md, CONTRIBUTING.md and docs/:
     ```sh                 commands, run in order in the page's folder; each must succeed
     ```console            `$ command` and what it says, whatever its exit code
     ```python             run, all blocks of a page in one namespace
-    ```text               lines that the block before has said, in this order; `...` leaves some out
+    ```text               what the block before has said, from its first line to its last; `...` leaves lines out
     ```xml                elements of a file, which must be well formed
     ```                   a quotation; nothing is done with it
 
@@ -19,6 +19,7 @@ import shlex
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -64,15 +65,23 @@ def dialogues(text: str) -> Iterator[tuple[list[str], str]]:
 
 
 def missing(expected: str, said: str) -> str | None:
-    """The first line of `expected` that `said` does not hold after the line before it; None if all are there."""
-    rest = _plain(said)
-    for line in expected.splitlines():
-        wanted = _plain(line.strip().removesuffix("..."))
-        if wanted:
-            _, found, rest = rest.partition(wanted)
-            if not found:
-                return line
-    return None
+    """The first part of `expected` that `said` does not hold where it has to be; None if `said` is as expected.
+
+    Both are the same from the first line to the last. `...` on a line of its own leaves out any lines, at the end of a
+    line what follows in that line and any lines after it.
+    """
+    lines = [line for line in map(_plain, said.splitlines()) if line]
+    starts = list(accumulate(map(len, lines), initial=0))
+    whole, at, gap = "".join(lines), 0, False
+    *parts, last = re.split(r"\.\.\.[ \t]*$", expected, flags=re.MULTILINE)
+    for part in (*parts, last):
+        wanted, cut = _plain(part), bool(part) and not part.endswith("\n") and part is not last
+        places = [start for start in starts if start >= at] if gap else [at]
+        ends = [p + len(wanted) for p in places if whole.startswith(wanted, p) and (cut or p + len(wanted) in starts)]
+        if not ends:
+            return part.strip()
+        at, gap = ends[0], True
+    return None if at == len(whole) or not _plain(last) else last.strip()
 
 
 def _plain(text: str) -> str:

@@ -50,5 +50,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     mathematics.add_renderer(app)
     app.connect("source-read", fill)
     app.connect("autodoc-process-docstring", reference.as_markup)
+    app.connect("autodoc-process-signature", reference.without_signature)
     app.connect("build-finished", check_alone)
     return {"parallel_read_safe": False}

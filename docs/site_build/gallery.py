@@ -7,11 +7,12 @@ from pathlib import Path
 
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studies.analysis import Analysis, analyze
-from kinetostat.views.picture import machine_picture
+from kinetostat.views.picture import Theme, machine_picture
 
 FOLDER = "generated"
 SIZE = (640, 480)
 """Pixels of a picture."""
+THEMES: tuple[Theme, ...] = ("light", "dark")
 FORMALITY = re.compile(r" ?(?:Every value is|Values are) text with a unit, or[^.]*\.")
 """What every file says of itself."""
 NUMBER = {2: "Two", 3: "Three", 4: "Four", 5: "Five", 6: "Six"}
@@ -21,15 +22,15 @@ def gallery(folder: Path) -> str:
     """One section for each machine, in the order of `kinetostat list`."""
     (folder / FOLDER).mkdir(exist_ok=True)
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as workers:
-        pictures = dict(zip(bundled(), workers.map(picture, bundled()), strict=True))
-    for name, data in pictures.items():
-        (folder / FOLDER / f"{name}.png").write_bytes(data)
+        wanted = [(name, theme) for name in bundled() for theme in THEMES]
+        for (name, theme), data in zip(wanted, workers.map(picture, *zip(*wanted, strict=True)), strict=True):
+            (folder / FOLDER / f"{name}-{theme}.png").write_bytes(data)
     return "\n".join(_section(name) for name in bundled())
 
 
-def picture(name: str) -> bytes:
-    """A bundled machine as PNG."""
-    return machine_picture(load(name), SIZE)
+def picture(name: str, theme: Theme) -> bytes:
+    """A bundled machine as PNG, to stand on a light or a dark page."""
+    return machine_picture(load(name), SIZE, theme=theme)
 
 
 def _section(name: str) -> str:
@@ -37,11 +38,15 @@ def _section(name: str) -> str:
     return "\n".join(
         [
             f"## {name}\n",
-            f"![{found.machine.name}]({FOLDER}/{name}.png)\n",
+            *(_picture(found.machine.name, f"{FOLDER}/{name}-{theme}.png", theme) for theme in THEMES),
             f"**{found.machine.name}.** {described(bundled()[name])}\n",
             f"{_facts(found)}\n",
         ]
     )
+
+
+def _picture(alt: str, path: str, theme: Theme) -> str:
+    return f"```{{image}} {path}\n:alt: {alt}\n:class: only-{theme}\n```\n"
 
 
 def described(text: str) -> str:

@@ -1,9 +1,10 @@
-"""The reference of the Python interface: every public name, from its docstring."""
+"""The reference of the Python interface: every public name and every answer, from its docstring."""
 
 import inspect
 import re
+from dataclasses import is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import kinetostat
 
@@ -15,7 +16,25 @@ def reference(_folder: Path) -> str:
         found = getattr(kinetostat, name)
         kind = "autoclass" if inspect.isclass(found) else "autofunction"
         entries += [f".. {kind}:: kinetostat.{name}", "   :members:" if kind == "autoclass" else "", ""]
+    entries += ["```", "", "## Answers", "", "What these functions return; made by them alone.", "", "```{eval-rst}"]
+    for answer in answers():
+        entries += [f".. autoclass:: {answer.__module__}.{answer.__name__}", "   :members:", ""]
     return "\n".join([*entries, "```"])
+
+
+def answers() -> list[type]:
+    """The classes of ours that public functions return, and that have no public name of their own."""
+    functions = (inspect.unwrap(getattr(kinetostat, name)) for name in kinetostat.__all__)
+    returned = {get_type_hints(one).get("return") for one in functions if inspect.isfunction(one)}
+    ours = (one for one in returned if is_dataclass(one) and one.__name__ not in kinetostat.__all__)
+    return sorted(ours, key=lambda one: one.__name__)
+
+
+def without_signature(
+    _app: Any, what: str, _name: str, found: Any, _options: Any, _signature: str, _returns: str
+) -> tuple[str, None] | None:
+    """Answers are made by functions: how they would be called is nobody's business."""
+    return ("", None) if what == "class" and is_dataclass(found) else None
 
 
 def as_markup(_app: Any, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:

@@ -84,6 +84,12 @@ def test_directions_that_the_machine_holds_rigidly(held):
     assert np.linalg.matrix_rank(validation.theirs * 1e3, tol=1e-9) == (4 if held == "rigid" else 5)
 
 
+def test_a_machine_without_anything_that_yields_is_refused():
+    """Both would say C = 0, which compares nothing."""
+    with pytest.raises(InputError, match="nothing to compare"):
+        validate(load("hexapod", ["stiffness.actuator=rigid"]))
+
+
 def test_a_leg_of_two_spherical_joints_is_a_strut():
     leg = two_force_leg("leg 1", Vector(0.0, 0.0, 0.0), Vector(0.1, 0.0, 0.4), 2e6, 1e6)
     (strut,) = pieces(leg)

@@ -154,10 +154,30 @@ def test_nothing_is_excused_that_is_not_there(words):
 
 
 def test_a_false_answer_is_found_out():
-    said = "  C  rx  0.516404\n     ry  1.404595\n"
-    assert missing("C rx 0.516404\n ...\nry 1.404595", said) is None
-    assert missing("C rx 0.516405", said) == "C rx 0.516405"
-    assert missing("ry 1.404595\nrx 0.516404", said) == "rx 0.516404"
+    said = "  C  rx  0.516404\n     ry  1.404595\n     z   0.011139\n"
+    assert missing("C rx 0.516404\nry 1.404595\n z 0.011139", said) is None
+    assert missing("C rx 0.516405\n...", said) == "C rx 0.516405"
+    assert missing("...\nry 1.404595\nrx 0.516404\n...", said) == "ry 1.404595\nrx 0.516404"
+
+
+@pytest.mark.parametrize(
+    ("shown", "marked"),
+    [
+        ("C rx 0.516404\nz 0.011139", "C rx 0.516404\n...\nz 0.011139"),
+        ("C rx 0.516404\nry 1.404595", "C rx 0.516404\nry 1.404595\n..."),
+        ("ry 1.404595\nz 0.011139", "...\nry 1.404595\nz 0.011139"),
+        ("C rx\nry 1.404595\nz 0.011139", "C rx ...\nry 1.404595\nz 0.011139"),
+    ],
+)
+def test_what_is_left_out_is_marked(shown, marked):
+    said = "  C  rx  0.516404\n     ry  1.404595\n     z   0.011139\n"
+    assert missing(shown, said) is not None
+    assert missing(marked, said) is None
+
+
+def test_a_number_that_is_cut_off_is_found_out():
+    assert missing("ry 1.40\n...", "ry 1.404595\n0 of 3\n") is not None
+    assert missing("...\ny 1.404595", "ry 1.404595\n") is not None
 
 
 def test_equations_are_numbered_in_order_and_those_that_are_named_exist():

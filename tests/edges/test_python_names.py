@@ -7,10 +7,13 @@ import ast
 import importlib
 import inspect
 import json
+import re
 import subprocess
 import sys
 import textwrap
+from dataclasses import is_dataclass
 from pathlib import Path
+from typing import get_type_hints
 
 import pytest
 import xarray as xr
@@ -150,6 +153,39 @@ def answers():
 @pytest.fixture(scope="module")
 def found():
     return answers()
+
+
+@pytest.mark.parametrize(
+    "name", ["machine", "analysis", "workspace", "sensitivity", "guidelines", "comparison", "validation"]
+)
+def test_an_answer_introduces_itself_in_a_line(found, name):
+    """A REPL shows what it is and of what, not ten thousand characters of it."""
+    line = repr(found[name])
+    assert line.startswith(f"<{type(found[name]).__name__} ")
+    assert len(line.splitlines()) == 1
+    assert len(line) < 200
+
+
+def answer_classes():
+    """The classes of ours that public functions return."""
+    functions = [getattr(kinetostat, name) for name in kinetostat.__all__]
+    returned = [get_type_hints(inspect.unwrap(one)).get("return") for one in functions if not inspect.isclass(one)]
+    return {one for one in returned if is_dataclass(one)}
+
+
+def test_docstrings_of_public_names_refer_to_nothing_that_is_not_public():
+    trees = [ast.parse(path.read_text("utf-8")) for path in Path(kinetostat.__file__).parent.rglob("*.py")]
+    ours = {one.name for tree in trees for one in tree.body if isinstance(one, ast.FunctionDef | ast.ClassDef)}
+    parts = {name for one in answer_classes() for name in (*one.__dataclass_fields__, *vars(one))}
+    public = parts.union(kinetostat.__all__, {"verdict"})  # a variable of a workspace's dataset
+    described = [getattr(kinetostat, name) for name in kinetostat.__all__]
+    described += [part for one in answer_classes() for part in (one, *vars(one).values()) if part.__doc__]
+    for one in described:
+        plain = inspect.unwrap(one)
+        arguments = set(inspect.signature(plain).parameters) if inspect.isfunction(plain) else set()
+        said = re.findall(r"`([\w.]+)`|\b([\w.]+)\(\)", one.__doc__ or "")
+        named = {(quoted or called).rpartition(".")[2] for quoted, called in said}
+        assert not (named & ours) - public - arguments, one
 
 
 @pytest.mark.parametrize("name", ["machine", "grid", "workspace", "sensitivity", "guidelines", "comparison"])

@@ -78,12 +78,28 @@ def test_its_matrices_are_those_of_analyze(paper):
 
 def test_its_loads_are_those_of_analyze(paper):
     load_case = paper.results["load"]
-    _, loaded, deflected = paper.table("The load at the tool point")
+    _, loaded, deflected = paper.table("The load at the ")
     assert [number(cell) for cell in loaded[1:]] == pytest.approx(load_case["wrench"])
     assert [number(cell) for cell in deflected[1:]] == pytest.approx(load_case["deflection"], rel=1e-3)
     actuators = [spring for spring in load_case["springs"] if spring["actuated"]]
     rows = paper.table("Actuators under")[1:]
     assert [number(row[1]) for row in rows] == pytest.approx([one["load"] for one in actuators], rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("settings", "point", "other"),
+    [
+        ([], "platform point P", "at the tool point"),
+        (['tool.offset=["0 mm","0 mm","-80 mm"]'], "tool point T", "at the platform point"),
+    ],
+)
+def test_the_reference_point_has_one_name(settings, point, other):
+    page = Page(quick(load(MACHINE, [*settings, LOAD[1]])))
+    assert f"Each direction at the {point}" in page.text
+    assert f"The load at the {point}" in page.text
+    assert f"mm from the {point}" in page.text
+    assert f"points from the {point}" in page.text
+    assert other not in page.text
 
 
 def test_every_number_of_the_machine_has_its_unit(paper):

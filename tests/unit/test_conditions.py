@@ -14,6 +14,8 @@ READ = [
     ("stiffness_z>=20N/um", "stiffness_z", ">=", 2e7),
     ("  compliance_z <1e-8 m/N ", "compliance_z", "<", 1e-8),
     ("compliance_rx <= 1e-3 mrad/(N*m)", "compliance_rx", "<=", 1e-6),
+    ("free_stiffness_z > 50 N/um", "free_stiffness_z", ">", 5e7),
+    ("free_stiffness_rz > 1e4 N*m/rad", "free_stiffness_rz", ">", 1e4),
     ("compliance_rx < 1 deg/(kN·m)", "compliance_rx", "<", math.radians(1) / 1e3),
     ("compliance_rx_z < 2e-6 rad/N", "compliance_rx_z", "<", 2e-6),
     ("stiffness_rz > 1e4 N*m/rad", "stiffness_rz", ">", 1e4),
@@ -31,11 +33,12 @@ def test_conditions_are_read_in_their_units(text, quantity, comparison, value):
 
 
 REFUSED = [
-    ("stiffness_z", ["is not a condition", "stiffness_z > 20 N/um"]),
+    ("stiffness_z", ["is not a condition", "free_stiffness_z > 20 N/um"]),
     ("stiffness_z = 3 N/m", ["is not a condition"]),
     ("1 < regularity < 2", ["is not a condition"]),
     ("3 N/m < stiffness_z", ["is not a condition"]),
     ("stiffness > 3 N/m", ["stands for several", "stiffness_rx"]),
+    ("free_stiffness > 3 N/m", ["stands for several", "free_stiffness_rx"]),
     ("stiffnes_z > 3 N/m", ['"stiffnes_z" is not a quantity']),
     ("stiffness_z > 3 m", ["stiffness_z", '"m" is no unit of linear stiffness', "20 N/um"]),
     ("stiffness_z > rigid", ["stiffness_z", "large value"]),

@@ -5,11 +5,14 @@ import math
 import numpy as np
 import pytest
 
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.engine.batch import evaluate
+from kinetostat.engine.points import Table
 from kinetostat.exchange.results import as_dataset
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.extremes import ROTATIONS, TRANSLATIONS
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import analyze
@@ -40,6 +43,35 @@ def test_extremes_are_eigenvalues(case):
             assert value(f"least_{word}_stiffness", response) == pytest.approx(1.0 / np.linalg.eigvalsh(soft)[-1])
         if np.isfinite(stiff).all():
             assert value(f"greatest_{word}_stiffness", response) == pytest.approx(np.linalg.eigvalsh(stiff)[-1])
+
+
+@every_machine
+def test_free_stiffness_is_what_is_left_of_k_when_all_else_follows(case):
+    """1 / C_ii by a second route: K_ii - K_io K_oo^-1 K_oi; at most K_ii, with which all else is held."""
+    response = respond(case.machine)
+    there = SPATIAL if response.configuration.plane is None else PLANAR
+    stiff = block(response.stiffness, there, range(6))
+    if not np.isfinite(stiff).all():
+        pytest.skip("rigid against some load")
+    scale = 1.0 / np.sqrt(np.diag(stiff))
+    unit = stiff * np.outer(scale, scale)
+    for k, i in enumerate(there):
+        others = [j for j in range(len(there)) if j != k]
+        left = 1.0 - unit[k, others] @ np.linalg.solve(unit[np.ix_(others, others)], unit[others, k])
+        found = value(f"free_stiffness_{COMPONENTS[i]}", response)
+        assert found == pytest.approx(left * stiff[k, k], rel=1e-6, abs=1e-12 * stiff[k, k])
+        assert found <= stiff[k, k] * (1.0 + CONDITION)
+
+
+def test_free_stiffness_where_nothing_gives_is_infinite_for_one_pose_and_for_many():
+    """With rigid links the paper's machine gives neither about z nor along y, C_ii = 0; the others are 1 / C_ii."""
+    machine = load("zhang-gosselin-4dof", ["stiffness.passive_links=rigid"])
+    alone, compliance = respond(machine), analyze(machine).compliance_diagonal
+    many = evaluate(machine, Table({"pose.z": np.array([0.68, 0.68])}), GROUPS["free_stiffness"], repeated=True)
+    for i, name in enumerate(COMPONENTS):
+        expected = 1.0 / compliance[i] if name not in ("rz", "y") else math.inf
+        assert value(f"free_stiffness_{name}", alone) == pytest.approx(expected)
+        assert many.values[f"free_stiffness_{name}"].tolist() == pytest.approx([expected, expected])
 
 
 @every_machine

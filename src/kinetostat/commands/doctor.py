@@ -61,5 +61,5 @@ def _drawn() -> str:
 
     stream = BytesIO()
     machine = load("zhang-gosselin-4dof")
-    three_views(machine.configure(), machine.name).savefig(stream)
+    three_views(machine, machine.name).savefig(stream)
     return f"the paper's machine drawn, {stream.tell() / 1000:.0f} kB"

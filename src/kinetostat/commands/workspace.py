@@ -26,7 +26,7 @@ def add_workspace_command(commands: "Commands") -> None:
     command = add_command(
         commands, "workspace", _workspace, "where the machine can work: volume, what limits it, pictures",
         'kinetostat workspace hexapod --set "limits.longest_leg=20 cm" --over "x=-8 cm:8 cm:41" '
-        '--over "y=-8 cm:8 cm:41" --over "z=10 cm:25 cm:41" --where "stiffness_z > 60 N/um" -o out',
+        '--over "y=-8 cm:8 cm:41" --over "z=10 cm:25 cm:41" --where "free_stiffness_z > 20 N/um" -o out',
     )  # fmt: skip
     takes_machine(command)
     command.add_argument(
@@ -35,7 +35,7 @@ def add_workspace_command(commands: "Commands") -> None:
     )  # fmt: skip
     command.add_argument(
         "--where", metavar="CONDITION", action="append", default=[], dest="conditions",
-        help='what a pose has to meet, e.g. "stiffness_z > 20 N/um"; repeatable, all have to be met',
+        help='what a pose has to meet, e.g. "free_stiffness_z > 20 N/um"; repeatable, all have to be met',
     )  # fmt: skip
     command.add_argument("--seed", type=_seed, default=0, help="of the random points for the volume (default: 0)")
     command.add_argument("-o", "--output", type=Path, help="folder for NetCDF and pictures (PNG, SVG, PDF)")

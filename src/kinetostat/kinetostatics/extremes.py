@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 
 from kinetostat.algebra.eigenvalues import greatest_eigenvalue
-from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller, sqrt, times, total, where
+from kinetostat.algebra.scalar import Scalar, is_zero, plus, reciprocal, smaller, sqrt, times, total, where
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
 from kinetostat.kinetostatics.response import Response
@@ -19,9 +19,32 @@ from kinetostat.machine.machine import springs
 ROTATIONS, TRANSLATIONS = range(3), range(3, 6)
 
 
+ROUNDED = 1e-24
+"""Share of all compliances of a pose below which one of them is the square of a rounding error, and 0 is meant."""
+
+
 def components(response: Response) -> tuple[int, ...]:
     """Which of rx ry rz x y z = 0 ... 5 the machine has."""
     return SPATIAL if response.configuration.plane is None else PLANAR
+
+
+def free_stiffness(response: Response, row: int) -> Scalar:
+    """What a tool feels along one component, all else free to follow: 1 / C_ii, N/m or N·m/rad; at most K_ii.
+
+    Args:
+        response: of a pose; at T, base axes.
+        row: of rx ry rz x y z = 0 ... 5.
+
+    Returns:
+        0 where the direction is free, infinity where nothing in it gives, to rounding.
+    """
+    soft, length = response.compliance.entry(row, row), response.configuration.length
+    turns = total([response.compliance.entry(i, i) for i in ROTATIONS])
+    moves = total([response.compliance.entry(i, i) for i in TRANSLATIONS])
+    area = times(length, length)
+    size = plus(turns, times(reciprocal(area), moves)) if row in ROTATIONS else plus(moves, times(area, turns))
+    least = where(size < math.inf, times(ROUNDED, size), 0.0)
+    return where(soft > least, reciprocal(soft), math.inf)
 
 
 def least_stiffness(response: Response, block: Sequence[int]) -> Scalar:

@@ -14,6 +14,7 @@ from kinetostat.kinetostatics.extremes import (
     ROTATIONS,
     TRANSLATIONS,
     actuator_load,
+    free_stiffness,
     frobenius_condition,
     greatest_stiffness,
     least_stiffness,
@@ -82,6 +83,15 @@ def _entries(
     return found
 
 
+def _free_stiffnesses() -> list[MapQuantity]:
+    found = []
+    for i, name in enumerate(COMPONENTS):
+        symbol = rf"$1/C_{{\mathrm{{{name}}}}}$"
+        value = partial(free_stiffness, row=i)
+        found.append(MapQuantity(f"free_stiffness_{name}", _stiffness_unit(i, i), symbol, value, (name,)))
+    return found
+
+
 def _extremes() -> list[MapQuantity]:
     blocks = (("translational", "N/m", "t", TRANSLATIONS), ("rotational", "N·m/rad", "r", ROTATIONS))
     found = []
@@ -97,6 +107,7 @@ QUANTITIES = {
     for quantity in (
         *_entries("compliance", "C", _compliance_unit, _compliance),
         *_entries("stiffness", "K", _stiffness_unit, _stiffness),
+        *_free_stiffnesses(),
         MapQuantity("regularity", "1", "regularity", _regularity),
         MapQuantity("mass", "kg", "moving mass", _mass),
         MapQuantity("side", "1", "side of singularities", side),
@@ -108,13 +119,14 @@ QUANTITIES = {
         MapQuantity("actuator_moment", "N·m", "greatest actuator moment", partial(actuator_load, sliding=False)),
     )
 }
-"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., regularity, mass, ..."""
+"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., free_stiffness_x, regularity, ..."""
 
 GROUPS = {
     "compliance": tuple(f"compliance_{name}" for name in COMPONENTS),
     "stiffness": tuple(f"stiffness_{name}" for name in COMPONENTS),
+    "free_stiffness": tuple(f"free_stiffness_{name}" for name in COMPONENTS),
 }
-"""Names that stand for several quantities: the six diagonal entries of C and of K."""
+"""Names that stand for several quantities: the six diagonal entries of C and of K, and the six 1/C_ii."""
 
 PARTS = {
     "shortest_leg": "a leg with an actuated slide between two joints",

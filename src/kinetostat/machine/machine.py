@@ -238,6 +238,9 @@ class Machine:
     family: Family
     sections: Mapping[str, Any]
 
+    def __repr__(self) -> str:
+        return f"<Machine {self.name!r}, family {self.family.name}>"
+
     def configure(self, joints: Sequence[Scalar] = ()) -> Configuration:
         """The machine at its pose; `joints` are its coordinates where the family has no closed form for them."""
         placed = {"joints": joints} if self.family.chains else {}
@@ -259,6 +262,11 @@ class Machine:
         """The wrench of the file's table [load], at the tool point, base axes (N·m, N)."""
         given = self.sections["load"]
         return Wrench(Vector(*given.moment), Vector(*given.force))
+
+    @property
+    def reference(self) -> str:
+        """What K, C and the load are given at: "tool point T" if the file has a tool, else "platform point P"."""
+        return "tool point T" if any(self.sections["tool"].offset) else "platform point P"
 
     def tool_point(self, platform: Displacement) -> Vector:
         """The tool point T in the base frame, m: P itself unless the file has a table [tool]."""

@@ -104,7 +104,7 @@ class PosesTable(Table):
         default=None,
         description="only those nodes of the grid that lie in the workspace of the machine as its file says",
     )
-    where: list[str] = Field(default=[], description='conditions of that workspace, e.g. "stiffness_z > 50 N/um"')
+    where: list[str] = Field(default=[], description='conditions of that workspace, e.g. "free_stiffness_z > 50 N/um"')
     required: float = Field(default=1.0, description="share of the poses that a design must reach", ge=0.0, le=1.0)
 
 

@@ -111,6 +111,9 @@ class Analysis:
     jacobian_condition: float | None = None
     length: float | None = None
 
+    def __repr__(self) -> str:
+        return f"<Analysis of {self.machine.name!r}: {self.status.word}, components {' '.join(self.components)}>"
+
     @property
     def mass(self) -> float | None:
         """Of what moves as far as it is known, kg; None where nothing is known."""

@@ -104,6 +104,9 @@ class Sensitivity:
     none: tuple[str, ...] = ()
     skipped: tuple[tuple[str, str], ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<Sensitivity of {self.machine.name!r}: {self.status.word}, {len(self.influences)} parameters>"
+
 
 def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -> Sensitivity:
     """How indices of a machine at its pose depend on each of its design parameters and pose coordinates.

@@ -117,6 +117,9 @@ class Validation:
     varied: str
     trials: tuple[tuple[float, float], ...]
 
+    def __repr__(self) -> str:
+        return f"<Validation of {self.machine.name!r} with {self.engine}: differs by {self.difference:.1e}>"
+
     @property
     def difference(self) -> float:
         """The largest of the blocks' relative differences."""
@@ -211,4 +214,6 @@ def _our_compliance(response: Response) -> Array:
     ours = np.array(response.compliance.rows(), dtype=float)
     if not np.all(np.isfinite(ours)):
         raise InputError("A spring without stiffness leaves the platform free: there is no compliance to compare.")
+    if not np.any(ours):
+        raise InputError("Every part is rigid: C is 0 in any engine, and there is nothing to compare.")
     return ours

@@ -29,15 +29,14 @@ def print_analysis(console: Console, analysis: Analysis, along: Sequence[Along] 
     console.print(Text.assemble((machine.name, "bold"), f"  {analysis.status.word}"))
     console.print(analysis.message, highlight=False)
     print_doubts(console, machine)
-    point = "the tool point T" if any(machine.sections["tool"].offset) else "the platform point P"
-    about = f"Components {' '.join(names)} at {point}, {analysis.axes} axes. Rank {analysis.rank}."
+    about = f"Components {' '.join(names)} at the {machine.reference}, {analysis.axes} axes. Rank {analysis.rank}."
     console.print(about, style="dim", highlight=False)
     console.print(stiffness_table(analysis))
     console.print(compliance_table(analysis))
     console.print(shares_table(analysis, full))
     shown = [principal_table(analysis), along_table(along)]
     if full and analysis.indices:
-        shown.append(eigenscrew_table(analysis.indices.eigenscrews))
+        shown.append(eigenscrew_table(analysis.indices.eigenscrews, machine.reference))
     if analysis.load:
         shown += [load_table(names, analysis.load), actuator_table(analysis.load)]
         shown.append(reaction_table(analysis.load, analysis.axes))
@@ -138,9 +137,10 @@ def _direction(vector: Sequence[float]) -> str:
     return " ".join(f"{round(component, 2) + 0.0:+.2f}" for component in vector)
 
 
-def eigenscrew_table(screws: Sequence[Eigenscrew]) -> Table:
-    """Eigenvalue, pitch, direction and point of each."""
-    table = numeric_table("Eigenscrews", "", ["eigenvalue (N/rad)", "pitch (mm/rad)", "direction", "point from T (mm)"])
+def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str) -> Table:
+    """Eigenvalue, pitch, direction and point of each, the point from the reference point."""
+    heads = ["eigenvalue (N/rad)", "pitch (mm/rad)", "direction", f"point from {reference[-1]} (mm)"]
+    table = numeric_table("Eigenscrews", "", heads)
     for i, screw in enumerate(screws, 1):
         point = "–" if screw.point is None else _millimetres(screw.point)
         pitch = "infinite" if math.isinf(screw.pitch) else number(1e3 * screw.pitch)
@@ -154,9 +154,9 @@ def _millimetres(point: Sequence[float]) -> str:
 
 
 def load_table(names: Sequence[str], load: LoadCase) -> Table:
-    """The load and the deflection of the tool point."""
+    """The load and the deflection of the reference point."""
     kept = [("rx", "ry", "rz", "x", "y", "z").index(name) for name in names]
-    table = numeric_table("Load at the tool point (N·m, N) and its deflection (rad, m)", "", names)
+    table = numeric_table("Load (N·m, N) and its deflection (rad, m)", "", names)
     table.add_row("load", *(number(load.wrench[i]) for i in kept))
     table.add_row("deflection", *(number(load.deflection[i], "free") for i in kept))
     return table
@@ -201,12 +201,12 @@ def remarks(analysis: Analysis) -> list[str]:
     if analysis.indices:
         centre = analysis.indices.centres["stiffness"]
         if centre is not None:
-            lines.append(f"Centre of stiffness: {_millimetres(centre)} mm from the point above.")
+            lines.append(f"Centre of stiffness: {_millimetres(centre)} mm from the {analysis.machine.reference}.")
         lines.append(
             f"Condition of K: {number(analysis.indices.condition, 'infinite')}, of the leg wrenches: "
             f"{number(analysis.wrench_condition)}, of the actuators' Jacobian: "
             f"{number(analysis.jacobian_condition, 'infinite')}; "
-            f"rotations compared through {number(analysis.length)} m."
+            f"rotations compared through the characteristic length, {number(analysis.length)} m."
         )
     if analysis.masses:
         lines.append(_moving(analysis))

@@ -60,7 +60,7 @@ class Kind:
 
 
 def _views(machine: Machine) -> dict[str, Figure]:
-    return {"views": three_views(machine.configure(), machine.name)}
+    return {"views": three_views(machine, machine.name)}
 
 
 def _names(dataset: xr.Dataset) -> list[str]:

@@ -26,7 +26,7 @@ class Scale:
 
 
 def family_of_names(names: Sequence[str]) -> str:
-    """What quantities have in common: "compliance" or "stiffness" where all are entries of C or of K, else nothing."""
+    """The group of which all quantities are, such as "stiffness" where all are entries of K; else nothing."""
     return next((group for group in GROUPS if all(name.startswith(f"{group}_") for name in names)), "")
 
 

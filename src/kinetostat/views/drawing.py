@@ -8,13 +8,16 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from kinetostat.algebra.vector import Vector
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Leg
-from kinetostat.machine.machine import Configuration
+from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout
 
 VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
 MILLIMETRES = 1e3
 LEG, CONSTRAINT, PLATE = COLOURS[0], COLOURS[1], "#555555"
+OFFSETS = {"P": (4, 4), "T": (4, -10)}
+"""Of the letters of reference points from these, in points: both can be read where one is behind the other."""
 
 SAME = 1e-6
 """Distance in mm below which two points of a view are one."""
@@ -22,13 +25,20 @@ SAME = 1e-6
 Loop = list[Vector]
 
 
-def three_views(configuration: Configuration, title: str) -> Figure:
-    """Front, side and plan of a machine, of a planar one the plan alone, to scale, in mm; actuated legs blue."""
+def three_views(machine: Machine, title: str) -> Figure:
+    """Front, side and plan of a machine, of a planar one the plan alone, to scale, in mm; actuated legs blue.
+
+    Args:
+        machine: at its pose; P is marked, and T where the machine has a tool.
+        title: over the whole figure.
+    """
+    response = respond(machine)
+    configuration, tool = response.configuration, response.reference
     views = VIEWS if configuration.plane is None else VIEWS[2:]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.6 if len(views) > 1 else 4.0, 3.3), layout="constrained")
         for panel, (name, across, up) in zip(figure.subplots(1, len(views), squeeze=False).flat, views, strict=True):
-            _draw_view(panel, configuration, across, up)
+            _draw_view(panel, configuration, tool, across, up)
             panel.set(title=name, xlabel=f"{across} (mm)", ylabel=f"{up} (mm)", aspect="equal")
             panel.margins(0.12)
         figure.suptitle(title, fontsize=10)
@@ -36,7 +46,7 @@ def three_views(configuration: Configuration, title: str) -> Figure:
     return figure
 
 
-def _draw_view(panel: Axes, configuration: Configuration, across: str, up: str) -> None:
+def _draw_view(panel: Axes, configuration: Configuration, tool: Vector, across: str, up: str) -> None:
     reference = configuration.platform.translation
     actuated = [leg for leg in configuration.legs if leg.actuated]
     standing = [leg for leg in actuated if len(leg.path) > 1]
@@ -44,9 +54,11 @@ def _draw_view(panel: Axes, configuration: Configuration, across: str, up: str) 
         panel.fill(*_flat(plate, across, up), facecolor="#dddddd", edgecolor=PLATE, linewidth=0.8, alpha=0.8)
     for leg in configuration.legs:
         _draw_leg(panel, leg, across, up, leg in actuated)
-    (x,), (y,) = _flat([reference], across, up)
-    panel.plot(x, y, "+", color="black", markersize=7, markeredgewidth=1.2)
-    panel.annotate("P", (x, y), textcoords="offset points", xytext=(4, 4))
+    marks = {"P": reference} if (tool - reference).norm() == 0.0 else {"P": reference, "T": tool}
+    for name, point in marks.items():
+        (x,), (y,) = _flat([point], across, up)
+        panel.plot(x, y, "+", color="black", markersize=7, markeredgewidth=1.2)
+        panel.annotate(name, (x, y), textcoords="offset points", xytext=OFFSETS[name])
 
 
 def _draw_leg(panel: Axes, leg: Leg, across: str, up: str, actuated: bool) -> None:

@@ -206,6 +206,6 @@ def _curve_panel(panel: Axes, dataset: xr.Dataset, across: str, names: Sequence[
         panel.plot(x, dataset[name].values * scale.factor, dash, color=colour, label=dataset[name].attrs["symbol"])
     if logarithmic:
         panel.set(xscale="log", yscale="log" if np.nanmin(values) > 0 else "linear")
-    panel.set(xlabel=x_label, ylabel=scale.label(family_of_names(names) or spoken(names[0])))
+    panel.set(xlabel=x_label, ylabel=scale.label(spoken(family_of_names(names) or names[0])))
     panel.margins(x=0.0)
     panel.legend(loc="best")

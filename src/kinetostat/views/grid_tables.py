@@ -11,6 +11,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.studies.grid.grid import failures
 from kinetostat.studies.grid.stored_grid import StoredGrid
 from kinetostat.studies.grid.tally import Extremes
+from kinetostat.views.display import family_of_names, spoken
 from kinetostat.views.tables import number, numeric_table
 
 LONGEST = 60
@@ -54,8 +55,9 @@ def _print_failures(console: Console, counts: Mapping[Status, int], size: int) -
 def _print_curve(console: Console, dataset: xr.Dataset, names: Sequence[str]) -> None:
     (across,) = dataset["status"].dims
     coordinate = dataset[across]
-    title = f"{dataset.attrs['machine']}: {', '.join(dict.fromkeys(name.split('_')[0] for name in names))}"
-    heads = [f"{name.split('_', 1)[-1]}\n{QUANTITIES[name].unit}" for name in names]
+    group = family_of_names(names)
+    title = f"{dataset.attrs['machine']}: {spoken(group)}".removesuffix(": ")
+    heads = [f"{spoken(name.removeprefix(f'{group}_'))}\n{QUANTITIES[name].unit}" for name in names]
     table = numeric_table(title, f"{across}\n{coordinate.attrs['units']}", heads)
     for i, value in enumerate(coordinate.values):
         table.add_row(number(float(value)), *(number(float(dataset[name].values[i])) for name in names))

@@ -64,7 +64,7 @@ def figures(found: Reproduction) -> dict[str, Figure]:
     """The figures by file name."""
     section = found.maps.rename({"geometry.passive_leg_offset": "pose.y"})
     return {
-        "machine": three_views(found.machine.configure(), MACHINE),
+        "machine": three_views(found.machine, MACHINE),
         "figure-4": curves(found.curves, GROUPS["stiffness"], FIGURE_4),
         "figure-5": contour_maps(section, GROUPS["compliance"], FIGURE_5),
         "figure-6": convergence(found.search.log, FIGURE_6),

@@ -58,7 +58,7 @@ def page(found: Reproduction, figures: Mapping[str, Figure]) -> str:
     pictures = {name: figure(as_svg(drawn), CAPTIONS[name]) for name, drawn in figures.items()}
     body = [
         "<h1>Zhang and Gosselin's machine, reproduced</h1>",
-        '<p class="soft">D. Zhang and C. M. Gosselin, "Parallel kinematic machine design with kinetostatic model", '
+        '<p class="soft">' + escape(printed.CITATION) + ", "
         f"beside what kinetostat {escape(version('kinetostat'))} computes. Order of components: rx ry rz x y z; "
         "SI units, base axes, at the platform point P.</p>",
         _tiles(found),
@@ -98,7 +98,7 @@ def _tiles(found: Reproduction) -> str:
         (misprints, "known misprints"),
         (differing, "numbers differ"),
         (equations, "groups of equations hold"),
-        (f"{holding} + {limited}", "statements hold + with limits"),
+        (f"{holding} + {limited}", "statements hold + in part"),
     ]
     cells = "".join(f'<div class="tile"><b>{figure}</b>{escape(text)}</div>' for figure, text in tiles)
     return f'<div class="tiles">{cells}</div>'

@@ -68,10 +68,18 @@ def machine_picture(
     transparent: bool = False,
     hidden: Collection[str] = PLAIN,
 ) -> Picture:
-    """A picture of a machine at its pose as a PNG; arguments as for `picture`.
+    """A picture of a machine at its pose as a PNG.
+
+    Args:
+        machine: with its pose.
+        size: width and height, pixels.
+        view: "iso", "front" and so on, or the direction from the machine to the camera, base axes.
+        theme: for "light" or for "dark" pages.
+        transparent: whether shadow and grid are all there is of a background.
+        hidden: layers of the scene to leave out.
 
     Raises:
-        InputError: where the pose cannot be drawn.
+        InputError: there is no such view, theme or layer, the size cannot be had, or the pose cannot be drawn.
     """
     return picture(scene_of(machine), size, view, theme=theme, transparent=transparent, hidden=hidden)
 

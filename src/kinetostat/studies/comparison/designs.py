@@ -100,6 +100,9 @@ class Comparison:
     poses: tuple[tuple[int, int], ...] = ()
     over: tuple[Row, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<Comparison of {', '.join(design.label for design in self.designs)}>"
+
 
 def read_design(text: str, settings: Sequence[str] = ()) -> Design:
     """A design from what people write: a file or bundled name, and after a colon overrides of its fields.
@@ -128,7 +131,8 @@ def compare(
     """Designs side by side, each at its own pose and, where ranges are given, all over the same grid.
 
     Args:
-        designs: two or more; machines, by names of your own if you like, or texts as `read_design` takes them.
+        designs: two or more; machines, by names of your own if you like, or texts, "NAME" or
+            "NAME:path=value;path=value".
         ranges: "FIELD=from:to:count", of fields that all of them have.
         progress: told how far the work is.
 

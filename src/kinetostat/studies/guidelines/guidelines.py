@@ -68,6 +68,9 @@ class Guidelines:
     poses: tuple[int, int] = (0, 0)
     everywhere: Roles | None = None
 
+    def __repr__(self) -> str:
+        return f"<Guidelines for {self.machine.name!r}: {self.status.word}, {len(self.moves)} parameters that matter>"
+
     @property
     def actuator(self) -> Element | None:
         """Actuators that all have one finite stiffness, to compare others with."""

@@ -91,6 +91,9 @@ class Problem:
     robust: Aggregate | None
     method: str
 
+    def __repr__(self) -> str:
+        return f"<Problem {self.study.name!r}: {len(self.objectives)} objectives, {len(self.constraints)} constraints>"
+
     @property
     def terms(self) -> tuple[Term, ...]:
         """Of all objectives, then of all constraints."""
@@ -122,7 +125,7 @@ def load_problem(study: str | Path, settings: Sequence[str] = ()) -> Problem:
     """The problem of a study file, or of a bundled study by its name.
 
     Args:
-        study: path of a TOML file, or a name from `bundled_studies()`.
+        study: path of a TOML file, or the name of a bundled study, as `kinetostat list` prints them.
         settings: overrides "path=value" of the study's fields, as `--set` takes them.
 
     Raises:

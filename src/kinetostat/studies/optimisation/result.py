@@ -90,6 +90,9 @@ class Result:
     no_ridges: str = ""
     robustness: Robustness | None = None
 
+    def __repr__(self) -> str:
+        return f"<Result of {self.problem.study.name!r}: {self.log.count:,} designs judged, {len(self.front)} best>"
+
     @property
     def solved(self) -> bool:
         """Whether any feasible design was found."""
@@ -139,14 +142,14 @@ def optimize(
     """Solve a problem.
 
     Args:
-        problem: from `problem.load_problem`.
+        problem: from `load_problem`.
         folder: where every step is kept, so that a search that was stopped goes on; None to keep nothing.
         watch: told how far the search is, and the best objective.
         resume: insist that the folder holds a part of the search.
         stop: asked after each step of a search with a folder; the result is then that of the steps so far.
 
     Raises:
-        InputError: see `search.search_into`.
+        InputError: another study or another process in the folder, nothing to resume, a full disk.
     """
     assess = Assessor(problem)
     log = search(assess, watch) if folder is None else search_into(assess, folder, watch, resume, stop)

@@ -1,10 +1,14 @@
 """What the paper prints, digit for digit, and its known misprints. Nothing is computed here.
 
-D. Zhang and C. M. Gosselin, "Parallel kinematic machine design with kinetostatic model", Robotica 20 (2002).
+Source: `CITATION`.
 """
 
 from dataclasses import dataclass
 
+CITATION = (
+    'D. Zhang and C. M. Gosselin, "Parallel kinematic machine design with kinetostatic model", Robotica 20(4), 429-438 '
+    "(2002)"
+)
 MACHINE = "zhang-gosselin-4dof"
 ACTUATOR = 1000.0
 """K_actuator, N/m, in every table."""

@@ -50,6 +50,9 @@ class Reproduction:
     search: Result
     search_claims: tuple[Claim, ...]
 
+    def __repr__(self) -> str:
+        return f"<Reproduction: {len(self.comparisons)} numbers, {'explained' if self.explained else 'NOT explained'}>"
+
     @property
     def explained(self) -> bool:
         """Whether nothing differs without an explanation."""
@@ -62,7 +65,7 @@ class Reproduction:
     def as_json(self) -> dict[str, Any]:
         """Numbers, equations and statements as plain data."""
         return {
-            "paper": "Zhang and Gosselin, Parallel kinematic machine design with kinetostatic model, 2002",
+            "paper": printed.CITATION,
             "explained": self.explained,
             "comparisons": [asdict(one) for one in self.comparisons],
             "equations": [asdict(check) | {"holds": check.holds} for check in self.checks],

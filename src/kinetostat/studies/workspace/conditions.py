@@ -1,4 +1,4 @@
-"""Conditions on quantities as people write them, "stiffness_z > 20 N/um": read, and tested at many points."""
+"""Conditions on quantities as people write them, "free_stiffness_z > 20 N/um": read, and tested at many points."""
 
 import math
 import operator
@@ -16,7 +16,7 @@ from kinetostat.studies.grid.grid import resolve_quantities
 from kinetostat.units import KINDS, UnitError, parse
 
 COMPARISONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
-HOW = 'write QUANTITY < VALUE or QUANTITY > VALUE, e.g. "stiffness_z > 20 N/um"'
+HOW = 'write QUANTITY < VALUE or QUANTITY > VALUE, e.g. "free_stiffness_z > 20 N/um"'
 LONGEST = 200
 
 _FORM = re.compile(r"\s*([a-z_]+)\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")

@@ -53,6 +53,10 @@ class Workspace:
     conditions: tuple[Condition, ...]
     divided: bool
 
+    def __repr__(self) -> str:
+        of = sum(self.counts.values())
+        return f"<Workspace of {self.dataset.attrs['machine']!r}: {self.counts[INSIDE]:,} of {of:,} nodes inside>"
+
     @property
     def found(self) -> bool:
         """Whether there is any."""

@@ -67,11 +67,10 @@ def report_of(
 
 def _title_block(answers: Answers) -> list[tuple[str, str]]:
     found, machine = answers.analysis, answers.machine
-    point = "tool point T" if any(machine.sections["tool"].offset) else "platform point P"
     rows = [("Machine", machine.name), ("Family", machine.family.name), ("Pose", _pose(machine))]
     return [
         *rows,
-        ("Reference", f"{point}, {found.axes} axes, SI units"),
+        ("Reference", f"{machine.reference}, {found.axes} axes, SI units"),
         ("Program", f"kinetostat {version('kinetostat')}"),
     ]
 

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 from kinetostat.kinematics.mobility import Mobility
-from kinetostat.kinetostatics.response import respond
 from kinetostat.spec.fields import NO_LIMIT
 from kinetostat.studies.analysis import Analysis
 from kinetostat.views.drawing import three_views
@@ -30,17 +29,20 @@ def machine_section(found: Analysis, pictures: Shown, live: bool) -> Section:
         caption += f" Deflections {pictures.factor:,.6g} times as large as they are."
     blocks: list[Block] = [
         Paragraph(_first_upper(machine.family.summary)),
+        *_mobility(found.mobility),
         Figure(caption, pictures.portrait(), SHARE, pictures.data if turning else None),
         _drawing(found),
     ]
-    return Section("The machine", (*blocks, *_mobility(found.mobility)))
+    return Section("The machine", tuple(blocks))
 
 
 def _drawing(found: Analysis) -> Figure:
     """The machine from its sides, a planar one from above."""
-    configuration = respond(found.machine).configuration
-    sides = "Front, side and plan" if configuration.plane is None else "Plan"
-    return drawn(three_views(configuration, ""), f"{sides}, to scale.")
+    sides = "Plan" if found.machine.family.planar else "Front, side and plan"
+    return drawn(
+        three_views(found.machine, ""),
+        f"{sides}, to scale; K, C and the load are given at {found.machine.reference[-1]}.",
+    )
 
 
 def _mobility(found: Mobility | None) -> tuple[Block, ...]:

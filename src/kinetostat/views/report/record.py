@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 
+from kinetostat.studies.paper.printed import CITATION
 from kinetostat.views.report.content import Formula, Listing, Paragraph, Section, Table
 
 LIBRARIES = ("kinetostat", "numpy", "scipy", "llvmlite", "pymoo", "matplotlib")
@@ -13,17 +14,14 @@ LIBRARIES = ("kinetostat", "numpy", "scipy", "llvmlite", "pymoo", "matplotlib")
 THEORY = (
     "Every elastic part is described by its compliance, which is 0 for a rigid one: rigid and flexible parts are one "
     "model, exact in the limit, and no large number stands in for infinity. Units are SI, in base axes; "
-    "a twist is (rotation, translation), a wrench (moment, force), both at the tool point. K and C are those of small "
-    "motions."
+    "a twist is (rotation, translation), a wrench (moment, force), both at the reference point. K and C are those of "
+    "small motions."
 )
 LEGS = (
     "A leg carries the wrenches W that do no work on its passive joints (unit twists J with index p) and yields by its "
     "elastic coordinates (unit twists J with index e, compliances S):"
 )
-SOURCE = (
-    'Source: D. Zhang and C. M. Gosselin, "Parallel kinematic machine design with kinetostatic model" (2002), and the '
-    "documentation of kinetostat, theory."
-)
+SOURCE = f"Source: {CITATION}, and the documentation of kinetostat, theory."
 AGAIN = (
     "The same command with the same input and the same versions gives this report again, byte for byte. The machine "
     "with all digits (machine.toml) and the results (results.json) are inside this file."

@@ -20,18 +20,17 @@ from kinetostat.views.report.typesetting import printed, typeset
 
 BLOCKS = "Blocks: {}, {} and {} (rotation, coupling, translation)."
 NO_LOAD = (
-    "The machine file has no load. Add a table [load] with a force (N) and a moment (N·m) at the tool point to have "
+    "The machine file has no load. Add a table [load] with a force (N) and a moment (N·m) at the {} to have "
     "deflections, actuator loads and joint reactions here."
 )
 
 
 def stiffness_section(found: Analysis) -> Section:
     """K, C, who is to blame, and what is read off them."""
-    point = "the tool point T" if any(found.machine.sections["tool"].offset) else "the platform point P"
     split = 3 if len(found.components) == 6 else 1
     about = (
-        f"Components {' '.join(found.components)} at {point}, {found.axes} axes; rotation first. A load w "
-        "(moment, force) and the small motion t (rotation, translation) that it causes belong together by"
+        f"Components {' '.join(found.components)} at the {found.machine.reference}, {found.axes} axes; rotation first. "
+        "A load w (moment, force) and the small motion t (rotation, translation) that it causes belong together by"
     )
     matrices: list[Block] = [
         Paragraph(about),
@@ -72,18 +71,19 @@ def _indices(found: Analysis) -> tuple[Block, ...]:
     if principal.row_count:
         caption = "Principal stiffnesses (N/m, N·m/rad) and their directions x y z, the other motions free or held."
         blocks.append(printed(principal, caption))
-    screws = eigenscrew_table(found.indices.eigenscrews if found.indices else ())
+    screws = eigenscrew_table(found.indices.eigenscrews if found.indices else (), found.machine.reference)
     if screws.row_count:
-        blocks.append(printed(screws, "Eigenscrews of the stiffness; points from the tool point."))
+        blocks.append(printed(screws, f"Eigenscrews of the stiffness; points from the {found.machine.reference}."))
     return tuple(blocks)
 
 
 def load_section(found: Analysis, pictures: Shown) -> Section:
     """The load case of the file, or how to have one."""
+    point = found.machine.reference
     if found.load is None:
-        return Section("Load case", (Paragraph(NO_LOAD),))
+        return Section("Load case", (Paragraph(NO_LOAD.format(point)),))
     tables = [
-        (load_table(found.components, found.load), "The load at the tool point (N·m, N) and its deflection (rad, m)."),
+        (load_table(found.components, found.load), f"The load at the {point} (N·m, N) and its deflection (rad, m)."),
         (actuator_table(found.load), "Actuators under the load."),
         (
             reaction_table(found.load, found.axes),

@@ -38,8 +38,8 @@ def _findings(answers: Answers, validation: Validation | str) -> Iterator[str]:
         soft = found.indices.free["translation"]
         values = [number(k, "rigid") for k in (soft.stiffnesses[0], soft.stiffnesses[-1])]
         yield (
-            f"Against a force at the tool point the machine is softest with {values[0]} N/m and stiffest with "
-            f"{values[1]} N/m, rotations free to follow."
+            f"Against a force at the {found.machine.reference} the machine is softest with {values[0]} N/m and "
+            f"stiffest with {values[1]} N/m, rotations free to follow."
         )
     if answers.guidelines is not None:
         yield from (one.text for one in statements(answers.guidelines) if one.topic == "weakest")
@@ -51,7 +51,8 @@ def _findings(answers: Answers, validation: Validation | str) -> Iterator[str]:
     if found.load:
         moved, turned = math.hypot(*found.load.deflection[3:]), math.hypot(*found.load.deflection[:3])
         if math.isfinite(moved) and math.isfinite(turned):
-            yield f"Under its load the tool point moves by {1e3 * moved:.4g} mm and turns by {1e3 * turned:.4g} mrad."
+            point = found.machine.reference
+            yield f"Under its load the {point} moves by {1e3 * moved:.4g} mm, and turns by {1e3 * turned:.4g} mrad."
     yield verdict(validation)
 
 
@@ -78,9 +79,9 @@ def _directions(answers: Answers) -> Table:
         values += [_scaled(k, f"stiffness_{name}", "rigid") for k in (free, stiff)]
         rows.append((name, *values, _blamed(found, i)))
     caption = (
-        "Each direction at the tool point: C is the motion by a unit load in the same direction, 1/C the stiffness "
+        f"Each direction at the {found.machine.reference}: C is the motion by a unit load in the same direction, 1/C "
+        "the stiffness with all other motions free to follow, K the stiffness with all other motions held."
     )
-    caption += "with all other motions free to follow, K the stiffness with all other motions held."
     return Table(caption, heads, tuple(rows), (False, True, True, True, False))
 
 
