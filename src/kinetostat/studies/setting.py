@@ -10,8 +10,7 @@ from kinetostat.units import KINDS
 
 def frame_of(machine: Machine, axes: str = "base") -> str:
     """The point to which K and C of a machine refer, and their axes, "base" or "platform"."""
-    point = "the tool point T" if any(machine.sections["tool"].offset) else "the platform point P"
-    return f"{axes} axes at {point}"
+    return f"{axes} axes at the {machine.reference}"
 
 
 def pose_of(machine: Machine, varied: Collection[str] = ()) -> str:

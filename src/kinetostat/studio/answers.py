@@ -191,7 +191,7 @@ def ranking(wish: RankingWish) -> Sensitivity:
 
 
 def map_quantities(machine: Machine) -> dict[str, str]:
-    """Names of what may be mapped and how people read them: diagonal entries of C and K, and the regularity."""
-    names = machine.family.component_names
-    found = {f"{matrix}_{name}": f"{matrix} {name}" for matrix in ("compliance", "stiffness") for name in names}
+    """Names of what may be mapped and how people read them: diagonals of C and K, 1/C_ii, and the regularity."""
+    names, groups = machine.family.component_names, ("compliance", "stiffness", "free_stiffness")
+    found = {f"{group}_{name}": f"{group.replace('_', ' ')} {name}" for group in groups for name in names}
     return {**found, "regularity": "regularity"}

@@ -72,5 +72,5 @@ def _centres(analysis: Analysis) -> str:
         [name, ", ".join(engineering(float(c), "m") for c in point) if point else DASH]
         for name, point in centres.items()
     ]
-    title = "Centres, from the tool point"
+    title = f"Centres, from the {analysis.machine.reference}"
     return heading(title) + table(title, ["", "x, y, z"], rows)
