@@ -37,7 +37,7 @@ WIDE = (
         ((*FEW, "robustness.objective=worst", "robustness.search_samples=8"), 1e-6),
         ((*FEW, "objectives.0.quantity=least_translational_stiffness"), 1e-6),
     ],
-    ids=["worst", "kinks", "constraints", "robust", "maximized"],
+    ids=["worst", "kinks", "constraints", "robust", "maximised"],
 )
 def test_unrelated_optimisers_agree(settings, close):
     """Genetic and gradient search over several poses; the second is never worse."""

@@ -239,7 +239,7 @@ def test_a_workspace_that_designs_must_reach():
     )
     study = written(text, 'set.limits.longest_leg="90 cm"')
     log = search(Assessor(study))
-    assert study.objectives[0].goal == "maximize"
+    assert study.objectives[0].goal == "maximise"
     assert study.objectives[0].term.unit == "m²"
     assert 0.0 < best(log) < 0.64, "of a box of 0.8 m x 0.8 m"
     assert best(log) == log.outcome().objectives[log.outcome().violation == 0.0, 0].max()

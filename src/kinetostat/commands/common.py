@@ -18,9 +18,10 @@ DONE, NO_ANSWER, BAD_INPUT, STOPPED = 0, 1, 2, 130
 """Exit codes; the last is that of shells for what Ctrl-C has ended."""
 
 QUANTITIES = (
-    "compliance, stiffness (their diagonal entries; default: {default}); one entry: compliance_rx, stiffness_x_z, ...; "
+    "compliance, stiffness, free_stiffness (their diagonal entries, the last 1/C_ii: what a tool feels; default: "
+    "{default}); one entry: compliance_rx, stiffness_x_z, free_stiffness_z, ...; "
     "least_translational_stiffness, greatest_translational_stiffness, least_rotational_stiffness, "
-    "greatest_rotational_stiffness, condition (of K), regularity (0 at a singularity), side (of the singularities: 1 "
+    "greatest_rotational_stiffness, frobenius_condition (of K), regularity (0 at a singularity), side (of the singularities: 1 "
     "or -1), shortest_leg, longest_leg, actuator_force and actuator_moment (the greatest under [load]), mass (moving); "
     "repeatable"
 )
