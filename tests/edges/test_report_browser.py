@@ -7,7 +7,7 @@ from browser import browser, needs_chromium
 from PIL import Image
 from report_pages import MACHINE, QUICK, reported, small_pictures
 
-pytestmark = [needs_chromium, pytest.mark.xdist_group("browser")]
+pytestmark = needs_chromium
 
 DRAWN = "document.querySelector('.machine-view')?.dataset.rest === 'fine'"
 

@@ -10,7 +10,7 @@ from matplotlib import image
 from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import analyze
 
-pytestmark = [needs_chromium, pytest.mark.xdist_group("browser")]
+pytestmark = needs_chromium
 MACHINE = "zhang-gosselin-4dof"
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from browser import browser, needs_chromium, served
 
-pytestmark = [needs_chromium, pytest.mark.xdist_group("browser")]
+pytestmark = needs_chromium
 AUDIT = (Path(__file__).parent / "page_audit.js").read_text("utf-8")
 MODES = ("Explore", "Design")
 PROJECTORS = ((1024, 768), (1280, 720), (1280, 800))

@@ -10,7 +10,7 @@ from matplotlib import image
 from kinetostat.cli import DONE, main
 from studies import SMALL
 
-pytestmark = [needs_chromium, pytest.mark.xdist_group("browser")]
+pytestmark = needs_chromium
 STUDY = SMALL + "[optimizer]\npopulation = 16\ngenerations = 12\nseed = 3\n"
 FRONT = STUDY + '[[objectives]]\nquantity = "compliance_z"\n[[objectives]]\nquantity = "stiffness_x"\n'
 
