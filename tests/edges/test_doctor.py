@@ -81,6 +81,10 @@ def test_a_package_that_is_too_old(monkeypatch):
     assert numpy.said == "1.26.4 is installed, but >=2.1 is needed"
 
 
+def test_every_package_of_the_core_is_loaded():
+    assert set(software.USED) == {requirement.name for requirement in software.requirements()}
+
+
 def test_an_extra_that_is_missing_is_no_failure(monkeypatch):
     monkeypatch.setattr(software, "version", installed_but(nicegui=None))
     found = list(software.checks())
@@ -131,7 +135,10 @@ def test_a_broken_library_hides_nothing_else(tmp_path):
     code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from kinetostat.cli import main; exit(main(['doctor']))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (NO_ANSWER, "")
-    assert "✓  numpy" in done.stdout
+    said = " ".join(done.stdout.split())
+    assert "✗ numpy" in said
+    assert f"{version('numpy')} is installed, but does not load: wrong processor" in said
+    assert "✓ packaging" in said
     assert "✗  vectors         ImportError: wrong processor" in done.stdout
     assert "✗  self-test       cannot be looked at, ImportError: wrong processor" in done.stdout
     assert "pip install --force-reinstall kinetostat" in done.stdout

@@ -1,15 +1,32 @@
-"""Which packages are installed, whether they suit, and which extras are there: from what the package says it needs."""
+"""Which packages are installed, suit and load, and which extras are there: from what the package says it needs."""
 
 import platform
 from collections.abc import Iterator
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, metadata, requires, version
 
 from packaging.requirements import Requirement
 
-from kinetostat.studies.diagnosis.check import Check, State
+from kinetostat.studies.diagnosis.check import Check, State, reinstall
 
 PACKAGE = "kinetostat"
 CORE, EXTRAS = "software", "extras"
+USED = {
+    "h5netcdf": "h5netcdf",
+    "h5py": "h5py",
+    "llvmlite": "llvmlite.binding",
+    "matplotlib": "matplotlib.figure",
+    "numpy": "numpy",
+    "packaging": "packaging.requirements",
+    "pillow": "PIL.Image",
+    "pint": "pint",
+    "pydantic": "pydantic",
+    "pymoo": "pymoo.operators.crossover.sbx",
+    "rich": "rich.console",
+    "scipy": "scipy.optimize",
+    "xarray": "xarray",
+}
+"""The part of each package that is used, which must load."""
 
 
 def checks() -> Iterator[Check]:
@@ -37,7 +54,7 @@ def requirements(extra: str = "") -> list[Requirement]:
 
 
 def suited(requirement: Requirement) -> Check:
-    """Whether a package that is needed is installed, in a version that suits."""
+    """Whether a package that is needed is installed, in a version that suits, and loads."""
     wanted = f"{requirement.name}{requirement.specifier}"
     found = installed(requirement)
     if found is None:
@@ -45,6 +62,11 @@ def suited(requirement: Requirement) -> Check:
     if not requirement.specifier.contains(found, prereleases=True):
         said = f"{found} is installed, but {requirement.specifier} is needed"
         return Check(CORE, requirement.name, State.FAILED, said, f"pip install '{wanted}'")
+    try:
+        import_module(USED[requirement.name.lower()])
+    except Exception as trouble:
+        said = f"{found} is installed, but does not load: {str(trouble).partition(chr(10))[0]}"
+        return Check(CORE, requirement.name, State.FAILED, said, reinstall(requirement.name))
     return Check(CORE, requirement.name, State.SOUND, found)
 
 
