@@ -66,17 +66,24 @@ class StudyFolder:
         self.path = path
         self._history = history
 
-    def question(self) -> Record | None:
-        """The question that is being answered here, or None where there is none yet.
+    def question(self, asked: Record) -> Record | None:
+        """The question that is being answered here, the one that is asked, or None where there is none yet.
 
         Raises:
-            InputError: it cannot be read.
+            InputError: it is another one, or cannot be read.
         """
         path = self.path / QUESTION
         try:
-            return json.loads(path.read_text("utf-8")) if path.exists() else None
+            held: Record | None = json.loads(path.read_text("utf-8")) if path.exists() else None
         except (OSError, ValueError):
             raise InputError(f'"{path}" cannot be read; choose another folder, or remove this one.') from None
+        different = [key for key in asked if held is not None and asked[key] != held.get(key)]
+        if different:
+            raise InputError(
+                f'"{self.path}" holds another study (different: {", ".join(different)}); choose another folder with '
+                "-o, or remove that one."
+            )
+        return held
 
     def begin(self, question: Record) -> None:
         """Note a new question, to which nothing is known yet."""

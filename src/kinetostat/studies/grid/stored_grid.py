@@ -104,18 +104,13 @@ def _partial(final: Path) -> Path:
 def _taken_up(question: GridQuestion, study: StudyFolder, final: Path) -> Work:
     """The work as the folder has it, or begun anew where the folder has none."""
     work = in_chunks(question.machine, question.grid, question.names)
-    asked, held = _as_record(question, final.name), study.question()
+    asked = _as_record(question, final.name)
+    held = study.question(asked)
     if held is None:
         attributes = {**{name: about(name) for name in question.names}, STATUS: _about_status()}
         create(_partial(final), question.labels, question.dims, attributes)
         study.begin({**asked, "chunk": work.chunk})
         return work
-    different = [key for key in asked if asked[key] != held.get(key)]
-    if different:
-        raise InputError(
-            f'"{study.path}" holds another study (different: {", ".join(different)}); choose another folder with '
-            "-o, or remove that one."
-        )
     if not final.exists() and not _partial(final).exists():
         raise InputError(f'"{final}" was removed from its study; remove the folder "{study.path}" to begin again.')
     return Work(work.machine, work.points, work.quantities, int(held["chunk"]))

@@ -116,17 +116,10 @@ def _take(method: Method, log: Log) -> None:
 
 def _take_up(problem: Problem, study: StudyFolder, log: Log) -> None:
     """See that the folder holds this study, or begin it."""
-    asked, held = question_of(problem, log.width), study.question()
-    if held is None:
+    asked = question_of(problem, log.width)
+    if study.question(asked) is None:
         (study.path / ROWS).unlink(missing_ok=True)
         study.begin(asked)
-        return
-    different = [key for key in asked if asked[key] != held.get(key)]
-    if different:
-        raise InputError(
-            f'"{study.path}" holds another study (different: {", ".join(different)}); choose another folder with '
-            "-o, or remove that one."
-        )
 
 
 def stored_problem(folder: Path) -> Problem:
