@@ -38,8 +38,9 @@ def test_a_module_says_in_its_first_line_what_lives_there(module):
 
 
 @pytest.mark.parametrize("module", modules())
-def test_every_public_name_is_documented(module):
-    missing = [name for name, node in public(module) if not first_line(node)]
+def test_public_classes_and_functions_are_documented(module):
+    """Methods and properties need no docstring where their name says it all."""
+    missing = [name for name, node in public(module) if "." not in name and not first_line(node)]
     assert not missing
 
 

@@ -9,6 +9,7 @@ import pytest
 from source import PACKAGE, ROOT, imports, modules
 
 LAYERS = [
+    "tolerances",
     "units",
     "spec",
     "algebra",
