@@ -19,3 +19,8 @@ settings.register_profile(
 )
 settings.register_profile("explore", max_examples=1000, deadline=None, suppress_health_check=QUIET)
 settings.load_profile("steady")
+
+
+def pytest_addoption(parser):
+    """`--rewrite-pages` corrects the answers that the documentation quotes, instead of refusing those that are not so."""
+    parser.addoption("--rewrite-pages", action="store_true", help="bring quoted answers of the documentation up to date")

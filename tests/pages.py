@@ -19,6 +19,7 @@ import shlex
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
+from difflib import SequenceMatcher
 from itertools import accumulate
 from pathlib import Path
 
@@ -82,6 +83,29 @@ def missing(expected: str, said: str) -> str | None:
             return part.strip()
         at, gap = ends[0], True
     return None if at == len(whole) or not _plain(last) else last.strip()
+
+
+def corrected(expected: str, said: str) -> str:
+    """The quotation `expected` with each of its parts replaced by the lines of `said` that resemble it most.
+
+    What `...` leaves out stays left out. The result is a proposal: read it before it is kept.
+    """
+    lines, result, start = [line.rstrip() for line in said.splitlines()], [], 0
+    for part in re.split(r"(^[ \t]*\.\.\.[ \t]*\n)", expected, flags=re.MULTILINE):
+        if not part.strip(" .\n"):
+            result.append(part)
+            continue
+        wanted, size = _plain(part), len(part.splitlines())
+        spans = [(i, i + n) for n in range(max(size - 2, 1), size + 3) for i in range(start, len(lines) - n + 1)]
+        resemblance = {span: _alike(wanted, _plain("".join(lines[slice(*span)]))) for span in spans}
+        first, start = max(resemblance, key=resemblance.__getitem__)
+        result.append("\n".join(lines[first:start]).strip("\n") + "\n")
+    return "".join(result)
+
+
+def _alike(one: str, other: str) -> float:
+    matcher = SequenceMatcher(None, one, other, autojunk=False)
+    return 0.0 if matcher.real_quick_ratio() < 0.5 or matcher.quick_ratio() < 0.5 else matcher.ratio()
 
 
 def _plain(text: str) -> str:
