@@ -22,5 +22,7 @@ settings.load_profile("steady")
 
 
 def pytest_addoption(parser):
-    """`--rewrite-pages` corrects the answers that the documentation quotes, instead of refusing those that are not so."""
-    parser.addoption("--rewrite-pages", action="store_true", help="bring quoted answers of the documentation up to date")
+    """`--rewrite-pages` corrects the answers that the documentation quotes, instead of refusing wrong ones."""
+    parser.addoption(
+        "--rewrite-pages", action="store_true", help="bring quoted answers of the documentation up to date"
+    )
