@@ -81,7 +81,7 @@ def parse(value: object, kind: str) -> float:
         kind: a key of `KINDS`; for a stiffness or rigidity, the text "rigid" gives infinity.
 
     Raises:
-        UnitError: not a number, no unit, an unknown unit, or a unit of another kind.
+        UnitError: it is not a number, the unit is unknown, or the unit is of another kind.
     """
     wanted = KINDS[kind]
     if isinstance(value, bool) or not isinstance(value, int | float | str):
@@ -94,9 +94,22 @@ def parse(value: object, kind: str) -> float:
         raise UnitError(f"it is too large; write {_allowed(wanted)}") from None
 
 
-def show(value: float, kind: str) -> str:
-    """An SI value as text, e.g. "0.22 m", that `parse` reads back exactly; infinity is "rigid"."""
+def write(value: float, kind: str) -> str:
+    """Return an SI value as text for a file, e.g. "0.22 m"; `parse` reads it back exactly. Infinity is "rigid"."""
     return RIGID if math.isinf(value) else f"{value!r} {KINDS[kind].unit}".rstrip()
+
+
+def show(value: float, unit: str, digits: int = 4) -> str:
+    """Return a value with its unit as people read it, e.g. "0.3124 m"; angles in rad are shown in degrees.
+
+    Args:
+        value: in `unit`; what infinity means ("rigid", "unlimited") is for the caller to say.
+        unit: as in `KINDS`; empty for a number without one.
+        digits: significant digits.
+    """
+    if unit == "rad":
+        value, unit = math.degrees(value), "deg"
+    return f"{value + 0.0:.{digits}g} {unit}".rstrip()  # + 0.0 turns -0.0 into 0.0
 
 
 def _parse_text(text: str, wanted: Kind) -> float:
@@ -132,11 +145,11 @@ def _factor(unit: str, wanted: Kind) -> float:
     if _UNIT.fullmatch(unit) is None:
         raise UnitError(f'"{unit}" is not a unit; write {_allowed(wanted)}')
     try:
-        one = _registry().Quantity(1.0, unit.replace("·", "*")).to_root_units()
+        given = _registry().Quantity(1.0, unit.replace("·", "*")).to_root_units()
         target = _registry().Quantity(1.0, wanted.unit.replace("·", "*")).to_root_units()
     except (pint.PintError, ValueError):
         raise UnitError(f'the unit "{unit}" is unknown; write {_allowed(wanted)}') from None
     turning = wanted.name == "angle"
-    if one.dimensionality != target.dimensionality or (turning and one.units != target.units):
-        raise UnitError(f'"{unit}" is no unit of {wanted.name}; write {_allowed(wanted)}')
-    return float(one.magnitude / target.magnitude)
+    if given.dimensionality != target.dimensionality or (turning and given.units != target.units):
+        raise UnitError(f'"{unit}" is not a unit of {wanted.name}; write {_allowed(wanted)}')
+    return float(given.magnitude / target.magnitude)

@@ -50,7 +50,7 @@ MISTAKES = {
     "a stiffness of another kind": (
         'stiffness = "1e6 N/m"',
         'stiffness = "1e6 N*m/rad"',
-        ["legs.z.slide.stiffness", '"N*m/rad" is no unit of linear stiffness'],
+        ["legs.z.slide.stiffness", '"N*m/rad" is not a unit of linear stiffness'],
     ),
     "an unknown type": ('type = "revolute"', 'type = "revolve"', ['joint "shoulder"', 'did you mean "revolute"?']),
     "an actuated ball joint": (

@@ -37,7 +37,7 @@ BAD_FILES = [
     ("number for a name", '"test machine"', "7", ["name is 7", 'name = "my machine"']),
     ("wrong schema", "schema = 1", "schema = 2", ["schema is 2", "schema = 1"]),
     ("text for a schema", "schema = 1", 'schema = "1"', ['schema is "1"', "schema = 1"]),
-    ("wrong unit", '"22 cm"', '"12 kg"', ["geometry.base_radius", '"12 kg"', '"kg" is no unit of length', *LENGTH]),
+    ("wrong unit", '"22 cm"', '"12 kg"', ["geometry.base_radius", '"12 kg"', '"kg" is not a unit of length', *LENGTH]),
     ("unknown unit", '"22 cm"', '"22 cn"', ["geometry.base_radius", '"22 cn"', '"cn" is unknown', *LENGTH]),
     ("not a number", '"22 cm"', '"wide"', ["geometry.base_radius", '"wide"', "it must be a length", *LENGTH]),
     ("true", '"22 cm"', "true", ["geometry.base_radius", "it must be a length", *LENGTH]),
@@ -142,7 +142,7 @@ def test_a_bad_file_is_refused_with_the_way_out(written, old, new, words):
 def test_all_mistakes_are_told_at_once_up_to_five(written):
     bad = GOOD.replace(" cm", " kg").replace(" deg", " N")
     message = refusal(written(bad))
-    assert message.count("is no unit of") == 5
+    assert message.count("is not a unit of") == 5
     assert "(and 4 more)" in message
 
 

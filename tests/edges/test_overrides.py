@@ -53,7 +53,7 @@ REFUSED = [
     ("=3", ["path=value"]),
     ("  = 3", ["path=value"]),
     ("geometry.base_radius=", ["geometry.base_radius", "it must be a length"]),
-    ("geometry.base_radius=12 kg", ["geometry.base_radius", '"12 kg"', "no unit of length"]),
+    ("geometry.base_radius=12 kg", ["geometry.base_radius", '"12 kg"', "not a unit of length"]),
     ("geometry.base_radius=nan", ["geometry.base_radius", "not a finite number"]),
     ("geometry.base_radios=1", ["geometry.base_radios is not known", "did you mean base_radius"]),
     ("geometri.base_radius=1", ["geometri is not known", "did you mean geometry"]),

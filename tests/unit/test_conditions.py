@@ -40,7 +40,7 @@ REFUSED = [
     ("stiffness > 3 N/m", ["stands for several", "stiffness_rx"]),
     ("free_stiffness > 3 N/m", ["stands for several", "free_stiffness_rx"]),
     ("stiffnes_z > 3 N/m", ['"stiffnes_z" is not a quantity']),
-    ("stiffness_z > 3 m", ["stiffness_z", '"m" is no unit of linear stiffness', "20 N/um"]),
+    ("stiffness_z > 3 m", ["stiffness_z", '"m" is not a unit of linear stiffness', "20 N/um"]),
     ("stiffness_z > rigid", ["stiffness_z", "large value"]),
     ("compliance_x < 3 N", ["compliance_x", "1e-8 m/N"]),
     ("regularity > 3 m", ["regularity", "a plain number"]),

@@ -5,7 +5,7 @@ import math
 import pint
 import pytest
 
-from kinetostat.units import KINDS, UNITS, UnitError, parse, show
+from kinetostat.units import KINDS, UNITS, UnitError, parse, show, write
 
 GOOD = [
     ("12 cm", "length", 0.12),
@@ -53,7 +53,7 @@ FIX = {"length": "12 cm", "angle": "30 deg", "linear stiffness": "20 N/um", "tor
 """The example that a message about each kind must show."""
 
 BAD = [
-    ("12 kg", "length", '"kg" is no unit of length'),
+    ("12 kg", "length", '"kg" is not a unit of length'),
     ("12 cm2", "length", '"cm2" is not a unit'),
     ("12 parsnips", "length", '"parsnips" is unknown'),
     ("cm", "length", "it must be a length"),
@@ -84,12 +84,12 @@ BAD = [
     (1 + 0j, "length", "it must be a length"),
     ("30 percent", "angle", "is unknown"),
     ("30 %", "angle", "is not a unit"),
-    ("2 radian**2", "angle", "is no unit of angle"),
-    ("2 m/m", "angle", "is no unit of angle"),
+    ("2 radian**2", "angle", "is not a unit of angle"),
+    ("2 m/m", "angle", "is not a unit of angle"),
     ("2 pi", "angle", "is unknown"),
-    ("30 m", "angle", "is no unit of angle"),
-    ("20 N*m/rad", "linear stiffness", "is no unit of linear stiffness"),
-    ("20 N/m", "torsional stiffness", "is no unit of torsional stiffness"),
+    ("30 m", "angle", "is not a unit of angle"),
+    ("20 N*m/rad", "linear stiffness", "is not a unit of linear stiffness"),
+    ("20 N/m", "torsional stiffness", "is not a unit of torsional stiffness"),
     ("20 degC", "length", "is unknown"),
     ("20 degC/m", "length", '"degC/m"'),
     ("20 degC**2", "length", '"degC**2"'),
@@ -141,13 +141,32 @@ def test_attacks_are_refused_before_they_are_evaluated(written, monkeypatch):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("value", [0.0, 0.22, 1.0, 1e-7, 1e10, 1 / 3])
-def test_what_is_shown_is_read_back_exactly(kind, value):
-    assert parse(show(value, kind), kind) == value
+def test_what_is_written_is_read_back_exactly(kind, value):
+    assert parse(write(value, kind), kind) == value
 
 
-def test_what_is_shown_has_its_unit():
-    assert show(0.22, "length") == "0.22 m"
-    assert show(math.inf, "linear stiffness") == "rigid"
+def test_what_is_written_has_its_unit():
+    assert write(0.22, "length") == "0.22 m"
+    assert write(math.inf, "linear stiffness") == "rigid"
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (math.radians(10), "rad", "10 deg"),
+        (0.31244, "m", "0.3124 m"),
+        (-0.0, "m", "0 m"),
+        (12345678.0, "N/m", "1.235e+07 N/m"),
+        (0.25, "", "0.25"),
+        (math.nan, "m", "nan m"),
+    ],
+)
+def test_what_is_shown_is_rounded_and_has_its_unit(value, unit, text):
+    assert show(value, unit) == text
+
+
+def test_digits_can_be_chosen():
+    assert show(0.31244, "m", 2) == "0.31 m"
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)

@@ -15,7 +15,7 @@ from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
 from kinetostat.spec.errors import shorten
-from kinetostat.units import KINDS, RIGID, UnitError, parse, show
+from kinetostat.units import KINDS, RIGID, UnitError, parse, write
 
 LARGEST = {"length": 1e6, "angle": 1e3}
 """Bounds on size, in SI: far beyond any machine, well inside float64."""
@@ -126,7 +126,7 @@ class Quantity:
 
     def show(self, value: float) -> str:
         """An SI value of it as text that a file may hold."""
-        return NO_LIMIT if value == self.unset else show(value, self.kind)
+        return NO_LIMIT if value == self.unset else write(value, self.kind)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
-from kinetostat.units import KINDS, UnitError, parse, show
+from kinetostat.units import KINDS, UnitError, parse, write
 
 MOST_VALUES = 1_000_000
 """Values along one axis."""
@@ -45,7 +45,7 @@ class Range:
             return np.linspace(start, end, self.count)
         if start <= 0 or end <= 0:
             raise InputError(
-                f"{self.field}: a logarithmic range needs ends above 0, not {show(min(start, end), quantity.kind)}; "
+                f"{self.field}: a logarithmic range needs ends above 0, not {write(min(start, end), quantity.kind)}; "
                 "leave out :log or raise the end."
             )
         return np.geomspace(start, end, self.count)

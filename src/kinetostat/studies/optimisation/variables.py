@@ -16,7 +16,7 @@ from kinetostat.machine.parameters import Parameter, find, values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.study import VariableTable
-from kinetostat.units import KINDS, UnitError, parse, show
+from kinetostat.units import KINDS, UnitError, parse, write
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Variable:
             return self.labels[int(value)] if value >= 0 else "none of the choices"
         if self.quantity.kind == "angle":
             return f"{math.degrees(value):.6g} deg"
-        return show(float(f"{value:.6g}"), self.quantity.kind)
+        return write(float(f"{value:.6g}"), self.quantity.kind)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,93 @@
+"""Public words of earlier versions and what they are called now, with the warning that an old word causes.
+
+An old word keeps working for one version. To rename one, add it to `RENAMED`; nothing else needs to know the old word.
+"""
+
+import warnings
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+RENAMED: Mapping[str, Mapping[str, str]] = MappingProxyType(
+    {
+        "quantity": {"regularity": "singularity_margin", "side": "aspect"},
+        "JSON key": {
+            "order": "components",
+            "regularity": "singularity_margin",
+            "shares": "attribution",
+            "side": "aspect",
+        },
+        "attribute": {"sections": "tables", "own_sections": "family_tables", "every_section": "every_table"},
+    }
+)
+"""The new word for each old one, by kind of word."""
+
+DEPRECATED_KEYS = "deprecated_keys"
+"""The key of JSON data under which the old keys are listed, each with the key that replaces it."""
+
+
+def current_name(name: str, kind: str) -> str:
+    """Return the present word for one that may be from an earlier version, and warn if it is.
+
+    Args:
+        name: a word as the user wrote it.
+        kind: a key of `RENAMED`; words that it does not list are returned as they are.
+    """
+    current = RENAMED[kind].get(name)
+    if current is None:
+        return name
+    _warn(f'The {kind} "{name}" is now called "{current}".')
+    return current
+
+
+def renamed_property(current: str) -> Any:
+    """Make a property that keeps the old name of an attribute alive: it warns and returns the attribute `current`."""
+
+    class Former:
+        """The old name of an attribute; it learns that name when the class with it is made."""
+
+        def __set_name__(self, owner: type, name: str) -> None:
+            self.name = name
+
+        def __get__(self, instance: Any, owner: type | None = None) -> Any:
+            if instance is None:
+                return self
+            _warn(f"{type(instance).__name__}.{self.name} is now called {type(instance).__name__}.{current}.")
+            return getattr(instance, current)
+
+    return Former()
+
+
+def with_former_keys(data: dict[str, Any], table: Mapping[str, str]) -> dict[str, Any]:
+    """Return JSON data in which values stand under their old keys as well as under the present ones.
+
+    Tables and lists inside the data are treated in the same way. The old keys that were added are listed at the top
+    under "deprecated_keys", so that a program that reads them can tell.
+
+    Args:
+        data: with the present keys; it is not changed.
+        table: the present key for each old one, e.g. `RENAMED["JSON key"]`.
+    """
+    used: dict[str, str] = {}
+    result = _with_old(data, {current: former for former, current in table.items()}, used)
+    return {**result, DEPRECATED_KEYS: {**data.get(DEPRECATED_KEYS, {}), **used}} if used else dict(result)
+
+
+def _with_old(value: Any, former: Mapping[str, str], used: dict[str, str]) -> Any:
+    if isinstance(value, list | tuple):
+        return [_with_old(entry, former, used) for entry in value]
+    if not isinstance(value, dict):
+        return value
+    result = {}
+    for key, entry in value.items():
+        result[key] = entry if key == DEPRECATED_KEYS else _with_old(entry, former, used)
+        old = former.get(key)
+        if old is not None and old not in value:
+            result[old] = result[key]
+            used[old] = key
+    return result
+
+
+def _warn(fact: str) -> None:
+    # Three levels up: this function, the function or property of this module, and the line that used the old word.
+    warnings.warn(f"{fact} The old name will go in the next version.", DeprecationWarning, stacklevel=3)
