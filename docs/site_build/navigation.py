@@ -17,7 +17,7 @@ PAGES = {
         "studio",
     ],
     "Know": ["theory", "verification", "validation", "performance"],
-    "Look up": ["gallery", "python", "api", "faq", "extending", "changelog"],
+    "Look up": ["gallery", "glossary", "python", "api", "faq", "extending", "changelog"],
 }
 """By the heading of their group."""
 
