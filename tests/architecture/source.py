@@ -1,6 +1,7 @@
 """The source of the package as syntax trees, and what each module imports."""
 
 import ast
+from collections.abc import Callable, Collection, Iterable
 from functools import cache
 from pathlib import Path
 
@@ -23,6 +24,12 @@ def modules() -> dict[str, ast.Module]:
 
 def is_package(module: str) -> bool:
     return (ROOT.parent / module.replace(".", "/")).is_dir()
+
+
+def wrong_in(check: Callable[[str], Collection[str]], names: Iterable[str] | None = None) -> dict[str, Collection[str]]:
+    """What a rule finds wrong, by module; empty where all modules keep it."""
+    wrong = {module: check(module) for module in (modules() if names is None else names)}
+    return {module: places for module, places in wrong.items() if places}
 
 
 @cache
