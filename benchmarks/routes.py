@@ -14,11 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cases import SUM, TWELVE, Case
-from kinetostat.engine import cuda_driver
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.device import Device
-from kinetostat.engine.kernel import slab_kernel
 from kinetostat.engine.points import Table
 from kinetostat.engine.threads import available_cores
 from kinetostat.kinetostatics.response import respond
@@ -32,9 +29,8 @@ NUMPY_SHARE = 20
 """NumPy is timed over this fraction of the poses."""
 SLAB = 16384
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC")
-TWELVE_OUTPUTS, DIAGONAL_OF_C, ONE_OF_C = "diagonals of C and K", "diagonal of C", "one entry of C"
+TWELVE_OUTPUTS, DIAGONAL_OF_C = "diagonals of C and K", "diagonal of C"
 SUM_OF_C, WITH_GRADIENT = "sum of C", "sum of C and gradient by 7"
-ONE = "compliance_x"
 
 
 @dataclass
@@ -75,7 +71,6 @@ def routes_of(case: Case, poses: dict[str, Array], folder: Path) -> list[Route]:
     """All ways to the numbers of a case that this machine offers."""
     return [
         *our_routes(case, poses),
-        *gpu_routes(case, poses),
         numpy_route(case, poses),
         *cpp_routes(case, poses, folder),
         *pynite_route(case, poses),
@@ -91,28 +86,6 @@ def our_routes(case: Case, poses: dict[str, Array]) -> list[Route]:
         WITH_GRADIENT: lambda: [*evaluate_gradient(machine, points, SUM, case.design).values],
     }
     return [_prepared(Route("kinetostat", task, points.size, run)) for task, run in tasks.items()]
-
-
-def gpu_routes(case: Case, poses: dict[str, Array]) -> list[Route]:
-    """evaluate() on an NVIDIA GPU, where there is one: with copies to and fro, and the program alone."""
-    if not cuda_driver.here():
-        return []
-    machine, points = load(case.machine), Table(poses)
-    columns = [np.ascontiguousarray(column) for column in poses.values()]
-    routes = []
-    for task, names in ((TWELVE_OUTPUTS, TWELVE), (ONE_OF_C, (ONE,))):
-        kernel = slab_kernel(machine, points.paths, names, device=Device.GPU)
-        whole = Route(
-            "kinetostat, GPU, with copies",
-            task,
-            points.size,
-            lambda names=names: [*evaluate(machine, points, names, device=Device.GPU).values.values()],
-        )
-        routes.append(_prepared(whole))
-        alone = Route("kinetostat, GPU, data staying there", task, points.size, whole.run)
-        alone.best = kernel.program.seconds(kernel.fixed, columns, len(names), 10)
-        routes.append(alone)
-    return routes
 
 
 def _prepared(route: Route) -> Route:

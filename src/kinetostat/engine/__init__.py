@@ -1,1 +1,1 @@
-"""The only place that knows batches, compilation, threads and devices. Holds no formula."""
+"""The only place that knows batches, compilation and threads. Holds no formula."""

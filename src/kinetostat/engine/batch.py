@@ -7,13 +7,11 @@ same functions.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.engine.device import Device
 from kinetostat.engine.points import Array, Part, Points
 from kinetostat.engine.threads import available_cores
 from kinetostat.kinematics.status import Status
@@ -21,7 +19,6 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, with_values
-from kinetostat.spec.errors import InputError
 
 NATIVE_FROM = 20_000
 """Points from which loading LLVM and compiling (0.1 to 0.3 s) pays: NumPy does 30 to 200 thousand poses/s."""
@@ -29,12 +26,6 @@ NUMPY_SLAB = 4096
 """Points per NumPy call: intermediates stay in the second cache level."""
 NATIVE_SLAB = 32768
 """Points per call of machine code: 2 ms of work, so that calls cost little and an interrupt is soon heard."""
-GPU_SLAB = 1 << 22
-"""Points per call of a GPU: some 500 MB of its memory, and enough for all its threads."""
-GPU_FROM = 4_000_000
-"""Points from which a GPU is taken where there is one: compiling for it takes about a second."""
-TRIED, SAME = 1000, 1e-9
-"""Points at which a GPU's results are compared with the processor's, and their greatest relative difference."""
 
 Progress = Callable[[int, int], None]
 """Told (points done, points in all) after each slab."""
@@ -67,7 +58,6 @@ def evaluate(
     *,
     part: range | None = None,
     threads: int | None = None,
-    device: Device | None = None,
     repeated: bool = False,
 ) -> Evaluation:
     """Quantities and status of a machine at many points.
@@ -80,22 +70,11 @@ def evaluate(
         part: only these points; where it starts at a multiple of `NATIVE_SLAB`, results are those of the whole batch
             bit for bit, because the size of the whole decides the arithmetic, and slabs are the same.
         threads: slabs under way at once; all processors unless given.
-        device: None for the engine's choice: a GPU for `GPU_FROM` points and more, where this machine has one and it
-            gives what the processor gives at some of them, to rounding; never for a part, which must not depend on it.
         repeated: whether the same will be asked of other numbers again and again, as by a slider: then compiling pays
             for few points as well, once; a thousand poses take a millisecond from then on.
-
-    Raises:
-        InputError: a GPU was asked for, and there is none, or it fails.
     """
-    if device is None and part is None and points.size >= GPU_FROM:
-        found = _by_trusted_gpu(machine, points, quantities, progress)
-        if found is not None:
-            return found
     method: Method
-    if device is Device.GPU:
-        slab, most, method = GPU_SLAB, 1, partial(_program_fill, device=device)
-    elif repeated or points.size >= NATIVE_FROM:
+    if repeated or points.size >= NATIVE_FROM:
         slab, most, method = NATIVE_SLAB, threads or available_cores(), _program_fill
     else:
         slab, most, method = NUMPY_SLAB, 1, _numpy_fill
@@ -103,27 +82,6 @@ def evaluate(
     served = points if part is None else Part(points, part.start, part.stop)
     results, status = in_slabs(served, fill, len(quantities), slab, most, progress)
     return Evaluation(dict(zip(quantities, results, strict=True)), status)
-
-
-def _by_trusted_gpu(
-    machine: Machine, points: Points, quantities: Sequence[str], progress: Progress
-) -> Evaluation | None:
-    """The results of a GPU, or None where there is none, it fails, or it does not give what the processor gives."""
-    from kinetostat.engine.cuda_driver import here
-
-    if not here():
-        return None
-    trial = range(min(TRIED, points.size))
-    try:
-        ours = evaluate(machine, points, quantities, part=trial, device=Device.CPU)
-        theirs = evaluate(machine, points, quantities, part=trial, device=Device.GPU)
-        pairs = ((ours.values[name], theirs.values[name]) for name in quantities)
-        alike = all(np.allclose(a, b, rtol=SAME, atol=0.0, equal_nan=True) for a, b in pairs)
-        if not alike or not np.array_equal(ours.status, theirs.status):
-            return None
-        return evaluate(machine, points, quantities, progress, device=Device.GPU)
-    except InputError:
-        return None
 
 
 Fill = Callable[[Mapping[str, Array], Array, Codes], None]
@@ -197,12 +155,10 @@ def _numpy_fill(machine: Machine, _paths: Sequence[str], quantities: Sequence[st
     return fill
 
 
-def _program_fill(
-    machine: Machine, paths: Sequence[str], quantities: Sequence[str], device: Device = Device.CPU
-) -> Fill:
+def _program_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str]) -> Fill:
     from kinetostat.engine.kernel import slab_kernel  # LLVM takes 0.1 s to load: only where it pays
 
-    return slab_kernel(machine, paths, quantities, device=device).run
+    return slab_kernel(machine, paths, quantities).run
 
 
 def _in_threads(task: Callable[[int], int], starts: Sequence[int], threads: int) -> Iterator[int]:

@@ -15,9 +15,6 @@ import numpy as np
 
 from kinetostat.algebra.scalar import where
 from kinetostat.engine.body import Array, Body, Codes, Runnable
-from kinetostat.engine.cuda import GpuProgram
-from kinetostat.engine.cuda_driver import Gpu, gpu
-from kinetostat.engine.device import Device
 from kinetostat.engine.form import Form, Kind, angles, form_of, number, reduced, traced
 from kinetostat.engine.native import Program
 from kinetostat.engine.trace import Traced
@@ -45,7 +42,6 @@ class Kernel:
         machine: of which this is the program.
         quantities: names of its results.
         iterated: whether joint coordinates are found slab by slab, by Newton's method, and are columns of the program.
-        device: what the program runs on.
     """
 
     program: Runnable
@@ -55,7 +51,6 @@ class Kernel:
     machine: Machine
     quantities: tuple[str, ...]
     iterated: bool
-    device: Device
 
     def run(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab of points; other threads run meanwhile.
@@ -81,17 +76,13 @@ class Kernel:
         left = np.flatnonzero(status == Status.NOT_CONVERGED)
         if left.size:
             found, codes = np.empty((len(results), left.size)), np.empty(left.size, dtype=status.dtype)
-            kernel = slab_kernel(self.machine, self.varying, self.quantities, True, self.device)
+            kernel = slab_kernel(self.machine, self.varying, self.quantities, True)
             kernel.run({path: column[left] for path, column in columns.items()}, found, codes)
             results[:, left], status[left] = found, codes
 
 
 def slab_kernel(
-    machine: Machine,
-    varying: Sequence[str],
-    quantities: Sequence[str],
-    iterated: bool | None = None,
-    device: Device = Device.CPU,
+    machine: Machine, varying: Sequence[str], quantities: Sequence[str], iterated: bool | None = None
 ) -> Kernel:
     """The program for slabs of points of a machine; about 0.1 s unless one of the same form has been compiled.
 
@@ -100,14 +91,13 @@ def slab_kernel(
         varying: leaf paths of the parameters that vary.
         quantities: names from `QUANTITIES`.
         iterated: see `Kernel`; None to decide.
-        device: what it runs on.
     """
     if iterated is None:
         iterated = needs_iteration(machine)
     form, numbers = form_of(machine, varying)
     names = tuple(quantities)
-    program = _program(Kind(machine), form, names, iterated, gpu() if device is Device.GPU else None)
-    return Kernel(program, numbers, form.varying, angles(machine), machine, names, iterated, device)
+    program = _program(Kind(machine), form, names, iterated)
+    return Kernel(program, numbers, form.varying, angles(machine), machine, names, iterated)
 
 
 def needs_iteration(machine: Machine) -> bool:
@@ -119,7 +109,7 @@ def needs_iteration(machine: Machine) -> bool:
 
 
 @lru_cache(KEPT)
-def _program(kind: Kind, form: Form, quantities: tuple[str, ...], iterated: bool, device: Gpu | None) -> Runnable:
+def _program(kind: Kind, form: Form, quantities: tuple[str, ...], iterated: bool) -> Runnable:
     given = traced(kind, form)
     joints = [given.graph.input() for _ in range(kind.machine.chains().size + 1)] if iterated else []
     response = respond(given.machine, _joints(given.machine, joints))
@@ -127,7 +117,7 @@ def _program(kind: Kind, form: Form, quantities: tuple[str, ...], iterated: bool
     results = [where(accepted, QUANTITIES[name].value(response), math.nan) for name in quantities]
     numbers = [number(result) for result in results]
     body = Body(given.fixed, [*given.columns.values(), *joints], numbers, number(response.status))
-    return Program(body) if device is None else GpuProgram(body, device)
+    return Program(body)
 
 
 def _joints(machine: Machine, columns: Sequence[Traced]) -> Joints | None:

@@ -1,4 +1,4 @@
-"""A traced graph as lines of LLVM assembly, for one point or a vector of points. Compiles nothing, knows no device."""
+"""A traced graph as lines of LLVM assembly, for one point or a vector of points. Compiles nothing."""
 
 import struct
 from collections.abc import Sequence

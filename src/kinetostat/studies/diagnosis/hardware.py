@@ -1,4 +1,4 @@
-"""What programs can run on here: system, processor and its vectors, memory, a GPU."""
+"""What programs can run on here: system, processor and its vectors, memory."""
 
 import os
 import platform
@@ -12,14 +12,13 @@ GROUP = "machine"
 
 
 def checks() -> Iterator[Check]:
-    """System, processor, vectors, memory and GPU."""
+    """System, processor, vectors and memory."""
     yield Check(GROUP, "system", State.SOUND, f"{platform.system()} {platform.release()}, {platform.machine()}")
     yield Check(GROUP, "processor", State.SOUND, f"{processor()}, {available_cores()} cores for this process")
     yield tried(GROUP, "vectors", vectors, reinstall("llvmlite"))
     memory = memory_size()
     if memory is not None:
         yield Check(GROUP, "memory", State.SOUND, f"{memory / 2**30:.1f} GiB")
-    yield gpu_found()
 
 
 def processor() -> str:
@@ -44,13 +43,3 @@ def memory_size() -> int | None:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):
         return None
-
-
-def gpu_found() -> Check:
-    """Whether an NVIDIA GPU answers; none is needed."""
-    try:
-        from kinetostat.engine.cuda_driver import gpu
-
-        return Check(GROUP, "gpu", State.SOUND, f"{gpu().name}; takes millions of points in memory")
-    except Exception as trouble:
-        return Check(GROUP, "gpu", State.ABSENT, f"none is used: {str(trouble).partition(';')[0]}")

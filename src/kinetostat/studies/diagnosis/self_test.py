@@ -12,7 +12,6 @@ import numpy as np
 import xarray as xr
 
 from kinetostat.engine.batch import Evaluation, evaluate
-from kinetostat.engine.device import Device
 from kinetostat.engine.points import Table
 from kinetostat.engine.threads import available_cores
 from kinetostat.kinematics.status import Status
@@ -82,7 +81,7 @@ def throughput() -> str:
     machine, poses = load(printed.MACHINE), _poses(MANY)
     evaluate(machine, _poses(FEW), QUANTITIES, repeated=True)
     start = time.perf_counter()
-    evaluate(machine, poses, QUANTITIES, device=Device.CPU)
+    evaluate(machine, poses, QUANTITIES)
     rate = MANY / (time.perf_counter() - start)
     return f"{rate / 1e6:.2g} million poses/s, {len(QUANTITIES)} numbers each, on {available_cores()} cores"
 
