@@ -59,7 +59,7 @@ def described(text: str) -> str:
 def _facts(found: Analysis) -> str:
     mobility = found.mobility
     assert mobility is not None
-    pose = ", ".join(f"`{field}`" for field in vars(found.machine.sections["pose"]))
+    pose = ", ".join(f"`{field}`" for field in vars(found.machine.tables["pose"]))
     redundant = mobility.here.redundant
     held = f", {redundant} constraints more than needed" if redundant else ""
     return f"{NUMBER[mobility.full_cycle]} freedoms: {pose}. {mobility.actuators} actuators{held}."

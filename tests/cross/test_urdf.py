@@ -88,7 +88,7 @@ def test_a_machine_comes_back_as_it_was(name, tmp_path):
     assert_same(found, again)
     assert again.mobility.full_cycle == found.mobility.full_cycle
     assert again.mobility.actuators == found.mobility.actuators
-    assert len(machine.own_sections["pose"].__dict__) == found.mobility.full_cycle, "as many coordinates as freedoms"
+    assert len(machine.family_tables["pose"].__dict__) == found.mobility.full_cycle, "as many coordinates as freedoms"
 
 
 @pytest.mark.parametrize(
@@ -154,7 +154,7 @@ def test_a_file_of_somebody_else(tmp_path):
 def test_an_actuator_without_a_stiffness_is_rigid(tmp_path):
     machine = read_text(FIVE_BAR.replace('<kinetostat stiffness="5e3"/>', "", 1), tmp_path)
     assert analyze(machine).rigid == ("leg 1 left motor actuator",)
-    assert machine.sections["legs.leg 1.left motor"].stiffness == math.inf
+    assert machine.tables["legs.leg 1.left motor"].stiffness == math.inf
 
 
 def test_a_compliance_is_in_the_axes_of_its_joint(tmp_path):

@@ -164,7 +164,7 @@ def test_a_load_that_no_spring_feels_is_held_rigidly(beside):
 
 def limits(machine):
     """Shortest and longest span of the passive leg."""
-    first, second = machine.sections["geometry"].passive_links
+    first, second = machine.tables["geometry"].passive_links
     return abs(first - second), first + second
 
 

@@ -70,8 +70,8 @@ MISTAKES = {
         "point = [0, 0], axis = [0, 0, 1], actuated",
         ["legs.z.slide.point is [0, 0]", "give 3"],
     ),
-    "an unknown shape": ('"round"', '"hex"', ['section "bar": shape is "hex"', "rectangle"]),
-    "no material": ('youngs_modulus = "70 GPa"', "", ['section "bar": material is missing', "aluminium"]),
+    "an unknown shape": ('"round"', '"hex"', ['cross-section "bar": shape is "hex"', "rectangle"]),
+    "no material": ('youngs_modulus = "70 GPa"', "", ['cross-section "bar": material is missing', "aluminium"]),
     "an unknown coordinate": ("[pose]", "[pose]\nq = 1", ['a name in [pose] is "q"', "roll"]),
     "no pose": ('x = "0.5 m"\ny = "0.5 m"\nz = "0.5 m"', "", ["[pose] must give the task coordinates"]),
     "no legs": (GOOD[GOOD.index("[[legs]]") :], "", ["needs 1 to 24 legs"]),
@@ -122,8 +122,8 @@ def test_a_mistaken_override_is_refused(setting, words):
 
 def test_overrides_reach_every_number():
     machine = load("tripteron", ['legs.z.slide.stiffness="rigid"', 'sections.bar.diameter="10 cm"', "pose.x=0.4"])
-    assert machine.sections["legs.z.slide"].stiffness == float("inf")
-    assert machine.sections["sections.bar"].diameter == 0.1
+    assert machine.tables["legs.z.slide"].stiffness == float("inf")
+    assert machine.tables["sections.bar"].diameter == 0.1
 
 
 def test_a_pose_off_the_constraint_is_refused_with_the_nearest_one():

@@ -110,7 +110,7 @@ def test_one_number_is_no_direction_and_no_place_of_all_legs(name, field):
 
 
 def test_one_turn_may_stand_for_all_cranks():
-    assert set(load("hexapod-rus", ["geometry.crank_turn=0.1"]).sections["geometry"].crank_turn) == {0.1}
+    assert set(load("hexapod-rus", ["geometry.crank_turn=0.1"]).tables["geometry"].crank_turn) == {0.1}
 
 
 def test_the_advice_for_missing_angles_is_a_list_and_a_file_that_works(written):

@@ -93,7 +93,7 @@ def test_load_analyse_map_optimise_and_plot_in_five_lines(tmp_path):
 
 def test_a_machine_is_built_from_text_or_tables_as_from_its_file():
     text = bundled()["tricept"]
-    assert build(text).sections == load("tricept").sections
+    assert build(text).tables == load("tricept").tables
     tables = {
         "schema": 1,
         "name": "mine",
@@ -110,7 +110,7 @@ def test_a_machine_is_built_from_text_or_tables_as_from_its_file():
     before = json.dumps(tables)
     machine = build(tables, settings=["pose.y=2 cm"])
     assert isinstance(machine, Machine)
-    assert machine.sections["pose"].y == 0.02
+    assert machine.tables["pose"].y == 0.02
     assert json.dumps(tables) == before
     with pytest.raises(InputError, match="base_radius"):
         build({**tables, "geometry": {"base_radius": "wide", "platform_radius": 0.1}})
@@ -121,8 +121,8 @@ def test_a_machine_is_built_from_text_or_tables_as_from_its_file():
 def test_a_changed_machine_takes_numbers_and_text_and_leaves_the_first_alone():
     machine = load("hexapod")
     other = changed(machine, {"pose.x": "5 mm", "pose.y": 0.01})
-    assert (other.sections["pose"].x, other.sections["pose"].y) == (0.005, 0.01)
-    assert machine.sections["pose"].x == 0.0
+    assert (other.tables["pose"].x, other.tables["pose"].y) == (0.005, 0.01)
+    assert machine.tables["pose"].x == 0.0
     with pytest.raises(InputError, match=r"pose\.x"):
         changed(machine, {"pose.x": "5 kg"})
 
@@ -218,7 +218,7 @@ def test_answers_are_kept_as_plain_data(found, name, tmp_path):
 
 
 def test_what_is_kept_is_what_it_was(found, tmp_path):
-    assert load(save(found["machine"], tmp_path / "machine.toml")).sections == found["machine"].sections
+    assert load(save(found["machine"], tmp_path / "machine.toml")).tables == found["machine"].tables
     assert xr.load_dataset(save(found["grid"], tmp_path / "grid.nc")).identical(found["grid"])
     assert (save(found["machine"], tmp_path / "machine.glb")).read_bytes()[:4] == b"glTF"
     small = machine_picture(found["machine"], (64, 48))
@@ -273,3 +273,9 @@ def test_a_report_that_cannot_be_is_refused(tmp_path):
     with pytest.raises(InputError, match="would have to span"):
         report(changed(load("delta"), {"pose.z": "-30 m"}), tmp_path / "report.html")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_old_name_of_the_tables_still_works():
+    machine = load("tricept")
+    with pytest.warns(DeprecationWarning, match=r"Machine\.sections is now called Machine\.tables"):
+        assert machine.sections == machine.tables

@@ -40,7 +40,7 @@ def test_a_changed_machine_is_no_longer_the_bundled_one(served):
     main(["studio", "hexapod", "--set", "pose.z=0.14"])
     machine, name, *_ = served[0]
     assert name == ""
-    assert machine.sections["pose"].z == 0.14
+    assert machine.tables["pose"].z == 0.14
 
 
 @pytest.mark.parametrize(

@@ -228,7 +228,7 @@ def test_a_sent_study_never_reads_files_of_the_server(tmp_path):
     with pytest.raises(InputError, match="weighs"):
         sent_draft(text.encode(), "x.toml", load(MACHINE))
     found = sent_draft(text.replace("mass", "frobenius_condition").encode(), "x.toml", load(MACHINE))
-    assert found.machine.sections["pose"].z == pytest.approx(0.7)
+    assert found.machine.tables["pose"].z == pytest.approx(0.7)
 
 
 @pytest.mark.parametrize(

@@ -95,7 +95,7 @@ def test_the_tool_lies_on_the_platform(case, data):
     machine = data.draw(regular_machines(case))
     response = respond(machine)
     platform = response.configuration.platform
-    offset = np.array(machine.sections["tool"].offset)
+    offset = np.array(machine.tables["tool"].offset)
     at_p = respond(with_values(machine, dict.fromkeys((f"tool.offset.{i}" for i in range(3)), 0.0)))
     assert vector(at_p.reference) == pytest.approx(vector(platform.translation), abs=1e-15)
     assert_transported(response, at_p, np.eye(3), matrix(platform.rotation) @ offset)

@@ -156,7 +156,7 @@ def test_rigid_links_leave_the_compliance_of_the_actuators(name):
 @pytest.mark.parametrize("name", CRANKS)
 def test_cranks_and_rods_have_their_lengths_and_cranks_point_outward(name):
     machine = somewhere(name)
-    geometry = machine.sections["geometry"]
+    geometry = machine.tables["geometry"]
     for leg, turn in zip([leg for leg in machine.configure().legs if leg.lines], geometry.crank_turn, strict=True):
         base, elbow, tip = (components(point) for point in leg.path)
         assert np.linalg.norm(elbow - base) == pytest.approx(geometry.crank_length, rel=1e-12)
@@ -174,7 +174,7 @@ def test_cranks_and_rods_have_their_lengths_and_cranks_point_outward(name):
 def test_a_crank_leg_yields_as_a_cantilever_with_a_rod(name):
     """G = f_t^2 a^2 / k + (f_t^2 + f_n^2) a^3 / 3 EI + L / EA for a unit force along the rod."""
     machine = somewhere(name)
-    geometry, stiffness = machine.sections["geometry"], machine.sections["stiffness"]
+    geometry, stiffness = machine.tables["geometry"], machine.tables["stiffness"]
     a, configuration = geometry.crank_length, machine.configure()
     for leg, k in zip([leg for leg in configuration.legs if leg.lines], stiffness.actuator, strict=True):
         base, elbow, tip = (components(point) for point in leg.path)
@@ -193,8 +193,8 @@ def test_a_crank_leg_yields_as_a_cantilever_with_a_rod(name):
 def test_planar_cranks_yield_likewise():
     machine = somewhere("planar-3rrr")
     geometry, stiffness, configuration = (
-        machine.sections["geometry"],
-        machine.sections["stiffness"],
+        machine.tables["geometry"],
+        machine.tables["stiffness"],
         machine.configure(),
     )
     a, rod = geometry.proximal_link, geometry.distal_link
@@ -222,8 +222,8 @@ def test_a_leg_with_bars_yields_as_beam_theory_says(name):
     """Drive, then a cantilever loaded at its end by both bars, then L / EA for each bar."""
     machine = somewhere(name)
     geometry, stiffness, configuration = (
-        machine.sections["geometry"],
-        machine.sections["stiffness"],
+        machine.tables["geometry"],
+        machine.tables["stiffness"],
         machine.configure(),
     )
     is_delta = name == "delta"
@@ -263,7 +263,7 @@ def test_the_slides_of_the_orthoglide_push_and_their_feet_stand_square():
         assert np.abs(np.cross(slide, forward)).max() <= 1e-15, "the slide is not on its axis"
         assert (joint - slide) @ forward > 0.0, "the slide is ahead of the platform"
         assert (slide - rail) @ np.array([forward, side]).T == pytest.approx([0.0, 0.0], abs=1e-15)
-        assert np.linalg.norm(slide - rail) == pytest.approx(machine.sections["geometry"].foot_length)
+        assert np.linalg.norm(slide - rail) == pytest.approx(machine.tables["geometry"].foot_length)
 
 
 def test_the_cranks_of_the_delta_point_outward():
@@ -279,7 +279,7 @@ def test_flexible_legs_are_springs_in_a_row_with_their_actuators(name):
     machine = with_values(machine, {"stiffness.leg_axial": INFINITE})
     legs = [leg for leg in machine.configure().legs if leg.lines]
     lengths = [(leg.path[-1] - leg.path[0]).norm() for leg in legs]
-    held = machine.sections["stiffness"].actuator
+    held = machine.tables["stiffness"].actuator
     softer = {
         f"stiffness.actuator.{i}": 1.0 / (1.0 / k + size / rigidity) if k else 0.0
         for i, (k, size) in enumerate(zip(held, lengths, strict=True))
@@ -301,17 +301,16 @@ SECTIONS = {
 def test_passive_links_from_a_section_are_in_a_row_with_their_joints(name):
     machine = somewhere(name)
     field, own = SECTIONS[machine.family.name.removesuffix("-rus")]
-    geometry, pose = machine.sections["geometry"], machine.sections["pose"]
+    geometry, pose = machine.tables["geometry"], machine.tables["pose"]
     lengths = getattr(geometry, "passive_links", None) or [getattr(pose, "length", None) or pose.z] * 3
-    given = replace(machine.sections["stiffness"], **{
+    given = replace(machine.tables["stiffness"], **{
         section: (2e3, 2e3) if section.startswith("passive") else 2e3 for section, _ in own
     })  # fmt: skip
     rows = zip(getattr(given, field), own, lengths, strict=True)
     by_hand = tuple(1.0 / (1.0 / k + size / (factor * 2e3)) for k, (_, factor), size in rows)
-    expected = replace(machine.sections["stiffness"], **{field: by_hand})
+    expected = replace(machine.tables["stiffness"], **{field: by_hand})
     answers = [
-        respond(replace(machine, sections={**machine.sections, "stiffness": s})).compliance.upper
-        for s in (given, expected)
+        respond(replace(machine, tables={**machine.tables, "stiffness": s})).compliance.upper for s in (given, expected)
     ]
     assert answers[0] == pytest.approx(answers[1], rel=1e-12)
 
@@ -355,7 +354,7 @@ def test_out_of_reach_is_said_with_figures(name, change):
 def test_optional_fields_stand_in_the_file(name):
     """As comments, where the machine does not use them, that may be put to use as they are."""
     text, machine = bundled()[name], load(name)
-    for section, fields in machine.family.sections.items():
+    for section, fields in machine.family.tables.items():
         table = text[text.index(f"[{section}]") :].partition("\n[")[0]
         for field in optional(fields):
             assert re.search(rf"^(# )?{field}\s*=", table, re.MULTILINE), f"{section}.{field} is not in {name}.toml"

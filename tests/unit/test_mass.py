@@ -63,7 +63,7 @@ def test_a_removed_leg_weighs_nothing():
 @pytest.mark.parametrize("family", families().values(), ids=lambda family: family.name)
 def test_every_rigidity_belongs_to_a_link_that_has_a_length(family):
     """A new family cannot forget its links, and each of them weighs what its length says."""
-    rigid = {name for name, q in quantities(family.sections["stiffness"]).items() if q.kind.endswith("rigidity")}
+    rigid = {name for name, q in quantities(family.tables["stiffness"]).items() if q.kind.endswith("rigidity")}
     assert {name for link in family.links for name in link.rigidities} == rigid
 
 
@@ -105,13 +105,13 @@ def test_a_file_of_it_reads_back():
 
 def test_a_number_of_ones_own_comes_before_that_of_the_section():
     settings = [f"stiffness.leg_axial={TUBE}", "linear_density.legs=1 kg/m"]
-    assert load("hexapod", settings).sections["linear_density"].legs == 1.0
+    assert load("hexapod", settings).tables["linear_density"].legs == 1.0
 
 
 def test_a_section_with_moduli_of_its_own_may_give_its_density():
-    assert load("hexapod", [f"stiffness.leg_axial={OWN}"]).sections["linear_density"].legs == 0.0
+    assert load("hexapod", [f"stiffness.leg_axial={OWN}"]).tables["linear_density"].legs == 0.0
     heavy = OWN.replace(" }", ', density = "2700 kg/m**3" }')
-    found = load("hexapod", [f"stiffness.leg_axial={heavy}"]).sections["linear_density"].legs
+    found = load("hexapod", [f"stiffness.leg_axial={heavy}"]).tables["linear_density"].legs
     assert found == pytest.approx(2700 * math.pi / 4 * 0.02**2)
 
 

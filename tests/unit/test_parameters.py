@@ -41,7 +41,7 @@ def test_a_field_stands_for_all_of_its_entries(case):
 
 def test_a_machine_is_never_modified():
     with pytest.raises(FrozenInstanceError):
-        MACHINE.sections["geometry"].base_radius = 1.0
+        MACHINE.tables["geometry"].base_radius = 1.0
 
 
 @pytest.mark.parametrize(

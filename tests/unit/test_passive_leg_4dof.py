@@ -70,9 +70,9 @@ def test_the_reference_pose_has_the_published_leg_lengths():
 @given(designs)
 def test_the_links_have_their_lengths_and_the_joints_their_places(machine):
     foot, elbow, tip, last = passive(machine).passive
-    links = machine.sections["geometry"].passive_links
+    links = machine.tables["geometry"].passive_links
     assert ((elbow.point - foot.point).norm(), (tip.point - elbow.point).norm()) == pytest.approx(links, rel=1e-12)
-    assert elbow.point.y == foot.point.y == tip.point.y == machine.sections["geometry"].passive_leg_offset
+    assert elbow.point.y == foot.point.y == tip.point.y == machine.tables["geometry"].passive_leg_offset
     assert tip.point == last.point == machine.configure().platform.translation
     assert foot.axis == elbow.axis == tip.axis == Y_AXIS
     assert (tip.point - elbow.point).cross(elbow.point - foot.point).y > 0.0, "the elbow has changed sides"
@@ -83,8 +83,8 @@ def test_the_orientation_is_pitch_then_roll(machine):
     """Q = Ry(90 deg - el2 - theta5) Rx(theta6), with el2 measured on the placed leg."""
     _, elbow, tip, last = passive(machine).passive
     link = tip.point - elbow.point
-    pitch = math.pi / 2 - math.atan2(link.z, link.x) - machine.sections["pose"].theta5
-    expected = about_y(pitch) @ about_x(machine.sections["pose"].theta6)
+    pitch = math.pi / 2 - math.atan2(link.z, link.x) - machine.tables["pose"].theta5
+    expected = about_y(pitch) @ about_x(machine.tables["pose"].theta6)
     assert np.allclose(matrix(machine.configure().platform.rotation), matrix(expected), atol=1e-13)
     assert np.allclose(vector(last.axis), vector(about_y(pitch).x), atol=1e-13)
 

@@ -40,7 +40,7 @@ def reference_point(analysis: Analysis) -> list[float]:
     if analysis.platform is None:
         raise ValueError("an analysis without an answer has no placement")
     position, rotation = analysis.platform
-    offset = np.array(analysis.machine.sections["tool"].offset)
+    offset = np.array(analysis.machine.tables["tool"].offset)
     return [float(c) for c in np.array(position) + np.array(rotation) @ offset]
 
 

@@ -130,13 +130,13 @@ def joints_on_the_way(chains: Chains, goal: Array) -> Array:
 
 
 def _batch(machine: Machine, chains: Chains) -> int:
-    """How many machines the sections hold at once."""
-    numbers = [number for section in machine.own_sections.values() for number in _numbers(section)]
+    """Return how many machines the tables describe at once."""
+    numbers = [number for table in machine.family_tables.values() for number in _numbers(table)]
     return max((np.size(number) for number in (*numbers, chains.length)), default=1)
 
 
-def _numbers(section: object) -> list[Scalar]:
-    held = list(vars(section).values())
+def _numbers(table: object) -> list[Scalar]:
+    held = list(vars(table).values())
     return [entry for value in held for entry in (value if isinstance(value, tuple) else (value,))]
 
 

@@ -65,7 +65,7 @@ def geometric_checks(machine: Machine, configuration: Configuration, joints: Seq
         configuration: it, placed.
         joints: its coordinates from the home pose (m, rad) where it is written leg by leg.
     """
-    limits, length = machine.sections["limits"], configuration.length
+    limits, length = machine.tables["limits"], configuration.length
     found = [*_lengths(limits, rods(configuration.legs), length)] if _any(limits, "shortest_leg", "longest_leg") else []
     if machine.family.chains and joints and _any(limits, "travel_from", "travel_to"):
         found += _travels(limits, machine.chains(), joints)

@@ -19,7 +19,7 @@ def actuator_checks(machine: Machine, configuration: Configuration, statics: Sta
         machine: with [limits] and [load]; the load acts at the tool point, base axes.
         configuration, statics: of it at its pose.
     """
-    limits, wrench = machine.sections["limits"], machine.load
+    limits, wrench = machine.tables["limits"], machine.load
     bounds = {True: ("actuator_force", limits.actuator_force), False: ("actuator_moment", limits.actuator_moment)}
     if all(is_zero(c) for c in wrench.components()) or not any(is_set(bound) for _, bound in bounds.values()):
         return []

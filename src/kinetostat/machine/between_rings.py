@@ -13,7 +13,7 @@ from kinetostat.machine.crank import CRANK_LINKS, CrankLinks, Cranks, crank_legs
 from kinetostat.machine.leg import RIGID, Leg, two_force_legs
 from kinetostat.machine.links import LinkKind, straight_legs
 from kinetostat.machine.machine import Closure, Configuration, Family
-from kinetostat.spec.fields import Field, Quantity, made_section, quantities
+from kinetostat.spec.fields import Field, Quantity, made_table, quantities
 
 
 @dataclass(frozen=True)
@@ -38,17 +38,17 @@ class Placement:
 
 
 Placed = Callable[[Any, Any, Any], Placement]
-"""From the sections geometry, stiffness and pose (SI) to the platform in closed form, NaN where it cannot be."""
+"""From the tables geometry, stiffness and pose (SI) to the platform in closed form, NaN where it cannot be."""
 
 
 def with_struts(
-    name: str, summary: str, sections: Mapping[str, type], placed: Placed, links: Sequence[LinkKind] = ()
+    name: str, summary: str, tables: Mapping[str, type], placed: Placed, links: Sequence[LinkKind] = ()
 ) -> Family:
     """The family whose actuated legs are U-P-S: forces along lines between the joints.
 
     Args:
         name, summary: as of `Family`.
-        sections: geometry (`Rings`), stiffness (with `actuator` and `leg_axial`) and pose.
+        tables: geometry (`Rings`), stiffness (with `actuator` and `leg_axial`) and pose.
         placed: the platform and what guides it.
         links: of what guides it, those with a mass.
     """
@@ -58,18 +58,18 @@ def with_struts(
         return found.moved_by(two_force_legs(*found.joints, stiffness.actuator, stiffness.leg_axial), geometry.size)
 
     legs = LinkKind("legs", ("leg_axial",), straight_legs)
-    return Family(name=name, summary=summary, sections=sections, configure=configure, links=(legs, *links))
+    return Family(name=name, summary=summary, tables=tables, configure=configure, links=(legs, *links))
 
 
 def with_cranks(
-    name: str, summary: str, sections: Mapping[str, type], placed: Placed, links: Sequence[LinkKind] = ()
+    name: str, summary: str, tables: Mapping[str, type], placed: Placed, links: Sequence[LinkKind] = ()
 ) -> Family:
     """The family whose actuated legs are R-U-S: the same machine with cranks and rods instead of struts.
 
     The cranks turn in vertical planes, outward where the platform is above the base. NaN where a rod does not reach.
 
     Args:
-        name, summary, sections, placed, links: as for `with_struts`; sections are those of the family with struts.
+        name, summary, tables, placed, links: as for `with_struts`; tables are those of the family with struts.
     """
 
     def configure(geometry: Any, stiffness: Any, pose: Any) -> Configuration:
@@ -79,11 +79,11 @@ def with_cranks(
         legs, limits = crank_legs(found.joints, sides, stiffness.actuator, bars)
         return found.moved_by(legs, geometry.size, limits)
 
-    cranked = {**sections, **_crank_sections(sections["geometry"], sections["stiffness"])}
-    return Family(name=name, summary=summary, sections=cranked, configure=configure, links=(*CRANK_LINKS, *links))
+    cranked = {**tables, **_crank_tables(tables["geometry"], tables["stiffness"])}
+    return Family(name=name, summary=summary, tables=cranked, configure=configure, links=(*CRANK_LINKS, *links))
 
 
-def _crank_sections(geometry: type, stiffness: type) -> dict[str, type]:
+def _crank_tables(geometry: type, stiffness: type) -> dict[str, type]:
     count = quantities(stiffness)["actuator"].count
     turn = Quantity("angle", "turn of each crank's plane about z, from the radial direction", count=count)
     changed = {
@@ -93,6 +93,6 @@ def _crank_sections(geometry: type, stiffness: type) -> dict[str, type]:
     }
     turns = {"crank_turn": Field(turn, (0.0,) * (count or 1))}
     return {
-        "geometry": made_section("Geometry", turns, (geometry, Cranks)),
-        "stiffness": made_section("Stiffness", changed, (stiffness,)),
+        "geometry": made_table("Geometry", turns, (geometry, Cranks)),
+        "stiffness": made_table("Stiffness", changed, (stiffness,)),
     }

@@ -11,7 +11,7 @@ from kinetostat.spec.fields import Quantity
 from kinetostat.units import UnitError, parse
 
 INDEPENDENT = ("pose", "tool", "load")
-"""Sections whose numbers need only be checked by themselves."""
+"""Tables whose numbers need only be checked by themselves."""
 
 
 def read_value(machine: Machine, path: str, text: str) -> float:
@@ -51,9 +51,9 @@ def changed(machine: Machine, values: Mapping[str, float | str]) -> Machine:
 def related(machine: Machine, path: str) -> bool:
     """Whether a field is checked against others: then `rebuilt` has the last word on a change."""
     parameter = find(machine.family, path)
-    section = parameter.path.split(".")[0]
+    table = parameter.path.split(".")[0]
     written = machine.family.chains is not None and not parameter.quantity.stiff
-    return section == "limits" or (written and section not in INDEPENDENT)
+    return table == "limits" or (written and table not in INDEPENDENT)
 
 
 def rebuilt(machine: Machine) -> Machine:

@@ -14,10 +14,10 @@ from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, Spring, rev
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure
 from kinetostat.machine.parts import Arm, if_elastic, per_length
-from kinetostat.spec.fields import Quantity, section
+from kinetostat.spec.fields import Quantity, table
 
 
-@section
+@table
 class Cranks:
     """Part of a table [geometry]: the links of R-U-S legs."""
 

@@ -302,7 +302,7 @@ def two_force_leg(
         name: of the leg.
         base_joint, platform_joint: centres of the universal and of the spherical joint, base frame, m.
         stiffness: of the actuator, N/m.
-        axial: EA of the leg's section, N: it yields over its whole length.
+        axial: EA of the leg's cross-section, N: it yields over its whole length.
     """
     span = platform_joint - base_joint
     size = span.norm()

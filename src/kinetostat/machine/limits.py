@@ -15,7 +15,7 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.fields import Quantity, quantities, section
+from kinetostat.spec.fields import Quantity, quantities, table
 
 RIGHT_ANGLE = math.pi / 2
 
@@ -28,7 +28,7 @@ def _most(kind: str, meaning: str, positive: bool = True, most: float = math.inf
     return Quantity(kind, meaning, positive, most=most, unset=math.inf)
 
 
-@section
+@table
 class Limits:
     """Table [limits], in any machine file; what is left out is not limited.
 

@@ -1,6 +1,6 @@
 """Links that yield: beams, lumped virtual joints, parallelograms, and a compliance matrix of one's own, all as springs.
 
-What a section and a material make of a link is `section`'s; where links lie is the family's business.
+What a cross-section and a material make of a link is `cross_section`'s; where links lie is the family's business.
 
 Source: theory (17) and (18); Tables I and II of the paper for lumped joints. Points and axes are in the base frame.
 """
@@ -23,12 +23,12 @@ FLAT = 1e-12
 
 @dataclass(frozen=True)
 class Rigidity:
-    """How a prismatic bar resists, from its section and material; infinity where it does not yield.
+    """How a prismatic bar resists, from its cross-section and material; infinity where it does not yield.
 
     Attributes:
         axial: E A, N.
         torsion: G J, N·m².
-        bending_y, bending_z: E I about the section's y and z axes, N·m².
+        bending_y, bending_z: E I about the cross-section's y and z axes, N·m².
         shear_y, shear_z: kappa G A along them, N: finite for a Timoshenko beam, infinite for an Euler-Bernoulli one.
     """
 
@@ -60,8 +60,8 @@ class Beam:
     Attributes:
         name: of the link.
         start, end: of its axis, base frame, m.
-        up: not along the link; the section's z axis lies in the plane of both.
-        rigidity: of its section.
+        up: not along the link; the cross-section's z axis lies in the plane of both.
+        rigidity: of its cross-section.
         placed: its axes and its length, m: known without the ends once it has been displaced.
     """
 
@@ -74,7 +74,7 @@ class Beam:
 
     @property
     def axes(self) -> tuple[Rotation, Scalar]:
-        """The section's axes in the base frame and the length of the link, m."""
+        """The cross-section's axes in the base frame and the length of the link, m."""
         return self.placed or link_axes(self.start, self.end, self.up)
 
     @property

@@ -12,10 +12,10 @@ from typing import Any
 from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import Vector
 from kinetostat.machine.leg import Leg
-from kinetostat.spec.fields import Field, Quantity, made_section
+from kinetostat.spec.fields import Field, Quantity, made_table
 
 Lengths = Callable[[Sequence[Leg], Vector, Any], list[tuple[str, Scalar]]]
-"""From the legs at a pose, P (base frame, m) and the section `geometry` to names and lengths (m) of links."""
+"""From the legs at a pose, P (base frame, m) and the table `geometry` to names and lengths (m) of links."""
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,14 @@ class LinkKind:
     count: int | None = None
 
 
-def density_section(kinds: Sequence[LinkKind]) -> type:
-    """The section [linear_density] of a family with these links; it may be left out."""
+def density_table(kinds: Sequence[LinkKind]) -> type:
+    """Make the table [linear_density] of a family with these links; it may be left out."""
     found = {}
     for kind in kinds:
         words = kind.name.replace("_", " ")
         quantity = Quantity("linear density", f"mass per length of the {words}; 0: not counted", count=kind.count)
         found[kind.name] = Field(quantity, 0.0 if kind.count is None else (0.0,) * kind.count)
-    return made_section("LinearDensity", found)
+    return made_table("LinearDensity", found)
 
 
 def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[tuple[str, Scalar]]:

@@ -26,7 +26,7 @@ from kinetostat.spec import document as documents
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import NO_LIMIT, optional, quantities
-from kinetostat.spec.validation import SCHEMA_VERSION, file_model, sections_in, validate
+from kinetostat.spec.validation import SCHEMA_VERSION, file_model, tables_in, validate
 from kinetostat.units import RIGID
 
 SUFFIX = ".toml"
@@ -87,7 +87,7 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
     family = _family(document.get("family"), origin)
     changed = documents.override(document, settings, _counts(family))
     machine = _validated(family, resolve(changed, family, origin), origin)
-    check_limits(machine.sections["limits"], machine.configure().legs, family.planar, False, origin)
+    check_limits(machine.tables["limits"], machine.configure().legs, family.planar, False, origin)
     return machine
 
 
@@ -97,27 +97,27 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     check_paths(named, settings)
     plan, numbers = separate(documents.override(named, settings, {}), origin)
     machine = _validated(written.family_of(plan), numbers, origin)
-    check_numbers(plan, machine.sections, origin)
-    whole = replace(machine, family=written.family_of(completed(plan, machine.own_sections)))
+    check_numbers(plan, machine.tables, origin)
+    whole = replace(machine, family=written.family_of(completed(plan, machine.family_tables)))
     legs = [
         Leg(leg.name, tuple(s.element for s in steps))
         for leg, steps in zip(plan.legs, whole.chains().legs, strict=True)
     ]
-    check_limits(machine.sections["limits"], legs, plan.planar, True, origin)
+    check_limits(machine.tables["limits"], legs, plan.planar, True, origin)
     return whole
 
 
 def _validated(family: Family, document: Document, origin: str) -> Machine:
-    sections = family.every_section
-    data: Any = validate(document, origin, file_model(family.name, sections), sections)
-    return Machine(data.name, family, sections_in(data, sections))
+    tables = family.every_table
+    data: Any = validate(document, origin, file_model(family.name, tables), tables)
+    return Machine(data.name, family, tables_in(data, tables))
 
 
 def _counts(family: Family) -> dict[str, int]:
     return {
         f"{name}.{field}": quantity.count
-        for name, section in family.every_section.items()
-        for field, quantity in quantities(section).items()
+        for name, table in family.every_table.items()
+        for field, quantity in quantities(table).items()
         if quantity.count is not None and not quantity.apart
     }
 
@@ -148,24 +148,24 @@ def as_toml(machine: Machine) -> str:
     ]
     literals = machine.family.literals
     lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get("", {}).items()]
-    for name in [*machine.sections, *(literals.keys() - machine.sections.keys() - {""})]:
-        section = machine.sections.get(name)
-        if section is not None and _left_out(machine.family.every_section[name], section):
+    for name in [*machine.tables, *(literals.keys() - machine.tables.keys() - {""})]:
+        table = machine.tables.get(name)
+        if table is not None and _left_out(machine.family.every_table[name], table):
             continue
         lines += ["", f"[{'.'.join(documents.toml_key(part) for part in name.split('.'))}]"]
         lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get(name, {}).items()]
-        lines += _quantity_lines(machine.family.every_section[name], section) if section is not None else []
+        lines += _quantity_lines(machine.family.every_table[name], table) if table is not None else []
     return "\n".join(lines) + "\n"
 
 
-def _left_out(fields: type, section: Any) -> bool:
-    """Whether a section says nothing that is not so without it."""
-    return optional(fields) == set(quantities(fields)) and bool(section == fields())
+def _left_out(fields: type, table: Any) -> bool:
+    """Whether a table says nothing that is not so without it."""
+    return optional(fields) == set(quantities(fields)) and bool(table == fields())
 
 
-def _quantity_lines(fields: type, section: Any) -> Iterator[str]:
+def _quantity_lines(fields: type, table: Any) -> Iterator[str]:
     for field, quantity in quantities(fields).items():
-        held = getattr(section, field)
+        held = getattr(table, field)
         if quantity.unset is not None and held == quantity.unset:
             continue
         texts = [json.dumps(quantity.show(value)) for value in (held if quantity.count else (held,))]
@@ -185,7 +185,7 @@ def template(family: str) -> str:
 
 def machine_schema() -> dict[str, Any]:
     """The JSON Schema of machine files of every family."""
-    models = [file_model(family.name, family.every_section) for family in families().values()]
+    models = [file_model(family.name, family.every_table) for family in families().values()]
     union: Any = reduce(operator.or_, models)
     schema = TypeAdapter(union).json_schema()
     schema["anyOf"].append(written_schema(SCHEMA_VERSION))

@@ -15,9 +15,10 @@ from kinetostat.algebra.screw import COMPONENTS, Wrench
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.leg import Joint, Leg, Spring, Turn
 from kinetostat.machine.limits import Limits
-from kinetostat.machine.links import LinkKind, density_section
+from kinetostat.machine.links import LinkKind, density_table
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.spec.fields import Quantity, section
+from kinetostat.spec.fields import Quantity, table
+from kinetostat.spec.renamed import renamed_property
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ class Member:
     linear_density: Scalar
 
 
-@section
+@table
 class Tool:
     """Table [tool], in any machine file: where on the platform loads act and motions are given."""
 
@@ -121,7 +122,7 @@ class Tool:
     mass: Annotated[float, Quantity("mass", "of the platform and the tool together; 0: not counted")] = 0.0
 
 
-@section
+@table
 class Load:
     """Table [load], in any machine file: a wrench on the platform at the tool point, base axes."""
 
@@ -138,7 +139,7 @@ class Load:
 
 
 COMMON = {"tool": Tool, "load": Load, "limits": Limits}
-"""Sections that every machine file may have."""
+"""Tables that every machine file may have."""
 
 
 @dataclass(frozen=True)
@@ -187,19 +188,19 @@ class Family:
     Attributes:
         name: as written in machine files.
         summary: one line for lists.
-        sections: the tables of a machine file by name (dots for tables in tables): dataclasses of annotated fields.
-        configure: from one instance per section, by keyword, to the machine at its pose.
+        tables: the tables of a machine file by name (dots for tables in tables): dataclasses of annotated fields.
+        configure: from one instance per table, by keyword, to the machine at its pose.
         planar: whether its platform moves in the x-y plane only.
-        chains: where there is no closed form, from the sections to the legs at the home pose, so that joint coordinates
+        chains: where there is no closed form, from the tables to the legs at the home pose, so that joint coordinates
             can be found that close them (`kinematics.closure`); `configure` then takes these as `joints`.
-        literals: what its machine files say beside numbers, by section.
+        literals: what its machine files say beside numbers, by table.
         links: those with a mass, of a family in closed form.
-        members: of a machine written leg by leg, from the sections to all links that can move.
+        members: of a machine written leg by leg, from the tables to all links that can move.
     """
 
     name: str
     summary: str
-    sections: Mapping[str, type]
+    tables: Mapping[str, type]
     configure: Callable[..., Configuration]
     planar: bool = False
     chains: Callable[..., "Chains"] | None = None
@@ -218,10 +219,10 @@ class Family:
         return tuple(COMPONENTS[i] for i in self.components)
 
     @cached_property
-    def every_section(self) -> dict[str, type]:
-        """Its own sections and the common ones."""
-        densities = {"linear_density": density_section(self.links)} if self.links else {}
-        return {**self.sections, **densities, **COMMON}
+    def every_table(self) -> dict[str, type]:
+        """Its own tables and the common ones."""
+        densities = {"linear_density": density_table(self.links)} if self.links else {}
+        return {**self.tables, **densities, **COMMON}
 
 
 @dataclass(frozen=True)
@@ -231,12 +232,15 @@ class Machine:
     Attributes:
         name: for people.
         family: its kind.
-        sections: one instance per section of the family and per common one, SI.
+        tables: one instance per table of the family and per common one, SI.
     """
 
     name: str
     family: Family
-    sections: Mapping[str, Any]
+    tables: Mapping[str, Any]
+
+    sections = renamed_property("tables")
+    own_sections = renamed_property("family_tables")
 
     def __repr__(self) -> str:
         return f"<Machine {self.name!r}, family {self.family.name}>"
@@ -244,33 +248,33 @@ class Machine:
     def configure(self, joints: Sequence[Scalar] = ()) -> Configuration:
         """The machine at its pose; `joints` are its coordinates where the family has no closed form for them."""
         placed = {"joints": joints} if self.family.chains else {}
-        return self.family.configure(**self.own_sections, **placed)
+        return self.family.configure(**self.family_tables, **placed)
 
     def chains(self) -> Chains:
         """Its legs at the home pose, where the family has no closed form."""
         if self.family.chains is None:
             raise ValueError(f"family {self.family.name} places its joints in closed form")
-        return self.family.chains(**self.own_sections)
+        return self.family.chains(**self.family_tables)
 
     @property
-    def own_sections(self) -> dict[str, Any]:
-        """The sections that its family asks for, by name."""
-        return {name: self.sections[name] for name in self.family.sections}
+    def family_tables(self) -> dict[str, Any]:
+        """The tables that its family asks for, by name."""
+        return {name: self.tables[name] for name in self.family.tables}
 
     @property
     def load(self) -> Wrench:
         """The wrench of the file's table [load], at the tool point, base axes (N·m, N)."""
-        given = self.sections["load"]
+        given = self.tables["load"]
         return Wrench(Vector(*given.moment), Vector(*given.force))
 
     @property
     def reference(self) -> str:
         """What K, C and the load are given at: "tool point T" if the file has a tool, else "platform point P"."""
-        return "tool point T" if any(self.sections["tool"].offset) else "platform point P"
+        return "tool point T" if any(self.tables["tool"].offset) else "platform point P"
 
     def tool_point(self, platform: Displacement) -> Vector:
         """The tool point T in the base frame, m: P itself unless the file has a table [tool]."""
-        return platform.apply(Vector(*self.sections["tool"].offset))
+        return platform.apply(Vector(*self.tables["tool"].offset))
 
 
 def need_machine(given: object) -> None:

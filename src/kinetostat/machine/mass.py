@@ -33,7 +33,7 @@ def moving_masses(machine: Machine, configuration: Configuration) -> list[Mass]:
         machine: says which links there are, their densities, and the mass of the platform.
         configuration: of it, at its pose.
     """
-    platform = machine.sections["tool"].mass
+    platform = machine.tables["tool"].mass
     links = [Mass(one.name, _weighed(one)) for one in _members(machine, configuration)]
     return [*links, Mass(PLATFORM, None if is_zero(platform) else platform)]
 
@@ -50,11 +50,11 @@ def _weighed(link: Member) -> Scalar | None:
 def _members(machine: Machine, configuration: Configuration) -> list[Member]:
     family = machine.family
     if family.members is not None:
-        return family.members(**machine.own_sections)
+        return family.members(**machine.family_tables)
     found = []
     for kind in family.links:
-        density = getattr(machine.sections["linear_density"], kind.name)
-        placed = configuration.legs, configuration.platform.translation, machine.sections["geometry"]
+        density = getattr(machine.tables["linear_density"], kind.name)
+        placed = configuration.legs, configuration.platform.translation, machine.tables["geometry"]
         for i, (name, length) in enumerate(kind.lengths(*placed)):
             found.append(Member(name, length, density if kind.count is None else density[i]))
     return found

@@ -31,10 +31,10 @@ class Parameter:
 
 def parameters(family: Family) -> Iterator[Parameter]:
     """All parameters of a family: every field, and every entry of fields that hold several."""
-    for section, fields in family.every_section.items():
+    for table, fields in family.every_table.items():
         for name, quantity in quantities(fields).items():
-            paths = tuple(leaves(f"{section}.{name}", quantity))
-            yield Parameter(f"{section}.{name}", quantity, paths)
+            paths = tuple(leaves(f"{table}.{name}", quantity))
+            yield Parameter(f"{table}.{name}", quantity, paths)
             if quantity.count is not None:
                 yield from (Parameter(path, quantity, (path,)) for path in paths)
 
@@ -72,25 +72,25 @@ def _find(family: Family, text: str) -> Parameter:
 def values(machine: Machine) -> dict[str, Scalar]:
     """Every scalar of a machine by path, SI."""
     found: dict[str, Scalar] = {}
-    for section, fields in machine.family.every_section.items():
+    for table, fields in machine.family.every_table.items():
         for name, quantity in quantities(fields).items():
-            held = getattr(machine.sections[section], name)
+            held = getattr(machine.tables[table], name)
             entries = (held,) if quantity.count is None else held
-            found.update(zip(leaves(f"{section}.{name}", quantity), entries, strict=True))
+            found.update(zip(leaves(f"{table}.{name}", quantity), entries, strict=True))
     return found
 
 
 def with_values(machine: Machine, changes: Mapping[str, Any]) -> Machine:
     """The machine with some scalars replaced, by leaf path; the values may be floats or traced scalars."""
     new = {**values(machine), **changes}
-    sections = {}
-    for section, fields in machine.family.every_section.items():
+    tables = {}
+    for table, fields in machine.family.every_table.items():
         made = {}
         for name, quantity in quantities(fields).items():
-            entries = tuple(new[path] for path in leaves(f"{section}.{name}", quantity))
+            entries = tuple(new[path] for path in leaves(f"{table}.{name}", quantity))
             made[name] = entries[0] if quantity.count is None else entries
-        sections[section] = fields(**made)
-    return replace(machine, sections=sections)
+        tables[table] = fields(**made)
+    return replace(machine, tables=tables)
 
 
 def with_leg(machine: Machine, path: str) -> str:

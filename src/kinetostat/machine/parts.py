@@ -53,7 +53,7 @@ class Arm:
         start, end: of its axis, base frame, m.
         name: of the link.
         up: unit vector, not along the link.
-        bending, torsion: E I about both axes of its section, and G J, N·m².
+        bending, torsion: E I about both axes of its cross-section, and G J, N·m².
     """
 
     start: Vector

@@ -1,7 +1,7 @@
 """Rigidities written as a cross-section and a material: E A, G J or E I from what an engineer orders.
 
 In any field of such a kind a table may stand: { shape = "tube", outer_diameter = "40 mm", inner_diameter = "30 mm",
-material = "steel" }. Machines written leg by leg have tables of sections instead.
+material = "steel" }. Machines written leg by leg have tables of cross-sections instead.
 """
 
 from collections.abc import Mapping
@@ -10,17 +10,17 @@ from typing import TypeAlias
 
 import numpy as np
 
+from kinetostat.machine.cross_section import MATERIALS
 from kinetostat.machine.machine import Family
-from kinetostat.machine.section import MATERIALS
 from kinetostat.machine.written.plan import SHAPES
-from kinetostat.machine.written.sections import SHAPE_KINDS, linear_density_of, rigidity_of
+from kinetostat.machine.written.tables import SHAPE_KINDS, linear_density_of, rigidity_of
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import quantities
 from kinetostat.units import UnitError, parse
 
 WHICH = {"axial rigidity": "axial", "torsional rigidity": "torsion", "bending rigidity": "bending_y"}
-"""Kinds of rigidity, and which of a section's they are."""
+"""Kinds of rigidity, and which of a cross-section's rigidities they are."""
 MODULI = ("youngs_modulus", "shear_modulus")
 SAME = 1e-9
 """Relative difference up to which two linear densities are one."""
@@ -42,7 +42,7 @@ def resolve(document: Document, family: Family, origin: str) -> Document:
         return document
     found = {
         name: _resolved(stiffness[name], WHICH[quantity.kind], f'"{origin}": stiffness.{name}')
-        for name, quantity in quantities(family.sections["stiffness"]).items()
+        for name, quantity in quantities(family.tables["stiffness"]).items()
         if quantity.kind in WHICH and name in stiffness
     }
     result = {**document, "stiffness": {**stiffness, **{name: numbers for name, (numbers, _) in found.items()}}}
@@ -87,7 +87,8 @@ def _rigidity(table: Mapping[str, object], which: str, where: str) -> tuple[floa
         numbers["density"] = _size(rest.pop("density"), "density", f"{where}: density")
     for key in rest:
         raise InputError(
-            f"{where}: {key} is not known; a {shape} section has {', '.join(SHAPES[shape])}, material and density."
+            f"{where}: {key} is not known; a {shape} cross-section has "
+            f"{', '.join(SHAPES[shape])}, material and density."
         )
     if shape == "tube" and not numbers["inner_diameter"] < numbers["outer_diameter"]:
         raise InputError(f"{where}: inner_diameter must be less than outer_diameter.")

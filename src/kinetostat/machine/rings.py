@@ -8,12 +8,12 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Displacement, Vector, polar, ring
-from kinetostat.spec.fields import Quantity, section
+from kinetostat.spec.fields import Quantity, table
 
 Three = tuple[float, float, float]
 
 
-@section
+@table
 class Rings:
     """Part of a table [geometry]: the radii."""
 
@@ -26,7 +26,7 @@ class Rings:
         return 0.5 * (self.base_radius + self.platform_radius)
 
 
-@section
+@table
 class ThreeLegs(Rings):
     """Part of a table [geometry]: rings of three legs."""
 

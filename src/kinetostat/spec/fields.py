@@ -1,6 +1,6 @@
 """The vocabulary in which a family declares what people may write: quantities with a kind, bounds and a meaning.
 
-A family's sections are plain frozen dataclasses whose fields are annotated with `Quantity`. From those annotations come
+A family's tables are plain frozen dataclasses whose fields are annotated with `Quantity`. From those annotations come
 the validation, the JSON Schema, the field paths and the messages; no family writes any of them.
 """
 
@@ -25,12 +25,12 @@ LARGEST_OTHER = 1e20
 NO_LIMIT = "none"
 """How people write that a limit is not set."""
 
-Section = TypeVar("Section")
+Table = TypeVar("Table")
 
 
 @dataclass_transform(frozen_default=True)
-def section(cls: type[Section]) -> type[Section]:
-    """Declare a section of a machine file: a frozen dataclass that refuses keys it does not have."""
+def table(cls: type[Table]) -> type[Table]:
+    """Declare a table of a machine file: a frozen dataclass that refuses keys it does not have."""
     made = dataclass(frozen=True)(cls)
     made.__pydantic_config__ = ConfigDict(extra="forbid")  # type: ignore[attr-defined]
     return made
@@ -148,31 +148,31 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Field:
-    """A field of a section that is made while the program runs: what it holds, its default if it may be left out."""
+    """A field of a table that is made while the program runs: what it holds, its default if it may be left out."""
 
     quantity: Quantity
     default: Any = None
 
 
-def made_section(name: str, given: Mapping[str, Field], bases: tuple[type, ...] = ()) -> type:
-    """A section class from its fields, those that may be left out last, and from the sections that it extends."""
+def made_table(name: str, given: Mapping[str, Field], bases: tuple[type, ...] = ()) -> type:
+    """Make the class of a table from its fields, optional ones last, and from the tables that it extends."""
     ordered = dict(sorted(given.items(), key=lambda item: item[1].default is not None))
     kinds = {key: float if one.quantity.count is None else tuple[float, ...] for key, one in ordered.items()}
     hints = {key: Annotated[kinds[key], one.quantity] for key, one in ordered.items()}
     defaults = {key: one.default for key, one in ordered.items() if one.default is not None}
-    return section(type(name, bases, {"__annotations__": hints, "__module__": __name__, **defaults}))
+    return table(type(name, bases, {"__annotations__": hints, "__module__": __name__, **defaults}))
 
 
 @lru_cache(1024)
-def quantities(section_type: type) -> Mapping[str, Quantity]:
-    """The fields of a section by name."""
-    hints = get_type_hints(section_type, include_extras=True)
-    return MappingProxyType({field.name: hints[field.name].__metadata__[0] for field in fields(section_type)})
+def quantities(table_type: type) -> Mapping[str, Quantity]:
+    """The fields of a table by name."""
+    hints = get_type_hints(table_type, include_extras=True)
+    return MappingProxyType({field.name: hints[field.name].__metadata__[0] for field in fields(table_type)})
 
 
-def optional(section_type: type) -> set[str]:
-    """Names of the fields of a section that may be left out."""
-    return {field.name for field in fields(section_type) if field.default is not MISSING}
+def optional(table_type: type) -> set[str]:
+    """Names of the fields of a table that may be left out."""
+    return {field.name for field in fields(table_type) if field.default is not MISSING}
 
 
 def leaves(name: str, quantity: Quantity) -> Iterator[str]:

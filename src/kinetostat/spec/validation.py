@@ -1,4 +1,4 @@
-"""A document against the sections of a family: validated SI data, or one paragraph that says what to mend.
+"""A document against the tables of a family: validated SI data, or one paragraph that says what to mend.
 
 The model of a file is made by pydantic from the family's own dataclasses; this module only words its findings.
 """
@@ -22,13 +22,13 @@ MODELS = 64
 """Models of files that are kept: making one takes longer than all else that reading a file is."""
 
 
-def file_model(family: str, sections: Mapping[str, type]) -> type[BaseModel]:
+def file_model(family: str, tables: Mapping[str, type]) -> type[BaseModel]:
     """The model of a machine file of one family."""
-    return _file_model(family, tuple(sections.items()))
+    return _file_model(family, tuple(tables.items()))
 
 
 @lru_cache(MODELS)
-def _file_model(family: str, sections: tuple[tuple[str, type], ...]) -> type[BaseModel]:
+def _file_model(family: str, tables: tuple[tuple[str, type], ...]) -> type[BaseModel]:
     content: dict[str, Any] = {
         "schema_version": (
             Literal[1],
@@ -37,25 +37,25 @@ def _file_model(family: str, sections: tuple[tuple[str, type], ...]) -> type[Bas
         "name": (str, Field(description="what people call the machine", min_length=1, max_length=80)),
         "family": (Literal[family], Field(description="kind of machine, see `kinetostat list`")),
     }
-    return _table_model("MachineFile", dict(sections), content)
+    return _table_model("MachineFile", dict(tables), content)
 
 
-def _table_model(title: str, sections: Mapping[str, type], content: dict[str, Any]) -> type[BaseModel]:
-    """The model of a table from the sections in it by dotted name; tables in tables become models in models."""
-    for i, name in enumerate(dict.fromkeys(path.partition(".")[0] for path in sections)):
-        inner = {path.partition(".")[2]: kind for path, kind in sections.items() if path.partition(".")[0] == name}
+def _table_model(title: str, tables: Mapping[str, type], content: dict[str, Any]) -> type[BaseModel]:
+    """Make the model of a table from the tables in it by dotted name; tables in tables become models in models."""
+    for i, name in enumerate(dict.fromkeys(path.partition(".")[0] for path in tables)):
+        inner = {path.partition(".")[2]: kind for path, kind in tables.items() if path.partition(".")[0] == name}
         model = inner[""] if "" in inner else _table_model(name, inner, {})
         may_miss = "" in inner and set(quantities(model)) == optional(model)
         default: Any = {"default_factory": model} if may_miss else {}
         about: Any = Field(alias=name, description=f"the machine's {name}", **default)
-        content[f"section_{i}"] = (model, about)
+        content[f"table_{i}"] = (model, about)
     return create_model(title, __config__=ConfigDict(extra="forbid"), **content)
 
 
-def sections_in(data: BaseModel, sections: Mapping[str, type]) -> dict[str, Any]:
-    """One instance per section, by dotted name, from a validated document."""
+def tables_in(data: BaseModel, tables: Mapping[str, type]) -> dict[str, Any]:
+    """Return one instance per table, by dotted name, from a validated document."""
     found = {}
-    for path in sections:
+    for path in tables:
         at: Any = data
         for key in path.split("."):
             names = {field.alias or name: name for name, field in type(at).model_fields.items()}
@@ -64,13 +64,13 @@ def sections_in(data: BaseModel, sections: Mapping[str, type]) -> dict[str, Any]
     return found
 
 
-def validate(document: Document, origin: str, model: type[BaseModel], sections: Mapping[str, type]) -> BaseModel:
+def validate(document: Document, origin: str, model: type[BaseModel], tables: Mapping[str, type]) -> BaseModel:
     """The document as validated data.
 
     Args:
         document: what was written.
         origin: name of the file, for messages.
-        model, sections: from `file_model` and the family.
+        model, tables: from `file_model` and the family.
 
     Raises:
         InputError: one sentence for each mistake, at most five.
@@ -78,20 +78,20 @@ def validate(document: Document, origin: str, model: type[BaseModel], sections: 
     try:
         return model.model_validate(document)
     except ValidationError as error:
-        found = [_sentence(dict(mistake), document, sections) for mistake in error.errors()]
+        found = [_sentence(dict(mistake), document, tables) for mistake in error.errors()]
         more = f" (and {len(found) - 5} more)" if len(found) > 5 else ""
         raise InputError(f'"{origin}": {" ".join(found[:5])}{more}') from None
 
 
-def _sentence(mistake: dict[str, Any], document: Document, sections: Mapping[str, type]) -> str:
+def _sentence(mistake: dict[str, Any], document: Document, tables: Mapping[str, type]) -> str:
     path = [str(part) for part in mistake["loc"]]
     name, last = ".".join(path), path[-1]
     within = ".".join(path[:-1])
-    known = quantities(sections[within]) if within in sections else {}
+    known = quantities(tables[within]) if within in tables else {}
     if mistake["type"] in ("missing", "missing_argument"):
         return _missing(within, name, last, known, document.get("family"))
     if mistake["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        allowed = list(known) or _tables_in(within, sections)
+        allowed = list(known) or _tables_in(within, tables)
         close = difflib.get_close_matches(last, allowed, 1)
         hint = f"did you mean {close[0]}?" if close else f"it may hold {', '.join(allowed)}."
         return f"{name} is not known; {hint}"
@@ -105,10 +105,10 @@ def _sentence(mistake: dict[str, Any], document: Document, sections: Mapping[str
     return f"{name} is {value}: {mistake['msg']}."
 
 
-def _tables_in(within: str, sections: Mapping[str, type]) -> list[str]:
+def _tables_in(within: str, tables: Mapping[str, type]) -> list[str]:
     """What a table of tables may hold."""
     start = f"{within}." if within else ""
-    tables = [path.removeprefix(start).partition(".")[0] for path in sections if path.startswith(start)]
+    tables = [path.removeprefix(start).partition(".")[0] for path in tables if path.startswith(start)]
     return list(dict.fromkeys([*([] if within else ["schema", "name", "family"]), *tables]))
 
 

@@ -25,7 +25,7 @@ def as_json(analysis: Analysis, along: Sequence[Along] = ()) -> dict[str, Any]:
         "status": analysis.status.word,
         "message": analysis.message,
         "platform": {"position": position and list(position), "rotation": rotation},
-        "tool_offset": list(machine.sections["tool"].offset),
+        "tool_offset": list(machine.tables["tool"].offset),
         "stiffness": analysis.stiffness,
         "compliance": analysis.compliance,
         "stiffness_diagonal": [_finite(entry) for entry in analysis.stiffness_diagonal] or None,

@@ -138,10 +138,10 @@ def compliance_map(wish: MapWish) -> dict[str, Array]:
 
 def _unloaded(machine: Machine) -> Machine:
     """The machine without its load, unless its actuators have limits, which a load may exceed."""
-    limits = machine.sections["limits"]
+    limits = machine.tables["limits"]
     if is_set(limits.actuator_force) or is_set(limits.actuator_moment):
         return machine
-    return replace(machine, sections={**machine.sections, "load": Load()})
+    return replace(machine, tables={**machine.tables, "load": Load()})
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,12 @@ from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm
 from kinetostat.machine.rings import Rings, Three
-from kinetostat.spec.fields import Quantity, section
+from kinetostat.spec.fields import Quantity, table
 
 LEGS = 3
 
 
-@section
+@table
 class Geometry(Rings):
     """Table [geometry]; the base frame has its origin at the base centre, the platform's axes stay parallel to it."""
 
@@ -34,7 +34,7 @@ class Geometry(Rings):
     bar_spacing: Annotated[float, Quantity("length", "distance of the two bars of a leg", positive=True)]
 
 
-@section
+@table
 class Stiffness:
     """Table [stiffness]."""
 
@@ -44,7 +44,7 @@ class Stiffness:
     arm_torsion: Annotated[float, Quantity("torsional rigidity", "torsional rigidity of the arms, GJ")] = RIGID
 
 
-@section
+@table
 class Pose:
     """Table [pose]: the three task coordinates; the platform does not turn."""
 
@@ -87,7 +87,7 @@ def _leg(
 FAMILY = Family(
     name="delta",
     summary="Delta: 3 actuated cranks with pairs of bars; freedoms x, y, z",
-    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
+    tables={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
     links=(
         LinkKind("arms", ("arm_bending", "arm_torsion"), in_each_leg("arm", "arm_length")),

@@ -10,13 +10,13 @@ from kinetostat.algebra.vector import Displacement, Vector, rotation_x, rotation
 from kinetostat.machine.between_rings import Placement, with_struts
 from kinetostat.machine.leg import RIGID
 from kinetostat.machine.rings import Rings, ends
-from kinetostat.spec.fields import Quantity, section
+from kinetostat.spec.fields import Quantity, table
 
 LEGS = 6
 Six = tuple[float, float, float, float, float, float]
 
 
-@section
+@table
 class Geometry(Rings):
     """Table [geometry]; the base frame has its origin at the base centre, the platform frame at P."""
 
@@ -30,7 +30,7 @@ class Geometry(Rings):
     platform_height: Annotated[float, Quantity("length", "z of the platform joints, platform frame (from P)")] = 0.0
 
 
-@section
+@table
 class Stiffness:
     """Table [stiffness]."""
 
@@ -40,7 +40,7 @@ class Stiffness:
     leg_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of the legs, EA")] = RIGID
 
 
-@section
+@table
 class Pose:
     """Table [pose]: Q = Rz(yaw) Ry(pitch) Rx(roll)."""
 

@@ -16,12 +16,12 @@ from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm
 from kinetostat.machine.rings import Three
-from kinetostat.spec.fields import Quantity, section
+from kinetostat.spec.fields import Quantity, table
 
 LEGS = 3
 
 
-@section
+@table
 class Geometry:
     """Table [geometry]; the origin of the base frame is the point P at the isotropic pose."""
 
@@ -35,7 +35,7 @@ class Geometry:
     ]
 
 
-@section
+@table
 class Stiffness:
     """Table [stiffness]."""
 
@@ -45,7 +45,7 @@ class Stiffness:
     foot_torsion: Annotated[float, Quantity("torsional rigidity", "torsional rigidity of the feet, GJ")] = RIGID
 
 
-@section
+@table
 class Pose:
     """Table [pose]: the three task coordinates; the platform does not turn."""
 
@@ -90,7 +90,7 @@ def _leg(
 FAMILY = Family(
     name="orthoglide",
     summary="Orthoglide: 3 actuated slides along x, y, z with pairs of bars; freedoms x, y, z",
-    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
+    tables={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
     links=(
         LinkKind("feet", ("foot_bending", "foot_torsion"), in_each_leg("foot", "foot_length")),

@@ -15,14 +15,14 @@ from kinetostat.machine.links import LinkKind, listed
 from kinetostat.machine.machine import Closure
 from kinetostat.machine.parts import bent_links, servo
 from kinetostat.machine.rings import Rings, four_joints
-from kinetostat.spec.fields import Quantity, section
+from kinetostat.spec.fields import Quantity, table
 
 LEGS = 4
 Four = tuple[float, float, float, float]
 Two = tuple[float, float]
 
 
-@section
+@table
 class PassiveLinks(Rings):
     """Part of a table [geometry]: the rings, and the two links of the passive leg."""
 
@@ -32,7 +32,7 @@ class PassiveLinks(Rings):
     ]
 
 
-@section
+@table
 class Geometry(PassiveLinks):
     """Table [geometry]; the base frame has its origin O at the foot of the passive leg, z up."""
 
@@ -43,7 +43,7 @@ class Geometry(PassiveLinks):
     ] = 0.0
 
 
-@section
+@table
 class PassiveLegStiffness:
     """Part of a table [stiffness]: what machines have in common whose passive leg has two links."""
 
@@ -58,7 +58,7 @@ class PassiveLegStiffness:
     ] = (RIGID, RIGID)
 
 
-@section
+@table
 class Stiffness(PassiveLegStiffness):
     """Table [stiffness]."""
 
@@ -70,7 +70,7 @@ class Stiffness(PassiveLegStiffness):
     ] = 0.0
 
 
-@section
+@table
 class Pose:
     """Table [pose]: the four task coordinates."""
 

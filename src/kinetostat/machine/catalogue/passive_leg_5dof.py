@@ -20,13 +20,13 @@ from kinetostat.machine.leg import Joint, Leg, Spring, revolutes
 from kinetostat.machine.machine import Closure
 from kinetostat.machine.parts import bent_links, servo
 from kinetostat.machine.rings import ends
-from kinetostat.spec.fields import Quantity, section
+from kinetostat.spec.fields import Quantity, table
 
 LEGS = 5
 Five = tuple[float, float, float, float, float]
 
 
-@section
+@table
 class Geometry(PassiveLinks):
     """Table [geometry]; the base frame has its origin O at the foot of the passive leg, z up."""
 
@@ -38,7 +38,7 @@ class Geometry(PassiveLinks):
     ]
 
 
-@section
+@table
 class Stiffness(PassiveLegStiffness):
     """Table [stiffness]."""
 
@@ -48,7 +48,7 @@ class Stiffness(PassiveLegStiffness):
     ] = 0.0
 
 
-@section
+@table
 class Pose:
     """Table [pose]: the five task coordinates; Q = Rx(psi) Ry(pitch) Rx(theta6), where psi tilts the leg's plane."""
 

@@ -12,17 +12,17 @@ from kinetostat.machine.links import LinkKind, straight_legs
 from kinetostat.machine.machine import Configuration, Family, Plane
 from kinetostat.machine.parts import if_elastic, per_length
 from kinetostat.machine.rings import Three, ThreeLegs, ends
-from kinetostat.spec.fields import Quantity, section
+from kinetostat.spec.fields import Quantity, table
 
 LEGS = 3
 
 
-@section
+@table
 class Geometry(ThreeLegs):
     """Table [geometry]; all joints lie in the x-y plane, the base ones about O, the platform ones about P."""
 
 
-@section
+@table
 class Stiffness:
     """Table [stiffness]."""
 
@@ -30,7 +30,7 @@ class Stiffness:
     leg_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of the legs, EA")] = RIGID
 
 
-@section
+@table
 class Pose:
     """Table [pose]."""
 
@@ -76,7 +76,7 @@ def _leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, axial: Scalar)
 FAMILY = Family(
     name="planar-3rpr",
     summary="planar: 3 R-P-R legs with actuated slides; freedoms x, y, angle",
-    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
+    tables={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
     links=(LinkKind("legs", ("leg_axial",), straight_legs),),
     planar=True,

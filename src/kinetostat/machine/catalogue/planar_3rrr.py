@@ -16,10 +16,10 @@ from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family, Plane
 from kinetostat.machine.parts import Arm, if_elastic, per_length
 from kinetostat.machine.rings import Three, ThreeLegs
-from kinetostat.spec.fields import Quantity, section
+from kinetostat.spec.fields import Quantity, table
 
 
-@section
+@table
 class Geometry(ThreeLegs):
     """Table [geometry]; all joints lie in the x-y plane, the base ones about O, the platform ones about P."""
 
@@ -27,7 +27,7 @@ class Geometry(ThreeLegs):
     distal_link: Annotated[float, Quantity("length", "from the elbow to the platform joint", positive=True)]
 
 
-@section
+@table
 class Stiffness:
     """Table [stiffness]."""
 
@@ -72,7 +72,7 @@ def _leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, links: CrankLi
 FAMILY = Family(
     name="planar-3rrr",
     summary="planar: 3 R-R-R legs with actuated base revolutes; freedoms x, y, angle",
-    sections={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
+    tables={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
     links=(
         LinkKind("proximal_links", ("proximal_bending",), in_each_leg("proximal link", "proximal_link")),

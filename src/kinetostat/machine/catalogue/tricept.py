@@ -12,17 +12,17 @@ from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes
 from kinetostat.machine.links import LinkKind, from_origin
 from kinetostat.machine.parts import in_series, servo
 from kinetostat.machine.rings import Three, ThreeLegs, ends
-from kinetostat.spec.fields import Quantity, section
+from kinetostat.spec.fields import Quantity, table
 
 LEGS = 3
 
 
-@section
+@table
 class Geometry(ThreeLegs):
     """Table [geometry]; the base frame has its origin at the Hooke joint of the tube."""
 
 
-@section
+@table
 class Stiffness:
     """Table [stiffness]."""
 
@@ -39,7 +39,7 @@ class Stiffness:
     ] = 0.0
 
 
-@section
+@table
 class Pose:
     """Table [pose]: Q = Ry(theta1) Rx(theta2), P = length Q z."""
 

@@ -1,1 +1,1 @@
-"""Machines written leg by leg: their file, their sections and how joint coordinates place them."""
+"""Machines written leg by leg: their file, their tables and how joint coordinates place them."""

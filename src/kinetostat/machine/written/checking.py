@@ -24,30 +24,30 @@ INDEPENDENT = 1e-9
 ELASTIC = ("lumped", "beam", "timoshenko")
 
 
-def check_numbers(plan: Plan, sections: Mapping[str, Any], origin: str) -> None:
-    """Refuse axes without direction, links without length and sections without substance.
+def check_numbers(plan: Plan, tables: Mapping[str, Any], origin: str) -> None:
+    """Refuse axes without direction, links without length and cross-sections without substance.
 
     Raises:
-        InputError: names leg and joint, or the section.
+        InputError: names leg and joint, or the cross-section.
     """
     for name, shape in plan.shapes.items():
-        data = sections[f"sections.{name}"]
+        data = tables[f"sections.{name}"]
         if shape == "tube" and not 0.0 <= data.inner_diameter < data.outer_diameter:
             raise InputError(
-                f'"{origin}": section "{name}": inner_diameter is {data.inner_diameter:g} m; it must be at least 0 and '
-                f"less than outer_diameter, {data.outer_diameter:g} m."
+                f'"{origin}": cross-section "{name}": inner_diameter is {data.inner_diameter:g} m; it must be at '
+                f"least 0 and less than outer_diameter, {data.outer_diameter:g} m."
             )
     for leg in plan.legs:
         for i, joint in enumerate(leg.joints):
             where = f'"{origin}": leg "{leg.name}", joint "{joint.name}"'
-            data = sections[f"legs.{leg.name}.{joint.name}"]
+            data = tables[f"legs.{leg.name}.{joint.name}"]
             _check_axes(data, where)
             if plan.planar:
                 _check_plane(joint, data, where)
             link = leg.links.get(joint.joins[1])
             if link is not None and link.model in ELASTIC:
                 after = leg.joints[i + 1]
-                _check_link(leg, joint, after, link, sections, plan.shapes[link.section], origin)
+                _check_link(leg, joint, after, link, tables, plan.shapes[link.cross_section], origin)
 
 
 def _check_axes(data: Any, where: str) -> None:
@@ -75,28 +75,28 @@ def _check_plane(joint: JointPlan, data: Any, where: str) -> None:
 
 
 def _check_link(
-    leg: LegPlan, near: JointPlan, far: JointPlan, link: LinkPlan, sections: Mapping[str, Any], shape: str, origin: str
+    leg: LegPlan, near: JointPlan, far: JointPlan, link: LinkPlan, tables: Mapping[str, Any], shape: str, origin: str
 ) -> None:
     where = f'"{origin}": leg "{leg.name}", link "{link.name}"'
-    ends = [np.array(sections[f"legs.{leg.name}.{joint.name}"].point) for joint in (near, far)]
+    ends = [np.array(tables[f"legs.{leg.name}.{joint.name}"].point) for joint in (near, far)]
     span = ends[1] - ends[0]
     if np.linalg.norm(span) < LEAST_AXIS:
         raise InputError(
             f'{where} has no length: joints "{near.name}" and "{far.name}" share a point; move one, or make it rigid.'
         )
     if link.up is None and shape in ("rectangle", "own"):
-        raise InputError(f"{where}: its section has two axes; say where z points, e.g. up = [0, 0, 1].")
+        raise InputError(f"{where}: its cross-section has two axes; say where z points, e.g. up = [0, 0, 1].")
     if link.up is not None and np.linalg.norm(np.cross(span, link.up)) < PARALLEL * np.linalg.norm(span):
         raise InputError(f"{where}: up points along the link; give another direction.")
 
 
-def completed(plan: Plan, sections: Mapping[str, Any]) -> Plan:
+def completed(plan: Plan, tables: Mapping[str, Any]) -> Plan:
     """The plan with what its numbers tell of each leg: a closed form if there is one, and its idle freedoms.
 
     Freedoms are idle that depend on others. The home pose may be special, so that joints are displaced at random to
     find them; legs need not close for that.
     """
-    home = chains(plan, **sections)
+    home = chains(plan, **tables)
     amounts = np.random.default_rng(1).uniform(-0.4, 0.4, home.size).tolist()
     remaining = iter(amounts)
     legs = []

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.machine.section import MATERIALS
+from kinetostat.machine.cross_section import MATERIALS
 from kinetostat.machine.written.plan import (
     BASE,
     JOINT_TYPES,
@@ -116,7 +116,7 @@ def separate(document: Document, origin: str) -> tuple[Plan, Document]:
     space = rest.pop("space", "spatial")
     if space not in ("spatial", "planar"):
         raise InputError(f'"{origin}": space is {shorten(space)}; it must be "spatial" or "planar" (the x-y plane).')
-    shapes, materials = _sections(rest, origin)
+    shapes, materials = _cross_sections(rest, origin)
     legs = tuple(_leg(name, leg, f'"{origin}": leg "{name}"', shapes) for name, leg in rest["legs"].items())
     coordinates = PLANAR_POSE if space == "planar" else SPATIAL_POSE
     pose = rest.get("pose", {})
@@ -128,11 +128,11 @@ def separate(document: Document, origin: str) -> tuple[Plan, Document]:
     return Plan(legs, shapes, materials, given, space == "planar"), rest
 
 
-def _sections(rest: Document, origin: str) -> tuple[dict[str, str], dict[str, str]]:
+def _cross_sections(rest: Document, origin: str) -> tuple[dict[str, str], dict[str, str]]:
     shapes, materials = {}, {}
     tables = rest.get("sections", {})
     for name, table in tables.items() if isinstance(tables, dict) else ():
-        where = f'"{origin}": section "{name}"'
+        where = f'"{origin}": cross-section "{name}"'
         if not isinstance(table, dict):
             raise InputError(f"{where} is {shorten(table)}; it must be a table with shape, sizes and material.")
         shapes[name] = choice(table.pop("shape", None), SHAPES, f"{where}: shape")

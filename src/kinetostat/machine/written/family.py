@@ -13,7 +13,7 @@ from kinetostat.machine.leg import Element, Joint, Leg, Spring, Turn, revolutes
 from kinetostat.machine.link import Beam, Parallelogram, lumped_springs, matrix_springs
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
 from kinetostat.machine.written.plan import JointPlan, LegPlan, LinkPlan, Plan, literals
-from kinetostat.machine.written.sections import linear_density_of, rigidity_of, sections_of
+from kinetostat.machine.written.tables import linear_density_of, rigidity_of, tables_of
 
 NAME = "legs"
 """As machine files name this kind."""
@@ -22,7 +22,7 @@ SUMMARY = "any machine, written leg by leg: joints by point and axis at the home
 
 
 KEPT = 64
-"""Families that are kept, so that machines with one plan share sections, models of files, and compiled programs."""
+"""Families that are kept, so that machines with one plan share tables, models of files, and compiled programs."""
 
 
 @lru_cache(KEPT)
@@ -31,7 +31,7 @@ def family_of(plan: Plan) -> Family:
     return Family(
         NAME,
         SUMMARY,
-        sections_of(plan),
+        tables_of(plan),
         partial(configure, plan),
         plan.planar,
         partial(chains, plan),
@@ -40,27 +40,27 @@ def family_of(plan: Plan) -> Family:
     )
 
 
-def configure(plan: Plan, joints: Sequence[Scalar | Turn], **sections: Any) -> Configuration:
+def configure(plan: Plan, joints: Sequence[Scalar | Turn], **tables: Any) -> Configuration:
     """The machine with its joints at given coordinates; the platform is where the first leg takes it.
 
     Args:
         plan: what the machine consists of.
         joints: coordinates of all joints leg by leg, from the home pose: m, and rad or turns.
-        sections: its numbers, SI.
+        tables: its numbers, SI.
     """
-    home = chains(plan, **sections)
+    home = chains(plan, **tables)
     remaining = iter(joints)
     placed = [place(steps, remaining) for steps in home.legs]
     legs = tuple(Leg(leg.name, tuple(chain), (), leg.idle) for leg, (chain, _) in zip(plan.legs, placed, strict=True))
     return Configuration(placed[0][1] @ home.home, legs, (), home.length, Plane() if plan.planar else None)
 
 
-def chains(plan: Plan, **sections: Any) -> Chains:
+def chains(plan: Plan, **tables: Any) -> Chains:
     """All legs at the home pose."""
-    legs = tuple(tuple(chain_at_home(plan, leg, sections)) for leg in plan.legs)
-    home = Displacement(IDENTITY, Vector(*sections["platform"].point))
-    pose = {name: getattr(sections["pose"], name) for name in plan.pose}
-    return Chains(legs, home, pose, _length(plan, sections), tuple(leg.inverse for leg in plan.legs))
+    legs = tuple(tuple(chain_at_home(plan, leg, tables)) for leg in plan.legs)
+    home = Displacement(IDENTITY, Vector(*tables["platform"].point))
+    pose = {name: getattr(tables["pose"], name) for name in plan.pose}
+    return Chains(legs, home, pose, _length(plan, tables), tuple(leg.inverse for leg in plan.legs))
 
 
 def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[list[Element], Displacement]:
@@ -76,9 +76,9 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
     return chain, motion
 
 
-def chain_at_home(plan: Plan, leg: LegPlan, sections: Mapping[str, Any]) -> list[Step]:
+def chain_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[Step]:
     """The elements of a leg at the home pose, from base to platform."""
-    data = [sections[f"legs.{leg.name}.{joint.name}"] for joint in leg.joints]
+    data = [tables[f"legs.{leg.name}.{joint.name}"] for joint in leg.joints]
     steps: list[Step] = []
     for i, joint in enumerate(leg.joints):
         title = f"{leg.name} {joint.name}"
@@ -89,7 +89,7 @@ def chain_at_home(plan: Plan, leg: LegPlan, sections: Mapping[str, Any]) -> list
         if link is not None:
             ends = Vector(*data[i].point), Vector(*data[i + 1].point)
             steps += [
-                Step(element, False) for element in _yielding(f"{leg.name} {link.name}", link, ends, plan, sections)
+                Step(element, False) for element in _yielding(f"{leg.name} {link.name}", link, ends, plan, tables)
             ]
     return steps
 
@@ -118,7 +118,7 @@ def _elements(title: str, joint: JointPlan, data: Any) -> list[Element]:
 
 
 def _yielding(
-    title: str, link: LinkPlan, ends: tuple[Vector, Vector], plan: Plan, sections: Mapping[str, Any]
+    title: str, link: LinkPlan, ends: tuple[Vector, Vector], plan: Plan, tables: Mapping[str, Any]
 ) -> Sequence[Element]:
     """What stands for a link that yields."""
     if link.model == "rigid":
@@ -126,31 +126,31 @@ def _yielding(
     if link.model == "matrix":
         return matrix_springs(title, link.compliance, ends[1])
     up = Vector(*link.up) if link.up else _any_up(ends)
-    shape, data = plan.shapes[link.section], sections[f"sections.{link.section}"]
+    shape, data = plan.shapes[link.cross_section], tables[f"sections.{link.cross_section}"]
     own = rigidity_of(shape, data, link.model == "timoshenko")
     if link.model == "lumped":
         return lumped_springs(title, *ends, up, own)
     return (Beam(title, *ends, up, own),)
 
 
-def members(plan: Plan, **sections: Any) -> list[Member]:
+def members(plan: Plan, **tables: Any) -> list[Member]:
     """The links between two joints that can move: those after the first joint of their leg that is not fixed."""
     found = []
     for leg in plan.legs:
-        points = [Vector(*sections[f"legs.{leg.name}.{joint.name}"].point) for joint in leg.joints]
+        points = [Vector(*tables[f"legs.{leg.name}.{joint.name}"].point) for joint in leg.joints]
         moves = False
         for joint, start, end in zip(leg.joints, points, points[1:], strict=False):
             moves = moves or joint.kind != "fixed"
             if moves:
-                section = leg.links[joint.joins[1]].section if joint.joins[1] in leg.links else ""
-                held = sections[f"sections.{section}"] if section else None
+                section = leg.links[joint.joins[1]].cross_section if joint.joins[1] in leg.links else ""
+                held = tables[f"sections.{section}"] if section else None
                 density = linear_density_of(plan.shapes[section], held) if section else 0.0
                 found.append(Member(f"{leg.name} {joint.joins[1]}", (end - start).norm(), density))
     return found
 
 
 def _any_up(ends: tuple[Vector, Vector]) -> Vector:
-    """The base axis that is furthest from a link's direction: for sections that look alike from all sides."""
+    """The base axis that is furthest from a link's direction: for cross-sections that look alike from all sides."""
     sizes = [times(c, c) for c in (ends[1] - ends[0]).components()]
     across = [axis for axis, size in zip(AXES, sizes, strict=True) if is_zero(size)]
     if across:
@@ -169,11 +169,11 @@ def unit(axis: Sequence[Scalar]) -> Vector:
     return vector * reciprocal(vector.norm())
 
 
-def _length(plan: Plan, sections: Mapping[str, Any]) -> Scalar:
+def _length(plan: Plan, tables: Mapping[str, Any]) -> Scalar:
     """Root mean square distance of the joints from P at the home pose, m."""
-    centre = Vector(*sections["platform"].point)
+    centre = Vector(*tables["platform"].point)
     arms = [
-        Vector(*sections[f"legs.{leg.name}.{joint.name}"].point) - centre for leg in plan.legs for joint in leg.joints
+        Vector(*tables[f"legs.{leg.name}.{joint.name}"].point) - centre for leg in plan.legs for joint in leg.joints
     ]
     squares = total([arm.dot(arm) for arm in arms])
     return sqrt(plus(squares, 0.0) * (1.0 / len(arms)))

@@ -75,14 +75,14 @@ class LinkPlan:
     Attributes:
         name: of the body.
         model: a key of `LINK_MODELS`.
-        section: name of its cross-section, or empty.
-        up: direction in which the section's z axis points, base axes at the home pose; None to leave the choice.
+        cross_section: name of its cross-section, or empty.
+        up: direction in which the cross-section's z axis points, base axes at the home pose; None to leave the choice.
         compliance: of model "matrix", as for a joint, at the link's end.
     """
 
     name: str
     model: str
-    section: str
+    cross_section: str
     up: tuple[float, float, float] | None
     compliance: Matrix
 
@@ -112,7 +112,7 @@ class Plan:
     Attributes:
         legs: in the order of the file.
         shapes: of the cross-sections, by name: keys of `SHAPES`.
-        materials: of the cross-sections, by name: keys of `section.MATERIALS`, or empty where E and G are given.
+        materials: of the cross-sections, by name: keys of `cross_section.MATERIALS`, or empty where E and G are given.
         pose: coordinates that the pose gives; the others follow from the legs.
         planar: whether the platform moves in the x-y plane only.
     """
@@ -152,8 +152,8 @@ def _joint_literals(joint: JointPlan) -> dict[str, object]:
 
 def _link_literals(link: LinkPlan) -> dict[str, object]:
     said: dict[str, object] = {"model": link.model}
-    if link.section:
-        said["section"] = link.section
+    if link.cross_section:
+        said["section"] = link.cross_section
     if link.up:
         said["up"] = list(link.up)
     if link.compliance:

@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from kinetostat.machine.section import MATERIALS
+from kinetostat.machine.cross_section import MATERIALS
 from kinetostat.machine.written.family import NAME, SUMMARY
 from kinetostat.machine.written.plan import JOINT_TYPES, LINK_MODELS, SHAPES, SPATIAL_POSE
-from kinetostat.machine.written.sections import JOINT_FIELDS, SHAPE_KINDS
+from kinetostat.machine.written.tables import JOINT_FIELDS, SHAPE_KINDS
 from kinetostat.spec.fields import Field
 from kinetostat.units import KINDS
 
@@ -26,7 +26,7 @@ def written_schema(version: int) -> dict[str, Any]:
             "space": {"enum": ["spatial", "planar"], "description": "planar: the x-y plane"},
             "platform": _table({"point": {**point, "description": "P at the home pose, base frame"}}, ["point"]),
             "pose": {**_table(dict.fromkeys(SPATIAL_POSE, QUANTITY)), "minProperties": 1},
-            "sections": {"type": "object", "additionalProperties": _section()},
+            "sections": {"type": "object", "additionalProperties": _cross_section()},
             "legs": {"type": "array", "minItems": 1, "items": _leg()},
             "tool": {"type": "object"},
             "load": {"type": "object"},
@@ -40,7 +40,7 @@ def _table(properties: dict[str, Any], required: list[str] | None = None) -> dic
     return {"type": "object", "properties": properties, "required": required or [], "additionalProperties": False}
 
 
-def _section() -> dict[str, Any]:
+def _cross_section() -> dict[str, Any]:
     sizes = {name: {**QUANTITY, "examples": [KINDS[kind].example]} for name, kind in SHAPE_KINDS.items()}
     known = {"shape": {"enum": list(SHAPES)}, "material": {"enum": list(MATERIALS)}}
     moduli = dict.fromkeys(("youngs_modulus", "shear_modulus", "density"), QUANTITY)

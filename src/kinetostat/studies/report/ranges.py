@@ -38,7 +38,7 @@ def usual_ranges(machine: Machine, count: int) -> list[str]:
         machine: whose pose has an answer.
         count: of points of each.
     """
-    limited = machine.sections["limits"]
+    limited = machine.tables["limits"]
     kinds = FAR if any(map(is_set, vars(limited).values())) else NEAR
     coordinates = [p for p in parameters(machine.family) if p.path.startswith("pose.") and len(p.leaves) == 1]
     ordered = sorted(coordinates, key=lambda p: p.quantity.kind != "length")

@@ -62,7 +62,7 @@ def demands(machine: Machine, poses: Mapping[str, Array]) -> tuple[Demand, ...]:
     if not next(iter(poses.values())).size:
         return ()
     wanted = {name: value for name, value in EVERYTHING.items() if not (machine.family.planar and "angle" in name)}
-    watched = replace(machine, sections={**machine.sections, "limits": Limits(**wanted)})
+    watched = replace(machine, tables={**machine.tables, "limits": Limits(**wanted)})
     found = used(watched, poses)
     told = []
     for name in (name for name in TITLES if name in found):

@@ -75,7 +75,7 @@ class Judge:
     @property
     def limits(self) -> list[str]:
         """Names of the limits that are set."""
-        held = self.machine.sections["limits"]
+        held = self.machine.tables["limits"]
         return [name for name in quantities(Limits) if is_set(getattr(held, name))]
 
     @property

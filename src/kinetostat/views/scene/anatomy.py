@@ -37,7 +37,7 @@ class LinkPart:
         kind: a bar, two parallel bars, or a telescope along which a slide runs.
         start, end: of its axis.
         driven: whether it holds an actuated slide.
-        up: in which the section's z axis lies, if that matters.
+        up: in which the cross-section's z axis lies, if that matters.
         side: from the middle to either bar, of two bars.
         pinned: of two bars, whether they turn on pins instead of balls.
     """

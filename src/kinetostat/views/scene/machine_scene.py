@@ -17,7 +17,7 @@ from kinetostat.views.scene import joints, links, overlays, shapes
 from kinetostat.views.scene.anatomy import Anatomy, JointPart, anatomy, together
 from kinetostat.views.scene.overlays import Measure
 from kinetostat.views.scene.plates import Plate, plate_behind
-from kinetostat.views.scene.profiles import Proportions, bounds, diagonal, leg_radius, sections_of
+from kinetostat.views.scene.profiles import Proportions, bounds, cross_sections_of, diagonal, leg_radius
 from kinetostat.views.scene.solids import Label, Scene, Solid, unit, upright
 
 SNUG = 0.42
@@ -36,7 +36,7 @@ def proportions_of(machine: Machine, configuration: Configuration) -> Proportion
     size = diagonal(configuration)
     return Proportions(
         leg_radius(machine, size),
-        sections_of(machine),
+        cross_sections_of(machine),
         {link.name: link.span.norm() for leg in legs for link in leg.links},
         {rail.name: rail.point for leg in legs for rail in leg.rails},
         size,
@@ -115,7 +115,7 @@ def _leg_solids(leg: Anatomy, base: Plate | None, platform: Plate, sizes: Propor
     found: list[Solid] = []
     for link in leg.links:
         span = sizes.spans.get(link.name, link.span.norm())
-        found += links.link_solids(link, radius, material, sizes.sections.get(link.name), span)
+        found += links.link_solids(link, radius, material, sizes.cross_sections.get(link.name), span)
     for joint in leg.joints:
         found += joints.joint_solids(joint, _sides(joint, leg, base, platform), radius, material)
     for rail in leg.rails:
@@ -126,7 +126,7 @@ def _leg_solids(leg: Anatomy, base: Plate | None, platform: Plate, sizes: Propor
 
 def _radius(leg: Anatomy, sizes: Proportions) -> float:
     """From which the joints of a leg are drawn, m: the machine's, or more where a link is thicker."""
-    profiles = [sizes.sections[link.name] for link in leg.links if link.name in sizes.sections]
+    profiles = [sizes.cross_sections[link.name] for link in leg.links if link.name in sizes.cross_sections]
     return max([sizes.leg, *(SNUG * profile.width for profile in profiles)])
 
 

@@ -27,14 +27,14 @@ class Proportions:
 
     Attributes:
         leg: radius of a leg, m.
-        sections: cross-section of each link that has one, by the link's name.
+        cross_sections: cross-section of each link that has one, by the link's name.
         spans: length of each telescope where the machine was loaded, m, by name: its cylinder does not grow.
         carriages: where each rail's carriage was then, by name, base frame, m: the rail stays.
         diagonal: of the machine, m.
     """
 
     leg: float
-    sections: Mapping[str, Profile]
+    cross_sections: Mapping[str, Profile]
     spans: Mapping[str, float]
     carriages: Mapping[str, Vector]
     diagonal: float
@@ -50,11 +50,11 @@ def diagonal(configuration: Configuration) -> float:
 
 def leg_radius(machine: Machine, size: float) -> float:
     """Radius of the legs, m."""
-    given = machine.sections["limits"].leg_diameter
+    given = machine.tables["limits"].leg_diameter
     return 0.5 * given if is_set(given) else SLENDER * size
 
 
-def sections_of(machine: Machine) -> dict[str, Profile]:
+def cross_sections_of(machine: Machine) -> dict[str, Profile]:
     """The cross-sections of a machine written leg by leg, by the name of the link."""
     found = {}
     for table, said in machine.family.literals.items():
@@ -62,7 +62,7 @@ def sections_of(machine: Machine) -> dict[str, Profile]:
         section = said.get("section")
         if parts[0] == "legs" and section:
             shape = machine.family.literals[f"sections.{section}"]["shape"]
-            found[f"{parts[1]} {parts[2]}"] = _profile(str(shape), machine.sections[f"sections.{section}"])
+            found[f"{parts[1]} {parts[2]}"] = _profile(str(shape), machine.tables[f"sections.{section}"])
     return found
 
 

@@ -49,7 +49,7 @@ MATERIALS = {
 
 
 @dataclass(frozen=True)
-class Section:
+class CrossSection:
     """A cross-section; y and z are its principal axes.
 
     Attributes:
@@ -66,7 +66,7 @@ class Section:
     shear_factor: Scalar = RIGID
 
 
-def tube_section(outer: Scalar, inner: Scalar = 0.0, poisson: Scalar = 0.3) -> Section:
+def tube(outer: Scalar, inner: Scalar = 0.0, poisson: Scalar = 0.3) -> CrossSection:
     """A round tube, or a round bar where `inner` is 0; diameters in m.
 
     Source of the shear factor: Cowper 1966, J. Appl. Mech. 33, 335.
@@ -77,10 +77,10 @@ def tube_section(outer: Scalar, inner: Scalar = 0.0, poisson: Scalar = 0.3) -> S
     ratio = times(small, reciprocal(big))
     thick = plus(1.0, ratio) * plus(1.0, ratio)
     below = plus((7.0 + 6.0 * poisson) * thick, times(20.0 + 12.0 * poisson, ratio))
-    return Section(area, second, second, 2.0 * second, 6.0 * (1.0 + poisson) * thick / below)
+    return CrossSection(area, second, second, 2.0 * second, 6.0 * (1.0 + poisson) * thick / below)
 
 
-def rectangular_section(width: Scalar, height: Scalar) -> Section:
+def rectangle(width: Scalar, height: Scalar) -> CrossSection:
     """A solid rectangle, `width` along y and `height` along z, m; shear factor 5/6.
 
     Source of the torsion constant: Roark's Formulas for Stress and Strain, solid rectangle (error below 0.5 percent).
@@ -96,23 +96,23 @@ def rectangular_section(width: Scalar, height: Scalar) -> Section:
         * (1.0 / 3.0 - 0.21 * slender * (1.0 - slender * slender * slender * slender / 12.0))
     )
     second = width * height * (1.0 / 12.0)
-    return Section(width * height, second * height * height, second * width * width, torsion, 5.0 / 6.0)
+    return CrossSection(width * height, second * height * height, second * width * width, torsion, 5.0 / 6.0)
 
 
-def rigidity(young: Scalar, slide: Scalar, section: Section, shear: bool = False) -> Rigidity:
+def rigidity(young: Scalar, slide: Scalar, profile: CrossSection, shear: bool = False) -> Rigidity:
     """EA, GJ, EI of a bar, and kappa GA where `shear` is asked for (Timoshenko).
 
     Args:
         young, slide: elastic moduli E and G, Pa.
-        section: its cross-section.
+        profile: its cross-section.
         shear: whether it yields in shear.
     """
-    sheared = section.shear_factor * slide * section.area if shear else RIGID
+    sheared = profile.shear_factor * slide * profile.area if shear else RIGID
     return Rigidity(
-        axial=young * section.area,
-        torsion=slide * section.torsion_constant,
-        bending_y=young * section.second_moment_y,
-        bending_z=young * section.second_moment_z,
+        axial=young * profile.area,
+        torsion=slide * profile.torsion_constant,
+        bending_y=young * profile.second_moment_y,
+        bending_z=young * profile.second_moment_z,
         shear_y=sheared,
         shear_z=sheared,
     )

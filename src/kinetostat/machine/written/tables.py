@@ -1,14 +1,14 @@
-"""The numbers of a machine written leg by leg: one section for each of its parts, as the plan has them."""
+"""The numbers of a machine written leg by leg: one table for each of its parts, as the plan has them."""
 
 from collections.abc import Mapping
 from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, times
+from kinetostat.machine.cross_section import MATERIALS, CrossSection, rectangle, rigidity, tube
 from kinetostat.machine.leg import RIGID
 from kinetostat.machine.link import Rigidity
-from kinetostat.machine.section import MATERIALS, Section, rectangular_section, rigidity, tube_section
 from kinetostat.machine.written.plan import SHAPES, JointPlan, Plan
-from kinetostat.spec.fields import Field, Quantity, made_section
+from kinetostat.spec.fields import Field, Quantity, made_table
 
 AXIS = Quantity("direction", "direction of the joint, of any length, base axes at the home pose", count=3, apart=True)
 POINT = Quantity("length", "a point of the joint, base frame, at the home pose", count=3, apart=True)
@@ -48,17 +48,17 @@ SHAPE_KINDS = {
 POSE_KINDS = {"x": "length", "y": "length", "z": "length", "roll": "angle", "pitch": "angle", "yaw": "angle"}
 
 
-def sections_of(plan: Plan) -> dict[str, type]:
-    """The sections of the plan's machine files, by dotted name."""
+def tables_of(plan: Plan) -> dict[str, type]:
+    """The tables of the plan's machine files, by dotted name."""
     point = Quantity("length", "platform point P at the home pose, base frame", count=3, apart=True)
-    found = {"platform": made_section("Platform", {"point": Field(point)})}
+    found = {"platform": made_table("Platform", {"point": Field(point)})}
     for name, shape in plan.shapes.items():
-        found[f"sections.{name}"] = made_section("CrossSection", _shape_fields(shape, plan.materials[name]))
+        found[f"sections.{name}"] = made_table("CrossSection", _shape_fields(shape, plan.materials[name]))
     for leg in plan.legs:
         for joint in leg.joints:
-            found[f"legs.{leg.name}.{joint.name}"] = made_section("JointSection", _joint_fields(joint))
+            found[f"legs.{leg.name}.{joint.name}"] = made_table("JointTable", _joint_fields(joint))
     pose = {name: Field(Quantity(POSE_KINDS[name], f"{name} of the platform")) for name in plan.pose}
-    return {**found, "pose": made_section("Pose", pose)}
+    return {**found, "pose": made_table("Pose", pose)}
 
 
 def _joint_fields(joint: JointPlan) -> dict[str, Field]:
@@ -90,7 +90,7 @@ def rigidity_of(shape: str, data: Any, shear: bool) -> Rigidity:
 
     Args:
         shape: a key of `SHAPES`.
-        data: an instance of its section.
+        data: an instance of its table.
         shear: whether it yields in shear (Timoshenko).
     """
     return rigidity(data.youngs_modulus, data.shear_modulus, _profile(shape, data), shear)
@@ -101,12 +101,12 @@ def linear_density_of(shape: str, data: Any) -> Scalar:
     return times(data.density, _profile(shape, data).area)
 
 
-def _profile(shape: str, data: Any) -> Section:
+def _profile(shape: str, data: Any) -> CrossSection:
     poisson = 0.5 * data.youngs_modulus / data.shear_modulus - 1.0
     if shape == "round":
-        return tube_section(data.diameter, 0.0, poisson)
+        return tube(data.diameter, 0.0, poisson)
     if shape == "tube":
-        return tube_section(data.outer_diameter, data.inner_diameter, poisson)
+        return tube(data.outer_diameter, data.inner_diameter, poisson)
     if shape == "rectangle":
-        return rectangular_section(data.width, data.height)
-    return Section(data.area, data.second_moment_y, data.second_moment_z, data.torsion_constant, 5.0 / 6.0)
+        return rectangle(data.width, data.height)
+    return CrossSection(data.area, data.second_moment_y, data.second_moment_z, data.torsion_constant, 5.0 / 6.0)
