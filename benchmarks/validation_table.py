@@ -26,7 +26,7 @@ SHIFT = 0.05
 TURN = math.radians(5)
 """Likewise one in rad."""
 REGULAR = 0.02
-"""Least regularity of a drawn pose, as in the tests."""
+"""Least singularity margin of a drawn pose, as in the tests."""
 DRAWS = 200
 """Draws before a machine is given up."""
 
@@ -41,7 +41,7 @@ def nearby(name: str, machine: Machine) -> Iterator[Machine]:
         reach = {path: TURN if kind == "angle" else SHIFT * length for path, kind in pose.items()}
         drawn = with_values(machine, {path: here[path] + draw.uniform(-r, r) for path, r in reach.items()})
         response = respond(drawn)
-        if Status(int(response.status)) is Status.OK and response.regularity > REGULAR:
+        if Status(int(response.status)) is Status.OK and response.singularity_margin > REGULAR:
             yield drawn
             found += 1
         if found == POSES:

@@ -7,7 +7,7 @@ first one it meets; run `pytest --hypothesis-profile=explore` to look for new co
 from hypothesis import HealthCheck, Phase, settings
 
 QUIET = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large]
-"""Poses are filtered by regularity and each costs a statics solve; neither is a fault of a test."""
+"""Poses are filtered by singularity margin and each costs a statics solve; neither is a fault of a test."""
 
 settings.register_profile(
     "steady",

@@ -20,7 +20,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 
 REGULAR = 0.02
-"""Least regularity of a drawn pose. Statics solve W; this near a singularity they lose less than three digits of 16."""
+"""Least singularity margin of a drawn pose. Statics solve W; there they lose less than three digits of 16."""
 SHARE = 0.1
 """How far a size varies about its value in the file, as a share of it; of the machine's length where it is 0."""
 TURN = radians(6)
@@ -201,7 +201,7 @@ def machines(draw: st.DrawFn, case: Case, stiffness: st.SearchStrategy[float] = 
 def is_regular(machine: Machine) -> bool:
     """Whether the pose can be reached and is not near a singularity."""
     response = respond(machine)
-    return response.status == Status.OK and response.regularity > REGULAR
+    return response.status == Status.OK and response.singularity_margin > REGULAR
 
 
 def regular_machines(case: Case, stiffness: st.SearchStrategy[float] = MODERATE) -> st.SearchStrategy[Machine]:

@@ -37,10 +37,10 @@ condition of W at a regular pose."""
 ROUNDED_ZERO = 1e-24
 """The square of a rounding error, which one route leaves of C in a rigid direction where another has zero."""
 REORDERED = 10.0
-"""Factor within which the regularity of a pose is known: it depends on the order in which vectors are taken, and that
-on which components are zero by form: a float that happens to be zero counts as such, a traced value never does."""
+"""Factor within which the singularity margin of a pose is known: it depends on the order in which vectors are taken,
+and that on which components are zero by form: a float that is zero counts as such, a traced value never does."""
 REGULAR = 0.05
-"""Regularity from which numbers are compared so sharply; statuses are compared everywhere."""
+"""Singularity margin from which numbers are compared so sharply; statuses are compared everywhere."""
 
 
 @dataclass(frozen=True)
@@ -101,10 +101,10 @@ def assert_same(actual: Found, expected: Found) -> None:
     endless = np.isinf(expected.values)
     np.testing.assert_array_equal(np.isinf(actual.values), endless)
     np.testing.assert_array_equal(actual.values[endless], expected.values[endless])
-    compared = np.isfinite(expected.values) & (expected.values[NAMES.index("regularity")] > REGULAR)
+    compared = np.isfinite(expected.values) & (expected.values[NAMES.index("singularity_margin")] > REGULAR)
     error = np.abs(np.subtract(actual.values, expected.values, where=compared, out=np.zeros(compared.shape)))
     allowed = (AGREEMENT + expected.lost) * scales(expected.values) + ROUNDED_ZERO
-    row = NAMES.index("regularity")
+    row = NAMES.index("singularity_margin")
     allowed[row] = math.inf
     assert np.all(error[compared] <= allowed[compared])
     ratio = actual.values[row, compared[row]] / expected.values[row, compared[row]]
@@ -285,11 +285,11 @@ def test_large_and_small_batches_agree() -> None:
 
 
 def test_results_that_nothing_varies() -> None:
-    """C does not depend on an actuator that is a column, where only the regularity is asked for."""
+    """C does not depend on an actuator that is a column, where only the singularity margin is asked for."""
     machine = load(FOUR)
-    found = native(machine, {"stiffness.actuator.0": np.linspace(1.0, 2.0, 30)}, ("regularity",))
+    found = native(machine, {"stiffness.actuator.0": np.linspace(1.0, 2.0, 30)}, ("singularity_margin",))
     assert np.all(found.values == found.values[0, 0])
-    assert found.values[0, 0] == pytest.approx(respond(machine).regularity, rel=AGREEMENT)
+    assert found.values[0, 0] == pytest.approx(respond(machine).singularity_margin, rel=AGREEMENT)
 
 
 def run_one(graph: Graph, x: Traced, result: object, at: Array) -> Array:

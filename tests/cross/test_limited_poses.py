@@ -72,7 +72,7 @@ def test_floats_arrays_and_machine_code_give_one_status(name, load_settings, fie
     with np.errstate(all="ignore"):
         arrays = np.broadcast_to(respond(with_values(machine, columns)).status, POSES)
     results, codes = np.empty((1, POSES)), np.empty(POSES, dtype=np.int8)
-    slab_kernel(machine, [*columns], ["regularity"]).run(columns, results, codes)
+    slab_kernel(machine, [*columns], ["singularity_margin"]).run(columns, results, codes)
     assert {Status.OK, Status.JOINT_LIMIT} <= set(expected)
     assert np.array_equal(arrays, expected)
     assert np.array_equal(codes, expected)
@@ -117,7 +117,9 @@ def test_a_limit_that_varies_is_a_column_like_any_other():
     machine = load("hexapod")
     length = np.linspace(0.08, 0.12, 200)
     results, codes = np.empty((1, 200)), np.empty(200, dtype=np.int8)
-    slab_kernel(machine, ["limits.longest_leg"], ["regularity"]).run({"limits.longest_leg": length}, results, codes)
+    slab_kernel(machine, ["limits.longest_leg"], ["singularity_margin"]).run(
+        {"limits.longest_leg": length}, results, codes
+    )
     reach = used(with_values(machine, {"limits.longest_leg": 1.0}), {"pose.x": np.zeros(1)})["longest_leg"][1]
     assert np.array_equal(codes == Status.OK, length >= reach)
     assert is_set(length)

@@ -49,7 +49,7 @@ def test_unrelated_optimisers_agree(settings, close):
 
 @pytest.mark.parametrize("over", ["worst", "mean", "percentile 80"])
 @pytest.mark.parametrize(
-    "quantity", ["compliance_sum", "stiffness_along", "leg_stroke", "frobenius_condition", "regularity"]
+    "quantity", ["compliance_sum", "stiffness_along", "leg_stroke", "frobenius_condition", "singularity_margin"]
 )
 def test_derivatives_over_poses_are_those_of_differences(quantity, over):
     direction = ["objectives.0.direction=[1, 0, 2]"] if quantity == "stiffness_along" else []

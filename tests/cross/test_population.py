@@ -10,7 +10,7 @@ from kinetostat.engine.population import Evaluator, Population, differentiate
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values
 
-NAMES = ("compliance_z", "stiffness_x", "regularity", "least_rotational_stiffness", "longest_leg")
+NAMES = ("compliance_z", "stiffness_x", "singularity_margin", "least_rotational_stiffness", "longest_leg")
 LINKS = ("geometry.passive_links.0", "geometry.passive_links.1")
 DESIGNS = {"geometry.platform_radius": (0.10, 0.14), **dict.fromkeys(LINKS, (0.2, 0.5))}
 POSES = {"pose.x": (-0.02, 0.02), "pose.theta5": (-1.1, -1.0)}
@@ -55,10 +55,10 @@ def test_derivatives_are_those_of_the_engine(machine):
     shares = np.array([0.95, 1.0, 1.02, 1.05])
     designs = {p: float(values(loaded)[p]) * shares for p in ("geometry.platform_radius", "geometry.base_radius")}
     population, by = Population(designs, {}), tuple(designs)
-    found = differentiate(loaded, population, ["compliance_x", "regularity"], by)
-    expected = evaluate_gradient(loaded, Table(designs), ["compliance_x", "regularity"], by)
+    found = differentiate(loaded, population, ["compliance_x", "singularity_margin"], by)
+    expected = evaluate_gradient(loaded, Table(designs), ["compliance_x", "singularity_margin"], by)
     np.testing.assert_allclose(found.slopes[:, :, :, 0], expected.gradients, rtol=1e-9)
-    np.testing.assert_allclose(found.values["regularity"][:, 0], expected.values[1], rtol=1e-12)
+    np.testing.assert_allclose(found.values["singularity_margin"][:, 0], expected.values[1], rtol=1e-12)
 
 
 def test_derivatives_where_joints_are_found_by_iteration():

@@ -59,4 +59,4 @@ def test_shares_of_energy_add_up():
 def test_too_few_wrenches_are_singular_not_an_error():
     configuration = load("hexapod").configure()
     legs = [leg.screws(configuration.platform.translation, LENGTH) for leg in configuration.legs[:5]]
-    assert solve_statics(legs, LENGTH).regularity == 0.0
+    assert solve_statics(legs, LENGTH).singularity_margin == 0.0

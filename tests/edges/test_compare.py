@@ -95,13 +95,15 @@ def test_over_a_grid():
     ranges = ["x=-2 cm:2 cm:5", "z=64 cm:70 cm:4"]
     found, _ = rows(PAPER, BEST, ranges=ranges)
     by_name = {(row["group"], row["name"]): row["values"] for row in found["grid"]["rows"]}
-    data = evaluate_grid(load(PAPER), ranges, ["compliance_x", "regularity"])
+    data = evaluate_grid(load(PAPER), ranges, ["compliance_x", "singularity_margin"])
     here = data["compliance_x"].values
     assert by_name["C_x", "worst"][0] == pytest.approx(float(here.max()))
     assert by_name["C_x", "95 %"][0] == pytest.approx(float(np.percentile(here, 95)))
     assert by_name["C_x", "mean"][0] == pytest.approx(float(here.mean()))
-    assert by_name["regularity", "worst"][0] == pytest.approx(float(data["regularity"].min()))
-    assert by_name["regularity", "95 %"][0] == pytest.approx(float(np.percentile(data["regularity"].values, 5)))
+    assert by_name["singularity margin", "worst"][0] == pytest.approx(float(data["singularity_margin"].min()))
+    assert by_name["singularity margin", "95 %"][0] == pytest.approx(
+        float(np.percentile(data["singularity_margin"].values, 5))
+    )
     assert found["grid"]["designs"] == [{"answered": 20, "poses": 20}] * 2
 
 
@@ -154,7 +156,7 @@ def test_bars_start_at_zero_and_what_is_not_known_is_said():
     assert panels["compliance along axes"].get_yscale() == "log"
     assert not panels["compliance along axes"].patches
     assert len(panels["compliance along axes"].lines) > 0
-    for name in ("compliance about axes", "regularity", "moving mass"):
+    for name in ("compliance about axes", "singularity margin", "moving mass"):
         assert panels[name].get_ylim()[0] == 0.0
     assert [text.get_text() for text in panels["moving mass"].texts] == ["not known"]
     assert figure.legends[0].get_title().get_text() == "compliance in base axes at the platform point P"

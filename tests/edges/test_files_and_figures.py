@@ -23,7 +23,7 @@ MACHINE = "zhang-gosselin-4dof"
 @pytest.fixture(scope="module")
 def section():
     ranges = ["pose.x=-20 cm:20 cm:5", "pose.z=60 cm:150 cm:4"]
-    return evaluate_grid(load(MACHINE), ranges, ["compliance", "stiffness", "compliance_rx_z", "regularity"])
+    return evaluate_grid(load(MACHINE), ranges, ["compliance", "stiffness", "compliance_rx_z", "singularity_margin"])
 
 
 def test_a_dataset_is_labelled_with_names_units_and_origin(section):
@@ -50,7 +50,7 @@ def test_no_value_is_missing_without_a_status(section):
     bad = section["status"].values != 0
     assert bad.any()
     assert not bad.all()
-    for name in resolve_quantities(["compliance", "stiffness", "regularity"]):
+    for name in resolve_quantities(["compliance", "stiffness", "singularity_margin"]):
         assert (np.isnan(section[name].values) == bad).all()
     assert sum(failures(section).values()) == bad.sum()
 
@@ -82,7 +82,7 @@ def test_commands_write_data_and_figures(command, tmp_path, capsys):
 
 
 def test_every_axis_of_a_map_has_its_unit(section):
-    figure = contour_maps(section, ["compliance_rx", "compliance_z", "regularity"], "title")
+    figure = contour_maps(section, ["compliance_rx", "compliance_z", "singularity_margin"], "title")
     panels = [axes for axes in figure.axes if axes.get_xlabel()]
     assert [axes.get_xlabel() for axes in panels] == ["x (mm)"] * 3
     assert [axes.get_ylabel() for axes in panels] == ["z (m)"] * 3

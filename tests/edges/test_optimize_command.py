@@ -180,7 +180,7 @@ MOSTLY_IMPOSSIBLE = (
     'variables.2.to="60 cm"',
     'variables.3.from="10 cm"',
     'variables.3.to="60 cm"',
-    'constraints=[{quantity="regularity", at_least=0.2}]',
+    'constraints=[{quantity="singularity_margin", at_least=0.2}]',
 )
 
 
@@ -195,7 +195,7 @@ def test_designs_that_cannot_be_never_win_and_are_counted(method, capsys):
     assert sum(found["infeasible"].values()) < found["evaluations"]
     lengths = found["variables"]["geometry.passive_links.0"] + found["variables"]["geometry.passive_links.1"]
     assert lengths >= 0.66, "they reach the platform"
-    assert found["constraints"]["regularity >= 0.2"] >= 0.2 - 1e-6
+    assert found["constraints"]["singularity_margin >= 0.2"] >= 0.2 - 1e-6
 
 
 def test_where_nothing_is_possible_there_is_no_answer(capsys):

@@ -64,35 +64,35 @@ def test_pictures_name_their_axes_and_colours(tmp_path, capsys):
 
 
 def test_the_file_says_what_its_numbers_mean(tmp_path, capsys):
-    assert main([*PLANE, "--where", "regularity > 0.3", "-o", str(tmp_path)]) == DONE
+    assert main([*PLANE, "--where", "singularity_margin > 0.3", "-o", str(tmp_path)]) == DONE
     with xr.open_dataset(tmp_path / "workspace.nc", engine="h5netcdf") as found:
         assert found["verdict"].dims == ("pose.x", "pose.y")
         meanings = found["verdict"].attrs["flag_meanings"].split()
         assert meanings[0] == "inside"
-        assert meanings[-1] == "fails_regularity_>_0.3"
+        assert meanings[-1] == "fails_singularity_margin_>_0.3"
         assert found["pose.x"].attrs["units"] == "m"
         assert found.attrs["volume_units"] == "m²"
         assert "two random points" in found.attrs["volume_method"]
         joined = found["connected"].values == 1
         assert joined.any()
         assert np.all(found["verdict"].values[joined] == 0)
-        assert np.all(found["regularity"].values[joined] > 0.3)
+        assert np.all(found["singularity_margin"].values[joined] > 0.3)
 
 
 def test_nothing_inside_is_no_answer(capsys):
-    assert main([*PLANE, "--where", "regularity > 2"]) == NO_ANSWER
+    assert main([*PLANE, "--where", "singularity_margin > 2"]) == NO_ANSWER
     assert "No pose of the box is inside" in capsys.readouterr().out
 
 
 def test_nothing_inside_can_be_drawn(tmp_path, capsys):
-    assert main([*SPACE, "--where", "regularity > 2", "-o", str(tmp_path)]) == NO_ANSWER
+    assert main([*SPACE, "--where", "singularity_margin > 2", "-o", str(tmp_path)]) == NO_ANSWER
     assert (tmp_path / "workspace-solid.png").stat().st_size > 10_000
 
 
 REFUSED = [
     (["workspace", "hexapod"], ["--over"]),
     ([*PLANE, "--where", "stiffness_z > 3 N/m"], ['"stiffness_z" is not a quantity', "stiffness_rz"]),
-    ([*PLANE, "--where", "regularity"], ["is not a condition", "stiffness_z > 20 N/um"]),
+    ([*PLANE, "--where", "singularity_margin"], ["is not a condition", "stiffness_z > 20 N/um"]),
     ([*PLANE, "--over", "geometry.base_radius=1:2:3"], ["is no coordinate of the pose"]),
     ([*PLANE, "--seed", "x"], ["x is no seed"]),
     ([*PLANE, "--set", "limits.longest=1"], ["limits.longest is not known", "longest_leg"]),

@@ -28,7 +28,7 @@ from numeric import (
 )
 
 INVARIANT = 1e-12
-"""Of each 3x3 block, norm-wise: some rounding units times the condition of W, which regularity 0.02 holds below 1e3.
+"""Of each 3x3 block, norm-wise: some rounding units times the condition of W, below 1e3 from a margin of 0.02.
 
 The trick of imitating free joints by huge compliances errs by percents here (DESIGN section 2).
 """
@@ -54,7 +54,7 @@ def assert_same(found, response):
 
 
 def assert_as_regular(found, response):
-    assert found.regularity == pytest.approx(response.regularity, rel=lost(response) + INVARIANT)
+    assert found.singularity_margin == pytest.approx(response.singularity_margin, rel=lost(response) + INVARIANT)
 
 
 @every_machine
@@ -160,7 +160,7 @@ def unit_of_stiffness(metre, newton):
 @few
 @given(data=st.data(), metre=st.sampled_from([1e-9, 1e-3, 1e3, 1e6]), newton=st.sampled_from([1.0, 1e3]))
 def test_the_units_of_length_and_of_force(case, metre, newton, data):
-    """Written in mm or km and mN, the machine has the same status, regularity, K and C."""
+    """Written in mm or km and mN, the machine has the same status, singularity margin, K and C."""
     machine = data.draw(regular_machines(case))
     here, there = respond(machine), respond(in_other_units(machine, metre, newton))
     assert there.status == here.status

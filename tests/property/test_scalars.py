@@ -20,7 +20,7 @@ SAME = 1e-11
 
 
 REORDERED = 10.0
-"""Factor within which the regularity of a pose is known; see `test_invariance`."""
+"""Factor within which the singularity margin of a pose is known; see `test_invariance`."""
 
 
 def joints_of(machine):
@@ -29,9 +29,9 @@ def joints_of(machine):
 
 
 def answers(machine, joints=None):
-    """K, C, regularity and status as one list of scalars."""
+    """K, C, singularity margin and status as one list of scalars."""
     response = respond(machine, joints)
-    return [*response.stiffness.upper, *response.compliance.upper, response.regularity, response.status]
+    return [*response.stiffness.upper, *response.compliance.upper, response.singularity_margin, response.status]
 
 
 def stacked(chosen):

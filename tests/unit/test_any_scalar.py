@@ -27,18 +27,18 @@ SPARSE = np.array(
 
 def sparse_dual(*filled):
     numbers = iter(filled)
-    rows, regularity = dual_basis([[next(numbers) if used else 0.0 for used in row] for row in SPARSE])
-    return [*(c for row in rows for c in row), regularity]
+    rows, singularity_margin = dual_basis([[next(numbers) if used else 0.0 for used in row] for row in SPARSE])
+    return [*(c for row in rows for c in row), singularity_margin]
 
 
 def dense_dual(*numbers):
-    rows, regularity = dual_basis([numbers[i : i + 4] for i in range(0, 16, 4)])
-    return [*(c for row in rows for c in row), regularity]
+    rows, singularity_margin = dual_basis([numbers[i : i + 4] for i in range(0, 16, 4)])
+    return [*(c for row in rows for c in row), singularity_margin]
 
 
 def sparse_complement(a, b, c, d):
-    rows, regularity = complement([[0.0, a, b, 0.0, 0.0], [c, 0.0, d, 0.0, a]])
-    return [*(c for row in rows for c in row), regularity]
+    rows, singularity_margin = complement([[0.0, a, b, 0.0, 0.0], [c, 0.0, d, 0.0, a]])
+    return [*(c for row in rows for c in row), singularity_margin]
 
 
 def conjugate_columns(a, b, c):

@@ -90,7 +90,7 @@ def actuator_rates(machine, path):
 def test_the_bundled_pose_is_regular(name):
     response = respond(load(name))
     assert response.status == Status.OK
-    assert response.regularity > 0.05
+    assert response.singularity_margin > 0.05
 
 
 @every_machine

@@ -14,7 +14,7 @@ from kinetostat.machine.parameters import parameters, values
 from machines import every_machine
 
 SLAB = 64
-NAMES = ("compliance_x", "stiffness_x", "regularity")
+NAMES = ("compliance_x", "stiffness_x", "singularity_margin")
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ def grid_around(case):
 @every_machine
 def test_chunks_of_any_size_give_the_same_bits(case, small_slabs):
     machine, grid = grid_around(case)
-    names = [name for name in NAMES if name.split("_")[-1] in (*machine.family.component_names, "regularity")]
+    names = [name for name in NAMES if name.split("_")[-1] in (*machine.family.component_names, "singularity_margin")]
     whole = evaluate(machine, grid, names)
     for slabs in (1, 3):
         work = Work(machine, grid, tuple(names), slabs * SLAB)

@@ -21,7 +21,7 @@ READ = [
     ("stiffness_rz > 1e4 N*m/rad", "stiffness_rz", ">", 1e4),
     ("stiffness_rz_x > 5 kN/rad", "stiffness_rz_x", ">", 5e3),
     ("stiffness_x > 3e6", "stiffness_x", ">", 3e6),
-    ("regularity > 0.05", "regularity", ">", 0.05),
+    ("singularity_margin > 0.05", "singularity_margin", ">", 0.05),
 ]
 
 
@@ -35,7 +35,7 @@ def test_conditions_are_read_in_their_units(text, quantity, comparison, value):
 REFUSED = [
     ("stiffness_z", ["is not a condition", "free_stiffness_z > 20 N/um"]),
     ("stiffness_z = 3 N/m", ["is not a condition"]),
-    ("1 < regularity < 2", ["is not a condition"]),
+    ("1 < singularity_margin < 2", ["is not a condition"]),
     ("3 N/m < stiffness_z", ["is not a condition"]),
     ("stiffness > 3 N/m", ["stands for several", "stiffness_rx"]),
     ("free_stiffness > 3 N/m", ["stands for several", "free_stiffness_rx"]),
@@ -43,7 +43,7 @@ REFUSED = [
     ("stiffness_z > 3 m", ["stiffness_z", '"m" is not a unit of linear stiffness', "20 N/um"]),
     ("stiffness_z > rigid", ["stiffness_z", "large value"]),
     ("compliance_x < 3 N", ["compliance_x", "1e-8 m/N"]),
-    ("regularity > 3 m", ["regularity", "a plain number"]),
+    ("singularity_margin > 3 m", ["singularity_margin", "a plain number"]),
     ("stiffness_z > " + "9" * 300, ["is not a condition"]),
     ("stiffness_z > \x1b[31m", ["stiffness_z"]),
     ("", ["is not a condition"]),
@@ -67,5 +67,5 @@ def test_a_planar_machine_has_no_other_components():
 
 def test_what_has_no_value_meets_nothing():
     values = np.array([1.0, 3.0, math.inf, math.nan])
-    assert parse_condition("regularity > 2", COMPONENTS).holds(values).tolist() == [False, True, True, False]
-    assert parse_condition("regularity <= 3", COMPONENTS).holds(values).tolist() == [True, True, False, False]
+    assert parse_condition("singularity_margin > 2", COMPONENTS).holds(values).tolist() == [False, True, True, False]
+    assert parse_condition("singularity_margin <= 3", COMPONENTS).holds(values).tolist() == [True, True, False, False]

@@ -83,7 +83,7 @@ def test_the_general_chain_finds_the_same_wrench(leg, reference, length):
     """Closed form against the general form: the reciprocal space of five joints, whatever the length that scales it."""
     chain = spelled_out(leg).screws(reference, length)
     (found,), (known,) = chain.wrenches, leg.screws(reference, length).wrenches
-    assume(chain.regularity > 0.01)
+    assume(chain.singularity_margin > 0.01)
     factor = found.work(chain.elastic[0])
     assert chain.loads == ((pytest.approx(factor),),)
     assert np.allclose(screw(found * (1.0 / factor)), screw(known), rtol=0, atol=100 * FEW)
@@ -143,17 +143,17 @@ def test_reciprocal_wrenches_do_no_work_and_miss_nothing(count, data):
     ]
     twists = [joint.twist(ZERO) for joint in joints]
     assume(np.linalg.svd(np.array([screw(t) for t in twists]), compute_uv=False)[-1] > 1e-2)
-    wrenches, regularity = reciprocal_wrenches(twists, 1.0)
+    wrenches, singularity_margin = reciprocal_wrenches(twists, 1.0)
     assert len(wrenches) == 6 - count
     assert max(abs(w.work(t)) for w in wrenches for t in twists) <= FEW
     assert np.linalg.matrix_rank(np.array([screw(w) for w in wrenches])) == 6 - count
-    assert 0.0 < regularity <= 1.0
+    assert 0.0 < singularity_margin <= 1.0
 
 
 def test_joints_that_coincide_lock_up():
     twice = revolutes(ZERO, (X_AXIS, X_AXIS))
-    _, regularity = reciprocal_wrenches([joint.twist(Vector(0.0, 1.0, 0.0)) for joint in twice], 1.0)
-    assert regularity <= FEW
+    _, singularity_margin = reciprocal_wrenches([joint.twist(Vector(0.0, 1.0, 0.0)) for joint in twice], 1.0)
+    assert singularity_margin <= FEW
 
 
 def post(stiffness):
@@ -216,7 +216,7 @@ class TestRelaxed:
         carried = [np.array([screw(w) for w in leg.wrenches]) for leg in (found, known)]
         across = carried[0] @ np.linalg.pinv(carried[1])
         assert yielding[0] == pytest.approx(across @ yielding[1] @ across.T, rel=1e-9, abs=1e-15)
-        assert found.regularity > 0.01
+        assert found.singularity_margin > 0.01
 
     def test_its_free_springs_feel_nothing(self):
         free = [Spring(e.name, e.joint, 0.0) if i == 3 else e for i, e in enumerate(self.CHAIN)]
@@ -243,7 +243,7 @@ class TestRelaxed:
         twice = (*self.CHAIN[:2], Spring("one", Joint(Z_AXIS, ZERO), 0.0), Spring("two", Joint(Z_AXIS, ZERO), 0.0))
         found = relaxed(Leg("leg", (*twice, *self.CHAIN[3:])).screws(Vector(0.1, 0.2, 0.5), 1.0))
         assert len(found.wrenches) == 4
-        assert found.regularity > 0.01
+        assert found.singularity_margin > 0.01
 
     def test_a_limp_leg_carries_nothing(self):
         limp = [self.CHAIN[0], *(Spring(f"s{i}", Joint(axis, ZERO), 0.0) for i, axis in enumerate(AXES))]

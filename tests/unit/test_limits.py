@@ -175,7 +175,7 @@ class TestDistance:
 
 
 @pytest.mark.parametrize(
-    ("placed", "reached", "regularity", "allowed", "borne", "status"),
+    ("placed", "reached", "singularity_margin", "allowed", "borne", "status"),
     [
         (0, True, 1.0, True, True, Status.OK),
         (0, True, 1.0, False, True, Status.JOINT_LIMIT),
@@ -186,8 +186,8 @@ class TestDistance:
         (4, True, 1.0, False, False, Status.NOT_CONVERGED),
     ],
 )
-def test_the_most_fundamental_obstacle_comes_first(placed, reached, regularity, allowed, borne, status):
-    assert pose_status(placed, reached, regularity, allowed, borne) == status
+def test_the_most_fundamental_obstacle_comes_first(placed, reached, singularity_margin, allowed, borne, status):
+    assert pose_status(placed, reached, singularity_margin, allowed, borne) == status
 
 
 TOLD = [

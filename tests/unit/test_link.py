@@ -182,7 +182,7 @@ def test_a_parallelogram_yields_as_two_bars_do(pair):
     """Between spherical joints, K is the sum of k f f^T over two real bars, whatever the angle of the short sides."""
     chain = (Joint(pair.side, pair.near), Joint(pair.along, pair.near), pair, Joint(pair.side, pair.far))
     leg = Leg("leg", chain).screws(pair.far, 1.0)
-    assume(leg.regularity > 0.05)
+    assume(leg.singularity_margin > 0.05)
     found = sum(k * np.outer(screw(b), screw(b)) for b, k in leg_modes(leg))
     forces = columns([bar.wrench(pair.far) for bar in bars_of(pair)])
     expected = pair.bar * forces @ forces.T

@@ -56,7 +56,7 @@ def test_every_status_has_its_own_sentence(status):
 
 
 @pytest.mark.parametrize(
-    ("placed", "reached", "regularity", "limits", "status"),
+    ("placed", "reached", "singularity_margin", "limits", "status"),
     [
         (Status.OK, True, 1.0, (), Status.OK),
         (Status.OK, True, SINGULAR / 2, (), Status.SINGULAR),
@@ -71,5 +71,5 @@ def test_every_status_has_its_own_sentence(status):
         (Status.OK, True, 1.0, (True, False), Status.JOINT_LIMIT),
     ],
 )
-def test_the_most_fundamental_obstacle_comes_first(placed, reached, regularity, limits, status):
-    assert pose_status(int(placed), reached, regularity, *limits) == status
+def test_the_most_fundamental_obstacle_comes_first(placed, reached, singularity_margin, limits, status):
+    assert pose_status(int(placed), reached, singularity_margin, *limits) == status

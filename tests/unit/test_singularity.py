@@ -26,8 +26,8 @@ SIX = [
 """Six independent unit forces at unit arms."""
 
 
-def legs_of(wrenches, regularity=1.0):
-    return [LegScrews((), (), (), (wrench,), (), regularity) for wrench in wrenches]
+def legs_of(wrenches, singularity_margin=1.0):
+    return [LegScrews((), (), (), (wrench,), (), singularity_margin) for wrench in wrenches]
 
 
 @pytest.mark.parametrize(
@@ -85,11 +85,11 @@ def test_a_regular_pose_resists_its_softest_twist(case, data):
 
 
 def test_locked_legs_are_named_and_come_first():
-    legs = legs_of(SIX[:5], regularity=0.0)
+    legs = legs_of(SIX[:5], singularity_margin=0.0)
     message = why_singular([f"leg {i}" for i in range(5)], legs[:2] + legs_of(SIX[2:5]), 1.0, 1e-9)
     assert "leg 0 and the leg 1 lock up" in message
     assert "leg 2" not in message
-    assert "lock up" in why_singular(["arm"], legs_of(SIX[:1], regularity=math.nan), 1.0, 1e-9)
+    assert "lock up" in why_singular(["arm"], legs_of(SIX[:1], singularity_margin=math.nan), 1.0, 1e-9)
 
 
 def test_a_platform_singularity_names_the_free_twist():

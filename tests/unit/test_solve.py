@@ -37,26 +37,26 @@ def test_dual_basis_is_the_inverse(sparse, data):
     basis = data.draw(matrices(sparse=sparse))
     condition = np.linalg.cond(np.array(basis))
     assume(condition < 1e6)
-    dual, regularity = dual_basis(basis)
+    dual, singularity_margin = dual_basis(basis)
     inverse = np.linalg.inv(np.array(basis).T)
     assert np.linalg.norm(np.array(dual) - inverse) <= STABLE * condition * np.linalg.norm(inverse)
     assert np.allclose(np.array(dual) @ np.array(basis).T, np.eye(len(basis)), rtol=0, atol=STABLE * condition)
-    assert 0.0 < regularity <= 1.0
+    assert 0.0 < singularity_margin <= 1.0
 
 
 @pytest.mark.parametrize("sparse", [False, True])
 @given(data=st.data())
-def test_regularity_is_a_reciprocal_condition_number_in_any_order_of_the_vectors(sparse, data):
+def test_singularity_margin_is_a_reciprocal_condition_number_in_any_order_of_the_vectors(sparse, data):
     basis = np.array(data.draw(matrices(sparse=sparse)))
     assume(np.linalg.cond(basis) < 1e6)
     sizes = np.linalg.norm(basis) * np.linalg.norm(np.linalg.inv(basis))
     for order in (basis, data.draw(st.permutations(basis.tolist()))):
-        _, regularity = dual_basis([*map(list, order)])
-        assert regularity == pytest.approx(len(basis) / sizes, rel=1e-8)
+        _, singularity_margin = dual_basis([*map(list, order)])
+        assert singularity_margin == pytest.approx(len(basis) / sizes, rel=1e-8)
 
 
 @given(matrices(st.just(6), columns=8))
-def test_regularity_of_fewer_or_more_vectors_is_that_of_their_pseudo_inverse(vectors):
+def test_singularity_margin_of_fewer_or_more_vectors_is_that_of_their_pseudo_inverse(vectors):
     assume(np.linalg.cond(np.array(vectors)) < 1e6)
     few, wide = vectors[:4], np.array(vectors).T.tolist()
     for given_vectors, found in ((few, complement(few)[-1]), (wide, right_inverse(wide)[-1])):
@@ -86,11 +86,11 @@ def test_dual_basis_does_not_care_for_the_sizes_of_its_vectors(basis, exponents)
         [[0.3, 0.4, 0.5], [0.1, 0.7, 0.2], [0.4, 1.1, 0.7]],
     ],
 )
-def test_dependent_vectors_have_no_regularity(dependent):
+def test_dependent_vectors_have_no_singularity_margin(dependent):
     with np.errstate(all="ignore"):
-        _, regularity = dual_basis(dependent)
+        _, singularity_margin = dual_basis(dependent)
         _, batched = dual_basis([[np.array([c, c]) for c in row] for row in dependent])
-    assert regularity <= STABLE
+    assert singularity_margin <= STABLE
     assert not np.any(batched > STABLE), "0, or NaN, which counts as singular"
 
 
@@ -100,22 +100,22 @@ def test_dependent_vectors_have_no_regularity(dependent):
 def test_complement_is_orthonormal_and_orthogonal(sparse, count, data):
     given_vectors = np.array(data.draw(matrices(st.just(6), columns=count, sparse=sparse)))
     assume(np.linalg.svd(given_vectors, compute_uv=False)[-1] > 1e-3)
-    found, regularity = complement(given_vectors.tolist())
+    found, singularity_margin = complement(given_vectors.tolist())
     rest = np.array(found)
     assert rest.shape == (6 - count, 6)
     assert np.allclose(rest @ rest.T, np.eye(6 - count), rtol=0, atol=STABLE)
     assert np.allclose(rest @ given_vectors.T, 0.0, rtol=0, atol=STABLE)
-    assert 0.0 < regularity <= 1.0
+    assert 0.0 < singularity_margin <= 1.0
 
 
 def test_complement_of_axes_is_made_of_axes_and_structural_zeros():
-    found, regularity = complement([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 2.0]])
+    found, singularity_margin = complement([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 2.0]])
     assert found == [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]
     assert all(is_zero(c) for row in found for c in row if c == 0.0)
-    assert regularity == pytest.approx(0.8), "2 / (|1 2| |1 1/2|)"
+    assert singularity_margin == pytest.approx(0.8), "2 / (|1 2| |1 1/2|)"
 
 
-def test_complement_of_nothing_new_has_regularity_zero():
+def test_complement_of_nothing_new_has_singularity_margin_zero():
     assert complement([[0.0, 0.0, 0.0]])[1] == 0.0
     assert complement([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0]])[1] <= STABLE
 

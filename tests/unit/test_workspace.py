@@ -126,7 +126,7 @@ class TestVerdicts:
     SETTINGS = ("limits.longest_leg=18 cm", "limits.shortest_leg=8 cm", "limits.base_joint_angle=55 deg",
                 "limits.actuator_force=180 N", "load.force=[0, 0, 500]")  # fmt: skip
     RANGES = ("x=-6 cm:6 cm:7", "y=-6 cm:6 cm:7", "z=6 cm:22 cm:9")
-    WHERE = ("stiffness_z > 50 N/um", "regularity > 0.1")
+    WHERE = ("stiffness_z > 50 N/um", "singularity_margin > 0.1")
 
     @pytest.fixture(scope="class")
     @classmethod
@@ -147,7 +147,7 @@ class TestVerdicts:
                 expected = "limits." + next(check.field for check in response.checks if not check.kept)
             elif response.stiffness.entry(5, 5) <= 5e7:
                 expected = f"fails {self.WHERE[0]}"
-            elif response.regularity <= 0.1:
+            elif response.singularity_margin <= 0.1:
                 expected = f"fails {self.WHERE[1]}"
             assert labels[int(found.dataset["verdict"].values[index])] == expected
 

@@ -71,8 +71,9 @@ def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
         basis: the vectors w_b, each of n scalars; components of comparable size (scale rows before).
 
     Returns:
-        The n dual vectors, and the regularity n / (|W| |W^-1|), Frobenius norms: the reciprocal of a condition number,
-        1 where the w_b are orthogonal and of one size, 0 where they are dependent and the dual vectors meaningless.
+        The n dual vectors, and the singularity margin n / (|W| |W^-1|), Frobenius norms: the reciprocal of a
+        condition number, 1 where the w_b are orthogonal and of one size, 0 where they are dependent and the dual
+        vectors meaningless.
     """
     solved = _triangularise(basis)
     dual: list[Row] = [[] for _ in basis]
@@ -83,7 +84,7 @@ def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
         for column, turned in enumerate(solved.turned):
             known = total([times(solved.vectors[j][row], dual[j][column]) for j in later])
             dual[here].append(times(minus(turned[row], known), inverse))
-    return dual, _regularity(basis, dual, solved.least)
+    return dual, _singularity_margin(basis, dual, solved.least)
 
 
 def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row], Scalar]:
@@ -91,7 +92,7 @@ def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row
 
     Returns:
         A+ as m rows of n scalars (the solution of least norm); the m - n orthonormal null vectors of m scalars; and the
-        regularity n / (|A| |A+|), as in `dual_basis`.
+        singularity margin n / (|A| |A+|), as in `dual_basis`.
     """
     solved = _triangularise(rows)
     size, wide, steps = len(rows), len(rows[0]), solved.inverse()
@@ -100,21 +101,23 @@ def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row
         for column in solved.turned
     ]
     null = [[solved.turned[i][row] for i in range(wide)] for row in solved.free]
-    return solution, null, _regularity(rows, steps, solved.least)
+    return solution, null, _singularity_margin(rows, steps, solved.least)
 
 
 def complement(vectors: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
     """An orthonormal basis of what is orthogonal to a independent vectors of n components, a < n.
 
     Returns:
-        The n - a basis vectors, and the regularity a / (|V| |V+|) of the given ones, as in `dual_basis`.
+        The n - a basis vectors, and the singularity margin a / (|V| |V+|) of the given ones, as in `dual_basis`.
     """
     solved = _triangularise(vectors)
     basis = [[column[row] for column in solved.turned] for row in solved.free]
-    return basis, _regularity(vectors, solved.inverse(), solved.least)
+    return basis, _singularity_margin(vectors, solved.inverse(), solved.least)
 
 
-def _regularity(vectors: Sequence[Sequence[Scalar]], inverse: Sequence[Sequence[Scalar]], least: Scalar) -> Scalar:
+def _singularity_margin(
+    vectors: Sequence[Sequence[Scalar]], inverse: Sequence[Sequence[Scalar]], least: Scalar
+) -> Scalar:
     """n / (|V| |V+|) for n vectors and anything of the size of their inverse, at most 1; 0 where they are dependent."""
     squares = [total([times(c, c) for row in rows for c in row]) for rows in (vectors, inverse)]
     found = times(float(len(vectors)), reciprocal(sqrt(times(*squares))))

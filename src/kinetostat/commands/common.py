@@ -21,8 +21,9 @@ QUANTITIES = (
     "compliance, stiffness, free_stiffness (their diagonal entries, the last 1/C_ii: what a tool feels; default: "
     "{default}); one entry: compliance_rx, stiffness_x_z, free_stiffness_z, ...; "
     "least_translational_stiffness, greatest_translational_stiffness, least_rotational_stiffness, "
-    "greatest_rotational_stiffness, frobenius_condition (of K), regularity (0 at a singularity), side (of the "
-    "singularities: 1 or -1), shortest_leg, longest_leg, actuator_force, actuator_moment (the greatest under [load]), "
+    "greatest_rotational_stiffness, frobenius_condition (of K), singularity_margin (0 at a singularity), "
+    "aspect (1 or -1, changes at singularities), shortest_leg, longest_leg, actuator_force, "
+    "actuator_moment (the greatest under [load]), "
     "mass (moving); repeatable"
 )
 """Of what sweeps, maps and sensitivities are."""

@@ -70,9 +70,9 @@ def why_singular(names: Sequence[str], legs: Sequence[LegScrews], length: float,
         names: of the legs.
         legs: their screws at P, base axes.
         length: characteristic length, m.
-        tolerance: regularity below which a leg counts as locked.
+        tolerance: singularity margin below which a leg counts as locked.
     """
-    locked = [name for name, leg in zip(names, legs, strict=True) if not leg.regularity > tolerance]
+    locked = [name for name, leg in zip(names, legs, strict=True) if not leg.singularity_margin > tolerance]
     if locked:
         return (
             f"The passive joints of the {' and the '.join(locked)} lock up here (links stretched, folded or aligned), "

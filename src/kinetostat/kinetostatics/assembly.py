@@ -42,7 +42,8 @@ class Statics:
         motions: the fewest shares that add up to C: one per spring, or per wrench of a leg that has more springs.
         actions: the fewest shares that add up to K; infinite against what is rigid.
         length: characteristic length, m; rotations and translations compare through it where rounding is judged.
-        regularity: 0 where the wrenches do not span all six dimensions: the platform is free with locked actuators.
+        singularity_margin: 0 where the wrenches do not span all six dimensions: the platform is free with
+            locked actuators.
     """
 
     wrenches: tuple[tuple[Wrench, ...], ...]
@@ -54,7 +55,7 @@ class Statics:
     motions: tuple[Motion, ...]
     actions: tuple[Action, ...]
     length: Scalar
-    regularity: Scalar
+    singularity_margin: Scalar
 
 
 def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench] = ()) -> Statics:
@@ -72,10 +73,10 @@ def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
     modes = [modes_of(leg) if redundant or _in_series(leg) else _unchanged(leg) for leg in balanced]
     wrenches = [wrench for leg in balanced for wrench in leg.wrenches] + list(guide)
     if len(wrenches) == SIZE:
-        twists, regularity = dual_twists(wrenches, length)
+        twists, singularity_margin = dual_twists(wrenches, length)
         rows = in_modes(modes, [twist.components() for twist in twists])
     else:
-        rows, regularity = least_energy_rows(modes, wrenches, length)
+        rows, singularity_margin = least_energy_rows(modes, wrenches, length)
     sharing: list[tuple[Twist, ...]] = []
     flexibility: list[Twist] = []
     motions: list[Motion] = []
@@ -98,7 +99,7 @@ def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
         tuple(motions),
         tuple(mode for one in resistances for mode in one.modes),
         length,
-        regularity,
+        singularity_margin,
     )
 
 
@@ -156,12 +157,12 @@ def dual_twists(wrenches: Sequence[Wrench], length: Scalar) -> tuple[list[Twist]
         length: m; moments are compared with forces through it.
 
     Returns:
-        The twists at P in base axes, and the regularity as in `solve.dual_basis`.
+        The twists at P in base axes, and the singularity margin as in `solve.dual_basis`.
     """
     shrink = reciprocal(length)
     scaled = [Wrench(wrench.rotational * shrink, wrench.translational).components() for wrench in wrenches]
-    rows, regularity = dual_basis(scaled)
-    return [Twist(Vector(*row[:3]) * shrink, Vector(*row[3:])) for row in rows], regularity
+    rows, singularity_margin = dual_basis(scaled)
+    return [Twist(Vector(*row[:3]) * shrink, Vector(*row[3:])) for row in rows], singularity_margin
 
 
 def least_energy_rows(
@@ -178,18 +179,18 @@ def least_energy_rows(
         length: m, scales rows.
 
     Returns:
-        Amounts of the modes per unit platform wrench [wrenches x 6], and the regularity of W.
+        Amounts of the modes per unit platform wrench [wrenches x 6], and the singularity margin of W.
     """
     shrink = reciprocal(length)
     columns = [Wrench(wrench.rotational * shrink, wrench.translational).components() for wrench in wrenches]
     if len(wrenches) < SIZE:
         return [NO_MOTION.components()] * len(wrenches), 0.0
-    balance, internal, regularity = right_inverse([list(row) for row in zip(*columns, strict=True)])
+    balance, internal, singularity_margin = right_inverse([list(row) for row in zip(*columns, strict=True)])
     compliance = [d for own in modes for d in own.compliance]
     every, null = (in_modes(modes, rows) for rows in (balance, [*zip(*internal, strict=True)]))
     weights = compliance + [0.0] * (len(wrenches) - len(compliance))
     shared = least_energy([*zip(*every, strict=True)], [*zip(*null, strict=True)], weights)
-    return [(*(times(c, shrink) for c in row[:3]), *row[3:]) for row in zip(*shared, strict=True)], regularity
+    return [(*(times(c, shrink) for c in row[:3]), *row[3:]) for row in zip(*shared, strict=True)], singularity_margin
 
 
 def weighted_sum(shares: Sequence[tuple[Screw, Scalar]], length: Scalar) -> Symmetric6:

@@ -46,10 +46,10 @@ def relaxed(leg: LegScrews) -> LegScrews:
         return leg
     felt = _independent(free)
     basis: list[list[Scalar]] = []
-    regularity = leg.regularity
+    singularity_margin = leg.singularity_margin
     if len(felt) < len(leg.wrenches):
         basis, apart = complement([_unit(row) for row in felt]) if felt else ([*_identity(len(leg.wrenches))], 1.0)
-        regularity = smaller(regularity, apart)
+        singularity_margin = smaller(singularity_margin, apart)
     weights = [0.0 if type(s) is float and s == INFINITE else s for s in leg.compliance]
     rows = [
         tuple(
@@ -58,7 +58,9 @@ def relaxed(leg: LegScrews) -> LegScrews:
         for row in leg.loads
     ]
     wrenches = tuple(combine(leg.wrenches, column) for column in basis)
-    return replace(leg, compliance=tuple(weights), wrenches=wrenches, loads=tuple(rows), regularity=regularity)
+    return replace(
+        leg, compliance=tuple(weights), wrenches=wrenches, loads=tuple(rows), singularity_margin=singularity_margin
+    )
 
 
 def _independent(rows: Sequence[Sequence[Scalar]]) -> list[Sequence[Scalar]]:

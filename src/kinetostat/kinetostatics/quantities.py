@@ -10,6 +10,7 @@ from functools import partial
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.symmetric import POSITIONS
+from kinetostat.kinetostatics.aspect import aspect
 from kinetostat.kinetostatics.extremes import (
     ROTATIONS,
     TRANSLATIONS,
@@ -22,7 +23,6 @@ from kinetostat.kinetostatics.extremes import (
     shortest_leg,
 )
 from kinetostat.kinetostatics.response import Response
-from kinetostat.kinetostatics.sides import side
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ def _stiffness(response: Response, i: int, j: int) -> Scalar:
     return response.stiffness.entry(i, j)
 
 
-def _regularity(response: Response) -> Scalar:
-    return response.regularity
+def _singularity_margin(response: Response) -> Scalar:
+    return response.singularity_margin
 
 
 def _mass(response: Response) -> Scalar:
@@ -108,9 +108,9 @@ QUANTITIES = {
         *_entries("compliance", "C", _compliance_unit, _compliance),
         *_entries("stiffness", "K", _stiffness_unit, _stiffness),
         *_free_stiffnesses(),
-        MapQuantity("regularity", "1", "regularity", _regularity),
+        MapQuantity("singularity_margin", "1", "singularity margin", _singularity_margin),
         MapQuantity("mass", "kg", "moving mass", _mass),
-        MapQuantity("side", "1", "side of singularities", side),
+        MapQuantity("aspect", "1", "aspect", aspect),
         *_extremes(),
         MapQuantity("frobenius_condition", "1", "condition of K (Frobenius)", frobenius_condition),
         MapQuantity("shortest_leg", "m", "shortest leg", shortest_leg),
@@ -119,7 +119,7 @@ QUANTITIES = {
         MapQuantity("actuator_moment", "N·m", "greatest actuator moment", partial(actuator_load, sliding=False)),
     )
 }
-"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., free_stiffness_x, regularity, ..."""
+"""Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., singularity_margin, ..."""
 
 GROUPS = {
     "compliance": tuple(f"compliance_{name}" for name in COMPONENTS),

@@ -21,10 +21,11 @@ from kinetostat.kinetostatics.overload import actuator_checks
 from kinetostat.machine.leg import Joint, LegScrews, reciprocal_wrenches
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.mass import moving_mass
+from kinetostat.spec.renamed import renamed_property
 
 SINGULAR = 1e-6
-"""Regularity below which a pose counts as singular: results have then lost six of their digits. A leg exactly at its
-limit comes out at the square root of a few rounding units, 1e-8 to 3e-7, not at zero."""
+"""Singularity margin below which a pose counts as singular: results have then lost six of their digits. A leg
+exactly at its limit comes out at the square root of a few rounding units, 1e-8 to 3e-7, not at zero."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,8 @@ class Response:
         statics: how the springs share loads.
         stiffness, compliance: K (N·m/rad, N/rad, N/m) and C (rad/(N·m), rad/N, m/N) at T, base axes; of a planar
             machine only rz, x, y have a meaning, and the other entries are 0.
-        regularity: 0 at a singularity, at most 1 (dimensionless): the least of the legs' and the platform's (theory
-            section 2).
+        singularity_margin: 0 at a singularity, at most 1 (dimensionless): the least of the legs' and the platform's
+            (theory section 2).
         status: a `Status` code.
         load: the wrench of the machine's table [load], at T, base axes (N·m, N).
         checks: the limits of the machine that are set, each with what it is compared with.
@@ -54,11 +55,12 @@ class Response:
     statics: Statics
     stiffness: Symmetric6
     compliance: Symmetric6
-    regularity: Scalar
+    singularity_margin: Scalar
     status: Scalar
     load: Wrench
     checks: tuple[Check, ...] = ()
     mass: Scalar = 0.0
+    regularity = renamed_property("singularity_margin")
 
 
 def respond(machine: Machine, joints: Joints | None = None) -> Response:
@@ -76,10 +78,10 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
     absent, guide = _out_of_plane(configuration, reference)
     legs = tuple(leg.screws(reference, length, absent) for leg in configuration.legs)
     statics = solve_statics(legs, length, guide)
-    regularity: Scalar = 1.0
+    singularity_margin: Scalar = 1.0
     for leg in legs:
-        regularity = smaller(regularity, leg.regularity)
-    regularity = smaller(regularity, statics.regularity)
+        singularity_margin = smaller(singularity_margin, leg.singularity_margin)
+    singularity_margin = smaller(singularity_margin, statics.singularity_margin)
     geometric = geometric_checks(machine, configuration, joints.coordinates)
     loaded = actuator_checks(machine, configuration, statics)
     reached = within_reach(configuration)
@@ -91,8 +93,8 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
         statics,
         stiffness_matrix(statics),
         compliance_matrix(statics),
-        regularity,
-        pose_status(joints.status, reached, regularity, within(geometric), within(loaded)),
+        singularity_margin,
+        pose_status(joints.status, reached, singularity_margin, within(geometric), within(loaded)),
         machine.load,
         (*geometric, *loaded),
         moving_mass(machine, configuration),
@@ -113,18 +115,18 @@ def _out_of_plane(configuration: Configuration, reference: Vector) -> tuple[tupl
 
 
 def pose_status(
-    placed: Scalar, reached: Scalar, regularity: Scalar, allowed: Scalar = True, borne: Scalar = True
+    placed: Scalar, reached: Scalar, singularity_margin: Scalar, allowed: Scalar = True, borne: Scalar = True
 ) -> Scalar:
-    """Status code of a pose, the most fundamental obstacle first; a regularity of NaN counts as singular.
+    """Status code of a pose, the most fundamental obstacle first; a singularity margin of NaN counts as singular.
 
     Args:
         placed: `Status` code of the joints.
         reached: whether all legs close.
-        regularity: of the pose.
+        singularity_margin: of the pose.
         allowed: whether the limits of geometry are kept.
         borne: whether the actuators bear the load, which means something where the pose is regular.
     """
     bearable = where(borne, int(Status.OK), int(Status.JOINT_LIMIT))
-    solvable = where(regularity > SINGULAR, bearable, int(Status.SINGULAR))
+    solvable = where(singularity_margin > SINGULAR, bearable, int(Status.SINGULAR))
     possible = where(allowed, solvable, int(Status.JOINT_LIMIT))
     return where(placed > Status.OK + 0.5, placed, where(reached, possible, int(Status.OUT_OF_REACH)))

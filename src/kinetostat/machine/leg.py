@@ -195,7 +195,7 @@ class LegScrews:
         compliance: of each spring (diagonal of S): 0 rigid, infinity free; m/N or rad/(N·m).
         wrenches: basis of what the leg can carry (W): no work on any passive twist.
         loads: load in each spring per unit of each wrench (J_e^T W).
-        regularity: 0 where the passive joints lock up, 1 where they are orthogonal (dimensionless).
+        singularity_margin: 0 where the passive joints lock up, 1 where they are orthogonal (dimensionless).
     """
 
     passive: tuple[Twist, ...]
@@ -203,7 +203,7 @@ class LegScrews:
     compliance: tuple[Scalar, ...]
     wrenches: tuple[Wrench, ...]
     loads: tuple[tuple[Scalar, ...], ...]
-    regularity: Scalar
+    singularity_margin: Scalar
 
 
 @dataclass(frozen=True)
@@ -259,10 +259,10 @@ class Leg:
         """
         passive = tuple(joint.twist(reference) for joint in (*self.passive, *absent))
         if self.lines:
-            wrenches, regularity = tuple(line.wrench(reference) for line in self.lines), 1.0
+            wrenches, singularity_margin = tuple(line.wrench(reference) for line in self.lines), 1.0
         else:
             needed = [twist for i, twist in enumerate(passive) if i not in self.idle]
-            wrenches, regularity = reciprocal_wrenches(needed, length)
+            wrenches, singularity_margin = reciprocal_wrenches(needed, length)
         elastic = tuple(spring.joint.twist(reference) for spring in self.springs)
         return LegScrews(
             passive=passive,
@@ -270,7 +270,7 @@ class Leg:
             compliance=tuple(reciprocal(spring.stiffness) for spring in self.springs),
             wrenches=wrenches,
             loads=tuple(self._loads(s, twist, wrenches) for s, twist in zip(self.springs, elastic, strict=True)),
-            regularity=regularity,
+            singularity_margin=singularity_margin,
         )
 
     def _loads(self, spring: Spring, twist: Twist, wrenches: Sequence[Wrench]) -> tuple[Scalar, ...]:
@@ -337,14 +337,14 @@ def reciprocal_wrenches(passive: Sequence[Twist], length: Scalar) -> tuple[tuple
         length: m; translations are compared with rotations through it, the space does not depend on it.
 
     Returns:
-        W, 6 - a wrenches at P in base axes (orthonormal once moments are divided by `length`), and the regularity:
-        0 where the twists are dependent.
+        W, 6 - a wrenches at P in base axes (orthonormal once moments are divided by `length`), and the singularity
+        margin: 0 where the twists are dependent.
     """
     if not passive:
         return (*(force_along(axis, ZERO) for axis in AXES), *(pure_moment(axis) * length for axis in AXES)), 1.0
     shrink = reciprocal(length)
-    basis, regularity = complement([comparable(twist, shrink) for twist in passive])
-    return tuple(Wrench(Vector(*row[:3]) * length, Vector(*row[3:])) for row in basis), regularity
+    basis, singularity_margin = complement([comparable(twist, shrink) for twist in passive])
+    return tuple(Wrench(Vector(*row[:3]) * length, Vector(*row[3:])) for row in basis), singularity_margin
 
 
 def comparable(twist: Twist, shrink: Scalar) -> tuple[Scalar, ...]:

@@ -68,7 +68,7 @@ def _drawable(status: Status, response: Response) -> bool:
 
 def _with_free_twist(scene: Scene, response: Response, sizes: Proportions) -> Scene:
     """The twist that the platform keeps with all actuators locked, unless it is a leg that locks up."""
-    if not all(leg.regularity > SINGULAR for leg in response.legs):
+    if not all(leg.singularity_margin > SINGULAR for leg in response.legs):
         return scene
     twist = free_twist(response.legs, float(response.configuration.length))
     arrows = twist_solids([twist], response.reference, Measure(sizes.diagonal, sizes.leg))
@@ -191,7 +191,7 @@ def ranking(wish: RankingWish) -> Sensitivity:
 
 
 def map_quantities(machine: Machine) -> dict[str, str]:
-    """Names of what may be mapped and how people read them: diagonals of C and K, 1/C_ii, and the regularity."""
+    """Names and labels of what may be mapped: diagonals of C and K, 1/C_ii, and the singularity margin."""
     names, groups = machine.family.component_names, ("compliance", "stiffness", "free_stiffness")
     found = {f"{group}_{name}": f"{group.replace('_', ' ')} {name}" for group in groups for name in names}
-    return {**found, "regularity": "regularity"}
+    return {**found, "singularity_margin": "singularity margin"}

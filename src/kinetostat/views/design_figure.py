@@ -23,7 +23,7 @@ LONGEST = 100
 
 
 def comparison_figure(found: Comparison) -> Figure:
-    """Compliance about and along the axes, regularity and mass of each design; over a grid mean and worst.
+    """Compliance about and along the axes, singularity margin and mass of each design; over a grid mean and worst.
 
     Bars start at 0. Where the numbers of a panel are too far apart for that, its axis is logarithmic and has marks, as
     the length of a bar would mean nothing.
@@ -65,17 +65,17 @@ def _compliance(rows: Sequence[Row], grid: bool) -> list[tuple[str, Bars]]:
 
 
 def _scalars(found: Comparison, rows: Sequence[Row], grid: bool) -> list[tuple[str, Bars]]:
-    regular = [row for row in rows if (row.group if grid else row.name) == "regularity"]
+    regular = [row for row in rows if (row.group if grid else row.name) == "singularity margin"]
     mass = [row for row in found.rows if row.name == "moving mass"]
-    return [("regularity", _pairs(regular, grid)), ("moving mass", [("", row, None) for row in mass])]
+    return [("singularity margin", _pairs(regular, grid)), ("moving mass", [("", row, None) for row in mass])]
 
 
 def _pairs(rows: Sequence[Row], grid: bool) -> Bars:
     if not grid:
-        return [(row.name.removeprefix("C_").replace("regularity", ""), row, None) for row in rows]
+        return [(row.name.removeprefix("C_").replace("singularity margin", ""), row, None) for row in rows]
     groups: dict[str, dict[str, Row]] = {}
     for row in rows:
-        groups.setdefault(row.group.removeprefix("C_").replace("regularity", ""), {})[row.name] = row
+        groups.setdefault(row.group.removeprefix("C_").replace("singularity margin", ""), {})[row.name] = row
     return [(label, own["mean"], own["worst"]) for label, own in groups.items()]
 
 

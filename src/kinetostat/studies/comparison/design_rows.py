@@ -79,7 +79,7 @@ def rows_at_poses(analyses: Sequence[Analysis]) -> tuple[Row, ...]:
         ("least stiffness, force", "N/m", Better.MORE, lambda one: _least(one, "translation")),
         ("least stiffness, moment", "N·m/rad", Better.MORE, lambda one: _least(one, "rotation")),
         ("condition of K", "1", Better.LESS, _condition),
-        ("regularity", "1", Better.MORE, _regularity),
+        ("singularity margin", "1", Better.MORE, _singularity_margin),
         ("moving mass", "kg", Better.LESS, lambda one: one.mass),
     ]
     for name, unit, better, value in scalars:
@@ -99,8 +99,8 @@ def _least(analysis: Analysis, block: str) -> float | None:
     return {str(name): one.stiffnesses[0] for name, one in (blocks or {}).items()}.get(block)
 
 
-def _regularity(analysis: Analysis) -> float:
-    return float(respond(analysis.machine).regularity)
+def _singularity_margin(analysis: Analysis) -> float:
+    return float(respond(analysis.machine).singularity_margin)
 
 
 def _condition(analysis: Analysis) -> float | None:
@@ -120,16 +120,16 @@ def rows_over(
     found: list[dict[str, tuple[float, ...]]] = []
     poses = []
     for done, machine in enumerate(machines, 1):
-        dataset = evaluate_grid(machine, ranges, ["compliance", "regularity"])
+        dataset = evaluate_grid(machine, ranges, ["compliance", "singularity_margin"])
         good = dataset["status"].values == Status.OK
         poses.append((int(good.sum()), int(good.size)))
         own = {str(name): dataset[name].values[good] for name in dataset.data_vars if name != "status"}
         found.append({name: _spread(name, row) for name, row in own.items() if row.size})
         progress(done, len(machines))
     rows = []
-    for name in [*(f"compliance_{component}" for component in common), "regularity"]:
-        better = Better.MORE if name == "regularity" else Better.LESS
-        shown = name.replace("compliance_", "C_")
+    for name in [*(f"compliance_{component}" for component in common), "singularity_margin"]:
+        better = Better.MORE if name == "singularity_margin" else Better.LESS
+        shown = name.replace("compliance_", "C_").replace("_margin", " margin")
         for k, what in enumerate(("worst", f"{PERCENTILE:g} %", "mean")):
             own_values = tuple(spread[name][k] if name in spread else None for spread in found)
             rows.append(Row(shown, what, QUANTITIES[name].unit, better, own_values))
@@ -138,6 +138,6 @@ def rows_over(
 
 def _spread(name: str, row: Array) -> tuple[float, ...]:
     """Worst, what so many percent of the poses are at least as good as, and mean."""
-    if name == "regularity":
+    if name == "singularity_margin":
         return float(row.min()), float(np.percentile(row, 100.0 - PERCENTILE)), float(row.mean())
     return float(row.max()), float(np.percentile(row, PERCENTILE)), float(row.mean())

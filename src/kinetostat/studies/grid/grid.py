@@ -20,6 +20,7 @@ from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import Parameter, find
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.ranges import Range, parse_range
+from kinetostat.spec.renamed import current_name
 from kinetostat.studies.grid.absent import refuse_absent
 from kinetostat.studies.setting import frame_of, pose_of
 from kinetostat.units import KINDS
@@ -165,7 +166,7 @@ def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONE
     """
     groups = {group: [name for name in members if _exists(name, components)] for group, members in GROUPS.items()}
     found: list[str] = []
-    for name in several(names):
+    for name in (current_name(given, "quantity") for given in several(names)):
         if name not in GROUPS and not (name in QUANTITIES and _exists(name, components)):
             raise InputError(_no_quantity(name, groups, components))
         found += groups.get(name, [name])

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, choice
+from kinetostat.spec.renamed import current_name
 from kinetostat.spec.study import TermTable
 from kinetostat.studies.grid.absent import refuse_absent
 from kinetostat.studies.optimisation.aggregate import parse_aggregate
@@ -29,13 +30,13 @@ AXES = "xyz"
 def known_terms(machine: Machine) -> list[str]:
     """Names of all terms that a machine of this kind may be asked for."""
     there = machine.family.component_names
-    own = [name for name, q in QUANTITIES.items() if all(part in there for part in q.components) and name != "side"]
+    own = [name for name, q in QUANTITIES.items() if all(part in there for part in q.components) and name != "aspect"]
     return [*SUMS, *ALONG, STROKE, VOLUME, *own]
 
 
 def more_is_better(name: str) -> bool:
     """Whether a quantity is wanted large unless people say otherwise."""
-    return "stiffness" in name or name in ("regularity", VOLUME)
+    return "stiffness" in name or name in ("singularity_margin", VOLUME)
 
 
 def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: bool, where: str) -> Term:
@@ -76,7 +77,7 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
 
 def _known(machine: Machine, name: str, where: str) -> str:
     """The name, if it is one of the catalogue; otherwise what was meant, or all but the single entries of C and K."""
-    known = known_terms(machine)
+    known, name = known_terms(machine), current_name(name, "quantity")
     entries = [entry for entry in known if entry in QUANTITIES and QUANTITIES[entry].components]
     if name in known or difflib.get_close_matches(name, known, 1):
         return choice(name, known, where)

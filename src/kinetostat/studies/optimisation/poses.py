@@ -82,7 +82,7 @@ def _row(machine: Machine, row: Mapping[str, float | str], where: str) -> dict[s
 
 
 def _grid(machine: Machine, table: PosesTable) -> PoseSet:
-    question = grid_question(machine, table.over or [], ["regularity"])
+    question = grid_question(machine, table.over or [], ["singularity_margin"])
     if question.grid.size > MOST_POSES:
         raise InputError(f"[poses] has {question.grid.size:,} nodes; at most {MOST_POSES:,} are allowed.")
     columns = question.grid.columns(0, question.grid.size)

@@ -115,7 +115,7 @@ class StrokeTerm:
 
 @dataclass(frozen=True)
 class VolumeTerm:
-    """Volume of the poses that a design reaches, on that side of its singularities where it reaches more of them.
+    """Volume of the poses that a design reaches, in that aspect in which it reaches more of them.
 
     Attributes:
         box: volume of the grid of poses; each node stands for its share.
@@ -125,13 +125,13 @@ class VolumeTerm:
     box: float
     unit: str
     label: str = "workspace_volume"
-    names: tuple[str, ...] = ("side",)
+    names: tuple[str, ...] = ("aspect",)
     differentiable: bool = False
 
     def values(self, found: dict[str, Array], there: Mask) -> Array:
         """See `Term`."""
-        sides = np.where(there, found["side"], np.nan)
-        most = np.maximum((sides > 0.0).sum(-1), (sides < 0.0).sum(-1)) + (sides == 0.0).sum(-1)
+        aspects = np.where(there, found["aspect"], np.nan)
+        most = np.maximum((aspects > 0.0).sum(-1), (aspects < 0.0).sum(-1)) + (aspects == 0.0).sum(-1)
         return self.box * most / there.shape[-1]
 
     def slopes(self, found: dict[str, Array], _there: Mask) -> dict[str, Array]:

@@ -21,7 +21,7 @@ NEAR = {"length": 0.3, "angle": math.radians(15.0)}
 FAR = {"length": 1.0, "angle": math.radians(90.0)}
 """Likewise of a machine whose file has limits, which then say how far it goes."""
 REGULAR = 0.1
-"""Share of the pose's own regularity that is kept, so that maps are not about singularities."""
+"""Share of the pose's singularity margin that is kept, so that maps are not about singularities."""
 SLACK = 1e-6
 """Of a step, within which an end counts as round already."""
 UNIT = {"length": 1.0, "angle": math.radians(1.0)}
@@ -69,9 +69,9 @@ def _extent(machine: Machine, parameter: Parameter, reach: float) -> tuple[float
     """How far a coordinate goes to each side, SI, before there is no good answer."""
     (path,), here = parameter.leaves, float(values(machine)[parameter.path])
     steps = np.linspace(-reach, reach, 2 * PROBES + 1)
-    answer = evaluate(machine, Table({path: here + steps}), ["regularity"])
-    regularity = np.nan_to_num(answer.values["regularity"])
-    good = (answer.status == Status.OK) & (regularity >= REGULAR * regularity[PROBES])
+    answer = evaluate(machine, Table({path: here + steps}), ["singularity_margin"])
+    singularity_margin = np.nan_to_num(answer.values["singularity_margin"])
+    good = (answer.status == Status.OK) & (singularity_margin >= REGULAR * singularity_margin[PROBES])
     bad = np.flatnonzero(~good)
     first = bad[bad < PROBES].max(initial=-1) + 1
     last = bad[bad > PROBES].min(initial=len(steps)) - 1

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from kinetostat.engine.points import Array
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.renamed import current_name
 from kinetostat.studies.grid.grid import resolve_quantities
 from kinetostat.units import KINDS, UnitError, parse
 
@@ -61,7 +62,8 @@ def parse_condition(text: str, components: Sequence[str]) -> Condition:
     match = _FORM.fullmatch(text) if len(text) <= LONGEST else None
     if match is None:
         raise InputError(f"{shorten(text)} is not a condition; {HOW}.")
-    name, comparison, written = match.groups()
+    given, comparison, written = match.groups()
+    name = current_name(given, "quantity")
     if name in GROUPS:
         raise InputError(f'"{name}" stands for several quantities; name one of {", ".join(GROUPS[name])}.')
     resolve_quantities([name], components)

@@ -1,4 +1,4 @@
-"""Whether a pose belongs to the workspace of a machine, and if not, why: from status, side and conditions."""
+"""Whether a pose belongs to the workspace of a machine, and if not, why: from status, aspect and conditions."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ import numpy.typing as npt
 from kinetostat.engine.limits import first_passed
 from kinetostat.engine.points import Array
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.aspect import aspect
 from kinetostat.kinetostatics.response import SINGULAR, respond
-from kinetostat.kinetostatics.sides import side
 from kinetostat.machine.limits import Limits, is_set
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.fields import quantities
@@ -66,11 +66,13 @@ class Judge:
     conditions: tuple[Condition, ...]
 
     @cached_property
-    def side(self) -> float:
-        """The side of the singularities on which the file's pose is; 0 if they do not divide, or it is on neither."""
+    def aspect(self) -> float:
+        """Aspect of the file's pose; 0 if no singular surface divides poses, or this pose has no answer."""
         response = respond(self.machine)
-        placed = Status(int(response.status)) in (Status.OK, Status.JOINT_LIMIT) and response.regularity > SINGULAR
-        return float(side(response)) if placed else 0.0
+        placed = (
+            Status(int(response.status)) in (Status.OK, Status.JOINT_LIMIT) and response.singularity_margin > SINGULAR
+        )
+        return float(aspect(response)) if placed else 0.0
 
     @property
     def limits(self) -> list[str]:
@@ -91,7 +93,7 @@ class Judge:
     @property
     def quantities(self) -> list[str]:
         """What has to be known of a pose beside its status."""
-        return list(dict.fromkeys(["side", *(condition.quantity for condition in self.conditions)]))
+        return list(dict.fromkeys(["aspect", *(condition.quantity for condition in self.conditions)]))
 
     def inside(self, status: Codes, values: Mapping[str, Any]) -> Mask:
         """Which poses are inside, from their status and quantities."""
@@ -119,5 +121,4 @@ class Judge:
         return found
 
     def _beyond(self, values: Mapping[str, Any]) -> Mask:
-        sides = np.asarray(values["side"])
-        return np.asarray((sides * self.side) < 0.0)
+        return np.asarray((np.asarray(values["aspect"]) * self.aspect) < 0.0)

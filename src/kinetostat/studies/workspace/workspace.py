@@ -32,7 +32,7 @@ class Workspace:
 
     Attributes:
         dataset: over the nodes of the grid: `status` (`Status` codes), `verdict` (place in `verdicts`), `connected`
-            (whether inside and joined to the file's pose), `regularity` and the quantities of the conditions.
+            (whether inside and joined to the file's pose), `singularity_margin` and the quantities of the conditions.
         verdicts: what may become of a node, "inside" first; then why not.
         counts: how many nodes have each verdict.
         volume: of the inside, whether joined to the file's pose or not.
@@ -40,7 +40,7 @@ class Workspace:
         extents: least and greatest value of each coordinate over the inside nodes, SI; empty where there are none.
         demands: what the workspace asks of legs, joints and actuators.
         conditions: that were asked for.
-        divided: whether singularities divide pose space and the file's pose says on which side to work.
+        divided: whether singularities divide pose space and the file's pose has an aspect to stay in.
     """
 
     dataset: xr.Dataset
@@ -83,7 +83,7 @@ def workspace(
     """
     need_machine(machine)
     judge = Judge(machine, tuple(parse_condition(text, machine.family.component_names) for text in several(conditions)))
-    question = grid_question(machine, ranges, ["regularity", *judge.quantities])
+    question = grid_question(machine, ranges, ["singularity_margin", *judge.quantities])
     _check(question)
     total = question.grid.size + Cells(question.grid.axes).size
     nodes = answer(question, lambda done, _: progress(done, total))
@@ -103,7 +103,7 @@ def workspace(
         _extents(question, inside),
         demands(machine, _poses(question, np.flatnonzero(inside)[:: 1 + int(inside.sum()) // MOST_DEMANDS])),
         judge.conditions,
-        judge.side != 0.0,
+        judge.aspect != 0.0,
     )
 
 
@@ -175,7 +175,7 @@ def _labelled(nodes: xr.Dataset, verdict: Codes, connected: Mask, judge: Judge, 
     about = {"flag_values": list(range(len(judge.labels))), "flag_meanings": words}
     told = {"long_name": "inside and joined to the file's pose", "flag_values": [0, 1], "flag_meanings": "no yes"}
     figures = {"volume": volume.value, "volume_standard_error": volume.standard_error, "volume_units": volume.unit}
-    wanted = nodes.drop_vars("side").assign(
+    wanted = nodes.drop_vars("aspect").assign(
         verdict=(dims, verdict, about), connected=(dims, connected.astype(np.int8), told)
     )
     pose = {path: float(value) for path, value in values(judge.machine).items() if path.startswith("pose.")}

@@ -29,7 +29,9 @@ class SensitivityPanel:
     def show(self, report: Report, session: Session) -> None:
         """Rank anew for another machine or pose."""
         self._session = session
-        names = {name: text for name, text in map_quantities(report.analysis.machine).items() if name != "regularity"}
+        names = {
+            name: text for name, text in map_quantities(report.analysis.machine).items() if name != "singularity_margin"
+        }
         if self.quantity.options != names:
             kept = self.quantity.value if self.quantity.value in names else list(names)[-1]
             self.quantity.set_options(names, value=kept)

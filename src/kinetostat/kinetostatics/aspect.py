@@ -1,4 +1,6 @@
-"""On which side of its singularities a machine stands: what tells two regions apart that only a singularity joins.
+"""The aspect of a pose: a sign that differs on the two sides of every singular surface of a machine.
+
+Two poses of different aspect can be joined only through a singularity. Nothing here decides where a workspace ends.
 
 Source: theory (30).
 """
@@ -11,8 +13,8 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import comparable
 
 
-def side(response: Response) -> Scalar:
-    """+1 or -1, different on the two sides of every singular surface; 0 where the machine has none that divides.
+def aspect(response: Response) -> Scalar:
+    """Return +1 or -1, different on the two sides of every singular surface; 0 if no such surface divides poses.
 
     The sign of det W, with the wrenches of each leg so oriented that they move continuously with its passive joints. It
     changes where the platform becomes free with locked actuators and where passive joints lock up. Legs that carry more

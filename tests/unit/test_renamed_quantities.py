@@ -1,0 +1,32 @@
+"""Former names of quantities still work, and warn."""
+
+import warnings
+
+import pytest
+
+from kinetostat import load
+from kinetostat.kinetostatics.response import respond
+from kinetostat.studies.grid.grid import resolve_quantities
+from kinetostat.studies.workspace.conditions import parse_condition
+
+COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")
+
+
+@pytest.mark.parametrize(("old", "new"), [("regularity", "singularity_margin"), ("side", "aspect")])
+def test_a_former_name_of_a_quantity_still_works_and_warns(old, new):
+    with pytest.warns(DeprecationWarning, match=new):
+        assert resolve_quantities([old]) == [new]
+    with pytest.warns(DeprecationWarning, match=new):
+        assert parse_condition(f"{old} > 0.5", COMPONENTS).quantity == new
+
+
+def test_the_former_attribute_of_a_response_still_works_and_warns():
+    response = respond(load("hexapod"))
+    with pytest.warns(DeprecationWarning, match="singularity_margin"):
+        assert response.regularity == response.singularity_margin
+
+
+def test_todays_names_do_not_warn():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert resolve_quantities(["singularity_margin", "aspect"]) == ["singularity_margin", "aspect"]
