@@ -18,7 +18,7 @@ from nicegui.testing.user_simulation import user_simulation
 
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studio import elements
-from kinetostat.studio.design.workshop import Workshop
+from kinetostat.studio.design.design_tab import Workshop
 from kinetostat.studio.serving import show
 
 KINDS = (elements.MachineView, elements.MapView, elements.CurveView, elements.FrontView)

@@ -11,7 +11,7 @@ from kinetostat.machine.loading import as_toml, load
 from kinetostat.spec.document import parse
 from kinetostat.spec.study import read_study
 from kinetostat.studies.bundled import bundled_studies
-from kinetostat.studio.design.favourites import Favourites
+from kinetostat.studio.design.state_folder import Favourites
 from studies import SMALL
 
 MACHINE = "zhang-gosselin-4dof"

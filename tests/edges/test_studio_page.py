@@ -18,7 +18,7 @@ from kinetostat import export
 from kinetostat.cli import main
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studies.analysis import analyze
-from kinetostat.studio.panels.matrices import matrix_text
+from kinetostat.studio.panels.tables import matrix_text
 from kinetostat.studio.serving import LOOPBACK, BoundedBody
 from machines import KINDS
 
@@ -54,7 +54,7 @@ def test_every_kind_of_machine_opens(name):
         assert page.one("status").text == "ok"
         assert len(page.shown("MachineView", "show")["solids"]) > 20
         assert any(value is not None for value in page.shown("MapView", "show")["values"])
-        assert "<li>" in page.one("blame-bars").content
+        assert "<li>" in page.one("contributions-bars").content
 
     on_page(steps, name)
 
@@ -170,12 +170,12 @@ def test_the_map_shows_any_quantity_over_any_two_coordinates():
     on_page(steps)
 
 
-def test_blame_is_attribution():
+def test_contributions_are_the_attribution():
     async def steps(page):
-        await page.choose("blame-direction", "y")
+        await page.choose("contributions-component", "y")
         shares = {share.name: share.compliance[4] for share in analyze(load(MACHINE)).shares}
-        assert f"{100 * shares['passive link 1']:.1f} %" in page.one("blame-bars").content
-        assert "leg 1 actuator" not in page.one("blame-bars").content
+        assert f"{100 * shares['passive link 1']:.1f} %" in page.one("contributions-bars").content
+        assert "leg 1 actuator" not in page.one("contributions-bars").content
 
     on_page(steps)
 
@@ -183,7 +183,7 @@ def test_blame_is_attribution():
 def test_every_view_follows():
     async def steps(page):
         for tab, mark, words in (
-            ("Indices", "indices", "condition of W"),
+            ("Indices", "indices", "condition number of W"),
             ("Sensitivity", "sensitivity-bars", "stiffness.actuator"),
             ("Loads", "under-load", "no load on the tool"),
         ):
@@ -266,7 +266,7 @@ def test_another_machine_replaces_all_controls():
         await page.choose("machines", "planar-3rpr")
         assert page.one("status").text == "ok"
         assert page.one("control pose.angle")._props["text"].endswith("deg")
-        assert len(page.one("blame-direction").options) == 3
+        assert len(page.one("contributions-component").options) == 3
         assert page.one("map-across").value.startswith("pose.")
 
     on_page(steps)
@@ -321,9 +321,9 @@ def test_names_from_files_are_never_markup():
         text = bundled()["tripteron"].replace('name = "z"', 'name = "<img src=x>"').encode()
         await page.upload("mine.toml", text)
         assert page.one("machines").value == "own"
-        await page.choose("blame-direction", "z")
-        assert "&lt;img" in page.one("blame-bars").content
-        assert "<img" not in page.one("blame-bars").content
+        await page.choose("contributions-component", "z")
+        assert "&lt;img" in page.one("contributions-bars").content
+        assert "<img" not in page.one("contributions-bars").content
 
     on_page(steps)
 

@@ -14,9 +14,9 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.study_folder import study_folder
 from kinetostat.studio.controls import controls
 from kinetostat.studio.design.draft import Draft, bundled_draft, sent_draft, usual_bounds
-from kinetostat.studio.design.favourites import Favourites
 from kinetostat.studio.design.progress import Follower, failure
 from kinetostat.studio.design.runs import MOST_RUNNING, Runs, Stage
+from kinetostat.studio.design.state_folder import Favourites
 from studies import PAPER, SMALL, problem, written
 
 QUICK = ("optimizer.population=8", "optimizer.generations=4")

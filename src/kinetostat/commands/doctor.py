@@ -41,7 +41,7 @@ def _checks() -> "Iterator[Check]":
     """All findings; what pictures and the studio add to them is known here alone."""
     from kinetostat.studies.diagnosis.check import Check, State, reinstall, tried
     from kinetostat.studies.diagnosis.diagnosis import diagnose
-    from kinetostat.studio.design.place import usual_state
+    from kinetostat.studio.design.state_folder import usual_state
 
     yield from diagnose()
     yield tried("self-test", "pictures", _drawn, reinstall("matplotlib"))

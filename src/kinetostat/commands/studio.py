@@ -55,7 +55,7 @@ def _studio(options: argparse.Namespace) -> int:
     machine = load_machine(options)
     if find_spec(EXTRA) is None:
         raise InputError("the studio is not installed; install it with `pip install 'kinetostat[studio]'`.")
-    from kinetostat.studio.design.place import usual_state
+    from kinetostat.studio.design.state_folder import usual_state
     from kinetostat.studio.serving import serve
 
     if options.host not in LOCAL:

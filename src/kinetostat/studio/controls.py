@@ -1,4 +1,7 @@
-"""The numbers of a machine as sliders: which there are, in which panel, over which range. Knows no page."""
+"""The numbers that the page offers as sliders: which there are, in which panel, over which range.
+
+Positions of a slider become SI values and back; the sliders themselves are elements of the page.
+"""
 
 import math
 from collections.abc import Iterator
@@ -6,25 +9,29 @@ from dataclasses import dataclass
 
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, parameters, values
-from kinetostat.studio.wording import VECTORS, label
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.studio.wording import VECTORS, label, table_of
 
 PANELS = ("Pose", "Geometry", "Stiffness", "Load")
 STEPS = 1000
 """Positions of a slider."""
-AROUND = 0.75
+LENGTH_SHARE = 0.75
 """How far a length varies about its value: in units of the machine's length in the pose, of itself elsewhere."""
 TURN = {"pose": math.radians(40.0), "geometry": math.radians(30.0)}
-FACTOR = 1e3
+"""How far an angle varies about its value."""
+STIFFNESS_FACTOR = 1e3
 """How far a stiffness varies about its value, up and down."""
 USUAL_STIFFNESS = 1e6
 """Middle of the range of a stiffness that is rigid or free, SI."""
 LARGEST_LOAD = {"force": 1000.0, "moment": 100.0}
 """Ends of the range of a load that is zero: N, N·m."""
+LEAST_SHARE = 0.02
+"""Lower end of a number that must be positive, as a share of the upper end."""
 
 
 @dataclass(frozen=True)
 class Control:
-    """One number, or one field whose entries move together.
+    """A number of the machine, or a field whose entries move together.
 
     Attributes:
         parameter: what it sets.
@@ -44,17 +51,15 @@ class Control:
 
     @property
     def path(self) -> str:
-        """Of its parameter."""
         return self.parameter.path
 
     @property
     def label(self) -> str:
-        """For people."""
         return label(self.parameter)
 
     @property
     def slides(self) -> bool:
-        """Whether it has a slider; limits are typed only."""
+        """Whether it has a slider; limits of actuators and joints are typed only."""
         return self.low < self.high
 
     def value_at(self, position: int) -> float:
@@ -80,50 +85,50 @@ class Control:
 
 
 def controls(machine: Machine, length: float) -> tuple[Control, ...]:
-    """All controls of a machine, in the order of its file.
+    """Return all controls of a machine, in the order of its file.
 
     Args:
         machine: whose present numbers the ranges lie about.
         length: its characteristic length, m.
     """
-    held = values(machine)
-    return tuple(_control(parameter, held, length) for parameter in _shown(machine, held))
+    present = values(machine)
+    return tuple(_control(parameter, present, length) for parameter in _offered(machine, present))
 
 
-def _shown(machine: Machine, held: dict[str, float]) -> Iterator[Parameter]:
-    """Fields whose entries are alike in kind and value are one control beside those of the entries."""
+def _offered(machine: Machine, present: dict[str, float]) -> Iterator[Parameter]:
+    """Offer every number, and a field of several as one control where its entries are alike in kind and value."""
     for parameter in parameters(machine.family):
         several = len(parameter.leaves) > 1
-        alike = len({held[leaf] for leaf in parameter.leaves}) == 1
+        alike = len({present[leaf] for leaf in parameter.leaves}) == 1
         vector = parameter.path.split(".")[-1] in VECTORS
         if not several or (not vector and (alike or parameter.quantity.stiff)):
             yield parameter
 
 
-def _control(parameter: Parameter, held: dict[str, float], length: float) -> Control:
-    section = parameter.path.split(".")[0]
-    value, quantity = held[parameter.leaves[0]], parameter.quantity
-    panel = "Stiffness" if quantity.stiff else {"pose": "Pose", "geometry": "Geometry"}.get(section, "Geometry")
-    panel = "Load" if section in ("load", "tool", "limits") else panel
-    group = parameter.path.rsplit(".", 2 if parameter.path.split(".")[-1].isdecimal() else 1)[0].replace(".", " ")
+def _control(parameter: Parameter, present: dict[str, float], length: float) -> Control:
+    table = parameter.path.split(".")[0]
+    value, quantity = present[parameter.leaves[0]], parameter.quantity
+    panel = "Stiffness" if quantity.stiff else "Pose" if table == "pose" else "Geometry"
+    panel = "Load" if table in ("load", "tool", "limits") else panel
+    group = table_of(parameter)
     if quantity.unset is not None:
         return Control(parameter, panel, group, 0.0, 0.0, False)
-    low, high, logarithmic = _range(quantity.kind, quantity.stiff, value, section, length)
+    low, high, logarithmic = _range(quantity.kind, quantity.stiff, value, table, length)
     if quantity.positive:
-        low = max(low, 0.02 * high)
+        low = max(low, LEAST_SHARE * high)
     return Control(parameter, panel, group, low, min(high, quantity.most), logarithmic)
 
 
-def _range(kind: str, stiff: bool, value: float, section: str, length: float) -> tuple[float, float, bool]:
-    """Ends of a slider and whether it is logarithmic."""
+def _range(kind: str, stiff: bool, value: float, table: str, length: float) -> tuple[float, float, bool]:
+    """Return the ends of a slider and whether it is logarithmic."""
     if stiff:
         middle = value if 0.0 < value < math.inf else USUAL_STIFFNESS
-        return middle / FACTOR, middle * FACTOR, True
+        return middle / STIFFNESS_FACTOR, middle * STIFFNESS_FACTOR, True
     if kind == "angle":
-        around = TURN.get(section, TURN["geometry"])
+        around = TURN.get(table, TURN["geometry"])
         return value - around, value + around, False
     if kind == "length":
-        around = AROUND * (length if section == "pose" or value == 0.0 else abs(value))
+        around = LENGTH_SHARE * (length if table == "pose" or value == 0.0 else abs(value))
         return value - around, value + around, False
     if kind in LARGEST_LOAD:
         most = max(LARGEST_LOAD[kind], 2.0 * abs(value))
@@ -131,3 +136,51 @@ def _range(kind: str, stiff: bool, value: float, section: str, length: float) ->
     if kind == "direction":
         return -1.0, 1.0, False
     return value / 10.0, value * 10.0, True
+
+
+# The factor by which the deflected shape is exaggerated: a slider as well, but no number of the machine.
+
+AUTO = "auto"
+"""What is typed to leave the choice of the factor to the page."""
+DECADES = (-3, 9)
+"""Powers of ten between which the factor lies."""
+ROUND = (1.0, 2.0, 5.0)
+FACTOR_STEPS = len(ROUND) * (DECADES[1] - DECADES[0])
+"""Positions of the slider: 1, 2 and 5 times every power of ten."""
+
+
+def factor_at(position: int) -> float:
+    """Return the exaggeration at a position from 0 to `FACTOR_STEPS`."""
+    decades, step = divmod(min(max(position, 0), FACTOR_STEPS), len(ROUND))
+    return float(f"{ROUND[step]:g}e{DECADES[0] + decades}")
+
+
+def factor_position(factor: float) -> int:
+    """Return the position whose exaggeration is nearest, by ratio."""
+    return min(range(FACTOR_STEPS + 1), key=lambda position: abs(math.log(factor_at(position) / factor)))
+
+
+def read_factor(text: str) -> float | None:
+    """Return the exaggeration that was typed; None for the page's choice.
+
+    Raises:
+        InputError: it is not a number in range.
+    """
+    typed = text.strip().lstrip("×x").strip()
+    if typed == AUTO or not typed or typed.endswith(f"({AUTO})"):
+        return None
+    least, most = (10.0**power for power in DECADES)
+    try:
+        factor = float(typed.replace(",", ""))
+    except ValueError:
+        factor = math.nan
+    if not least <= factor <= most:
+        raise InputError(
+            f"the exaggeration is {shorten(text)}; it must be a number from {least:g} to {most:g}, or {AUTO}."
+        )
+    return factor
+
+
+def factor_text(factor: float, automatic: bool) -> str:
+    """Return an exaggeration as the page shows it; `automatic` if the page chose it."""
+    return f"{factor:,.6g}" + (f" ({AUTO})" if automatic else "")

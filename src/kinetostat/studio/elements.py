@@ -1,26 +1,40 @@
-"""The page's own elements: the machine in three dimensions, maps, curves, and a number with its slider."""
+"""The page's building blocks: the machine in three dimensions, maps, curves, sliders, and buttons in one style.
 
+Each JavaScript component has its class here; what is shown in it is decided by the panels.
+"""
+
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import nicegui.elements.scene  # noqa: F401  (registers three.js, which NiceGUI brings with it)
+from nicegui import ui
 from nicegui.element import Element
 
+from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.views.scene.browser import RENDERER
 from kinetostat.views.scene.looks import looks_data
 
 COMPONENTS = Path(__file__).parent / "components"
 MODULES = {"kinetostat-studio": str(COMPONENTS), "kinetostat-scene": str(RENDERER)}
+MAIN_BUTTON = "unelevated no-caps text-color=accent-ink dense"
+"""Style of the button that does what its part of the page is for."""
 
 
-class MachineView(Element, component=RENDERER / "machine_view.js", esm=MODULES):
+class Labelled(Element):
+    """An element with a label for screen readers."""
+
+    def __init__(self, label: str) -> None:
+        super().__init__()
+        self._props["label"] = label
+
+
+class MachineView(Labelled, component=RENDERER / "machine_view.js", esm=MODULES):
     """Scenes of solids, with light, shadows and a camera; methods `show`, `overlay`, `look`."""
 
     def __init__(self, label: str) -> None:
-        """An empty view; `label` says what it shows to those who do not see it."""
-        super().__init__()
-        self._props["label"] = label
-        self._props["hidden"] = []
-        self._props["looks"] = looks_data()
+        super().__init__(label)
+        self._props.update(hidden=[], looks=looks_data())
 
     def hide(self, layers: list[str]) -> None:
         """Show all layers but these."""
@@ -28,66 +42,81 @@ class MachineView(Element, component=RENDERER / "machine_view.js", esm=MODULES):
         self.update()
 
 
-class MapView(Element, component=COMPONENTS / "map_view.js"):
+class MapView(Labelled, component=COMPONENTS / "map_view.js"):
     """A map with a mark; methods `show`, `mark`; events `pick` with x and y, and `settle`."""
 
-    def __init__(self, label: str) -> None:
-        """An empty map."""
-        super().__init__()
-        self._props["label"] = label
 
-
-class CurveView(Element, component=COMPONENTS / "curve_view.js"):
+class CurveView(Labelled, component=COMPONENTS / "curve_view.js"):
     """Curves over one number; method `show`."""
 
-    def __init__(self, label: str) -> None:
-        """No curves yet."""
-        super().__init__()
-        self._props["label"] = label
 
-
-class FrontView(Element, component=COMPONENTS / "front_view.js"):
+class FrontView(Labelled, component=COMPONENTS / "front_view.js"):
     """Designs as points over two objectives; method `show`; event `pick` with the number of a point."""
 
-    def __init__(self, label: str) -> None:
-        """No points yet."""
-        super().__init__()
-        self._props["label"] = label
 
-
-class DesignTable(Element, component=COMPONENTS / "design_table.js"):
+class DesignTable(Labelled, component=COMPONENTS / "design_table.js"):
     """Designs as rows that sort by any column; event `pick` with the number of a design."""
 
     def __init__(self, label: str) -> None:
-        """No rows yet."""
-        super().__init__()
-        self._props.update(label=label, names=[], values=[], texts=[], knee=0, chosen=None)
+        super().__init__(label)
+        self.put([], [], [], 0, None)
 
     def put(
         self, names: list[str], values: list[list[float]], texts: list[list[str]], knee: int, chosen: int | None
     ) -> None:
-        """Show designs: names of columns, numbers to sort by and texts to read, each [designs x columns]."""
+        """Show other designs: what each column is, numbers to sort by, and how they are written."""
         self._props.update(names=names, values=values, texts=texts, knee=knee, chosen=chosen)
         self.update()
 
 
-class QuantityRow(Element, component=COMPONENTS / "quantity_row.js"):
+class QuantityRow(Labelled, component=COMPONENTS / "quantity_row.js"):
     """A number with its name and unit, and a slider; events `slide`, `settle`, `write`."""
 
     def __init__(self, label: str, meaning: str, steps: int, slides: bool) -> None:
         """A row without a value yet; `steps` positions of its slider, if it has one."""
-        super().__init__()
-        self._props.update(label=label, meaning=meaning, steps=steps, slides=slides, text="", position=0, problem="")
+        super().__init__(label)
+        self._props.update(meaning=meaning, steps=steps, slides=slides, text="", position=0, problem="")
 
     def put(self, text: str, position: int) -> None:
-        """Show a value and where its slider stands; what was wrong before is right now."""
+        """Show a value and the position of its slider, and clear an earlier complaint."""
         self._set(text=text, position=position, problem="")
 
     def complain(self, problem: str) -> None:
-        """Say what is wrong with what was asked for."""
+        """Show why the value that was typed is refused."""
         self._set(problem=problem)
 
     def _set(self, **props: object) -> None:
+        # Rows are written after every move of any slider; only those that change are sent to the browser.
         if any(self._props[name] != value for name, value in props.items()):
             self._props.update(props)
             self.update()
+
+
+def choice(options: dict[Any, str], label: str, on_change: Callable[[], None], mark: str) -> ui.select:
+    """A list to choose from; `mark` is the name by which tests know it."""
+    select = ui.select(options, label=label, on_change=on_change).mark(mark)
+    return select.props("dense options-dense outlined").classes("field")
+
+
+def toggle(options: Sequence[str], value: str, on_change: Callable[[], None], mark: str) -> ui.toggle:
+    """A row of buttons of which one is pressed."""
+    buttons = ui.toggle(list(options), value=value, on_change=on_change).mark(mark)
+    return buttons.props("dense no-caps unelevated toggle-text-color=accent-ink").classes("choice")
+
+
+def icon_button(icon: str, text: str, action: Callable[[], object], mark: str) -> ui.button:
+    """A button that shows an icon; `text` is its tooltip and what a screen reader says."""
+    # A quotation mark would end the property early; names of machines may contain one.
+    label = text.replace('"', "'").replace("\\", "/")
+    button = ui.button(icon=icon, on_click=action).props(f'flat round dense aria-label="{label}"')
+    return button.tooltip(text).mark(mark)
+
+
+def upload_field(on_upload: Callable[[Any], Any], refuse: Callable[[str], None], mark: str) -> ui.upload:
+    """A hidden field that takes one TOML file from the browser; `pickFiles` of it opens the dialogue."""
+    too_large = f"The file is larger than {LARGEST_FILE >> 20} MiB, the limit for a machine or study file."
+    field = ui.upload(
+        on_upload=on_upload, on_rejected=lambda: refuse(too_large), auto_upload=True,
+        max_file_size=LARGEST_FILE, max_files=1,
+    )  # fmt: skip
+    return field.props('accept=".toml" aria-hidden="true"').classes("unseen").mark(mark)

@@ -12,25 +12,21 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, PictureWish, Report, ReportWish, picture, report
-from kinetostat.studio.design.design_tab import DesignTab
-from kinetostat.studio.design.workshop import Workshop
+from kinetostat.studio.design.design_tab import DesignTab, Workshop
 from kinetostat.studio.files_menu import FilesMenu
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.map_panel import MapPanel
-from kinetostat.studio.panels.blame import BlamePanel
-from kinetostat.studio.panels.indices import IndicesPanel
+from kinetostat.studio.panels import Panel
+from kinetostat.studio.panels.contributions import ContributionsPanel, SensitivityPanel
 from kinetostat.studio.panels.link_stiffness import LinkPanel
-from kinetostat.studio.panels.matrices import MatricesPanel
-from kinetostat.studio.panels.panel import Panel
-from kinetostat.studio.panels.sensitivity import SensitivityPanel
-from kinetostat.studio.panels.under_load import UnderLoadPanel
+from kinetostat.studio.panels.tables import IndicesPanel, LoadsPanel, MatricesPanel
 from kinetostat.studio.parameters_panel import ParametersPanel
 from kinetostat.studio.scene_panel import ScenePanel
 from kinetostat.studio.session import Memory, Session
 from kinetostat.views.scene.machine_scene import proportions_of
 
-PANELS: tuple[Callable[[], Panel], ...] = (
-    BlamePanel, MatricesPanel, IndicesPanel, SensitivityPanel, LinkPanel, UnderLoadPanel,
+PANELS: tuple[type[Panel], ...] = (
+    ContributionsPanel, MatricesPanel, IndicesPanel, SensitivityPanel, LinkPanel, LoadsPanel,
 )  # fmt: skip
 """The linked views, in the order of their tabs."""
 ACCENT = "#0b5ea8"

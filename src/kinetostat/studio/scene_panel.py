@@ -9,8 +9,8 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, Report
+from kinetostat.studio.controls import FACTOR_STEPS, factor_at, factor_position, factor_text, read_factor
 from kinetostat.studio.elements import MachineView, QuantityRow
-from kinetostat.studio.exaggeration import STEPS, factor_at, factor_text, position_of, read_factor
 from kinetostat.studio.wording import engineering
 
 LAYERS = {
@@ -53,7 +53,7 @@ class ScenePanel:
                 button.props("flat dense no-caps").tooltip(text).mark(f"view-{view}")
         with ui.element("div").classes("scene-key"):
             self.key = ui.html("", sanitize=False).mark("scene-key")
-            self.scale = QuantityRow("deflection ×", SCALE, STEPS, slides=True).mark("exaggeration")
+            self.scale = QuantityRow("deflection ×", SCALE, FACTOR_STEPS, slides=True).mark("exaggeration")
             self.scale.classes("scene-scale").set_visibility(False)
         self.scale.on("slide", lambda event: self._exaggerate(factor_at(int(event.args))), throttle=THROTTLE)
         self.scale.on("write", self._written)
@@ -101,7 +101,7 @@ class ScenePanel:
         self.key.set_content(scene_key(report))
         self.scale.set_visibility(report.exaggeration is not None)
         if report.exaggeration is not None:
-            self.scale.put(factor_text(report.exaggeration, own), position_of(report.exaggeration))
+            self.scale.put(factor_text(report.exaggeration, own), factor_position(report.exaggeration))
         self.figures.set_content(headline(report))
 
 

@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError
-from kinetostat.studio.design.workshop import Workshop
+from kinetostat.studio.design.design_tab import Workshop
 from kinetostat.studio.page import StudioPage
 from kinetostat.studio.session import Memory
 

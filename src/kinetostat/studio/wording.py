@@ -1,11 +1,18 @@
-"""Names, numbers and units as the page shows them. Computes nothing else."""
+"""Numbers, names, tables and bars as the page writes them.
+
+Values come in SI and leave as text; names and texts that may come from a file are escaped before they become HTML.
+"""
 
 import math
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
 
 from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.fields import Quantity
-from kinetostat.units import KINDS
-from kinetostat.views.display import PREFIXES
+from kinetostat.units import KINDS, show
+from kinetostat.views.display import prefixed_scale
 
 DIGITS = 6
 """Significant digits of a value that may be typed over."""
@@ -14,49 +21,42 @@ VECTORS = ("offset", "moment", "force", "point", "axis", "first_axis", "second_a
 """Fields whose entries are along x, y, z."""
 DASH = "–"
 MINUS = "\u2212"
+ENTRY_UNITS = {
+    "length": (1e3, "mm"),
+    "linear stiffness": (1e-6, "N/µm"),
+    "elastic modulus": (1e-9, "GPa"),
+    "area": (1e4, "cm**2"),
+    "second moment of area": (1e8, "cm**4"),
+}
+"""Factor from SI and unit of the kinds that are written in an engineering unit."""
+LEAST_GAIN = 1e-3
+"""Logarithm of the gain that fills a whole bar when no gain is greater, so that tiny ones look tiny."""
 
 
 def shown(quantity: Quantity, value: float) -> str:
-    """A value as people write it, e.g. "220 mm", "30 deg", "20 N/µm"; `units.parse` reads it."""
+    """Return a value as a field shows it, e.g. "220 mm", "30 deg", "20 N/µm"; `units.parse` reads it back."""
     if value == quantity.unset or math.isinf(value):
         return quantity.show(value)
-    kind, unit = quantity.kind, KINDS[quantity.kind].unit
-    match kind:
-        case "length":
-            return f"{_digits(1e3 * value)} mm" if abs(value) < 10.0 else f"{_digits(value)} m"
-        case "angle":
-            return f"{_digits(math.degrees(value))} deg"
-        case "linear stiffness" if abs(value) >= 1e6:
-            return f"{_digits(1e-6 * value)} N/µm"
-        case "elastic modulus":
-            return f"{_digits(1e-9 * value)} GPa"
-        case "area":
-            return f"{_digits(1e4 * value)} cm**2"
-        case "second moment of area":
-            return f"{_digits(1e8 * value)} cm**4"
-    return f"{_digits(value)} {unit}".rstrip()
+    factor, unit = ENTRY_UNITS.get(quantity.kind, (1.0, KINDS[quantity.kind].unit))
+    # Long lengths and soft springs read better in SI: 12 m, 3000 N/m.
+    if (unit == "mm" and abs(value) >= 10.0) or (unit == "N/µm" and abs(value) < 1e6):
+        factor, unit = 1.0, KINDS[quantity.kind].unit
+    return show(factor * value, unit, DIGITS).replace("e+0", "e").replace("e+", "e")
 
 
-def _digits(value: float) -> str:
-    return f"{value:.{DIGITS}g}".replace("e+0", "e").replace("e+", "e")
-
-
-def engineering(value: float | None, unit: str = "", digits: int = 4) -> str:
-    """A result with an SI prefix: "3.628 kN/m"; infinity is "rigid or free", nothing is a dash."""
+def engineering(value: float | None, unit: str = "1", digits: int = 4) -> str:
+    """Return a result with an SI prefix, e.g. "3.628 kN/m"; "∞" if it is infinite, a dash if there is none."""
     if value is None or math.isnan(value):
         return DASH
     if math.isinf(value):
         return "∞"
-    if unit in ("", "1") or value == 0.0:
-        return f"{value:.{digits}g} {unit if unit != '1' else ''}".strip()
-    power = 3 * math.floor(math.log10(abs(value) * (1.0 + 1e-12)) / 3)
-    factor = min(max(10.0**power, min(PREFIXES)), max(PREFIXES))
-    nearest = min(PREFIXES, key=lambda known: abs(math.log10(known / factor)))
-    return f"{value / nearest:.{digits}g} {PREFIXES[nearest]}{unit}"
+    # Not `units.show`: a deflection of some microradians stays in radians.
+    scale = prefixed_scale(unit, np.array([value]))
+    return f"{scale.factor * value:.{digits}g} {'' if unit == '1' else scale.unit}".strip()
 
 
 def scientific(value: float | None) -> str:
-    """A matrix entry in four digits, e.g. "5.094e-7"; a dash where there is none."""
+    """Return a matrix entry in four digits, e.g. "5.094e−7"; a dash if there is none."""
     if value is None:
         return DASH
     if math.isinf(value):
@@ -66,7 +66,7 @@ def scientific(value: float | None) -> str:
 
 
 def label(parameter: Parameter) -> str:
-    """The name of a parameter within its section: "base radius", "actuator 2", "offset z"."""
+    """Return the name of a parameter within its table, e.g. "base radius", "actuator 2", "offset z"."""
     name = parameter.path.split(".")[-1]
     if not name.isdecimal():
         return name.replace("_", " ")
@@ -75,7 +75,62 @@ def label(parameter: Parameter) -> str:
     return f"{field.replace('_', ' ')} {entry}"
 
 
+def table_of(parameter: Parameter) -> str:
+    """Return the table of the machine file in which a parameter stands, e.g. "pose" or "leg 1 upper"."""
+    within = 2 if parameter.path.split(".")[-1].isdecimal() else 1
+    return parameter.path.rsplit(".", within)[0].replace(".", " ")
+
+
 def full_label(parameter: Parameter) -> str:
-    """Its name with its section where that is not the pose: "x", "geometry: base radius"."""
-    section = parameter.path.rsplit(".", 2 if parameter.path.split(".")[-1].isdecimal() else 1)[0]
-    return label(parameter) if section == "pose" else f"{section.replace('.', ' ')}: {label(parameter)}"
+    """Return the name of a parameter with its table unless that is the pose: "x", "geometry: base radius"."""
+    where = table_of(parameter)
+    return label(parameter) if where == "pose" else f"{where}: {label(parameter)}"
+
+
+def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "") -> str:
+    """Return an HTML table whose first column names the rows.
+
+    Args:
+        caption: read aloud by screen readers, not shown.
+        head: of the columns; no head is shown where all of it is empty.
+        rows: of texts.
+        kind: further class for the style sheet.
+    """
+    top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
+    body = "".join(
+        f'<tr><th scope="row">{escape(first)}</th>{"".join(f"<td>{escape(cell)}</td>" for cell in rest)}</tr>'
+        for first, *rest in rows
+    )
+    columns = f"<thead><tr>{top}</tr></thead>" if any(head) else ""
+    return f'<table class="figures {kind}"><caption>{escape(caption)}</caption>{columns}<tbody>{body}</tbody></table>'
+
+
+def bars(caption: str, rows: Sequence[tuple[str, float, str]]) -> str:
+    """Return horizontal bars: of each a name, its length as a share of the track (coloured if negative), and a text."""
+    if not rows:
+        return paragraph("There is nothing to show.")
+    items = "".join(
+        f'<li><span class="bar-name" title="{escape(name)}">{escape(name)}</span>'
+        f'<span class="bar-track"><span class="bar-fill {"negative" if share < 0 else ""}" '
+        f'style="width:{100 * min(abs(share), 1.0):.2f}%"></span></span>'
+        f'<span class="bar-value">{escape(text)}</span></li>'
+        for name, share, text in rows
+    )
+    return f'<ol class="bars" aria-label="{escape(caption)}">{items}</ol>'
+
+
+def gains(caption: str, rows: Sequence[tuple[str, float]]) -> str:
+    """Return bars of factors by which something has become better: logarithmic, losses in another colour."""
+    sizes = {name: math.log(gain) if 0.0 < gain < math.inf else 0.0 for name, gain in rows}
+    longest = max([LEAST_GAIN, *map(abs, sizes.values())])
+    return bars(caption, [(name, sizes[name] / longest, f"× {gain:.4g}") for name, gain in rows])
+
+
+def heading(text: str) -> str:
+    """Return a heading within a panel."""
+    return f"<h3>{escape(text)}</h3>"
+
+
+def paragraph(text: str, kind: str = "note") -> str:
+    """Return a paragraph of the class `kind`."""
+    return f'<p class="{kind}">{escape(text)}</p>'

@@ -6,8 +6,7 @@ from html import escape
 
 from kinetostat.studies.comparison.design_rows import Better, Row
 from kinetostat.studies.comparison.designs import Blame, Comparison
-from kinetostat.studio.markup import gains, heading, paragraph, table
-from kinetostat.studio.wording import DASH, engineering
+from kinetostat.studio.wording import DASH, engineering, gains, heading, paragraph, table
 from kinetostat.views.tables import readable
 
 SAME = 0.05
@@ -27,7 +26,7 @@ def comparison_text(found: Comparison) -> str:
     parts += [heading("Where they differ"), _differences(found, letters)]
     if any(found.softest):
         blame = [[letter, *_softest(own)] for letter, own in zip(letters, found.softest, strict=True)]
-        title = "To blame in the softest directions"
+        title = "Largest contributions in the softest directions"
         parts += [heading(title), table(title, ["", "rotation", "translation"], blame, "words")]
     return "".join(parts)
 

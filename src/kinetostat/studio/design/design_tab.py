@@ -1,6 +1,7 @@
 """The design tab: a study on the left, the search and its answer on the right; the machine stays between them."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 from nicegui import ui
 
@@ -8,11 +9,28 @@ from kinetostat.machine.machine import Machine
 from kinetostat.studio.design.draft import Draft
 from kinetostat.studio.design.favourites_panel import FavouritesPanel
 from kinetostat.studio.design.run_panel import RunPanel
+from kinetostat.studio.design.runs import Runs
+from kinetostat.studio.design.state_folder import Favourites
 from kinetostat.studio.design.study_form import StudyForm
-from kinetostat.studio.design.workshop import Workshop
 from kinetostat.studio.session import Session
 
 RESULT, FRONT, FAVOURITES = "Result", "Front", "Favourites"
+
+
+class Workshop:
+    """The searches and favourites of one state folder, shared by all pages of a server; they outlive the pages.
+
+    Attributes:
+        runs: searches.
+        favourites: machines that are kept.
+    """
+
+    def __init__(self, state: Path) -> None:
+        self.runs, self.favourites = Runs(state), Favourites(state)
+
+    def close(self) -> None:
+        """Let all searches end after their present step."""
+        self.runs.close()
 
 
 class DesignTab:

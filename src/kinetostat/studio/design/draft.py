@@ -15,7 +15,7 @@ from kinetostat.studies.bundled import study_of
 from kinetostat.studies.optimisation.catalogue import ALONG
 from kinetostat.studies.optimisation.problem import Problem, problem_of, settings_of
 from kinetostat.studio.controls import USUAL_STIFFNESS, Control
-from kinetostat.studio.design.place import slug
+from kinetostat.studio.design.state_folder import slug
 from kinetostat.studio.wording import shown
 
 AROUND = 0.2

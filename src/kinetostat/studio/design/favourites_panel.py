@@ -10,7 +10,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.comparison.designs import Comparison, Design, compare
 from kinetostat.studio.design.comparison_text import comparison_text
-from kinetostat.studio.design.favourites import LONGEST_NAME, LONGEST_NOTE, Favourite, Favourites
+from kinetostat.studio.design.state_folder import LONGEST_NAME, LONGEST_NOTE, Favourite, Favourites
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.session import Session
 

@@ -12,8 +12,7 @@ from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import best_feasible, designed
 from kinetostat.studies.optimisation.search import kept_log, stored_problem
 from kinetostat.studies.study_folder import Record, noted
-from kinetostat.studio.design.runs import RESULT, Run, Stage
-from kinetostat.studio.design.worker import FAILURE
+from kinetostat.studio.design.runs import FAILURE, RESULT, Run, Stage
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,7 @@ from typing import Any
 
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studio.design.progress import Progress
-from kinetostat.studio.markup import gains, heading, paragraph, table
-from kinetostat.studio.wording import DASH, engineering, shown
+from kinetostat.studio.wording import DASH, engineering, gains, heading, paragraph, shown, table
 
 MUCH = 0.01
 """Stiffness that is left, as a share, below which the loss is pointed out."""

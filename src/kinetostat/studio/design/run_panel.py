@@ -13,7 +13,7 @@ from kinetostat.studio.design.result_text import result_text
 from kinetostat.studio.design.runs import Run, Runs, Stage
 from kinetostat.studio.elements import CurveView
 from kinetostat.studio.lanes import Lane
-from kinetostat.studio.markup import paragraph
+from kinetostat.studio.wording import paragraph
 
 NOTHING = "Nothing has been searched yet: say on the left what may change and what is wanted, then start."
 GLANCE = 0.5

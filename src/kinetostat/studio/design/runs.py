@@ -1,7 +1,12 @@
-"""Searches in processes of their own, each in a folder that outlives page and server: start, stop, go on, list."""
+"""Searches, each in its own process and folder: start, stop, go on, list, delete; and what that process does.
+
+The process is `python -m kinetostat.studio.design.runs FOLDER`. It ends after its present step when its standard input
+is closed, which also happens when the server that started it dies: no search runs on unnoticed.
+"""
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -11,17 +16,21 @@ from pathlib import Path
 
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.search import begin_search
+from kinetostat.studies.optimisation.result import optimize
+from kinetostat.studies.optimisation.result_data import write_result
+from kinetostat.studies.optimisation.search import begin_search, stored_problem
+from kinetostat.studies.storage import write_text
 from kinetostat.studies.study_folder import QUESTION, in_use, noted
-from kinetostat.studio.design.place import numbered, slug
-from kinetostat.studio.design.worker import FAILURE
+from kinetostat.studio.design.state_folder import numbered, slug
 
 MOST_RUNNING = 2
 """Searches at a time; each takes what the machine has."""
 MOST_RUNS = 60
 """Searches that are kept."""
-WORKER = "kinetostat.studio.design.worker"
+WORKER = "kinetostat.studio.design.runs"
 RESULT = "result.json"
+FAILURE = "failed.txt"
+"""File in the folder of a search that could not go on, with the reason."""
 
 
 class Stage(StrEnum):
@@ -189,3 +198,32 @@ def _complete(folder: Path) -> bool:
     """Whether all steps are made and the answer is written."""
     steps, _ = noted(folder)
     return bool(steps) and len(steps) >= steps[-1].get("of", len(steps)) and (folder / RESULT).exists()
+
+
+def work(folder: Path) -> None:
+    """Search on from where the folder stands, and write the answer so far; this is what the process of a search does.
+
+    Args:
+        folder: of a search that has been begun.
+    """
+    stopped = threading.Event()
+    threading.Thread(target=_listen, args=(stopped,), daemon=True).start()
+    try:
+        write_result(optimize(stored_problem(folder), folder, stop=stopped.is_set), folder)
+    except InputError as error:
+        if not in_use(folder):  # otherwise another process is at work here, and the search is not a failure
+            write_text(folder / FAILURE, str(error))
+    except Exception as error:
+        write_text(folder / FAILURE, f"The search ended with an error of the program: {error!r}")
+        raise
+
+
+def _listen(stopped: threading.Event) -> None:
+    """Wait until standard input is closed, then ask the search to stop after its step."""
+    sys.stdin.buffer.read()
+    stopped.set()
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the terminal is for the server, which closes our input
+    work(Path(sys.argv[1]))

@@ -1,1 +1,36 @@
-"""The linked views of the page: each shows one side of an analysis. No formula here."""
+"""The linked views beside the machine: a class each, listed in `PANELS` of the page.
+
+A panel shows results of `answers`; it holds no formula and knows nothing of the page around it.
+"""
+
+from kinetostat.studio.answers import Report
+from kinetostat.studio.session import Session
+
+
+class Panel:
+    """A linked view of the analysis, in a tab of its own.
+
+    The page makes one of each class, calls `build` once inside the tab, `show` after every new analysis while the
+    tab is in front, and `close` when the browser has left.
+
+    Attributes:
+        name: text of the tab.
+    """
+
+    name = ""
+
+    def build(self) -> None:
+        """Create the elements of the panel, still empty, where the page is being built."""
+        raise NotImplementedError
+
+    def show(self, report: Report, session: Session) -> None:
+        """Show a new analysis of a pose that has an answer.
+
+        Args:
+            report: the analysis and what is drawn of it.
+            session: the machine with its controls, for panels that compute more.
+        """
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Stop what is being computed; a panel that only shows the report has nothing to stop."""

@@ -8,6 +8,7 @@ from kinetostat.studio.answers import Curves, CurveWish, Ends, Report, curves
 from kinetostat.studio.controls import USUAL_STIFFNESS
 from kinetostat.studio.elements import CurveView
 from kinetostat.studio.lanes import Lane
+from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import full_label
 from kinetostat.units import KINDS
@@ -18,7 +19,7 @@ BLOCKS = {"C, translation": ("compliance", "xyz"), "C, rotation": ("compliance",
           "K, translation": ("stiffness", "xyz"), "K, rotation": ("stiffness", "r")}  # fmt: skip
 
 
-class LinkPanel:
+class LinkPanel(Panel):
     """Curves of K or C over one stiffness, the present value marked."""
 
     name = "Links"

@@ -1,0 +1,121 @@
+"""The folder of what outlives the page: where it is, its numbered entries, and the favourite machines kept in it.
+
+Searches are kept in the same folder, by `runs`.
+"""
+
+import os
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from kinetostat.machine.loading import as_toml, load
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.document import read
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.storage import write_text
+
+MOST = 100
+"""Machines that are kept."""
+LONGEST_NAME, LONGEST_NOTE = 80, 400
+REMARK = "# "
+
+
+def usual_state() -> Path:
+    """Return the folder for it among the user's data, by the custom of the operating system."""
+    home = Path.home()
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = home / "Library" / "Application Support"
+    else:
+        base = Path(os.environ.get("XDG_DATA_HOME") or home / ".local" / "share")
+    return base / "kinetostat" / "studio"
+
+
+def slug(name: str, otherwise: str) -> str:
+    """Return a name as part of a file name: letters, digits and single hyphens; `otherwise` if none are left."""
+    kept = "".join(c if c.isalnum() and c.isascii() else "-" for c in name.lower())
+    return "-".join(part for part in kept.split("-") if part)[:40] or otherwise
+
+
+def numbered(folder: Path) -> dict[int, Path]:
+    """Return the entries of a folder whose names begin with a number of four digits, the latest first."""
+    paths = folder.iterdir() if folder.is_dir() else ()
+    known = {int(path.name[:4]): path for path in paths if path.name[:4].isdecimal() and path.name[4:5] == "-"}
+    return dict(sorted(known.items(), reverse=True))
+
+
+@dataclass(frozen=True)
+class Favourite:
+    """A machine that is kept.
+
+    Attributes:
+        number: under which it is kept.
+        path: of its machine file, which every command reads.
+        name: of the machine.
+        note: what the designer wrote about it.
+    """
+
+    number: int
+    path: Path
+    name: str
+    note: str
+
+    def machine(self) -> Machine:
+        """Read the machine from its file.
+
+        Raises:
+            InputError: the file has been changed and has a mistake, or is gone.
+        """
+        return load(self.path)
+
+
+class Favourites:
+    """All machines that are kept in a state folder: a machine file each, its note as the first comment."""
+
+    def __init__(self, state: Path) -> None:
+        """Favourites below `state`; nothing is written before the first one."""
+        self._folder = state / "favourites"
+
+    def every(self) -> list[Favourite]:
+        """All favourites, the latest first; files that cannot be read are left out."""
+        favourites = []
+        for number, path in numbered(self._folder).items():
+            try:
+                name = str(read(path).get("name", path.stem))
+                first = path.read_text("utf-8").partition("\n")[0]
+            except (OSError, InputError):
+                continue
+            note = first.removeprefix(REMARK) if first.startswith(REMARK) else ""
+            favourites.append(Favourite(number, path, name, note))
+        return favourites
+
+    def keep(self, machine: Machine, name: str, note: str = "") -> Favourite:
+        """Keep a machine under a name.
+
+        Raises:
+            InputError: the name is empty or too long, too many machines are kept, or the folder cannot be written.
+        """
+        name, note = _printable(name), _printable(note)
+        if not name or len(name) > LONGEST_NAME:
+            raise InputError(f"the name of a favourite must have 1 to {LONGEST_NAME} characters.")
+        if len(note) > LONGEST_NOTE:
+            raise InputError(f"the note has {len(note)} characters; it may have at most {LONGEST_NOTE}.")
+        present = numbered(self._folder)
+        if len(present) >= MOST:
+            raise InputError(f"{MOST} favourites are kept, the most there may be; delete one that you no longer need.")
+        number = max(present, default=0) + 1
+        path = self._folder / f"{number:04d}-{slug(name, 'machine')}.toml"
+        remark = f"{REMARK}{note}\n" if note else ""
+        write_text(path, remark + as_toml(replace(machine, name=name)))
+        return Favourite(number, path, name, note)
+
+    def delete(self, number: int) -> None:
+        """Delete a favourite; nothing happens if it is gone already."""
+        path = numbered(self._folder).get(number)
+        if path is not None:
+            path.unlink(missing_ok=True)
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text).strip()

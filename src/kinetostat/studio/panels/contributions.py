@@ -1,0 +1,112 @@
+"""What makes the machine compliant: the contribution of every part, and the sensitivity to every parameter.
+
+Both are bars, the greatest first. The numbers come from `studies`; here they are only ranked and written.
+"""
+
+from nicegui import ui
+
+from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.machine.parameters import with_leg
+from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.sensitivity import Sensitivity
+from kinetostat.studio.answers import RankingWish, Report, map_quantities, ranking
+from kinetostat.studio.elements import choice, toggle
+from kinetostat.studio.lanes import Lane
+from kinetostat.studio.panels import Panel
+from kinetostat.studio.session import Session
+from kinetostat.studio.wording import bars, engineering, paragraph
+
+LEAST = 5e-4
+"""Share of the compliance below which a part is left out: it would read 0.0 %."""
+MOST = 24
+"""Parameters that are listed."""
+
+
+class ContributionsPanel(Panel):
+    """The share of each part in the compliance along or about one axis."""
+
+    name = "Contributions"
+
+    def build(self) -> None:
+        self._report: Report | None = None
+        self.component = toggle(["x"], "x", self._draw, "contributions-component")
+        self.bars = ui.html("", sanitize=False).mark("contributions-bars")
+
+    def show(self, report: Report, _session: Session) -> None:
+        self._report = report
+        names = list(report.analysis.components)
+        if self.component.options != names:
+            kept = self.component.value if self.component.value in names else names[-1]
+            self.component.set_options(names, value=kept)
+        self._draw()
+
+    def _draw(self) -> None:
+        if self._report is not None and self.component.value in self._report.analysis.components:
+            self.bars.set_content(contributions_text(self._report.analysis, str(self.component.value)))
+
+
+def contributions_text(analysis: Analysis, component: str) -> str:
+    """Bars of the parts that make one component of the compliance, all springs of a part added up.
+
+    Args:
+        analysis: of one pose.
+        component: one of its component names, e.g. "rx".
+    """
+    index = analysis.components.index(component)
+    compliance = analysis.compliance_diagonal[index]
+    shares: dict[str, float] = {}
+    for spring in analysis.shares:
+        shares[spring.part] = shares.get(spring.part, 0.0) + (spring.compliance[index] or 0.0)
+    ranked = sorted(shares.items(), key=lambda item: -item[1])
+    rows = [(part, share, f"{100 * share:.1f} %") for part, share in ranked if share > LEAST]
+    if compliance == 0.0:
+        return paragraph(f"The platform is rigid in {component}: no part deflects under this load.")
+    if not rows:
+        return paragraph(f"The platform moves freely in {component}: a spring there has no stiffness.")
+    unit = QUANTITIES[f"compliance_{component}"].unit
+    return paragraph(f"Compliance in {component}: {engineering(compliance, unit)}", "lead") + bars(
+        "contributions to the compliance", rows
+    )
+
+
+class SensitivityPanel(Panel):
+    """The change of one quantity per percent of each parameter (of an angle: per 0.01 rad)."""
+
+    name = "Sensitivity"
+
+    def build(self) -> None:
+        self._session: Session | None = None
+        self._lane = Lane(ranking, self._draw)
+        self.quantity = choice({}, "quantity", self._ask, "sensitivity-quantity")
+        self.bars = ui.html("", sanitize=False).mark("sensitivity-bars")
+
+    def show(self, report: Report, session: Session) -> None:
+        self._session = session
+        names = {name: text for name, text in map_quantities(report.analysis.machine).items() if name != "singularity_margin"}
+        if self.quantity.options != names:
+            kept = self.quantity.value if self.quantity.value in names else list(names)[-1]
+            self.quantity.set_options(names, value=kept)
+        self._ask()
+
+    def close(self) -> None:
+        self._lane.close()
+
+    def _ask(self) -> None:
+        if self._session is not None and self.quantity.value:
+            self._lane.ask(RankingWish(self._session.machine, str(self.quantity.value)))
+
+    def _draw(self, _wish: RankingWish, answer: Sensitivity) -> None:
+        self.bars.set_content(ranking_text(answer))
+
+
+def ranking_text(answer: Sensitivity) -> str:
+    """Bars of the parameters that influence the first quantity of a sensitivity study."""
+    percents = [(with_leg(answer.machine, p.path), p.percents[0]) for p in answer.influences if p.percents]
+    known = [(path, percent) for path, percent in percents if percent is not None]
+    largest = max((abs(percent) for _, percent in known), default=1.0)
+    rows = [(path, percent / largest, f"{percent:+.3f}") for path, percent in known[:MOST]]
+    if not rows:
+        return paragraph(answer.message or "No parameter changes this quantity at this pose.")
+    note = "Change of the quantity in percent, per percent of the parameter; of an angle, per 0.01 rad."
+    more = f" {len(known) - MOST} parameters with less effect are omitted." if len(known) > MOST else ""
+    return bars("sensitivities", rows) + paragraph(note + more)

@@ -1,0 +1,172 @@
+"""The analysis as tables: the matrices K and C, the indices of the pose, and the loads in the springs.
+
+The tables are HTML made of an `Analysis`; nothing is computed but the rounding of its numbers.
+"""
+
+from nicegui import ui
+
+from kinetostat.studies.analysis import Analysis
+from kinetostat.studio.answers import Report
+from kinetostat.studio.elements import toggle
+from kinetostat.studio.panels import Panel
+from kinetostat.studio.session import Session
+from kinetostat.studio.wording import DASH, engineering, heading, paragraph, scientific, table
+from kinetostat.views.analysis_tables import UNITS_OF_C, UNITS_OF_K
+
+KINDS = {"C": "compliance", "K": "stiffness"}
+MATRIX_UNITS = {"C": UNITS_OF_C, "K": UNITS_OF_K}
+PRINCIPAL_UNITS = {"translation": "N/m", "rotation": "N·m/rad"}
+COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")
+
+
+class MatricesPanel(Panel):
+    """K or C in four digits; the button copies all digits."""
+
+    name = "Matrices"
+
+    def build(self) -> None:
+        self._report: Report | None = None
+        with ui.row().classes("panel-tools"):
+            self.kind = toggle(list(KINDS), "C", self._draw, "matrix-kind")
+            ui.space()
+            copy = ui.button("Copy", icon="content_copy", on_click=self._copy).props("flat dense no-caps")
+            copy.mark("matrix-copy").tooltip("copy the matrix with all digits, separated by tabs, for a spreadsheet")
+        self.table = ui.html("", sanitize=False).mark("matrix-table")
+
+    def show(self, report: Report, _session: Session) -> None:
+        self._report = report
+        self._draw()
+
+    def _draw(self) -> None:
+        if self._report is not None:
+            self.table.set_content(matrix_table(self._report.analysis, str(self.kind.value)))
+
+    def _copy(self) -> None:
+        if self._report is not None:
+            ui.clipboard.write(matrix_text(self._report.analysis, str(self.kind.value)))
+            ui.notify(f"{self.kind.value} copied", position="bottom", timeout=1500)
+
+
+def _rows(analysis: Analysis, kind: str) -> list[list[float]] | None:
+    return analysis.compliance if kind == "C" else analysis.stiffness
+
+
+def _diagonal(analysis: Analysis, kind: str) -> list[float]:
+    return analysis.compliance_diagonal if kind == "C" else analysis.stiffness_diagonal
+
+
+def matrix_table(analysis: Analysis, kind: str) -> str:
+    """C or K as a table; only its diagonal where the matrix is not finite.
+
+    Args:
+        analysis: of one pose.
+        kind: "C" or "K".
+    """
+    names, rows = analysis.components, _rows(analysis, kind)
+    title = f"{KINDS[kind]} matrix {kind}"
+    if rows is not None:
+        body = [[name, *map(scientific, row)] for name, row in zip(names, rows, strict=True)]
+        return table(title, ["", *names], body, "matrix") + paragraph(MATRIX_UNITS[kind])
+    body = [[name, scientific(entry)] for name, entry in zip(names, _diagonal(analysis, kind), strict=True)]
+    reason = "A part is free" if kind == "C" else "A part is rigid"
+    note = paragraph(f"{reason}, so {kind} is not finite; its diagonal is shown.")
+    return note + table(title, ["", "diagonal"], body, "matrix")
+
+
+def matrix_text(analysis: Analysis, kind: str) -> str:
+    """C or K in all digits, cells separated by tabs; only its diagonal where the matrix is not finite."""
+    rows = _rows(analysis, kind) or [[entry] for entry in _diagonal(analysis, kind)]
+    return "\n".join("\t".join(repr(entry) for entry in row) for row in rows)
+
+
+class IndicesPanel(Panel):
+    """Principal stiffnesses, condition numbers, mobility and centres."""
+
+    name = "Indices"
+
+    def build(self) -> None:
+        self.content = ui.html("", sanitize=False).mark("indices")
+
+    def show(self, report: Report, _session: Session) -> None:
+        self.content.set_content(indices_text(report.analysis))
+
+
+def indices_text(analysis: Analysis) -> str:
+    """All indices of a pose as tables under headings."""
+    return "".join([_principal(analysis), _pose(analysis), _centres(analysis)])
+
+
+def _principal(analysis: Analysis) -> str:
+    blocks = analysis.indices.free if analysis.indices else None
+    rows = [
+        [f"{name} {n}", engineering(stiffness, PRINCIPAL_UNITS[name]), ", ".join(f"{c:.3f}" for c in direction)]
+        for name, block in (blocks or {}).items()
+        for n, (stiffness, direction) in enumerate(zip(block.stiffnesses, block.directions, strict=True), 1)
+    ]
+    title = "Principal stiffnesses"
+    return heading(title) + table(title, ["", "stiffness", "direction"], rows)
+
+
+def _pose(analysis: Analysis) -> str:
+    mobility, indices = analysis.mobility, analysis.indices
+    rows = [
+        ["condition number of W", engineering(analysis.wrench_condition)],
+        ["condition number of the actuators' Jacobian", engineering(analysis.jacobian_condition)],
+        ["condition number of K", engineering(indices.condition if indices else None)],
+        ["rank", str(analysis.rank)],
+        ["characteristic length", engineering(analysis.length, "m")],
+    ]
+    if mobility is not None:
+        rows += [
+            ["kind of pose", str(mobility.kind)],
+            ["degrees of freedom", str(mobility.full_cycle)],
+            ["actuators", str(mobility.actuators)],
+            ["redundant constraints", str(mobility.here.redundant)],
+            ["singularity margin of the legs (0 to 1)", f"{mobility.leg_distance:.4g}"],
+            ["singularity margin of the platform (0 to 1)", f"{mobility.platform_distance:.4g}"],
+        ]
+    return heading("Pose") + table("Pose", ["", ""], rows)
+
+
+def _centres(analysis: Analysis) -> str:
+    centres = analysis.indices.centres if analysis.indices else {}
+    rows = [
+        [name, ", ".join(engineering(float(c), "m") for c in point) if point else DASH]
+        for name, point in centres.items()
+    ]
+    title = f"Centres, measured from the {analysis.machine.reference}"
+    return heading(title) + table(title, ["", "x, y, z"], rows)
+
+
+class LoadsPanel(Panel):
+    """The deflection of the tool, and the load and deformation of every spring."""
+
+    name = "Loads"
+
+    def build(self) -> None:
+        self.content = ui.html("", sanitize=False).mark("under-load")
+
+    def show(self, report: Report, _session: Session) -> None:
+        self.content.set_content(load_text(report.analysis))
+
+
+def load_text(analysis: Analysis) -> str:
+    """Deflection and spring loads as tables; without a load, how to set one."""
+    load = analysis.load
+    if load is None:
+        return paragraph("There is no load on the tool. Set a force or a moment under Load on the left.")
+    tool = [
+        [name, *_loaded(wrench, motion, name.startswith("r"))]
+        for name, wrench, motion in zip(COMPONENTS, load.wrench, load.deflection, strict=True)
+    ]
+    springs = [[spring.name, *_loaded(spring.load, spring.deformation, spring.turning)] for spring in load.springs]
+    return (
+        heading("Tool point")
+        + table("tool point", ["", "load", "deflection"], tool)
+        + heading("Actuators and springs")
+        + table("actuators and springs", ["", "load", "deformation"], springs)
+    )
+
+
+def _loaded(load: float, motion: float, turning: bool) -> list[str]:
+    return [engineering(load, "N·m" if turning else "N"), engineering(motion, "rad" if turning else "m")]
