@@ -82,7 +82,9 @@ class SensitivityPanel(Panel):
 
     def show(self, report: Report, session: Session) -> None:
         self._session = session
-        names = {name: text for name, text in map_quantities(report.analysis.machine).items() if name != "singularity_margin"}
+        names = {
+            name: text for name, text in map_quantities(report.analysis.machine).items() if name != "singularity_margin"
+        }
         if self.quantity.options != names:
             kept = self.quantity.value if self.quantity.value in names else list(names)[-1]
             self.quantity.set_options(names, value=kept)
