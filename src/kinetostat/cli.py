@@ -223,8 +223,7 @@ def _check_study(options: argparse.Namespace) -> int:
 
 def _analyze(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
-    from kinetostat.studies.analysis import analyze
-    from kinetostat.studies.analysis_data import as_json
+    from kinetostat.studies.analysis import analyze, as_json
 
     found = analyze(load_machine(options), options.axes)
     answered = found.status is Status.OK

@@ -54,7 +54,7 @@ def load_case(found):
     places = [COMPONENTS.index(name) for name in found.components]
     compliance = np.zeros((6, 6))
     compliance[np.ix_(places, places)] = found.compliance
-    sizes = np.repeat([1.0, found.length], 3)
+    sizes = np.repeat([1.0, found.characteristic_length], 3)
     wrench = np.zeros(6)
     wrench[places] = (np.random.default_rng(5).uniform(0.5, 1.0, 6) / sizes[::-1])[places]
     largest = np.max(np.abs(compliance @ wrench) / sizes)
@@ -133,4 +133,4 @@ def test_known_masses_are_those_of_the_machine():
     model = Loaded(found).model
     assert model.body("platform").mass[0] == 12.0
     legs = sum(model.body_mass) - 12.0
-    assert legs == pytest.approx(found.mass - 12.0)
+    assert legs == pytest.approx(found.moving_mass - 12.0)

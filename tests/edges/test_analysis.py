@@ -13,8 +13,7 @@ from kinetostat.cli import main
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.analysis import analyze
-from kinetostat.studies.analysis_data import as_json
+from kinetostat.studies.analysis import analyze, as_json
 from machines import CASES, CONTRASTING, every_machine, machines
 
 NAME = "zhang-gosselin-4dof"
@@ -80,7 +79,7 @@ def test_json_has_its_shape_and_no_number_that_json_lacks(settings, status, word
     data = as_json(at(*settings))
     assert json.loads(json.dumps(data, allow_nan=False)) == data
     assert data["name"] == "Zhang & Gosselin 4-dof"
-    assert data["order"] == list(COMPONENTS)
+    assert data["components"] == list(COMPONENTS)
     assert set(data["pose"]) == {"x", "z", "theta5", "theta6"}
     assert (data["status"], data["message"]) == (status, at(*settings).message)
     for matrix in ("stiffness", "compliance"):

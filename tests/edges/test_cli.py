@@ -175,7 +175,7 @@ def test_json_is_all_that_stdout_holds(settings, status, missing, capsys):
     found = json.loads(output.out)
     assert output.err == ""
     assert found["status"] == status
-    assert found["order"] == ["rx", "ry", "rz", "x", "y", "z"]
+    assert found["components"] == ["rx", "ry", "rz", "x", "y", "z"]
     if missing:
         assert found[missing] is None
     else:

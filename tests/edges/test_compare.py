@@ -47,7 +47,7 @@ def test_machines_with_other_freedoms_have_gaps():
     assert by_name["C_rx"]["percent"][1] is None
     assert by_name["C_rz"]["values"][1] == pytest.approx(analyze(load("planar-3rpr")).compliance_diagonal[0])
     assert by_name["moving mass"]["values"][:2] == [None, None]
-    assert [one["order"][0] for one in found["designs"]] == ["rx", "rz", "rx"]
+    assert [one["components"][0] for one in found["designs"]] == ["rx", "rz", "rx"]
     differences = found["differences"]
     assert {"pose.x", "pose.y"} <= set(differences)
     assert differences["stiffness.actuator"][2] is None, "the tripteron's are in its legs"

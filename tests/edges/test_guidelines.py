@@ -100,7 +100,7 @@ def test_every_kind_of_machine_has_guidelines(name, capsys):
     assert found["statements"]
     assert found["parameters"]
     shares = [row["compliance_share"] for row in found["elements"] if row["name"] != "links together"]
-    for direction in found["order"]:
+    for direction in found["components"]:
         assert sum(row[direction] for row in shares) == pytest.approx(1.0, abs=1e-9)
 
 

@@ -71,7 +71,7 @@ def test_its_matrices_are_those_of_analyze(paper):
     assert paper.results == found
     for start, key in (("Stiffness K", "stiffness"), ("Compliance C", "compliance")):
         heads, *rows = paper.table(start)
-        assert heads[1:] == [row[0] for row in rows] == found["order"]
+        assert heads[1:] == [row[0] for row in rows] == found["components"]
         for row, expected in zip(rows, found[key], strict=True):
             assert [number(cell) for cell in row[1:]] == pytest.approx(expected, rel=1e-3, abs=1e-12)
 

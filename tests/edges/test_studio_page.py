@@ -173,7 +173,7 @@ def test_the_map_shows_any_quantity_over_any_two_coordinates():
 def test_contributions_are_the_attribution():
     async def steps(page):
         await page.choose("contributions-component", "y")
-        shares = {share.name: share.compliance[4] for share in analyze(load(MACHINE)).shares}
+        shares = {one.spring: one.compliance_share[4] for one in analyze(load(MACHINE)).attribution}
         assert f"{100 * shares['passive link 1']:.1f} %" in page.one("contributions-bars").content
         assert "leg 1 actuator" not in page.one("contributions-bars").content
 

@@ -33,8 +33,8 @@ def test_netcdf_holds_k_and_c_by_the_names_of_their_rows(name, tmp_path):
             dataset["compliance"].sel(row="x", column="rz")
             == found.compliance[-2 if name[0] == "p" else 3][list(found.components).index("rz")]
         )
-        assert dataset["compliance_share"].sel(spring=found.shares[0].name).values.tolist() == pytest.approx(
-            list(found.shares[0].compliance)
+        assert dataset["compliance_share"].sel(spring=found.attribution[0].spring).values.tolist() == pytest.approx(
+            list(found.attribution[0].compliance_share)
         )
         assert all("units" in variable.attrs for variable in dataset.data_vars.values())
         assert dataset["pose_x"].attrs["units"] == "m"
@@ -61,8 +61,8 @@ def test_csv_has_a_number_a_line_with_its_unit(name, tmp_path):
     assert told["stiffness", "rz", "rz"][1] == "N·m/rad"
     assert told["stiffness", "rz", "x"][1] == told["stiffness", "x", "rz"][1] == "N/rad"
     assert told["compliance", "x", "y"][1] == "m/N"
-    drive = next(share for share in found.shares if "actuator" in share.name)
-    assert told["spring_stiffness", drive.name, ""] == (repr(drive.stiffness), "N/m")
+    drive = next(one for one in found.attribution if "actuator" in one.spring)
+    assert told["spring_stiffness", drive.spring, ""] == (repr(drive.stiffness), "N/m")
 
 
 def test_results_say_of_what_and_where_they_hold(tmp_path):

@@ -15,8 +15,7 @@ from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
-from kinetostat.studies.analysis import analyze
-from kinetostat.studies.analysis_data import as_json
+from kinetostat.studies.analysis import analyze, as_json
 from machines import every_machine
 
 CONDITION = 1e-8

@@ -5,8 +5,7 @@ import pytest
 from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.vector import Vector
 from kinetostat.machine.loading import bundled, load
-from kinetostat.studies.analysis import analyze
-from kinetostat.studies.analysis_data import as_json
+from kinetostat.studies.analysis import analyze, as_json
 from kinetostat.studies.rounding import clean_matrix, clean_screw
 from kinetostat.validation.comparison import validate
 

@@ -65,7 +65,7 @@ class Pace:
 def pace_of(analysis: Analysis, model: Model) -> Pace:
     """What suits a machine: accurate constraints, springs that the time step can follow, quick rest."""
     masses = _masses(model, analysis.masses)
-    length = float(analysis.length or 1.0)
+    length = float(analysis.characteristic_length or 1.0)
     gyration = GYRATION * length
     stiff, soft = min(_compliances(analysis, gyration)), max(_compliances(analysis, length))
     step = math.sqrt(YIELDING * stiff * min(masses.values()) / (1.0 - IMPEDANCE)) / LEAST_STEPS

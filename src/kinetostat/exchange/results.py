@@ -71,8 +71,8 @@ def as_dataset(analysis: Analysis) -> xr.Dataset:
         "row": names,
         "column": names,
         "component": names,
-        "spring": [share.name for share in analysis.shares],
-        "part": ("spring", [share.part for share in analysis.shares]),
+        "spring": [contribution.spring for contribution in analysis.attribution],
+        "part": ("spring", [contribution.part for contribution in analysis.attribution]),
         "spring_unit": ("spring", [_spring_unit(spring) for spring in springs(respond(machine).configuration)]),
         "axis": list(AXES),
         "base_axis": list(AXES),
@@ -104,10 +104,10 @@ def pose_of(analysis: Analysis) -> dict[str, Variable]:
 
 
 def _springs(analysis: Analysis) -> dict[str, Variable]:
-    shares = analysis.shares
+    shares = analysis.attribution
     by_matrix = {
         "stiffness_share": ([one.stiffness_share for one in shares], "share of the diagonal of K"),
-        "compliance_share": ([one.compliance for one in shares], "share of the diagonal of C"),
+        "compliance_share": ([one.compliance_share for one in shares], "share of the diagonal of C"),
     }
     size = (len(shares), len(analysis.components))
     found: dict[str, Variable] = {
@@ -130,19 +130,23 @@ def _indices(analysis: Analysis) -> dict[str, Variable]:
         "wrench_condition": (analysis.wrench_condition, "condition of W, of the leg wrenches", "1"),
         "jacobian_condition": (analysis.jacobian_condition, "condition of the actuators' Jacobian", "1"),
         "stiffness_condition": (
-            indices.condition if indices else None,
+            indices.stiffness_condition if indices else None,
             "condition of K, by its extreme eigenvalues",
             "1",
         ),
-        "characteristic_length": (analysis.length, "by which rotations are compared with translations", "m"),
-        "moving_mass": (analysis.mass, "of what moves, as far as it is known", "kg"),
+        "characteristic_length": (
+            analysis.characteristic_length,
+            "by which rotations are compared with translations",
+            "m",
+        ),
+        "moving_mass": (analysis.moving_mass, "of what moves, as far as it is known", "kg"),
     }
     found: dict[str, Variable] = {
         name: ((), value, _said(meaning, unit))
         for name, (value, meaning, unit) in scalars.items()
         if value is not None and math.isfinite(value)
     }
-    for block, principal in ((indices and indices.principal) or {}).items():
+    for block, principal in ((indices and indices.principal_compliances) or {}).items():
         unit = UNITS["compliance"][0 if block == "rotation" else 2]
         told = _said(f"principal compliances, {block}", unit)
         found[f"principal_compliance_{block}"] = ((f"principal_{block}",), list(principal.compliances), told)

@@ -1,11 +1,12 @@
-"""The first question: how stiff is this machine at this pose, and why. One pose; nothing is compiled.
+"""Analysis of a machine at one pose: how stiff it is, and why. Nothing is compiled for a single pose.
 
-What is printed or written of it is elsewhere (`analysis_data`, `views.tables`).
+Plain data of it is at the end of this file; tables are in `views.analysis_tables`.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -17,19 +18,19 @@ from kinetostat.kinematics.mobility import Mobility, mobility
 from kinetostat.kinematics.singularity import conditioning, describe, independent
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, stiffness_matrix
-from kinetostat.kinetostatics.attribution import compliance_shares, stiffness_shares
 from kinetostat.kinetostatics.conditioning import twist_condition
 from kinetostat.kinetostatics.internal import InternalLoads, internal_loads
 from kinetostat.kinetostatics.response import Response, respond
-from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Configuration, Machine, need_machine, springs
 from kinetostat.machine.mass import Mass, moving_masses
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.studies.indices import Along, Indices, indices_of, stiffness_along
+from kinetostat.studies.attribution import Contribution, contributions
+from kinetostat.studies.indices import Along, Indices, indices_json, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
+from kinetostat.studies.plain_data import plain, stiffness_of_spring
 from kinetostat.studies.refusal import why_not
-from kinetostat.studies.rounding import clean_matrix, clean_screw
+from kinetostat.studies.rounding import clean_matrix, clean_statics
 
 Rows = list[list[float]]
 
@@ -39,25 +40,6 @@ INDEPENDENT = 1e-9
 """Relative size of a singular value below which the motions of springs are dependent."""
 NEARBY = 0.03
 """How far poses for the general mobility lie from the pose: in units of the machine's length, and in rad."""
-
-
-@dataclass(frozen=True)
-class SpringShare:
-    """What one spring does to the platform.
-
-    Attributes:
-        name: of the spring.
-        part: the joint or link that it stands for.
-        stiffness: N/m or N·m/rad; infinity if rigid.
-        compliance: its share of the diagonal entries of C, 0 to 1, or None where there is nothing to share.
-        stiffness_share: likewise of K.
-    """
-
-    name: str
-    part: str
-    stiffness: float
-    compliance: tuple[float | None, ...]
-    stiffness_share: tuple[float | None, ...]
 
 
 @dataclass(frozen=True)
@@ -76,16 +58,16 @@ class Analysis:
         stiffness_diagonal, compliance_diagonal: their diagonals, infinity where rigid or free.
         rank: of C, or of K where a direction is free.
         rigid, free: names of the springs with infinite and with zero stiffness.
-        shares: attribution, spring by spring.
+        attribution: what each spring contributes to K and C.
         indices: numbers and directions read off K and C.
         mobility: what can move, and the kind of pose.
-        internal: statically indeterminate loads.
+        internal_loads: statically indeterminate loads.
         load: what the machine's [load] does, None without one.
         masses: of what moves, part by part.
         wrench_condition: ratio of the extreme singular values of W, moments divided by the characteristic length.
         jacobian_condition: of the actuators' Jacobian, angles multiplied by that length; None where actuators are of
             two kinds, or there is none.
-        length: that length, m.
+        characteristic_length: that length, m.
     """
 
     machine: Machine
@@ -101,23 +83,23 @@ class Analysis:
     rank: int | None = None
     rigid: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
-    shares: tuple[SpringShare, ...] = ()
+    attribution: tuple[Contribution, ...] = ()
     indices: Indices | None = None
     mobility: Mobility | None = None
-    internal: InternalLoads | None = None
+    internal_loads: InternalLoads | None = None
     load: LoadCase | None = None
     masses: tuple[Mass, ...] = ()
     wrench_condition: float | None = None
     jacobian_condition: float | None = None
-    length: float | None = None
+    characteristic_length: float | None = None
 
     def __repr__(self) -> str:
         return f"<Analysis of {self.machine.name!r}: {self.status.word}, components {' '.join(self.components)}>"
 
     @property
-    def mass(self) -> float | None:
-        """Of what moves as far as it is known, kg; None where nothing is known."""
-        known = [float(one.mass) for one in self.masses if one.mass is not None]
+    def moving_mass(self) -> float | None:
+        """Mass of all moving parts whose mass is known, kg; None where none is known."""
+        known = [float(part.mass) for part in self.masses if part.mass is not None]
         return sum(known) if known else None
 
     def along(self, direction: Sequence[float]) -> Along:
@@ -148,17 +130,20 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     response = respond(machine)
     status = Status(int(response.status))
     configuration = response.configuration
+    nearby = _nearby(machine, float(configuration.length))
     if status is not Status.OK:
-        return Analysis(machine, status, why_not(machine, response, _around(machine)), machine.family.component_names)
+        return Analysis(machine, status, why_not(machine, response, nearby), machine.family.component_names)
     turn = IDENTITY if axes == "base" else configuration.platform.rotation.inverse()
-    response = replace(response, statics=_without_rounding(response.statics))
-    statics = _without_rounding(_turned(response.statics, turn))
+    # Screws are cleaned before they are turned, where an exact zero is easy to tell, and once more after it, because
+    # turning adds round-off of its own.
+    response = replace(response, statics=clean_statics(response.statics))
+    statics = clean_statics(_turned(response.statics, turn))
     stiffness, compliance = stiffness_matrix(statics), compliance_matrix(statics)
     kept = machine.family.components
     soft, stiff = _rows(compliance, kept), _rows(stiffness, kept)
-    held, length = springs(configuration), float(configuration.length)
-    rigid = tuple(spring.name for spring in held if math.isinf(spring.stiffness))
-    free = tuple(spring.name for spring in held if spring.stiffness == 0.0)
+    every, length = springs(configuration), float(configuration.length)
+    rigid = tuple(spring.name for spring in every if math.isinf(spring.stiffness))
+    free = tuple(spring.name for spring in every if spring.stiffness == 0.0)
     extremes = conditioning(response.legs, length, response.guide)
     return Analysis(
         machine,
@@ -174,15 +159,15 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
         rank=_rank(statics, soft is None),
         rigid=rigid,
         free=free,
-        shares=_shares(held, statics, stiffness, compliance, kept),
+        attribution=contributions(every, statics, stiffness, compliance, kept),
         indices=indices_of(stiff, soft, length, kept),
-        mobility=mobility(configuration, _around(machine), response.reference),
-        internal=internal_loads([leg.name for leg in configuration.legs], response.legs, length, response.guide),
-        load=load_case(machine, replace(response, compliance=compliance), turn),
+        mobility=mobility(configuration, nearby, response.reference),
+        internal_loads=internal_loads([leg.name for leg in configuration.legs], response.legs, length, response.guide),
+        load=load_case(response, compliance, turn),
         masses=tuple(moving_masses(machine, configuration)),
         wrench_condition=float(extremes[0] / extremes[-1]),
         jacobian_condition=_jacobian_condition(response, length),
-        length=length,
+        characteristic_length=length,
     )
 
 
@@ -196,7 +181,7 @@ def _jacobian_condition(response: Response, length: float) -> float | None:
 
 
 def _rows(matrix: Symmetric6, kept: tuple[int, ...]) -> Rows | None:
-    """The rows and columns that exist, without rounding, or None where an entry is infinite."""
+    """The rows and columns that exist, without round-off, or None where an entry is infinite."""
     rows = [[float(matrix.entry(i, j)) for j in kept] for i in kept]
     return clean_matrix(rows) if all(math.isfinite(entry) for row in rows for entry in row) else None
 
@@ -207,26 +192,22 @@ def _placement(configuration: Configuration) -> tuple[tuple[float, ...], Rows]:
     return tuple(float(c) for c in configuration.platform.translation.components()), [list(row) for row in rows]
 
 
-def _around(machine: Machine) -> list[Configuration]:
-    """The machine at three poses around its own, as far as it can reach them."""
-    pose = {p.path: p.quantity.kind for p in parameters(machine.family) if p.path.startswith("pose.")}
-    length, held = float(machine_length(machine)), values(machine)
-    found, rng = [], np.random.default_rng(0)
-    for _ in range(3):
-        reach = {path: NEARBY * (length if kind == "length" else 1.0) for path, kind in pose.items()}
-        response = respond(with_values(machine, {p: held[p] + r * float(rng.uniform(-1, 1)) for p, r in reach.items()}))
-        if Status(int(response.status)) is Status.OK:
-            found.append(response.configuration)
-    return found
+def _nearby(machine: Machine, length: float) -> list[Configuration]:
+    """The machine at three poses near its pose, as far as it can reach them; `length` is its characteristic length.
 
-
-def machine_length(machine: Machine) -> float:
-    """The characteristic length of a machine at its pose, m."""
-    return float(respond(machine).configuration.length)
+    Mobility is a rank, and ranks drop at special poses: only the poses around tell what holds in general. They are
+    random, so that none lies on a symmetry of the machine, but the same every time.
+    """
+    kinds = {p.path: p.quantity.kind for p in parameters(machine.family) if p.path.startswith("pose.")}
+    reach = {path: NEARBY * (length if kind == "length" else 1.0) for path, kind in kinds.items()}
+    here, rng = values(machine), np.random.default_rng(0)
+    poses = [{path: here[path] + r * float(rng.uniform(-1, 1)) for path, r in reach.items()} for _ in range(3)]
+    answers = [respond(with_values(machine, pose)) for pose in poses]
+    return [answer.configuration for answer in answers if Status(int(answer.status)) is Status.OK]
 
 
 def _turned(statics: Statics, turn: Rotation) -> Statics:
-    """The shares of the springs, of K and of C in axes turned back by `turn`."""
+    """The statics with all that K, C and their attribution are made of in axes turned back by `turn`."""
     return replace(
         statics,
         flexibility=tuple(twist.rotated(turn) for twist in statics.flexibility),
@@ -236,35 +217,24 @@ def _turned(statics: Statics, turn: Rotation) -> Statics:
     )
 
 
-def _without_rounding(statics: Statics) -> Statics:
-    """The same statics with exact zeros where a screw's component is but rounding beside its others."""
-    length = statics.length
-    return replace(
-        statics,
-        flexibility=tuple(clean_screw(twist, 1.0 / length) for twist in statics.flexibility),
-        resistance=tuple(clean_screw(wrench, length) for wrench in statics.resistance),
-        motions=tuple((clean_screw(twist, 1.0 / length), s) for twist, s in statics.motions),
-        actions=tuple((clean_screw(wrench, length), k) for wrench, k in statics.actions),
-    )
-
-
 def _rank(statics: Statics, endless: bool) -> int:
     """Rank of C, or of K where C is not finite; independent of how much the springs differ."""
     if endless:
-        held: list[Screw] = [wrench for wrench, k in statics.actions if k > 0.0]
-        return independent(held, statics.length, INDEPENDENT)
-    moved: list[Screw] = [twist for twist, s in statics.motions if s > 0.0]
-    return independent(moved, 1.0 / statics.length, INDEPENDENT)
+        wrenches: list[Screw] = [wrench for wrench, k in statics.actions if k > 0.0]
+        return independent(wrenches, statics.length, INDEPENDENT)
+    twists: list[Screw] = [twist for twist, s in statics.motions if s > 0.0]
+    return independent(twists, 1.0 / statics.length, INDEPENDENT)
 
 
-def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...], yielding: bool) -> str:
+def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...], finite: bool) -> str:
+    """What is special about a pose with an answer; `finite` says whether K is."""
     sentences = []
-    if not yielding and not rigid:
-        sentences.append("A leg carries a load here that none of its springs feels: K is infinite against it, C exact.")
+    if not finite and not rigid:
+        sentences.append("At this pose one leg is rigid against some load: K is infinite against it, C is exact.")
     if rigid:
         sentences.append(f"Rigid: {', '.join(rigid)}; K is infinite in the directions that they hold, C is exact.")
-    held = springs(response.configuration)
-    for spring, twist in zip(held, response.statics.flexibility, strict=True):
+    every = springs(response.configuration)
+    for spring, twist in zip(every, response.statics.flexibility, strict=True):
         if spring.name in free:
             per = "m" if spring.joint.point is None else "rad"
             motion = describe([float(c) for c in twist.components()], (f"rad/{per}", f"m/{per}"))
@@ -273,19 +243,54 @@ def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...], 
     return " ".join(sentences) or Status.OK.sentence
 
 
-def _shares(
-    held: list[Spring], statics: Statics, stiffness: Symmetric6, compliance: Symmetric6, kept: tuple[int, ...]
-) -> tuple[SpringShare, ...]:
-    parts = zip(compliance_shares(statics), stiffness_shares(statics), held, strict=True)
-    return tuple(
-        SpringShare(
-            spring.name, spring.part or spring.name, spring.stiffness,
-            _ratio(soft, compliance, kept), _ratio(stiff, stiffness, kept),
-        )
-        for soft, stiff, spring in parts
-    )  # fmt: skip
+def as_json(analysis: Analysis, along: Sequence[Along] = ()) -> dict[str, Any]:
+    """The analysis, and stiffnesses along directions, as plain data."""
+    machine = analysis.machine
+    pose = {path.removeprefix("pose."): value for path, value in values(machine).items() if path.startswith("pose.")}
+    position, rotation = analysis.platform or (None, None)
+    data: dict[str, Any] = {
+        "name": machine.name,
+        "family": machine.family.name,
+        "components": analysis.components,
+        "axes": analysis.axes,
+        "pose": pose,
+        "status": analysis.status.word,
+        "message": analysis.message,
+        "platform": {"position": position, "rotation": rotation},
+        "tool_offset": machine.tables["tool"].offset,
+        "stiffness": analysis.stiffness,
+        "compliance": analysis.compliance,
+        "stiffness_diagonal": analysis.stiffness_diagonal or None,
+        "compliance_diagonal": analysis.compliance_diagonal or None,
+        "rank": analysis.rank,
+        "rigid": analysis.rigid,
+        "free": analysis.free,
+        "wrench_condition": analysis.wrench_condition,
+        "jacobian_condition": analysis.jacobian_condition,
+        "characteristic_length": analysis.characteristic_length,
+        **indices_json(analysis.indices),
+        "along": along,
+        "mobility": analysis.mobility and _mobility_json(analysis.mobility),
+        "internal_loads": analysis.internal_loads,
+        "load": analysis.load,
+        "moving_mass": analysis.moving_mass,
+        "masses": {part.name: part.mass for part in analysis.masses},
+        "attribution": [{**vars(one), "stiffness": stiffness_of_spring(one.stiffness)} for one in analysis.attribution],
+    }
+    return dict(plain(data))
 
 
-def _ratio(part: Symmetric6, whole: Symmetric6, kept: tuple[int, ...]) -> tuple[float | None, ...]:
-    pairs = [(part.entry(i, i), whole.entry(i, i)) for i in kept]
-    return tuple(p / w if 0.0 < w < math.inf else None for p, w in pairs)
+def _mobility_json(mobility: Mobility) -> dict[str, Any]:
+    return {
+        "full_cycle": mobility.full_cycle,
+        "here": mobility.here.platform,
+        "legs": mobility.here.legs,
+        "idle": mobility.here.idle,
+        "redundant_constraints": mobility.here.redundant,
+        "actuators": mobility.actuators,
+        "kind": mobility.kind,
+        "locked_legs": mobility.lost,
+        "free_twists": mobility.twists,
+        "leg_distance": mobility.leg_distance,
+        "platform_distance": mobility.platform_distance,
+    }

@@ -1,7 +1,11 @@
-"""All indices of one pose together, read off K and C; their formulas are in `kinetostatics`."""
+"""Indices of one pose, read off K and C: principal stiffnesses, centres, eigenscrews.
+
+The formulas are in `kinetostatics`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from kinetostat.kinetostatics.centres import (
     Point,
@@ -32,17 +36,18 @@ class Indices:
     """Indices of a pose, at T and in the axes of K and C.
 
     Attributes:
-        principal: principal compliances by block, None where a direction is free.
+        principal_compliances: by block, None where a direction is free.
         free, guided: principal stiffnesses by block, the other block free or held (`kinetostatics.indices`).
-        condition: of K, rotations made comparable by the characteristic length; infinite where rigid or free.
+        stiffness_condition: condition number of K, rotations made comparable by the characteristic length;
+            infinite where rigid or free.
         centres: of stiffness, compliance and elasticity, from T, m; None where there is none.
         eigenscrews: of K, or of C where K is not finite; empty for a planar machine.
     """
 
-    principal: dict[str, Principal] | None
+    principal_compliances: dict[str, Principal] | None
     free: dict[str, PrincipalStiffness] | None
     guided: dict[str, PrincipalStiffness] | None
-    condition: float
+    stiffness_condition: float
     centres: dict[str, Point | None]
     eigenscrews: tuple[Eigenscrew, ...]
 
@@ -114,3 +119,24 @@ def indices_of(stiffness: Rows | None, compliance: Rows | None, length: float, c
         },
         tuple(screws),
     )
+
+
+def indices_json(indices: Indices | None) -> dict[str, Any]:
+    """The indices as the part of an analysis's plain data that they are."""
+    if indices is None:
+        return {"principal_compliances": None}
+    compliances = (indices.principal_compliances or {}).items()
+    stiffnesses = {"free": indices.free or {}, "guided": indices.guided or {}}
+    return {
+        "principal_compliances": {
+            block: {"values": c.compliances, "directions": c.directions} for block, c in compliances
+        }
+        or None,
+        "principal_stiffnesses": {
+            kind: {block: {"values": k.stiffnesses, "directions": k.directions} for block, k in blocks.items()}
+            for kind, blocks in stiffnesses.items()
+        },
+        "stiffness_condition": indices.stiffness_condition,
+        "centres": indices.centres,
+        "eigenscrews": indices.eigenscrews,
+    }

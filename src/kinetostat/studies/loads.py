@@ -8,7 +8,7 @@ from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import Rotation
 from kinetostat.kinetostatics.loading import JointReaction, deflection, joint_reactions, spring_loads
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.machine import Machine, springs
+from kinetostat.machine.machine import springs
 from kinetostat.studies.rounding import ROUNDING, clean_screw
 
 
@@ -47,15 +47,15 @@ class LoadCase:
     reactions: tuple[JointReaction, ...]
 
 
-def load_case(machine: Machine, response: Response, turn: Rotation) -> LoadCase | None:
-    """The effects of a machine's load; None where it has none.
+def load_case(response: Response, compliance: Symmetric6, turn: Rotation) -> LoadCase | None:
+    """Compute the effects of a machine's load; None where its file gives none.
 
     Args:
-        machine: with its table [load], base axes.
-        response: of it, with C in the axes of the results.
+        response: of the machine, its load included; base axes.
+        compliance: C in the axes of the results.
         turn: from base axes to those.
     """
-    wrench = machine.load
+    wrench = response.load
     if not any(wrench.components()):
         return None
     length = float(response.configuration.length)
@@ -64,7 +64,7 @@ def load_case(machine: Machine, response: Response, turn: Rotation) -> LoadCase 
     loads = zip(springs(response.configuration), spring_loads(response, wrench), strict=True)
     return LoadCase(
         seen.components(),
-        _deflection(response.compliance, seen),
+        _deflection(compliance, seen),
         tuple(
             SpringLoad(
                 s.name, s.actuated, s.joint.point is not None, float(load), _give(float(load), float(s.stiffness))

@@ -1,12 +1,14 @@
-"""What is but rounding beside the other numbers of one result is 0. Nothing else is rounded.
+"""Round-off: entries of a result that are only round-off beside its other entries are set to zero.
 
-Screws and matrices are at one point, in one set of axes, in the order rx ry rz x y z.
+No other digit is touched. Screws and matrices are at one point, in one set of axes, in the order rx ry rz x y z.
 """
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from kinetostat.algebra.vector import Vector
+from kinetostat.kinetostatics.assembly import Statics
 from kinetostat.kinetostatics.leg import AnyScrew
 
 ROUNDING = 1e-12
@@ -35,3 +37,15 @@ def clean_matrix(rows: Sequence[Sequence[float]], share: float = ROUNDING) -> li
         [0.0 if abs(c) < share * math.sqrt(size * other) else c for c, other in zip(row, sizes, strict=True)]
         for row, size in zip(rows, sizes, strict=True)
     ]
+
+
+def clean_statics(statics: Statics) -> Statics:
+    """The same statics with exact zeros where a component of a screw is only round-off."""
+    length = statics.length
+    return replace(
+        statics,
+        flexibility=tuple(clean_screw(twist, 1.0 / length) for twist in statics.flexibility),
+        resistance=tuple(clean_screw(wrench, length) for wrench in statics.resistance),
+        motions=tuple((clean_screw(twist, 1.0 / length), s) for twist, s in statics.motions),
+        actions=tuple((clean_screw(wrench, length), k) for wrench, k in statics.actions),
+    )

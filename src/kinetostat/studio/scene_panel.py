@@ -109,7 +109,8 @@ def scene_key(report: Report) -> str:
     """What the overlays are, with their scales."""
     found, parts = report.analysis, []
     units = {"translation": "m/N", "rotation": "rad/(N·m)"}
-    for block, one in (found.indices.principal if found.indices and found.indices.principal else {}).items():
+    principal = found.indices.principal_compliances if found.indices else None
+    for block, one in (principal or {}).items():
         parts.append(f'<li class="key-{block}">{block}: softest {engineering(one.compliances[-1], units[block])}</li>')
     return f"<ul>{''.join(parts)}</ul>"
 

@@ -9,7 +9,8 @@ from rich.text import Text
 
 from kinetostat.kinetostatics.eigenscrews import Eigenscrew
 from kinetostat.kinetostatics.indices import PrincipalStiffness
-from kinetostat.studies.analysis import Analysis, Rows, SpringShare
+from kinetostat.studies.analysis import Analysis, Rows
+from kinetostat.studies.attribution import by_part
 from kinetostat.studies.indices import Along
 from kinetostat.studies.loads import LoadCase
 from kinetostat.studies.rounding import ROUNDING
@@ -74,19 +75,12 @@ def _matrix_table(
 def shares_table(analysis: Analysis, full: bool = False) -> Table:
     """Attribution, by default of joints and links as a whole."""
     table = numeric_table("Attribution: shares in the diagonal of C", "part", analysis.components)
-    for name, shares in [(s.name, [s]) for s in analysis.shares] if full else by_part(analysis.shares):
-        columns = zip(*(share.compliance for share in shares), strict=True)
+    springs = {one.spring: [one] for one in analysis.attribution}
+    for name, contributions in (springs if full else by_part(analysis.attribution)).items():
+        columns = zip(*(contribution.compliance_share for contribution in contributions), strict=True)
         parts = [None if None in column else sum(c for c in column if c is not None) for column in columns]
         table.add_row(name, *("–" if part is None else f"{100 * part:.1f} %" for part in parts))
     return table
-
-
-def by_part(shares: Sequence[SpringShare]) -> list[tuple[str, list[SpringShare]]]:
-    """The shares of springs by the joint or link that they stand for."""
-    found: dict[str, list[SpringShare]] = {}
-    for share in shares:
-        found.setdefault(share.part, []).append(share)
-    return list(found.items())
 
 
 def principal_table(analysis: Analysis) -> Table:
@@ -192,21 +186,21 @@ def remarks(analysis: Analysis) -> list[str]:
             f"Mobility: {found.full_cycle} freedoms, {found.actuators} actuators{extra}; {found.kind} pose, "
             f"distance from a singularity {legs} (legs), {platform} (platform) of 1."
         )
-    if analysis.internal and analysis.internal.degree:
-        legs = ", ".join(analysis.internal.legs)
+    if analysis.internal_loads and analysis.internal_loads.degree:
+        legs = ", ".join(analysis.internal_loads.legs)
         lines.append(
-            f"Internal loads: {analysis.internal.degree} statically indeterminate, in {legs}; "
-            f"{analysis.internal.undecided or 'none'} of them undecided by elasticity."
+            f"Internal loads: {analysis.internal_loads.degree} statically indeterminate, in {legs}; "
+            f"{analysis.internal_loads.undecided or 'none'} of them undecided by elasticity."
         )
     if analysis.indices:
         centre = analysis.indices.centres["stiffness"]
         if centre is not None:
             lines.append(f"Centre of stiffness: {_millimetres(centre)} mm from the {analysis.machine.reference}.")
         lines.append(
-            f"Condition of K: {number(analysis.indices.condition, 'infinite')}, of the leg wrenches: "
+            f"Condition of K: {number(analysis.indices.stiffness_condition, 'infinite')}, of the leg wrenches: "
             f"{number(analysis.wrench_condition)}, of the actuators' Jacobian: "
             f"{number(analysis.jacobian_condition, 'infinite')}; "
-            f"rotations compared through the characteristic length, {number(analysis.length)} m."
+            f"rotations compared through the characteristic length, {number(analysis.characteristic_length)} m."
         )
     if analysis.masses:
         lines.append(_moving(analysis))
@@ -216,9 +210,9 @@ def remarks(analysis: Analysis) -> list[str]:
 def _moving(analysis: Analysis) -> str:
     """What moves, and what of it is not counted."""
     unknown = [one.name for one in analysis.masses if one.mass is None]
-    if analysis.mass is None:
+    if analysis.moving_mass is None:
         return "Moving mass: not known; give links a cross-section, and the platform [tool] mass."
     shown = ", ".join(unknown[:MOST_NAMED])
     more = f" and {len(unknown) - MOST_NAMED} more" if len(unknown) > MOST_NAMED else ""
     without = f"; without {shown}{more}, of which no mass is given" if unknown else ", all links and the platform"
-    return f"Moving mass: {number(analysis.mass)} kg{without}."
+    return f"Moving mass: {number(analysis.moving_mass)} kg{without}."

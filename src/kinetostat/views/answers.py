@@ -11,7 +11,7 @@ from rich.console import Console
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.studies import analysis_data, sensitivity
+from kinetostat.studies import analysis, sensitivity
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.comparison import designs_data
 from kinetostat.studies.comparison.designs import Comparison
@@ -84,7 +84,7 @@ def _sensitivity_figures(found: Sensitivity) -> dict[str, Figure]:
 
 KINDS = (
     Kind(Machine, print_machine, _views),
-    Kind(Analysis, print_analysis, data=analysis_data.as_json),
+    Kind(Analysis, print_analysis, data=analysis.as_json),
     Kind(
         xr.Dataset,
         lambda console, found: print_dataset(console, found, _names(found)),

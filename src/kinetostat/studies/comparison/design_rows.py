@@ -80,7 +80,7 @@ def rows_at_poses(analyses: Sequence[Analysis]) -> tuple[Row, ...]:
         ("least stiffness, moment", "N·m/rad", Better.MORE, lambda one: _least(one, "rotation")),
         ("condition of K", "1", Better.LESS, _condition),
         ("singularity margin", "1", Better.MORE, _singularity_margin),
-        ("moving mass", "kg", Better.LESS, lambda one: one.mass),
+        ("moving mass", "kg", Better.LESS, lambda one: one.moving_mass),
     ]
     for name, unit, better, value in scalars:
         own = tuple(value(one) if one.status is Status.OK else None for one in analyses)
@@ -104,7 +104,7 @@ def _singularity_margin(analysis: Analysis) -> float:
 
 
 def _condition(analysis: Analysis) -> float | None:
-    value = analysis.indices.condition if analysis.indices else math.inf
+    value = analysis.indices.stiffness_condition if analysis.indices else math.inf
     return value if math.isfinite(value) else None
 
 

@@ -14,7 +14,7 @@ def as_json(found: Comparison) -> dict[str, Any]:
             "design": design.label,
             "name": design.machine.name,
             "family": design.machine.family.name,
-            "order": list(design.analysis.components),
+            "components": list(design.analysis.components),
             "status": design.analysis.status.word,
             "message": design.analysis.message,
             "softest": [{"direction": one.component, "shares": dict(one.shares)} for one in own],

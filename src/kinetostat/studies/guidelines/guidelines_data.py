@@ -18,7 +18,7 @@ def as_json(found: Guidelines) -> dict[str, Any]:
         "name": found.machine.name,
         "status": found.status.word,
         "message": found.message,
-        "order": list(names),
+        "components": list(names),
         "rigid_within": EXCESS,
         "compliance_diagonal": [_finite(entry) for entry in found.compliance] or None,
         "elements": [_element(found, here, k, one) for k, one in enumerate(found.found)] if here else [],

@@ -146,7 +146,8 @@ def _held_by_both() -> Claim:
 def _first_link() -> Claim:
     here = coefficients()
     ratios = [here["k52"][i] / here["k54"][i] for i in HELD]
-    shares = [share.compliance[HELD[1]] or 0.0 for share in analyze(load(printed.MACHINE)).shares[:2]]
+    links = analyze(load(printed.MACHINE)).attribution[:2]
+    shares = [link.compliance_share[HELD[1]] or 0.0 for link in links]
     return Claim(
         "Guideline (v)",
         "The first passive link matters more than the second for holding the constrained directions.",

@@ -8,11 +8,11 @@ import numpy as np
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Array, Table
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, parameters, values
 from kinetostat.spec.ranges import parse_range
-from kinetostat.studies.analysis import machine_length
 
 PROBES = 48
 """Steps to each side in which it is tried how far a coordinate goes."""
@@ -42,7 +42,7 @@ def usual_ranges(machine: Machine, count: int) -> list[str]:
     kinds = FAR if any(map(is_set, vars(limited).values())) else NEAR
     coordinates = [p for p in parameters(machine.family) if p.path.startswith("pose.") and len(p.leaves) == 1]
     ordered = sorted(coordinates, key=lambda p: p.quantity.kind != "length")
-    length, found = machine_length(machine), []
+    length, found = float(respond(machine).configuration.length), []
     for parameter in ordered:
         reach = kinds[parameter.quantity.kind] * (length if parameter.quantity.kind == "length" else 1.0)
         low, high = _extent(machine, parameter, reach)

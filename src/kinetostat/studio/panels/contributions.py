@@ -55,8 +55,8 @@ def contributions_text(analysis: Analysis, component: str) -> str:
     index = analysis.components.index(component)
     compliance = analysis.compliance_diagonal[index]
     shares: dict[str, float] = {}
-    for spring in analysis.shares:
-        shares[spring.part] = shares.get(spring.part, 0.0) + (spring.compliance[index] or 0.0)
+    for spring in analysis.attribution:
+        shares[spring.part] = shares.get(spring.part, 0.0) + (spring.compliance_share[index] or 0.0)
     ranked = sorted(shares.items(), key=lambda item: -item[1])
     rows = [(part, share, f"{100 * share:.1f} %") for part, share in ranked if share > LEAST]
     if compliance == 0.0:

@@ -112,9 +112,9 @@ def _pose(analysis: Analysis) -> str:
     rows = [
         ["condition number of W", engineering(analysis.wrench_condition)],
         ["condition number of the actuators' Jacobian", engineering(analysis.jacobian_condition)],
-        ["condition number of K", engineering(indices.condition if indices else None)],
+        ["condition number of K", engineering(indices.stiffness_condition if indices else None)],
         ["rank", str(analysis.rank)],
-        ["characteristic length", engineering(analysis.length, "m")],
+        ["characteristic length", engineering(analysis.characteristic_length, "m")],
     ]
     if mobility is not None:
         rows += [

@@ -7,11 +7,11 @@ import numpy as np
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.attribution import by_part
 from kinetostat.studies.guidelines.sentences import statements
 from kinetostat.studies.optimisation.result_data import message
 from kinetostat.studies.report.answers import Answers
 from kinetostat.validation.comparison import AGREED, Validation
-from kinetostat.views.analysis_tables import by_part
 from kinetostat.views.display import prefixed_scale
 from kinetostat.views.report.content import Paragraph, Points, Section, Table
 from kinetostat.views.report.study import gains
@@ -94,7 +94,8 @@ def _scaled(value: float, quantity: str, endless: str) -> str:
 
 
 def _blamed(found: Analysis, i: int) -> str:
-    shares = {name: sum(one.compliance[i] or 0.0 for one in parts) for name, parts in by_part(found.shares)}
+    parts = by_part(found.attribution).items()
+    shares = {name: sum(one.compliance_share[i] or 0.0 for one in springs) for name, springs in parts}
     worst = sorted((pair for pair in shares.items() if pair[1] >= BLAMED), key=lambda pair: -pair[1])
     named = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in worst[:MOST_BLAMED])
     more = len(worst) - MOST_BLAMED

@@ -11,7 +11,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.analysis_data import as_json
+from kinetostat.studies.analysis import as_json
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.result_data import message
 from kinetostat.studies.report.answers import STEPS, Answers, gather

@@ -22,7 +22,7 @@ def overlays_of(found: Analysis, sizes: Proportions, factor: float | None = None
     if found.indices is None:
         return [], None
     machine, response = found.machine, respond(found.machine)
-    solids = scenes.response_overlays(machine, response.configuration, sizes, found.indices.principal)
+    solids = scenes.response_overlays(machine, response.configuration, sizes, found.indices.principal_compliances)
     if found.load is None:
         return solids, None
     load = Wrench(Vector(*found.load.wrench[:3]), Vector(*found.load.wrench[3:]))

@@ -1,0 +1,69 @@
+"""Attribution: how much each spring contributes to the stiffness and the compliance of the platform at one pose.
+
+The formulas are in `kinetostatics.attribution`; tables and bars of the contributions are in `views` and `studio`.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.kinetostatics.assembly import Statics
+from kinetostat.kinetostatics.attribution import compliance_shares, stiffness_shares
+from kinetostat.machine.leg import Spring
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What one spring contributes to the diagonal entries of C and K.
+
+    Attributes:
+        spring: its name.
+        part: the joint or link that it stands for.
+        stiffness: N/m or N·m/rad; infinity if rigid.
+        compliance_share: its share of each diagonal entry of C, 0 to 1, or None where the entry is zero or infinite.
+        stiffness_share: the same for K.
+    """
+
+    spring: str
+    part: str
+    stiffness: float
+    compliance_share: tuple[float | None, ...]
+    stiffness_share: tuple[float | None, ...]
+
+
+def contributions(
+    springs: Sequence[Spring], statics: Statics, stiffness: Symmetric6, compliance: Symmetric6, kept: tuple[int, ...]
+) -> tuple[Contribution, ...]:
+    """Compute what each spring contributes to K and C.
+
+    Args:
+        springs: all springs of the machine, in the order of the statics.
+        statics: how they share loads, in the axes of K and C.
+        stiffness, compliance: K and C.
+        kept: which of rx ry rz x y z = 0 ... 5 the machine has.
+    """
+    parts = zip(springs, compliance_shares(statics), stiffness_shares(statics), strict=True)
+    return tuple(
+        Contribution(
+            spring.name,
+            spring.part or spring.name,
+            spring.stiffness,
+            _ratios(of_compliance, compliance, kept),
+            _ratios(of_stiffness, stiffness, kept),
+        )
+        for spring, of_compliance, of_stiffness in parts
+    )
+
+
+def _ratios(part: Symmetric6, whole: Symmetric6, kept: tuple[int, ...]) -> tuple[float | None, ...]:
+    pairs = [(part.entry(i, i), whole.entry(i, i)) for i in kept]
+    return tuple(p / w if 0.0 < w < math.inf else None for p, w in pairs)
+
+
+def by_part(attribution: Sequence[Contribution]) -> dict[str, list[Contribution]]:
+    """Group the contributions of springs by the joint or link that they stand for."""
+    parts: dict[str, list[Contribution]] = {}
+    for contribution in attribution:
+        parts.setdefault(contribution.part, []).append(contribution)
+    return parts

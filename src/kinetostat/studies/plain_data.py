@@ -1,0 +1,57 @@
+"""Plain data of any answer, as JSON takes it: dictionaries, lists, texts and finite numbers in SI. Nothing is computed.
+
+Each study lists what belongs to its answer (`as_json`); how a value is written is decided here alone.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from kinetostat.algebra.screw import Screw
+from kinetostat.algebra.vector import Vector
+
+
+def plain(value: Any) -> Any:
+    """Turn a value into plain data.
+
+    Numbers that are infinite or not a number become null, arrays and tuples become lists, vectors lists of three
+    numbers, and dataclasses dictionaries of their fields; the keys of dictionaries become texts.
+
+    Args:
+        value: dictionaries, sequences, arrays, dataclasses and scalars, nested to any depth.
+    """
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, np.ndarray):
+        return _nested_lists(value)
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, Vector | Screw):
+        return plain(value.components())
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    return value
+
+
+def _nested_lists(values: np.ndarray[Any, Any]) -> Any:
+    """An array as nested lists, with null for what is not finite; at once, because grids have millions of numbers."""
+    if values.dtype.kind != "f":
+        return values.tolist()
+    entries = values.astype(object)
+    entries[~np.isfinite(values)] = None
+    return entries.tolist()
+
+
+def stiffness_of_spring(stiffness: float | None) -> float | str | None:
+    """A spring's stiffness as machine files write it: infinity is "rigid"."""
+    return "rigid" if stiffness is not None and math.isinf(stiffness) else stiffness
