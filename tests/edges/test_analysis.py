@@ -204,3 +204,14 @@ def test_directions_of_equal_stiffness_are_told_together(capsys):
     assert main(["analyze", "hexapod-cubic"]) == 0
     row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith(" force, rotations held"))
     assert row.split()[-2:] == ["any", "any"]
+
+
+def test_words_of_the_version_before_still_work_with_a_warning():
+    analysis = analyze(load(NAME))
+    with pytest.warns(DeprecationWarning, match="attribution"):
+        assert analysis.shares == analysis.attribution
+    with pytest.warns(DeprecationWarning, match="compliance_share"):
+        assert analysis.attribution[0].compliance == analysis.attribution[0].compliance_share
+    data = as_json(analysis)
+    assert data["order"] == data["components"]
+    assert data["deprecated_keys"] == {"order": "components"}

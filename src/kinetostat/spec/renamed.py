@@ -14,7 +14,6 @@ RENAMED: Mapping[str, Mapping[str, str]] = MappingProxyType(
         "JSON key": {
             "order": "components",
             "regularity": "singularity_margin",
-            "shares": "attribution",
             "side": "aspect",
         },
         "attribute": {"sections": "tables", "own_sections": "family_tables", "every_section": "every_table"},

@@ -25,10 +25,11 @@ from kinetostat.machine.machine import Configuration, Machine, need_machine, spr
 from kinetostat.machine.mass import Mass, moving_masses
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.spec.errors import InputError, choice
+from kinetostat.spec.renamed import renamed_property
 from kinetostat.studies.attribution import Contribution, contributions
 from kinetostat.studies.indices import Along, Indices, indices_json, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
-from kinetostat.studies.plain_data import plain, stiffness_of_spring
+from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
 from kinetostat.studies.refusal import why_not
 from kinetostat.studies.rounding import clean_matrix, clean_statics
 
@@ -92,6 +93,11 @@ class Analysis:
     wrench_condition: float | None = None
     jacobian_condition: float | None = None
     characteristic_length: float | None = None
+
+    shares = renamed_property("attribution")
+    internal = renamed_property("internal_loads")
+    length = renamed_property("characteristic_length")
+    mass = renamed_property("moving_mass")
 
     def __repr__(self) -> str:
         return f"<Analysis of {self.machine.name!r}: {self.status.word}, components {' '.join(self.components)}>"
@@ -277,7 +283,7 @@ def as_json(analysis: Analysis, along: Sequence[Along] = ()) -> dict[str, Any]:
         "masses": {part.name: part.mass for part in analysis.masses},
         "attribution": [{**vars(one), "stiffness": stiffness_of_spring(one.stiffness)} for one in analysis.attribution],
     }
-    return dict(plain(data))
+    return as_answer(data)
 
 
 def _mobility_json(mobility: Mobility) -> dict[str, Any]:

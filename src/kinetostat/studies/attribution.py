@@ -11,6 +11,7 @@ from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.kinetostatics.assembly import Statics
 from kinetostat.kinetostatics.attribution import compliance_shares, stiffness_shares
 from kinetostat.machine.leg import Spring
+from kinetostat.spec.renamed import renamed_property
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,9 @@ class Contribution:
     stiffness: float
     compliance_share: tuple[float | None, ...]
     stiffness_share: tuple[float | None, ...]
+
+    name = renamed_property("spring")
+    compliance = renamed_property("compliance_share")
 
 
 def contributions(

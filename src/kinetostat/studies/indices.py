@@ -27,6 +27,7 @@ from kinetostat.kinetostatics.indices import (
     principal_compliances,
 )
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.renamed import renamed_property
 
 Rows = Sequence[Sequence[float]]
 
@@ -50,6 +51,9 @@ class Indices:
     stiffness_condition: float
     centres: dict[str, Point | None]
     eigenscrews: tuple[Eigenscrew, ...]
+
+    principal = renamed_property("principal_compliances")
+    condition = renamed_property("stiffness_condition")
 
 
 @dataclass(frozen=True)

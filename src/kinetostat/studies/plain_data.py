@@ -13,6 +13,12 @@ import numpy as np
 
 from kinetostat.algebra.screw import Screw
 from kinetostat.algebra.vector import Vector
+from kinetostat.spec.renamed import RENAMED, with_former_keys
+
+
+def as_answer(data: dict[str, Any]) -> dict[str, Any]:
+    """Turn an answer into plain data, in which the keys of the version before stand beside those of today."""
+    return {key: plain(value) for key, value in with_former_keys(data, RENAMED["JSON key"]).items()}
 
 
 def plain(value: Any) -> Any:
