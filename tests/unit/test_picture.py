@@ -11,10 +11,9 @@ from kinetostat.algebra.vector import Displacement, Vector, rotation_x
 from kinetostat.machine.loading import load
 from kinetostat.spec.errors import InputError
 from kinetostat.views.picture import machine_picture, picture
-from kinetostat.views.rendering.body import Body, hits_of
 from kinetostat.views.rendering.camera import VIEWS, camera_on
-from kinetostat.views.rendering.light import casters_of, light_on
-from kinetostat.views.rendering.raster import depth_map, edges_of, nearest_triangles
+from kinetostat.views.rendering.light import light_on
+from kinetostat.views.rendering.visibility import Body, hits_of, nearest_triangles, normals_at
 from kinetostat.views.scene import shapes
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.mesh import mesh_of
@@ -125,7 +124,6 @@ def test_triangles_cover_every_pixel_between_them_once():
     assert ((number >= 0) == inside).all()
     plane = (5.0 + 0.1 * x - 0.05 * y).ravel()
     assert near[inside] == pytest.approx(plane[inside], rel=1e-6)
-    assert depth_map(points, nearness, triangles, side)[inside] == pytest.approx(plane[inside], rel=1e-6)
 
 
 def test_rays_meet_a_floor_where_it_is_however_steeply_it_runs_away():
@@ -138,11 +136,13 @@ def test_rays_meet_a_floor_where_it_is_however_steeply_it_runs_away():
     assert np.ptp(seen.points[top, 1]) > 50.0
 
 
-def test_shares_of_corners_add_up_and_are_1_at_their_own():
-    shares = edges_of(np.array([(0.0, 0.0), (0.0, 4.0), (4.0, 0.0)]), np.array([(0, 1, 2)])).weights(
-        np.array([0, 0]), np.array([0.0, 1.0]), np.array([4.0, 1.0])
-    )
-    assert shares.T.tolist() == [[0.0, 1.0, 0.0], [0.5, 0.25, 0.25]]
+def test_normals_are_those_of_the_corners_and_in_between_by_area():
+    body = Body([])
+    body.points, body.triangles = np.array([(0.0, 0.0, 0.0), (0.0, 4.0, 0.0), (4.0, 0.0, 0.0)]), np.array([(0, 1, 2)])
+    body.normals = np.eye(3)
+    normals = normals_at(body, np.array([0, 0]), np.array([(0.0, 4.0, 0.0), (1.0, 1.0, 0.0)]))
+    assert normals[0] == pytest.approx((0.0, 1.0, 0.0))
+    assert normals[1] == pytest.approx(np.array((0.5, 0.25, 0.25)) / math.sqrt(0.375))
 
 
 def test_triangles_that_face_away_are_not_seen():
@@ -153,8 +153,8 @@ def test_triangles_that_face_away_are_not_seen():
 
 def test_light_falls_on_what_is_open_and_not_below_a_roof():
     """Over open ground all of sun and sky, under a wide plate nothing, away from a lamp's side neither."""
-    roof = mesh_of(shapes.block(2.0, 2.0, 0.1))
-    casters = casters_of(roof.points + np.array([0.0, 0.0, 0.2]), roof.triangles)
+    place = Displacement(rotation_x(1.0, 0.0), Vector(0.0, 0.0, 0.2))
+    casters = Body([Solid("roof", shapes.block(2.0, 2.0, 0.1), "steel", place)])
     points = np.array([(0.0, 0.0, 0.0), (50.0, 0.0, 0.0), (50.0, 0.0, 0.0)])
     normals = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)])
     light = light_on(points, normals, casters, 400)

@@ -1,42 +1,50 @@
-"""A picture of a machine as a PNG: solids with light, shadow and ground. Needs no graphics processor and no browser."""
+"""A picture of a machine as a PNG: solids with light, shadow and ground.
+
+The parts of the renderer (camera, visibility, light, ground) join here; it needs no graphics processor and no browser.
+"""
 
 import io
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, TypeAlias
 
+import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, choice, shorten
-from kinetostat.views.rendering.body import Body, Hits, hits_of
 from kinetostat.views.rendering.camera import VIEWS, Camera, camera_on
-from kinetostat.views.rendering.ground import SIDE, Ground, Veil, veil_over
-from kinetostat.views.rendering.labels import draw_labels
-from kinetostat.views.rendering.light import Casters, Light, casters_of, light_on
-from kinetostat.views.rendering.surface import encoded, finish_of, shaded
+from kinetostat.views.rendering.ground import SIDE, Ground, veil_over
+from kinetostat.views.rendering.light import Light, encoded, light_on, shaded
+from kinetostat.views.rendering.visibility import Body, Hits, hits_of
 from kinetostat.views.scene.looks import LOOKS
 from kinetostat.views.scene.machine_scene import scene_of
-from kinetostat.views.scene.solids import LAYERS, Scene
+from kinetostat.views.scene.solids import LAYERS, Label, Scene
 
 Floats = NDArray[np.float32]
 Theme: TypeAlias = Literal["light", "dark"]
 
 FINER = 2
-"""Samples of a pixel across and down."""
+"""Samples of a pixel across and down: their mean has smooth edges."""
 SMALLEST, LARGEST = 16, 4096
-"""Pixels of a side."""
+"""Smallest and largest side of a picture, pixels."""
 PLAIN = ("frames", "labels")
-"""Layers that a picture leaves out unless they are asked for."""
+"""Layers that a picture leaves out by default."""
 UNSHADOWED = frozenset(("springs", "frames", "directions", "ellipsoids", "deflection"))
-"""Layers of signs, which cast no shadow."""
+"""Layers of symbols, which cast no shadow."""
+FONT = Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans-Bold.ttf"
+LETTERS, SMALLEST_LETTERS = 0.017, 9
+"""Height of letters as a share of the picture's shorter side, and at least, pixels."""
+INK, DISC, RIM = (20, 28, 38, 255), (255, 255, 255, 235), (120, 132, 146, 255)
+"""Colours of letters, of the disc below the number of a leg, and of its rim."""
 
 
 class Picture(bytes):
-    """The bytes of a PNG, which a notebook displays."""
+    """Bytes of a PNG that a notebook displays."""
 
     def _repr_png_(self) -> bytes:
         return bytes(self)
@@ -44,7 +52,13 @@ class Picture(bytes):
 
 @dataclass(frozen=True)
 class Paper:
-    """What a picture stands on: colours as sRGB shares, strength of shadows and grid, brightness of the machine."""
+    """Background of a picture.
+
+    Attributes:
+        color, ink: of the page and of the grid, sRGB from 0 to 1.
+        shadow, grid: how strongly shadows and grid cover it, 0 to 1.
+        brightness: of the machine.
+    """
 
     color: tuple[float, float, float]
     ink: tuple[float, float, float]
@@ -68,18 +82,18 @@ def machine_picture(
     transparent: bool = False,
     hidden: Collection[str] = PLAIN,
 ) -> Picture:
-    """A picture of a machine at its pose as a PNG.
+    """Draw a machine at its pose as a PNG.
 
     Args:
-        machine: with its pose.
+        machine: at the pose to draw.
         size: width and height, pixels.
-        view: "iso", "front" and so on, or the direction from the machine to the camera, base axes.
+        view: "iso", "front", "side" or "top", or the direction from the machine to the camera, base axes.
         theme: for "light" or for "dark" pages.
-        transparent: whether shadow and grid are all there is of a background.
+        transparent: whether the background consists of shadow and grid alone.
         hidden: layers of the scene to leave out.
 
     Raises:
-        InputError: there is no such view, theme or layer, the size cannot be had, or the pose cannot be drawn.
+        InputError: an unknown view, theme or layer, a size out of range, or a pose that cannot be drawn.
     """
     return picture(scene_of(machine), size, view, theme=theme, transparent=transparent, hidden=hidden)
 
@@ -93,18 +107,18 @@ def picture(
     transparent: bool = False,
     hidden: Collection[str] = PLAIN,
 ) -> Picture:
-    """A picture of a scene as a PNG.
+    """Draw a scene as a PNG.
 
     Args:
-        scene: what there is to see.
+        scene: solids and labels to draw.
         size: width and height, pixels.
-        view: one of `camera.VIEWS`, or the direction from the scene to the camera, base axes.
+        view: "iso", "front", "side" or "top", or the direction from the scene to the camera, base axes.
         theme: for white or for dark pages.
-        transparent: whether shadow and grid are all there is of a background.
+        transparent: whether the background consists of shadow and grid alone.
         hidden: layers of the scene to leave out.
 
     Raises:
-        InputError: there is no such view, theme or layer, or the size cannot be had.
+        InputError: an unknown view, theme or layer, a size out of range, or nothing left to draw.
     """
     _check_size(size)
     paper = PAPERS[choice(theme, PAPERS, "theme")]
@@ -112,21 +126,23 @@ def picture(
         choice(layer, LAYERS, "hidden")
     solids = [solid for solid in scene.solids if solid.layer not in hidden]
     if not solids:
-        raise InputError(f"hidden leaves nothing to draw; leave out fewer of {', '.join(LAYERS)}.")
-    opaque = Body([solid for solid in solids if LOOKS[solid.material].opacity == 1.0])
-    clear = [Body([s for s in solids if s.material == m]) for m, look in LOOKS.items() if look.opacity < 1.0]
-    bodies = [opaque, *(body for body in clear if body.solids)]
+        raise InputError(f"hidden leaves nothing to draw; hide fewer of {', '.join(LAYERS)}.")
+    opaque_solids = [solid for solid in solids if LOOKS[solid.material].opacity == 1.0]
+    translucent = [[s for s in solids if s.material == m] for m, look in LOOKS.items() if look.opacity < 1.0]
+    bodies = [Body(opaque_solids), *(Body(group) for group in translucent if group)]
     points = np.concatenate([body.points for body in bodies])
     camera = camera_on(points, _direction(view), *size)
     layers = [hits_of(body, camera, FINER) for body in bodies]
     foot = np.array([*scene.centre.components()[:2], scene.floor], dtype=float)
     ground = Ground(foot, scene.size, min(SIDE, max(size) // 2))
-    casting = Body([solid for solid in opaque.solids if solid.layer not in UNSHADOWED])
-    lights = _lights(layers, ground, casters_of(casting.points, casting.triangles), max(size))
-    machine = _machine(layers, lights[:-1], camera, paper.brightness)
-    image = Image.fromarray(_composed(machine, veil_over(ground, lights[-1], camera), paper, transparent))
-    draw_labels(image, [label for label in scene.labels if label.layer not in hidden], camera)
-    return _png(image if transparent else image.convert("RGB"))
+    casters = Body([solid for solid in opaque_solids if solid.layer not in UNSHADOWED])
+    *lights, on_ground = _lights(layers, ground, casters, max(size))
+    machine = _machine(layers, lights, camera, paper.brightness)
+    image = Image.fromarray(_composed(machine, *veil_over(ground, on_ground, camera), paper, transparent))
+    _draw_labels(image, [label for label in scene.labels if label.layer not in hidden], camera)
+    stream = io.BytesIO()
+    (image if transparent else image.convert("RGB")).save(stream, "PNG")
+    return Picture(stream.getvalue())
 
 
 def _check_size(size: tuple[int, int]) -> None:
@@ -142,27 +158,27 @@ def _direction(view: str | Sequence[float]) -> Sequence[float]:
     return view
 
 
-def _lights(layers: Sequence[Hits], ground: Ground, casters: Casters, detail: int) -> list[Light]:
-    """The light on the samples of each layer, and on the ground, all asked for at once."""
+def _lights(layers: Sequence[Hits], ground: Ground, casters: Body, detail: int) -> list[Light]:
+    """The light on the samples of each layer, and on the ground; computed together, so that lamps are set up once."""
     ends = np.cumsum([len(layer.points) for layer in layers])
     points = np.concatenate([*(layer.points for layer in layers), ground.points])
     up = np.broadcast_to((0.0, 0.0, 1.0), (len(points) - ends[-1], 3))
-    found = light_on(points, np.concatenate([*(layer.normals for layer in layers), up]), casters, detail)
-    parts = [np.split(values, ends) for values in (found.sun, found.sky, found.openness)]
+    light = light_on(points, np.concatenate([*(layer.normals for layer in layers), up]), casters, detail)
+    parts = [np.split(values, ends) for values in (light.sun, light.sky, light.openness)]
     return [Light(*part) for part in zip(*parts, strict=True)]
 
 
 def _machine(layers: Sequence[Hits], lights: Sequence[Light], camera: Camera, brightness: float) -> Floats:
-    """What is seen of the solids [height x width x 4]: sRGB shares times opacity, and opacity."""
-    looks = list(LOOKS.values())
-    opaque = layers[0]
+    """What is seen of the solids [height x width x 4]: sRGB from 0 to 1 times opacity, and opacity.
+
+    The opaque layer comes first; translucent ones are laid over it where nothing opaque hides them.
+    """
+    opacities = np.array([[look.opacity] for look in LOOKS.values()], dtype=np.float32)
     canvas = np.zeros((camera.height * camera.width * FINER**2, 4), dtype=np.float32)
-    nearness = opaque.nearness
-    for layer, light in sorted(zip(layers, lights, strict=True), key=lambda pair: pair[0] is not opaque):
-        finish = finish_of(looks, layer.look)
-        color = encoded(brightness * shaded(finish, layer.normals, layer.to_eye, light))
-        opacity = np.array([[look.opacity] for look in looks], dtype=np.float32)[layer.look]
-        ahead = layer.nearness[layer.pixel] >= nearness[layer.pixel]
+    for layer, light in zip(layers, lights, strict=True):
+        color = encoded(np.minimum(brightness * shaded(layer.look, layer.normals, layer.to_eye, light), 1.0))
+        opacity = opacities[layer.look]
+        ahead = layer.nearness[layer.pixel] >= layers[0].nearness[layer.pixel]
         at, sample = layer.pixel[ahead], layer.sample[ahead]
         canvas[at] *= 1.0 - opacity[sample]
         canvas[at] += np.concatenate([color, np.ones_like(opacity)], axis=1)[sample] * opacity[sample]
@@ -171,9 +187,9 @@ def _machine(layers: Sequence[Hits], lights: Sequence[Light], camera: Camera, br
     return summed / np.float32(FINER**2)
 
 
-def _composed(machine: Floats, veil: Veil, paper: Paper, transparent: bool) -> NDArray[np.uint8]:
-    """Machine over grid over shadow over paper [height x width x 4]."""
-    shadow, ink = paper.shadow * veil.shadow[..., None], paper.grid * veil.ink[..., None]
+def _composed(machine: Floats, shadow: Floats, ink: Floats, paper: Paper, transparent: bool) -> NDArray[np.uint8]:
+    """The machine over the grid, over the shadow, over the page [height x width x 4]."""
+    shadow, ink = paper.shadow * shadow[..., None], paper.grid * ink[..., None]
     under = np.zeros(3, np.float32) if transparent else np.array(paper.color, np.float32)
     color = under * (1.0 - shadow) * (1.0 - ink) + np.array(paper.ink, np.float32) * ink
     alpha = shadow * (1.0 - ink) + ink if transparent else np.ones_like(shadow)
@@ -184,7 +200,18 @@ def _composed(machine: Floats, veil: Veil, paper: Paper, transparent: bool) -> N
     return np.round(255.0 * shares).astype(np.uint8)
 
 
-def _png(image: Image.Image) -> Picture:
-    stream = io.BytesIO()
-    image.save(stream, "PNG")
-    return Picture(stream.getvalue())
+def _draw_labels(image: Image.Image, labels: Sequence[Label], camera: Camera) -> None:
+    """Write numbers of legs in white discs, and letters of frames on a halo."""
+    if not labels:
+        return
+    size = max(SMALLEST_LETTERS, round(LETTERS * min(image.size)))
+    pen, font = ImageDraw.Draw(image, "RGBA"), ImageFont.truetype(str(FONT), size)
+    places, _ = camera.project(np.array([label.point.components() for label in labels], dtype=float))
+    for label, (x, y) in zip(labels, places.tolist(), strict=True):
+        if label.layer == "labels":
+            half = max(0.5 * pen.textlength(label.text, font) + 0.45 * size, 0.95 * size)
+            box = (x - half, y - 0.95 * size, x + half, y + 0.95 * size)
+            pen.rounded_rectangle(box, 0.95 * size, fill=DISC, outline=RIM, width=max(1, size // 14))
+            pen.text((x, y), label.text, INK, font, anchor="mm")
+        else:
+            pen.text((x, y), label.text, INK, font, anchor="mm", stroke_width=max(1, size // 8), stroke_fill=DISC)

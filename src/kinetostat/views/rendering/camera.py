@@ -1,4 +1,7 @@
-"""Where a picture is taken from, and where points of the base frame fall on it. Knows no pixel's colour."""
+"""Perspective camera: where a picture is taken from, and where points of the base frame fall on it.
+
+Nothing here knows solids, light or colours.
+"""
 
 import math
 from collections.abc import Sequence
@@ -10,13 +13,13 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 VIEWS = {"iso": (1.0, -1.35, 0.75), "front": (0.0, -1.0, 0.02), "side": (1.0, 0.0, 0.02), "top": (0.0, -0.02, 1.0)}
-"""From the machine to the camera, base axes."""
+"""Direction from the machine to the camera, base axes."""
 FIELD = math.radians(32.0)
-"""Angle of the picture's shorter side."""
+"""Angle of view across the picture's shorter side."""
 MARGIN = 0.07
-"""Share of a picture that stays empty on each side."""
+"""Share of the picture that stays empty on each side."""
 FITS = 12
-"""Times the camera is moved until what it shows fills the picture."""
+"""Number of times the camera is moved until the machine fills the picture."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +47,9 @@ class Camera:
         return seen[:, :2] * (self.focal * nearness)[:, None] + centre, nearness
 
     def rays(self, x: Array, y: Array) -> Array:
-        """Ways [n x 3] from the eye through points of the picture (pixels) that gain a depth of 1."""
-        across, down = (x - 0.5 * self.width) / self.focal, (y - 0.5 * self.height) / self.focal
-        return np.stack([across, down, np.ones_like(across)], axis=-1) @ self.axes
+        """Vectors [... x 3] from the eye through points of the picture (pixels), each long enough for a depth of 1."""
+        right, down = (x - 0.5 * self.width) / self.focal, (y - 0.5 * self.height) / self.focal
+        return np.stack([right, down, np.ones_like(right)], axis=-1) @ self.axes
 
     def enlarged(self, factor: int) -> "Camera":
         """The same view with more pixels."""
@@ -54,7 +57,7 @@ class Camera:
 
 
 def axes_towards(forward: Sequence[float] | Array) -> Array:
-    """Axes to the right, down and forward of one who looks that way with z up, [3 x 3] by rows."""
+    """Return the axes to the right, down and forward of a viewer who looks that way with z up, [3 x 3] by rows."""
     ahead = np.array(forward) / np.linalg.norm(forward)
     right = np.cross(ahead, (0.0, 0.0, 1.0))
     right = right / np.linalg.norm(right) if np.linalg.norm(right) > 0.0 else np.array((1.0, 0.0, 0.0))
@@ -62,7 +65,10 @@ def axes_towards(forward: Sequence[float] | Array) -> Array:
 
 
 def camera_on(points: Array, direction: Sequence[float], width: int, height: int) -> Camera:
-    """A camera in some direction from points [n x 3] (base frame, m) that fills its picture with them.
+    """Place a camera so that the points [n x 3] (base frame, m) fill its picture.
+
+    In perspective there is no closed form for that: the camera is centred on the projected points and brought nearer
+    or farther until it fits, which converges in a few steps.
 
     Args:
         points: what is to be seen.

@@ -1,74 +1,69 @@
-"""Sun and sky as many distant lamps, each with a map of what is in its way: light on points. Knows no colour.
+"""Light: what sun and sky send to points, and how much of it their surfaces send on to the eye.
 
-Products are `einsum`, which stays in its thread; a matrix product would start threads of its own in each of ours.
+Nothing here knows cameras or machines. Products are `einsum`, which stays in its thread; a matrix product would start
+threads of its own in each of the threads here.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kinetostat.engine.threads import available_cores
 from kinetostat.views.rendering.camera import axes_towards
-from kinetostat.views.rendering.raster import depth_map
+from kinetostat.views.rendering.visibility import Body, nearest_triangles
+from kinetostat.views.scene.looks import LOOKS, linear
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Indices = NDArray[np.int64]
+Lamp: TypeAlias = tuple[Floats, Callable[[Floats, Floats], NDArray[np.bool_]]]
+"""Direction to a distant lamp, and whether it reaches points [3 x n] looked up aside by pixels of its map [2 x n]."""
 
 SUN = np.array((-0.55, -0.75, 1.5)) / math.sqrt(0.55**2 + 0.75**2 + 1.5**2)
-"""Towards the main light, base axes: over the left shoulder of who looks from the front."""
+"""Direction to the main light, base axes: over the left shoulder of a viewer in front."""
 SUN_RADIUS = 0.055
-"""Of the main light as seen from the machine, rad: how soft its shadows are."""
+"""Radius of the main light as seen from the machine, rad: it decides how soft the shadows are."""
 SUNS, SKIES = 12, 56
 """Lamps that make up the main light, and the sky."""
 SUN_SIDE, SKY_SIDE = 1024, 320
-"""Pixels of a side of a lamp's map, at most."""
+"""Largest side of a lamp's shadow map, pixels."""
 AWAY = 1.6
-"""How far off its surface a point is asked for, in pixels of the map: a surface does not shade itself."""
-GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
+"""Height of a point above its surface when its light is looked up, in pixels of the map: no surface shades itself."""
 SOFT = 3.0
 """Width over which points look up a map at random, in its pixels: steps of a shadow's edge become fine grain."""
 BLOCK = 65536
-"""Points whose light is summed together: what stays in the cache."""
-
-
-@dataclass(frozen=True)
-class Casters:
-    """What is in the light's way.
-
-    Attributes:
-        points: base frame, m [n x 3].
-        triangles: of the points [m x 3].
-        centre: of the box around them, m [3].
-        radius: of the ball around that box, m.
-    """
-
-    points: Array
-    triangles: Indices
-    centre: Array
-    radius: float
-
-
-def casters_of(points: Array, triangles: Indices) -> Casters:
-    """What is in the light's way, and how far it reaches; nothing at all is a ball of radius 1 around the origin."""
-    if not len(points):
-        return Casters(points, triangles, np.zeros(3), 1.0)
-    low, high = points.min(axis=0), points.max(axis=0)
-    return Casters(points, triangles, 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)))
+"""Points whose light is summed together: they stay in the processor's cache."""
+SUN_POWER, SKY_POWER, BOUNCE_POWER = 1.55, 0.75, 0.3
+"""Irradiance of the main light, of the sky, and of what the ground reflects upwards, over pi."""
+DIELECTRIC = 0.04
+"""Reflectance of paint at normal incidence."""
+EXPOSURE = 0.82
+BOXES = (
+    ((0.0, 0.0, 1.0), 0.8, 2.4),
+    ((-0.74, -0.56, 0.37), 0.86, 2.6),
+    ((0.85, -0.42, 0.32), 0.88, 1.7),
+    ((0.0, 0.95, 0.32), 0.85, 1.2),
+)
+"""Soft boxes that metals mirror: direction, cosine of their half width, brightness."""
+GLINT = (tuple(SUN.tolist()), 0.96, 6.0)
+"""The main light, as far as surfaces mirror it; likewise."""
+WALL, GROUND = 0.3, 0.42
+"""Brightness of the room above and below the horizon."""
 
 
 @dataclass(frozen=True)
 class Light:
-    """What falls on points [n]: of the sun and of the sky, 1 on an open surface that faces the one or the other.
+    """Light on points [n], 1 on an open surface that faces the lamp.
 
     Attributes:
         sun, sky: with shadows.
-        openness: share of the sky over the surface that is not hidden.
+        openness: share of the sky before the surface that nothing hides.
     """
 
     sun: Floats
@@ -76,90 +71,136 @@ class Light:
     openness: Floats
 
 
-@dataclass(frozen=True)
-class Lamp:
-    """A distant lamp and what it reaches first.
-
-    Attributes:
-        direction: towards it, base axes [3].
-        axes, shift: from a point of the base frame to column and row of the map, and to the distance behind its origin.
-        nearest: of the map's pixels [side^2], the negative of that distance.
-        side: pixels of a side.
-    """
-
-    direction: Floats
-    axes: Floats
-    shift: Floats
-    nearest: Floats
-    side: int
-
-    def reaches(self, points: Floats, aside: Floats) -> NDArray[np.bool_]:
-        """Whether points [3 x n] (base frame, m) are lit, looked up `aside` by some pixels of the map [2 x n]."""
-        placed = np.einsum("ij,jn->in", self.axes, points) + self.shift
-        column, row = np.clip(placed[:2] + aside, 0, self.side - 1).astype(np.int32)
-        lit: NDArray[np.bool_] = self.nearest[row * self.side + column] <= -placed[2]
-        return lit
-
-
-def light_on(points: Array, normals: Array, casters: Casters, detail: int) -> Light:
-    """Light on points of surfaces.
+def light_on(points: Array, normals: Array, casters: Body, detail: int) -> Light:
+    """Compute the light on points of surfaces from many distant lamps, each with a map of what is in its way.
 
     Args:
         points: base frame, m [n x 3].
         normals: of the surfaces, unit vectors [n x 3].
-        casters: what is in the light's way.
+        casters: what casts shadows.
         detail: pixels across a picture of all of it: shadows need not be finer.
     """
+    box = casters.points if len(casters.points) else np.zeros((1, 3))
+    low, high = box.min(axis=0), box.max(axis=0)
+    centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)) or 1.0
     places, facing = (np.ascontiguousarray(array.T, dtype=np.float32) for array in (points, normals))
     aside = SOFT * (np.random.default_rng(0).random((2, len(points)), dtype=np.float32) - 0.5)
     parts = [slice(start, start + BLOCK) for start in range(0, len(points), BLOCK)]
+    sums = []
     with ThreadPoolExecutor(available_cores()) as threads:
-        fallen = []
-        for directions, side in ((_sun_directions(), SUN_SIDE), (_sky_directions(), min(SKY_SIDE, detail // 2))):
-            lamps = list(threads.map(partial(lamp_on, casters, side=min(side, detail)), directions))
-            pieces = ((places[:, part], facing[:, part], aside[:, part]) for part in parts)
-            found = list(threads.map(partial(_fallen, lamps, casters.radius), *zip(*pieces, strict=True)))
-            fallen.append(np.concatenate(found, axis=1))
-    (sun, _), (sky, unhidden) = fallen
+        for directions, largest in ((_sun_directions(), SUN_SIDE), (_sky_directions(), SKY_SIDE)):
+            side = min(largest, detail)
+            lamps = list(threads.map(partial(_lamp, casters, centre, radius, side), directions))
+            received = partial(_received, lamps, 2.0 * AWAY * radius / side)
+            pieces = zip(*((places[:, part], facing[:, part], aside[:, part]) for part in parts), strict=True)
+            sums.append(np.concatenate(list(threads.map(received, *pieces)), axis=1))
+    (sun, _), (sky, unhidden) = sums
     return Light(sun, sky, np.where(unhidden > 0.0, sky / np.maximum(unhidden, 1e-6), 1.0))
 
 
-def lamp_on(casters: Casters, direction: Array, side: int) -> Lamp:
-    """A lamp in some direction (unit vector, base axes) over all that casts shadows."""
-    scale = np.array([0.5 * (side - 4) / casters.radius, 0.5 * (side - 4) / casters.radius, 1.0])
-    axes = axes_towards(-direction) * scale[:, None]
-    shift = np.array([0.5 * side, 0.5 * side, 0.0]) - axes @ casters.centre
+def _lamp(casters: Body, centre: Array, radius: float, side: int, direction: Array) -> Lamp:
+    """A lamp with a shadow map [side x side] that covers the ball around all casters: the depth nearest to the lamp."""
+    axes = axes_towards(-direction)
+    axes[:2] *= 0.5 * (side - 4) / radius
+    shift = np.array([0.5 * side, 0.5 * side, 2.0 * radius]) - axes @ centre
     placed = np.einsum("nj,ij->ni", casters.points, axes) + shift
-    nearest = depth_map(placed[:, :2], -placed[:, 2], casters.triangles, side)
-    return Lamp(direction.astype(np.float32), axes.astype(np.float32), shift.astype(np.float32)[:, None], nearest, side)
+    nearest, _ = nearest_triangles(placed[:, :2], 4.0 * radius - placed[:, 2], casters.triangles, side, side)
+    nearest[nearest == 0.0] = -np.inf  # no caster: lit at every depth
+    turn, moved = axes.astype(np.float32), shift.astype(np.float32)[:, None]
+
+    def reaches(points: Floats, aside: Floats) -> NDArray[np.bool_]:
+        at = np.einsum("ij,jn->in", turn, points) + moved
+        column, row = np.clip(at[:2] + aside, 0, side - 1).astype(np.int32)
+        lit: NDArray[np.bool_] = nearest[row * side + column] <= np.float32(4.0 * radius) - at[2]
+        return lit
+
+    return direction.astype(np.float32), reaches
 
 
-def _fallen(lamps: Sequence[Lamp], radius: float, points: Floats, normals: Floats, aside: Floats) -> Floats:
-    """Mean light of lamps on points [3 x n], with and without what is in the way [2 x n]."""
-    lifted = points + normals * np.float32(2.0 * AWAY * radius / lamps[0].side)
-    fallen = np.zeros((2, points.shape[1]), np.float32)
-    for number, lamp in enumerate(lamps):
-        cosines = np.maximum(np.einsum("i,in->n", lamp.direction, normals), 0.0)
-        fallen[0] += cosines * lamp.reaches(lifted, aside if number % 2 else -aside[::-1])
-        fallen[1] += cosines
-    return fallen / np.float32(len(lamps))
+def _received(lamps: Sequence[Lamp], away: float, points: Floats, normals: Floats, aside: Floats) -> Floats:
+    """Mean light of lamps on points [3 x n] lifted `away` (m) from their surface, with and without shadows [2 x n]."""
+    lifted = points + normals * np.float32(away)
+    light = np.zeros((2, points.shape[1]), np.float32)
+    for number, (direction, reaches) in enumerate(lamps):
+        cosines = np.maximum(np.einsum("i,in->n", direction, normals), 0.0)
+        # Neighbours in the list of lamps look up in different places, so that their grain is not the same.
+        light[0] += cosines * reaches(lifted, aside if number % 2 else -aside[::-1])
+        light[1] += cosines
+    return light / np.float32(len(lamps))
 
 
 def _disc(count: int) -> Array:
-    """Points [count x 2] that fill the unit disc evenly (Vogel's spiral)."""
+    """Points [count x 2] that fill the unit disc evenly: Vogel's spiral, with the golden angle between neighbours."""
     numbers = np.arange(count) + 0.5
-    radii, angles = np.sqrt(numbers / count), GOLDEN * numbers
+    radii, angles = np.sqrt(numbers / count), math.pi * (3.0 - math.sqrt(5.0)) * numbers
     return np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
 
 
 def _sun_directions() -> Array:
-    across = axes_towards(-SUN)[:2]
-    ways = SUN + SUN_RADIUS * _disc(SUNS) @ across
-    directions: Array = ways / np.linalg.norm(ways, axis=1, keepdims=True)
-    return directions
+    directions: Array = SUN + SUN_RADIUS * _disc(SUNS) @ axes_towards(-SUN)[:2]
+    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
 def _sky_directions() -> Array:
-    """Lamps on the upper half of a sphere, in number as the cosine from the zenith, as an overcast sky is bright."""
+    """Lamps on the upper half of a sphere, as dense as the cosine from the zenith: an overcast sky."""
     flat = _disc(SKIES)
     return np.column_stack([flat, np.sqrt(1.0 - np.sum(flat**2, axis=1))])
+
+
+def shaded(look: Indices, normals: Floats, to_eye: Floats, light: Light) -> Floats:
+    """Compute the colours [n x 3] (linear, 0 to 1) of points: paint and metal in a studio with soft boxes.
+
+    Diffuse paint takes light from sun, sky and ground; what shines mirrors the room and the main light. At the end
+    bright light is compressed as film does.
+
+    Source: C. Schlick, An inexpensive BRDF model for physically-based rendering (1994), for the reflectance;
+    K. Narkowicz, ACES filmic tone mapping curve (2016).
+
+    Args:
+        look: numbers of their looks [n].
+        normals, to_eye: unit vectors [n x 3], base axes.
+        light: on the points.
+    """
+    looks = LOOKS.values()
+    color = np.array([linear(each.color) for each in looks], dtype=np.float32)[look]
+    metal = np.array([[each.metalness] for each in looks], dtype=np.float32)[look]
+    roughness = np.array([[each.roughness] for each in looks], dtype=np.float32)[look]
+    mirrored = DIELECTRIC * (1.0 - metal) + color * metal
+    facing = np.maximum(np.sum(normals * to_eye, axis=1, keepdims=True), 0.02)
+    open_to, sun = light.openness[:, None], light.sun[:, None]
+    bounce = BOUNCE_POWER * (0.5 - 0.5 * normals[:, 2:]) * (0.35 + 0.65 * open_to)
+    diffuse = color * (1.0 - metal) * (SUN_POWER * sun + SKY_POWER * light.sky[:, None] + bounce)
+    grazing = np.maximum(1.0 - roughness, mirrored) - mirrored
+    reflectance = mirrored + grazing * (1.0 - np.minimum(facing, 1.0)) ** 5
+    mirror = 2.0 * facing * normals - to_eye
+    room = (0.3 + 0.7 * open_to) * _room(mirror, roughness) + sun * _box(mirror, roughness, *GLINT)
+    x = EXPOSURE * (diffuse + reflectance * room)
+    return np.clip(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0.0, 1.0)
+
+
+def _room(direction: Floats, roughness: Floats) -> Floats:
+    """Brightness [n x 1] of the room in a direction: walls, ground and soft boxes."""
+    brightness = GROUND + (WALL - GROUND) * smooth_step(direction[:, 2:], -_blur(roughness), _blur(roughness))
+    return sum((_box(direction, roughness, *box) for box in BOXES), start=brightness)
+
+
+def _box(direction: Floats, roughness: Floats, centre: Sequence[float], edge: float, power: float) -> Floats:
+    """Brightness [n x 1] of a soft box in a direction, the more blurred and the weaker the rougher the surface."""
+    along, blur = direction @ np.array(centre, dtype=np.float32)[:, None], _blur(roughness)
+    return power * smooth_step(along, edge - blur, edge + blur) * (1.0 - 0.45 * roughness)
+
+
+def _blur(roughness: Floats) -> Floats:
+    return 0.06 + 0.55 * roughness
+
+
+def smooth_step(value: Array | Floats, low: Array | Floats | float, high: Array | Floats | float) -> Floats:
+    """Rise from 0 at `low` to 1 at `high`, level at both ends."""
+    share = np.clip((value - low) / (high - low), 0.0, 1.0)
+    return np.asarray(share * share * (3.0 - 2.0 * share))
+
+
+def encoded(light: Floats) -> Floats:
+    """Encode linear light, 0 to 1, as sRGB (IEC 61966-2-1)."""
+    bright = 1.055 * np.maximum(light, 0.0031308) ** np.float32(1.0 / 2.4) - 0.055
+    return np.where(light <= 0.0031308, 12.92 * light, bright)
