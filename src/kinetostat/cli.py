@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"kinetostat: {error}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
-        return stopped("files that were already written are complete.")
+        return stopped("files that had been written are complete.")
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
@@ -74,58 +74,68 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> Parser:
     parser = Parser(
         prog="kinetostat",
-        description="Stiffness of parallel kinematic machines: how stiff, where weak, and why.",
+        description="Compute how stiff a parallel kinematic machine is, where it is weak, and why.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="store_true", help="print the version and stop")
     parser.set_defaults(run=_version_or_help, parser=parser)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", parser_class=Parser)
-    add_command(commands, "list", _list, "bundled machines and studies, and families", "kinetostat list")
+    add_command(commands, "list", _list, "list bundled machines, bundled studies and families", "kinetostat list")
     new = add_command(
         commands, "new", _new, "print a commented machine or study file", "kinetostat new passive-leg-4dof > mine.toml"
     )
     source = new.add_mutually_exclusive_group(required=True)
     source.add_argument(
-        "family", metavar="FAMILY", nargs="?", help="a family, see `kinetostat list`; or study, for a study file"
+        "family",
+        metavar="FAMILY",
+        nargs="?",
+        help="a family (see `kinetostat list`), or the word study for a study file",
     )
     source.add_argument(
-        "--from", metavar="FILE", type=Path, dest="urdf", help="a URDF with closed loops, as a machine leg by leg"
+        "--from",
+        metavar="FILE",
+        type=Path,
+        dest="urdf",
+        help="convert a URDF with closed loops into a machine written leg by leg",
     )
     schema = add_command(
         commands,
         "schema",
         _schema,
-        "print the JSON Schema of a file",
+        "print the JSON Schema of machine or study files",
         "kinetostat schema machine > machine.schema.json",
     )
     schema.add_argument("what", choices=["machine", "study"], help="kind of file")
     check = add_command(
-        commands, "check", _check, "read a machine or a study and show what it says", "kinetostat check mine.toml"
+        commands, "check", _check, "read a machine or study file and show its values", "kinetostat check mine.toml"
     )
     takes_machine(check, "a machine or study file, or the name of a bundled one (see `kinetostat list`)")
     analyze = add_command(
-        commands, "analyze", _analyze, "K, C, attribution and indices at a pose",
+        commands, "analyze", _analyze, "compute stiffness, compliance, attribution and indices at a pose",
         'kinetostat analyze mine.toml --set pose.x="5 mm" --json',
     )  # fmt: skip
     takes_machine(analyze)
     analyze.add_argument(
-        "--axes", choices=["base", "platform"], default="base", help="in which everything is given (default: base)"
+        "--axes",
+        choices=["base", "platform"],
+        default="base",
+        help="axes of the results (default: base)",
     )
     analyze.add_argument(
         "--along", metavar="X,Y,Z", action="append", default=[], type=_direction,
-        help="stiffness along (force) and about (moment) a direction; repeatable",
+        help="also give the stiffness along (force) and about (moment) this direction; repeatable",
     )  # fmt: skip
-    analyze.add_argument("--full", action="store_true", help="eigenscrews and every single spring as well")
+    analyze.add_argument("--full", action="store_true", help="also show eigenscrews and every single spring")
     takes_json(analyze)
     validate = add_command(
-        commands, "validate", _validate, "the same machine in an engine that is not ours, side by side",
+        commands, "validate", _validate, "compare the machine with an independent engine",
         'kinetostat validate tripteron --pose x="0.4 m" y="0.6 m" --pose z="0.3 m"',
     )  # fmt: skip
     takes_machine(validate)
     validate.add_argument(
         "--pose", metavar="NAME=VALUE", nargs="+", action="append", default=[], dest="poses",
-        help="coordinates of a pose that differ from the file's; repeat for several poses",
+        help="coordinates of the pose to change from those of the file; repeat for several poses",
     )  # fmt: skip
     validate.add_argument("--engine", help="exudyn or pynite (default: the first that is installed)")
     takes_json(validate)
@@ -139,7 +149,7 @@ def _parser() -> Parser:
     add_report_command(commands)
     add_studio_command(commands)
     reproduce = add_command(
-        commands, "reproduce", _reproduce, "every table, equation and figure of the paper, printed beside computed",
+        commands, "reproduce", _reproduce, "recompute every table, equation and figure of the paper and compare",
         "kinetostat reproduce -o reproduce",
     )  # fmt: skip
     reproduce.add_argument("-o", "--output", type=Path, default=Path("reproduce"), help="folder (default: reproduce)")
@@ -152,7 +162,7 @@ def _direction(text: str) -> tuple[float, ...]:
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text} is no direction; give three numbers, e.g. 0,0,1") from None
+        raise argparse.ArgumentTypeError(f"{text} is not a direction; give three numbers, e.g. 0,0,1") from None
     return x, y, z
 
 

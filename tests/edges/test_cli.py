@@ -27,10 +27,10 @@ ANSWERED = [
     (["analyze", MACHINE, "--set", "stiffness.passive_links=rigid"], ["Rigid: passive link 1", "0.516397", "rigid"]),
     (["analyze", MACHINE, "--set", "stiffness.actuator.0=0"], ["Free: leg 1 actuator", "free"]),
     (["sweep", MACHINE, "--vary", "stiffness.passive_links=1e3:1e10:8:log"], ["7.407e+06", "743.982"]),
-    (["sweep", MACHINE, "--vary", "z=60 cm:200 cm:5"], ["2 of 5 points: out_of_reach"]),
+    (["sweep", MACHINE, "--vary", "z=60 cm:200 cm:5"], ["2 of 5 points have no result (out of reach)"]),
     (
         ["map", MACHINE, "--over", "x=-2 cm:2 cm:3", "--over", "z=66 cm:70 cm:3"],
-        ["compliance_rx", "3 pose.x x 3 pose.z"],
+        ["compliance_rx", "pose.x (3) × pose.z (3)"],
     ),
     (["--version"], ["kinetostat 0."]),
     ([], ["commands:", "examples:"]),
@@ -194,7 +194,7 @@ def test_json_of_a_sweep_has_null_and_a_status_where_there_is_no_answer(capsys):
 
 def test_a_sweep_without_any_answer_exits_1(capsys):
     assert main(["sweep", MACHINE, "--vary", "z=2 m:3 m:3"]) == NO_ANSWER
-    assert "3 of 3 points: out_of_reach" in capsys.readouterr().out
+    assert "3 of 3 points have no result (out of reach)" in capsys.readouterr().out
 
 
 def test_the_template_is_the_machine_it_was_made_from(tmp_path, capsys):

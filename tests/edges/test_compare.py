@@ -61,7 +61,7 @@ def test_a_machine_of_another_kind_hides_no_difference_of_the_others(capsys):
     said = capsys.readouterr().out
     row = next(line for line in said.splitlines() if line.startswith(" geometry.base_radius"))
     assert row.split()[-5:] == ["0.115", "m", "0.13", "m", "–"]
-    assert "Fields that only one of them has are left out." in said
+    assert "Fields that only one design has are omitted." in said
 
 
 def test_the_softest_direction_and_who_is_to_blame():
@@ -114,7 +114,7 @@ def test_files_are_designs_too(tmp_path, capsys):
     assert main(arguments) == 0
     said = capsys.readouterr().out
     assert "geometry.base_radius" in said
-    assert "What is to blame" in said
+    assert "Largest contributions" in said
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"compare.json", "compare.png", "compare.svg", "compare.pdf"}
     told = json.loads((tmp_path / "out" / "compare.json").read_text("utf-8"))

@@ -51,7 +51,7 @@ def test_a_failure_on_a_terminal():
     text = shown(Check("software", "numpy", State.FAILED, "is not installed", "pip install 'numpy>=2.1'"))
     assert "✗  numpy           is not installed" in text
     assert "→ pip install 'numpy>=2.1'" in text
-    assert text.rstrip().endswith("See to: numpy.")
+    assert text.rstrip().endswith("To repair: numpy.")
 
 
 def installed_but(**changed):
@@ -71,7 +71,7 @@ def test_a_package_that_is_missing(monkeypatch, capsys):
     text = capsys.readouterr().out
     assert "✗  scipy           is not installed" in text
     assert "→ pip install 'scipy>=1.15'" in text
-    assert "See to: scipy." in text
+    assert "To repair: scipy." in text
 
 
 def test_a_package_that_is_too_old(monkeypatch):

@@ -71,7 +71,7 @@ def test_an_analysis_shows_the_numbers_of_the_terminal_with_their_units(shown):
     page = Reader(shown(found)["text/html"])
     said = " ".join(page.words)
     assert "Stiffness K (N·m/rad, N/rad, N/m)" in said
-    assert "Actuators under it" in said
+    assert "Actuators under this load" in said
     matrix = [row for row in page.rows if row[0] == "rz" and len(row) == 4]
     assert float(matrix[0][1]) == pytest.approx(found.stiffness[0][0], rel=1e-3)
     assert len(page.images) == 1

@@ -201,9 +201,9 @@ def test_a_figure_that_there_is_not_is_refused_with_those_that_there_are(found):
     assert plot(found["guidelines"], "design").axes
     with pytest.raises(InputError, match="choose from design"):
         plot(found["guidelines"], "spider web")
-    with pytest.raises(InputError, match="no figure of this Analysis"):
+    with pytest.raises(InputError, match="no figure for a result of type Analysis"):
         plot(found["analysis"])
-    with pytest.raises(InputError, match="int is no answer"):
+    with pytest.raises(InputError, match="int is not an answer"):
         plot(42)
     with pytest.raises(InputError, match="no answer"):
         plot(xr.Dataset())

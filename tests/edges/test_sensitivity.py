@@ -143,7 +143,7 @@ def test_it_prints_a_table_with_notes(capsys):
     printed = capsys.readouterr().out
     assert "percent per percent" in printed
     assert "geometry.base_radius" in printed
-    assert "Left out as rigid" in printed
+    assert "Omitted because rigid" in printed
 
 
 def test_json_is_all_of_stdout(capsys):

@@ -17,7 +17,7 @@ def test_it_says_how_much_and_why_not_more(capsys):
     assert main([*SPACE, *LIMITS]) == DONE
     text = capsys.readouterr().out
     told = ["Volume:", "m³", "± two", "a leg is too long", "fails stiffness_z > 50 N/um"]
-    told += ["The inside extends", "mm", "length of the legs", "angle at the base joints"]
+    told += ["Extent of the workspace", "mm", "length of the legs", "angle at the base joints"]
     for word in told:
         assert word in text
 
@@ -81,7 +81,7 @@ def test_the_file_says_what_its_numbers_mean(tmp_path, capsys):
 
 def test_nothing_inside_is_no_answer(capsys):
     assert main([*PLANE, "--where", "singularity_margin > 2"]) == NO_ANSWER
-    assert "No pose of the box is inside" in capsys.readouterr().out
+    assert "No pose of the box is in the workspace" in capsys.readouterr().out
 
 
 def test_nothing_inside_can_be_drawn(tmp_path, capsys):
@@ -94,7 +94,7 @@ REFUSED = [
     ([*PLANE, "--where", "stiffness_z > 3 N/m"], ['"stiffness_z" is not a quantity', "stiffness_rz"]),
     ([*PLANE, "--where", "singularity_margin"], ["is not a condition", "stiffness_z > 20 N/um"]),
     ([*PLANE, "--over", "geometry.base_radius=1:2:3"], ["is no coordinate of the pose"]),
-    ([*PLANE, "--seed", "x"], ["x is no seed"]),
+    ([*PLANE, "--seed", "x"], ["x is not a seed"]),
     ([*PLANE, "--set", "limits.longest=1"], ["limits.longest is not known", "longest_leg"]),
 ]
 

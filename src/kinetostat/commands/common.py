@@ -18,13 +18,12 @@ DONE, NO_ANSWER, BAD_INPUT, STOPPED = 0, 1, 2, 130
 """Exit codes; the last is that of shells for what Ctrl-C has ended."""
 
 QUANTITIES = (
-    "compliance, stiffness, free_stiffness (their diagonal entries, the last 1/C_ii: what a tool feels; default: "
-    "{default}); one entry: compliance_rx, stiffness_x_z, free_stiffness_z, ...; "
+    "compliance, stiffness or free_stiffness (all entries of the diagonal; the free stiffness is 1/C_ii, which a tool "
+    "feels; default: {default}); a single entry such as compliance_rx, stiffness_x_z, free_stiffness_z; "
     "least_translational_stiffness, greatest_translational_stiffness, least_rotational_stiffness, "
-    "greatest_rotational_stiffness, frobenius_condition (of K), singularity_margin (0 at a singularity), "
-    "aspect (1 or -1, changes at singularities), shortest_leg, longest_leg, actuator_force, "
-    "actuator_moment (the greatest under [load]), "
-    "mass (moving); repeatable"
+    "greatest_rotational_stiffness, frobenius_condition (of K), singularity_margin (0: singular, 1: best), "
+    "aspect (1 or -1; the sign changes at singularities), shortest_leg, longest_leg, actuator_force, "
+    "actuator_moment (the greatest under [load]), mass (of all moving parts); repeatable"
 )
 """Of what sweeps, maps and sensitivities are."""
 MACHINE = "a machine file, or the name of a bundled machine (see `kinetostat list`)"
@@ -69,7 +68,7 @@ def takes_quantities(command: Parser, default: str) -> None:
 
 def takes_json(command: Parser) -> None:
     """Give a command `--json`."""
-    command.add_argument("--json", action="store_true", help="machine-readable output on stdout and nothing else")
+    command.add_argument("--json", action="store_true", help="print the result as JSON and nothing else")
 
 
 def load_machine(options: argparse.Namespace, more: "Sequence[str]" = ()) -> "Machine":

@@ -17,13 +17,13 @@ STEM = "compare"
 def add_compare_command(commands: "Commands") -> None:
     """Add `compare`."""
     command = add_command(
-        commands, "compare", _compare, "designs side by side: where they differ, how stiff each is, who gains what",
+        commands, "compare", _compare, "compare designs side by side: differences, stiffness, gains",
         'kinetostat compare zhang-gosselin-4dof "zhang-gosselin-4dof:geometry.base_radius=26 cm;pose.z=66 cm"',
     )  # fmt: skip
     command.add_argument(
         "designs", metavar="DESIGN", nargs="+",
-        help='a machine file or a bundled machine, also with overrides of its own: "NAME:path=value;path=value"; '
-        "the first is what the others are compared with",
+        help='a machine file or a bundled machine, optionally with overrides: "NAME:path=value;path=value"; '
+        "all designs are compared with the first",
     )  # fmt: skip
     command.add_argument(
         "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",
@@ -31,7 +31,7 @@ def add_compare_command(commands: "Commands") -> None:
     )  # fmt: skip
     command.add_argument(
         "--over", metavar="FIELD=from:to:count", action="append", default=[], dest="ranges",
-        help="an axis of a grid of poses: worst, 95 percent and mean over it; repeatable",
+        help="a coordinate of the pose and its range: compare worst, 95 percent and mean over it as well; repeatable",
     )  # fmt: skip
     command.add_argument("-o", "--output", type=Path, help="folder for the figure (PNG, SVG, PDF) and JSON")
     takes_json(command)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def add_doctor_command(commands: "Commands") -> None:
     """Add `doctor`."""
     command = add_command(
-        commands, "doctor", _doctor, "versions, extras and processor, and a self-test with known numbers",
+        commands, "doctor", _doctor, "check the installation: versions, extras, processor, known numbers",
         "kinetostat doctor --json",
     )  # fmt: skip
     takes_json(command)

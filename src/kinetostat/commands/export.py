@@ -16,12 +16,14 @@ FORMATS = "mjcf, urdf, glb, step, csv, netcdf, mat, nastran, abaqus or ansys"
 def add_export_command(commands: "Commands") -> None:
     """Add `export`."""
     command = add_command(
-        commands, "export", _export, "the machine or its results for other programs",
+        commands, "export", _export, "write the machine or its results for other programs",
         "kinetostat export tripteron --to mjcf -o tripteron.xml",
     )  # fmt: skip
     takes_machine(command)
-    command.add_argument("--to", metavar="FORMAT", help=f"{FORMATS} (default: as the file's suffix says)")
-    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="the file (default: named as the machine)")
+    command.add_argument("--to", metavar="FORMAT", help=f"{FORMATS} (default: given by the suffix of the file)")
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="the file (default: the name of the machine)"
+    )
 
 
 def _export(options: argparse.Namespace) -> int:

@@ -31,13 +31,13 @@ MOST_WORKERS = 1024
 def add_grid_commands(commands: "Commands") -> None:
     """Add `sweep` and `map`."""
     sweep = add_command(
-        commands, "sweep", _sweep, "quantities along one parameter, as table, curves and NetCDF",
+        commands, "sweep", _sweep, "compute quantities along one parameter: table, curves and NetCDF",
         'kinetostat sweep zhang-gosselin-4dof --vary "stiffness.passive_links=1e3:1e10:8:log" --quantity compliance',
     )  # fmt: skip
     sweep.add_argument("--vary", metavar=VARY, required=True, action="append", dest="ranges", help="parameter to vary")
     sweep.set_defaults(default_quantity="stiffness")
     mapping = add_command(
-        commands, "map", _map, "quantities over two to six parameters, as contour maps and NetCDF",
+        commands, "map", _map, "compute quantities over two to six parameters: contour maps and NetCDF",
         'kinetostat map zhang-gosselin-4dof --over "x=-2 cm:2 cm:41" --over "z=66 cm:70 cm:41" -o maps',
     )  # fmt: skip
     mapping.add_argument(
@@ -50,8 +50,8 @@ def add_grid_commands(commands: "Commands") -> None:
         command.add_argument("-o", "--output", type=Path, help="folder for NetCDF and figures (PNG, SVG, PDF)")
         command.add_argument(
             "--resume", action="store_true",
-            help="go on with what the folder holds, and refuse where it holds nothing; without this, the same command "
-            "goes on as well, or begins (grids of over 5 million points)",
+            help="continue the grid in the folder, and refuse if there is none; without this option, the same command "
+            "continues or begins (grids of over 5 million points)",
         )  # fmt: skip
         who = command.add_mutually_exclusive_group()
         who.add_argument("--workers", metavar="N", type=_workers, help="compute in N processes on this machine")
@@ -61,7 +61,7 @@ def add_grid_commands(commands: "Commands") -> None:
 
 def _workers(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text[:9]) <= MOST_WORKERS:
-        raise argparse.ArgumentTypeError(f"{text} is no number of processes; give 1 to {MOST_WORKERS}")
+        raise argparse.ArgumentTypeError(f"{text} is not a number of processes; give 1 to {MOST_WORKERS}")
     return int(text)
 
 
@@ -163,7 +163,7 @@ def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) ->
         with hired(_crew(options)) as compute, progress_bar("computing") as progress:
             found = answer_into(question, options.output, stem, progress, compute, options.resume)
     except KeyboardInterrupt:
-        return stopped(f"what was computed is in {options.output}: the same command goes on from there.")
+        return stopped(f"the results so far are in {options.output}; the same command continues from there.")
     if options.json:
         from kinetostat.studies.grid.grid_data import as_summary
 

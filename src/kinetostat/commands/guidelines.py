@@ -18,16 +18,16 @@ STEM = "guidelines"
 def add_guidelines_command(commands: "Commands") -> None:
     """Add `guidelines`."""
     command = add_command(
-        commands, "guidelines", _guidelines, "what stiffness depends on, what counts as rigid, what to change",
+        commands, "guidelines", _guidelines, "show what stiffness depends on, what counts as rigid, what to change",
         'kinetostat guidelines zhang-gosselin-4dof --over "x=-2 cm:2 cm:11" --over "z=66 cm:70 cm:11" -o out',
     )  # fmt: skip
     takes_machine(command)
     command.add_argument(
         "--over", metavar="FIELD=from:to:count", action="append", default=[], dest="ranges",
-        help="a coordinate of the pose and its range: at how many poses the guidelines hold; repeatable",
+        help="a coordinate of the pose and its range: count at how many poses the guidelines hold; repeatable",
     )  # fmt: skip
     command.add_argument(
-        "--full", action="store_true", help="every parameter, and a sentence for those that matter most"
+        "--full", action="store_true", help="show every parameter, and sentences about the most important ones"
     )
     command.add_argument("-o", "--output", type=Path, help="folder for the figures (PNG, SVG, PDF) and JSON")
     takes_json(command)

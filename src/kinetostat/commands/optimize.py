@@ -10,17 +10,17 @@ if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
     from kinetostat.studies.optimisation.result import Result
 
-STUDY = "a study file, the name of a bundled study (see `kinetostat list`), or the folder of a study to go on with"
+STUDY = "a study file, the name of a bundled study (see `kinetostat list`), or the folder of a study to continue"
 
 
 def add_optimize_commands(commands: "Commands") -> None:
     """Add `optimize` and `pareto`."""
     optimize = add_command(
-        commands, "optimize", _optimize, "the best design that a study file asks for, beside the machine as it is",
+        commands, "optimize", _optimize, "search for the best design that a study file describes",
         "kinetostat optimize zhang-gosselin-2002 --set optimizer.seed=3 -o better",
     )  # fmt: skip
     pareto = add_command(
-        commands, "pareto", _pareto, "the designs of which none beats another in everything, for several objectives",
+        commands, "pareto", _pareto, "compute the Pareto front of a study with several objectives",
         "kinetostat pareto zhang-gosselin-front -o front",
     )  # fmt: skip
     for command in (optimize, pareto):
@@ -31,10 +31,10 @@ def add_optimize_commands(commands: "Commands") -> None:
         )  # fmt: skip
         command.add_argument(
             "-o", "--output", type=Path,
-            help="folder for the result, its figures and all designs; a search that was stopped goes on in it",
+            help="folder for the result, its figures and all designs; a stopped search continues there",
         )  # fmt: skip
         command.add_argument(
-            "--resume", action="store_true", help="go on with what the folder holds, and refuse where it holds nothing"
+            "--resume", action="store_true", help="continue the search in the folder, and refuse if there is none"
         )
         takes_json(command)
 
@@ -71,12 +71,12 @@ def _found(options: argparse.Namespace, least: int = 1) -> "Result":
     given = Path(options.study)
     if exists(given) and holds_study(given):
         if options.settings or options.output:
-            raise InputError(f'"{given}" holds a study with settings of its own; leave out --set and -o.')
+            raise InputError(f'"{given}" holds a study together with its settings; leave out --set and -o.')
         problem, options.output = stored_problem(given), given
     else:
         problem = load_problem(options.study, options.settings)
     if options.resume and options.output is None:
-        raise InputError("--resume goes on in a folder; give it with -o.")
+        raise InputError("--resume continues the search in a folder; name the folder with -o.")
     if len(problem.objectives) < least:
         raise InputError("a Pareto front needs two objectives or more; for one, use `kinetostat optimize`.")
     with telling_bar("searching") as tell:

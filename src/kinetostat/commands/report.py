@@ -17,7 +17,7 @@ WITHOUT = ("maps", "guidelines", "sensitivity", "validation")
 def add_report_command(commands: "Commands") -> None:
     """Add `report`."""
     command = add_command(
-        commands, "report", _report, "everything about a machine or a study in one file for a design review",
+        commands, "report", _report, "write one document about a machine or a study for a design review",
         'kinetostat report tripteron --set \'load.force=["0 N","0 N","-500 N"]\' -o tripteron.pdf',
     )  # fmt: skip
     command.add_argument(
@@ -30,17 +30,26 @@ def add_report_command(commands: "Commands") -> None:
     )  # fmt: skip
     command.add_argument(
         "--over", metavar="FIELD=from:to:count", action="append", default=[], dest="ranges",
-        help="an axis of the maps, one or two; default: two coordinates of the pose, as far as the machine can follow",
+        help="an axis of the maps (one or two); default: two coordinates of the pose, over their reach",
     )  # fmt: skip
     command.add_argument(
         "--without", metavar="PART", action="append", default=[], choices=WITHOUT,
-        help=f"leave out what takes time: {', '.join(WITHOUT)}; repeatable",
+        help=f"omit a part that takes time: {', '.join(WITHOUT)}; repeatable",
     )  # fmt: skip
-    command.add_argument("--engine", help="of the validation: exudyn or pynite (default: the first that is installed)")
-    command.add_argument("--author", help="a name for the title block")
-    command.add_argument("--date", help="a date for the title block; without it, the same input gives the same bytes")
     command.add_argument(
-        "-o", "--output", type=Path, default=Path("report.html"), help="file, .html or .pdf (default: report.html)"
+        "--engine",
+        help="independent engine for the validation: exudyn or pynite (default: the first that is installed)",
+    )
+    command.add_argument("--author", help="author in the title block")
+    command.add_argument(
+        "--date", help="date in the title block (default: none, so that equal input gives equal files)"
+    )
+    command.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("report.html"),
+        help="the file, .html or .pdf (default: report.html)",
     )
 
 
@@ -61,7 +70,7 @@ def _report(options: argparse.Namespace) -> int:
     if result is not None and not result.solved:
         return no_answer(message(result))
     machine = subject.machine if result is None else result.machine
-    with progress_bar("asking") as progress:
+    with progress_bar("computing") as progress:
         answers = gather(machine, wanted.ranges, wanted.without, result, progress)
         if answers.analysis.status is Status.OK:
             named = [options.subject, *(word for text in options.settings for word in ("--set", text))]

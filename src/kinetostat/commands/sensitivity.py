@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def add_sensitivity_command(commands: "Commands") -> None:
     """Add `sensitivity`."""
     command = add_command(
-        commands, "sensitivity", _sensitivity, "which parameters matter: derivatives of indices at a pose, ranked",
+        commands, "sensitivity", _sensitivity, "rank the parameters by their effect on the stiffness at a pose",
         "kinetostat sensitivity zhang-gosselin-4dof --quantity compliance_z -o sensitivity",
     )  # fmt: skip
     takes_machine(command)

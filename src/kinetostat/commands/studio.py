@@ -22,7 +22,7 @@ EXTRA = "nicegui"
 def add_studio_command(commands: "Commands") -> None:
     """Add the command."""
     studio = add_command(
-        commands, "studio", _studio, "see a machine, move it, and see where it is stiff, in a browser",
+        commands, "studio", _studio, "open a page in the browser to see a machine, move it, and see where it is stiff",
         "kinetostat studio tripteron --port 8010",
     )  # fmt: skip
     studio.add_argument("machine", metavar="MACHINE", nargs="?", default=FIRST, help=f"{MACHINE}; default: {FIRST}")
@@ -30,21 +30,21 @@ def add_studio_command(commands: "Commands") -> None:
         "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",
         help='override a field, e.g. --set geometry.base_radius="26 cm"; repeatable',
     )  # fmt: skip
-    studio.add_argument("--port", type=_port, default=PORT, help=f"port to listen at (default: {PORT})")
+    studio.add_argument("--port", type=_port, default=PORT, help=f"port to listen on (default: {PORT})")
     studio.add_argument(
         "--host", default=LOCAL[0],
-        help="address to listen at (default: 127.0.0.1, which only this computer can reach)",
+        help="address to listen on (default: 127.0.0.1, which only this computer can reach)",
     )  # fmt: skip
     studio.add_argument(
         "--state", metavar="FOLDER", type=Path,
-        help="folder for searches and favourites of the design tab (default: among your own data)",
+        help="folder for the searches and favourites of the Design tab (default: in your user data)",
     )  # fmt: skip
     studio.add_argument("--no-browser", action="store_true", help="do not open a browser")
 
 
 def _port(text: str) -> int:
     if not text.isdecimal() or not 0 < int(text[:6]) < 65536:
-        raise argparse.ArgumentTypeError(f"{text} is no port; give a number from 1 to 65535")
+        raise argparse.ArgumentTypeError(f"{text} is not a port; give a number from 1 to 65535")
     return int(text)
 
 

@@ -24,27 +24,27 @@ STEM = "workspace"
 def add_workspace_command(commands: "Commands") -> None:
     """Add `workspace`."""
     command = add_command(
-        commands, "workspace", _workspace, "where the machine can work: volume, what limits it, pictures",
+        commands, "workspace", _workspace, "compute where the machine can work: volume, limits, pictures",
         'kinetostat workspace hexapod --set "limits.longest_leg=20 cm" --over "x=-8 cm:8 cm:41" '
         '--over "y=-8 cm:8 cm:41" --over "z=10 cm:25 cm:41" --where "free_stiffness_z > 20 N/um" -o out',
     )  # fmt: skip
     takes_machine(command)
     command.add_argument(
         "--over", metavar="FIELD=from:to:count", required=True, action="append", dest="ranges",
-        help="a coordinate of the pose and its range; two to six of them",
+        help="a coordinate of the pose and its range; give two to six",
     )  # fmt: skip
     command.add_argument(
         "--where", metavar="CONDITION", action="append", default=[], dest="conditions",
-        help='what a pose has to meet, e.g. "free_stiffness_z > 20 N/um"; repeatable, all have to be met',
+        help='a condition that a pose must meet, e.g. "free_stiffness_z > 20 N/um"; repeatable, all must be met',
     )  # fmt: skip
-    command.add_argument("--seed", type=_seed, default=0, help="of the random points for the volume (default: 0)")
+    command.add_argument("--seed", type=_seed, default=0, help="seed of the random points for the volume (default: 0)")
     command.add_argument("-o", "--output", type=Path, help="folder for NetCDF and pictures (PNG, SVG, PDF)")
     takes_json(command)
 
 
 def _seed(text: str) -> int:
     if not text.isdecimal() or len(text) > 9:
-        raise argparse.ArgumentTypeError(f"{text} is no seed; give a number of at most nine digits")
+        raise argparse.ArgumentTypeError(f"{text} is not a seed; give a whole number of at most nine digits")
     return int(text)
 
 

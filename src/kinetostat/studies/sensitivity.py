@@ -38,8 +38,8 @@ MOST_NAMED = 12
 PER = "percent per percent, of an angle per 0.01 rad"
 """What the numbers are. An angle counts from an axis of choice, and with 360 deg more it is the same."""
 
-RIGID = "as rigid, so that no percent of it means anything"
-FREE = "as free, so that C is infinite or does not feel it"
+RIGID = "because rigid (a relative change is undefined)"
+FREE = "because free (C is infinite, or does not depend on it)"
 OPENS = "as the legs would no longer close if one of them changed alone"
 
 
@@ -245,7 +245,7 @@ def notes(answer: Sensitivity) -> Iterator[str]:
     said = [meaning for measure, meaning in meanings.items() if measure in used]
     yield "; ".join(["Percent of the result per percent of the parameter", *said]) + "."
     for reason in dict.fromkeys(reason for _, reason in answer.skipped):
-        yield f"Left out {reason}: {', '.join(path for path, why in answer.skipped if why == reason)}."
+        yield f"Omitted {reason}: {', '.join(path for path, why in answer.skipped if why == reason)}."
     if answer.none:
         shown = answer.none[:MOST_NAMED]
         more = f" and {len(answer.none) - len(shown)} more" if len(answer.none) > len(shown) else ""

@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from kinetostat.kinematics.mobility import Mobility
 from kinetostat.kinetostatics.eigenscrews import Eigenscrew
 from kinetostat.kinetostatics.indices import PrincipalStiffness
 from kinetostat.studies.analysis import Analysis, Rows
@@ -74,7 +75,7 @@ def _matrix_table(
 
 def shares_table(analysis: Analysis, full: bool = False) -> Table:
     """Attribution, by default of joints and links as a whole."""
-    table = numeric_table("Attribution: shares in the diagonal of C", "part", analysis.components)
+    table = numeric_table("Attribution: share of each part in the diagonal of C", "part", analysis.components)
     springs = {one.spring: [one] for one in analysis.attribution}
     for name, contributions in (springs if full else by_part(analysis.attribution)).items():
         columns = zip(*(contribution.compliance_share for contribution in contributions), strict=True)
@@ -150,7 +151,7 @@ def _millimetres(point: Sequence[float]) -> str:
 def load_table(names: Sequence[str], load: LoadCase) -> Table:
     """The load and the deflection of the reference point."""
     kept = [("rx", "ry", "rz", "x", "y", "z").index(name) for name in names]
-    table = numeric_table("Load (N·m, N) and its deflection (rad, m)", "", names)
+    table = numeric_table("Load (N·m, N) and the deflection under it (rad, m)", "", names)
     table.add_row("load", *(number(load.wrench[i]) for i in kept))
     table.add_row("deflection", *(number(load.deflection[i], "free") for i in kept))
     return table
@@ -158,7 +159,7 @@ def load_table(names: Sequence[str], load: LoadCase) -> Table:
 
 def actuator_table(load: LoadCase) -> Table:
     """What each actuator bears, and how far it gives."""
-    table = numeric_table("Actuators under it", "", ["load", "", "deformation", ""])
+    table = numeric_table("Actuators under this load", "", ["load", "", "deformation", ""])
     for spring in load.springs:
         if spring.actuated:
             units = ("N·m", "rad") if spring.turning else ("N", "m")
@@ -168,7 +169,7 @@ def actuator_table(load: LoadCase) -> Table:
 
 def reaction_table(load: LoadCase, axes: str) -> Table:
     """The wrench in each joint, in base or platform axes."""
-    title = f"Load passed on towards the base, at the joint (N·m, N; {axes} axes)"
+    title = f"Joint reactions: load that each joint passes on towards the base (N·m, N; {axes} axes)"
     table = numeric_table(title, "joint", ["mx", "my", "mz", "fx", "fy", "fz"])
     for reaction in load.reactions:
         table.add_row(reaction.joint, *(number(float(c)) for c in reaction.wrench.components()))
@@ -180,39 +181,49 @@ def remarks(analysis: Analysis) -> list[str]:
     lines = []
     if analysis.mobility:
         found = analysis.mobility
-        legs, platform = number(found.leg_distance), number(found.platform_distance)
-        extra = f", {found.here.redundant} constraints redundant" if found.here.redundant else ""
+        extra = f", {found.here.redundant} redundant constraints" if found.here.redundant else ""
         lines.append(
-            f"Mobility: {found.full_cycle} freedoms, {found.actuators} actuators{extra}; {found.kind} pose, "
-            f"distance from a singularity {legs} (legs), {platform} (platform) of 1."
+            f"Mobility: {found.full_cycle} freedoms, {found.actuators} actuators{extra}. "
+            f"{found.kind.capitalize()} pose. {margins(found)}"
         )
     if analysis.internal_loads and analysis.internal_loads.degree:
         legs = ", ".join(analysis.internal_loads.legs)
         lines.append(
-            f"Internal loads: {analysis.internal_loads.degree} statically indeterminate, in {legs}; "
-            f"{analysis.internal_loads.undecided or 'none'} of them undecided by elasticity."
+            f"Statically indeterminate internal loads: {analysis.internal_loads.degree}, in {legs}; "
+            f"elasticity {_decided(analysis.internal_loads.undecided)}."
         )
     if analysis.indices:
         centre = analysis.indices.centres["stiffness"]
         if centre is not None:
             lines.append(f"Centre of stiffness: {_millimetres(centre)} mm from the {analysis.machine.reference}.")
         lines.append(
-            f"Condition of K: {number(analysis.indices.stiffness_condition, 'infinite')}, of the leg wrenches: "
-            f"{number(analysis.wrench_condition)}, of the actuators' Jacobian: "
-            f"{number(analysis.jacobian_condition, 'infinite')}; "
-            f"rotations compared through the characteristic length, {number(analysis.characteristic_length)} m."
+            f"Condition numbers: {number(analysis.indices.stiffness_condition, 'infinite')} of K, "
+            f"{number(analysis.wrench_condition)} of the leg wrenches, "
+            f"{number(analysis.jacobian_condition, 'infinite')} of the Jacobian of the actuators; "
+            f"rotations are scaled by the characteristic length, {number(analysis.characteristic_length)} m."
         )
     if analysis.masses:
         lines.append(_moving(analysis))
     return lines
 
 
+def margins(mobility: Mobility) -> str:
+    """Return a sentence with the singularity margins of a pose, to two digits."""
+    legs, platform = mobility.leg_distance, mobility.platform_distance
+    return f"Singularity margin (0 to 1): legs {legs:.2g}, platform {platform:.2g}."
+
+
+def _decided(undecided: int) -> str:
+    """Return how many internal loads follow from the compliance of the legs."""
+    return f"leaves {undecided} of them undetermined" if undecided else "determines all of them"
+
+
 def _moving(analysis: Analysis) -> str:
-    """What moves, and what of it is not counted."""
+    """Return the moving mass, and name the parts that are not counted because their mass is unknown."""
     unknown = [one.name for one in analysis.masses if one.mass is None]
     if analysis.moving_mass is None:
-        return "Moving mass: not known; give links a cross-section, and the platform [tool] mass."
+        return "Moving mass: unknown; give links a cross-section, and the platform a mass in [tool]."
     shown = ", ".join(unknown[:MOST_NAMED])
     more = f" and {len(unknown) - MOST_NAMED} more" if len(unknown) > MOST_NAMED else ""
-    without = f"; without {shown}{more}, of which no mass is given" if unknown else ", all links and the platform"
+    without = f"; not counted, as no mass is given: {shown}{more}" if unknown else ", all links and the platform"
     return f"Moving mass: {number(analysis.moving_mass)} kg{without}."

@@ -119,7 +119,7 @@ def kind_of(answer: object) -> Kind:
     found = next((kind for kind in KINDS if isinstance(answer, kind.type)), None)
     if found is None or (isinstance(answer, xr.Dataset) and "status" not in answer):
         known = ", ".join(kind.type.__name__ for kind in KINDS)
-        raise InputError(f"A {type(answer).__name__} is no answer of kinetostat; give one of: {known}.")
+        raise InputError(f"A {type(answer).__name__} is not an answer of kinetostat; give one of: {known}.")
     return found
 
 
@@ -136,5 +136,7 @@ def plot(answer: object, which: str | None = None) -> Figure:
     """
     figures = kind_of(answer).figures(answer)
     if not figures:
-        raise InputError(f"There is no figure of this {type(answer).__name__}; its tables and data say all of it.")
+        raise InputError(
+            f"There is no figure for a result of type {type(answer).__name__}; use its tables and its data instead."
+        )
     return figures[next(iter(figures)) if which is None else choice(which, figures, "which")]

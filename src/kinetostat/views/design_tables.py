@@ -24,14 +24,14 @@ def print_comparison(console: Console, found: Comparison) -> None:
         said = f"  {design.label}  {design.machine.name}"
         why = "" if design.answered else f": {design.analysis.message}"
         console.print(Text.assemble((letter, "bold"), said, why))
-    console.print("Percentages are against A; the best of each row is bold.", style="dim")
+    console.print("Percentages are changes against A; the best value of each row is bold.", style="dim")
     _print_differences(console, found, letters)
     _print_rows(console, "At the pose of each design", letters, found.rows)
     _print_softest(console, found, letters)
     if found.ranges:
         counts = ", ".join(f"{letter} {n:,} of {m:,}" for letter, (n, m) in zip(letters, found.poses, strict=True))
         _print_rows(console, f"Over {', '.join(found.ranges)}", letters, found.over, by_group=True)
-        console.print(f"Poses with an answer: {counts}.", highlight=False)
+        console.print(f"Poses with a result: {counts}.", highlight=False)
 
 
 def _print_differences(console: Console, found: Comparison, letters: str) -> None:
@@ -48,9 +48,9 @@ def _print_differences(console: Console, found: Comparison, letters: str) -> Non
         if table.row_count:
             console.print(table)
     if not rows:
-        console.print("The files do not differ.")
+        console.print("The files have equal values.")
     if len(set(families)) > 1:
-        console.print("Fields that only one of them has are left out.", style="dim")
+        console.print("Fields that only one design has are omitted.", style="dim")
 
 
 def _abreast(console: Console, letters: str) -> Iterator[list[int]]:
@@ -95,7 +95,7 @@ def _percent(percent: float) -> str:
 def _print_softest(console: Console, found: Comparison, letters: str) -> None:
     if not any(found.softest):
         return
-    table = text_table("What is to blame in the softest directions", "", "rotation", "translation")
+    table = text_table("Largest contributions in the softest directions", "", "rotation", "translation")
     for letter, own in zip(letters, found.softest, strict=True):
         turning = next((one for one in own if one.component.startswith("r")), None)
         sliding = next((one for one in own if not one.component.startswith("r")), None)

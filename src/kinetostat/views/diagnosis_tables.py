@@ -28,9 +28,9 @@ def print_verdict(console: Console, checks: Iterable[Check]) -> None:
     """One sentence: sound, or what to see to."""
     failed = [check.name for check in checks if check.state is State.FAILED]
     if failed:
-        console.print(Text.assemble(("\nSee to:", "bold red"), f" {', '.join(failed)}."))
+        console.print(Text.assemble(("\nTo repair:", "bold red"), f" {', '.join(failed)}."))
     else:
-        sound = " What is needed is there, and the known numbers come out."
+        sound = " Everything needed is installed; the self-test gives the known numbers."
         console.print(Text.assemble(("\nSound.", "bold green"), sound))
 
 

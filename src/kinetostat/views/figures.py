@@ -179,7 +179,7 @@ def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray) -> None:
     panel.grid(visible=False)
     panel.set(xlim=(x.min(), x.max()), ylim=(y.min(), y.max()))
     if values.count() == 0:
-        _note(panel, "no value here")
+        _note(panel, "no result")
     elif np.ptp(values.compressed()) <= FLAT * np.abs(values).max():
         panel.set_facecolor("#b5dbe3")
         _note(panel, f"constant: {values.compressed()[0]:.6g} {scale.unit}")

@@ -38,7 +38,7 @@ def print_stored(console: Console, stored: StoredGrid) -> None:
     }
     _print_failures(console, failed, question.grid.size)
     if stored.computed < stored.chunks:
-        console.print(f"{stored.chunks - stored.computed:,} of {stored.chunks:,} chunks were there already.")
+        console.print(f"{stored.chunks - stored.computed:,} of {stored.chunks:,} chunks had been computed before.")
 
 
 def print_written(console: Console, paths: Iterable[Path]) -> None:
@@ -49,7 +49,9 @@ def print_written(console: Console, paths: Iterable[Path]) -> None:
 
 def _print_failures(console: Console, counts: Mapping[Status, int], size: int) -> None:
     for status, count in counts.items():
-        console.print(f"{count:,} of {size:,} points: {status.word}. {status.sentence}")
+        console.print(
+            f"{count:,} of {size:,} points have no result ({status.word.replace('_', ' ')}). {status.sentence}"
+        )
 
 
 def _print_curve(console: Console, dataset: xr.Dataset, names: Sequence[str]) -> None:
@@ -69,7 +71,7 @@ def _extremes(data: xr.DataArray) -> Extremes:
 
 
 def _print_extremes(console: Console, machine: str, sizes: Mapping[str, int], extremes: Mapping[str, Extremes]) -> None:
-    size = " x ".join(f"{count} {dim}" for dim, count in sizes.items())
+    size = " × ".join(f"{dim} ({count})" for dim, count in sizes.items())
     table = numeric_table(f"{machine}: {size}", "quantity", ["unit", "least", "mean", "largest"])
     for name, found in extremes.items():
         statistics = (found.least, found.mean, found.largest)

@@ -46,8 +46,8 @@ def limit_figure(found: Guidelines) -> Figure | None:
 def design_figure(found: Guidelines) -> Figure:
     """Parameters against directions: blue where one percent more makes a direction stiffer, red where softer."""
     rows = {with_leg(found.machine, move.path): move.percents for move in found.moves}
-    titles = f"{found.machine.name}: what the design does", setting_of(found.machine)
-    label = "percent stiffer per percent more, of an angle per 0.01 rad"
+    titles = f"{found.machine.name}: effect of each parameter", setting_of(found.machine)
+    label = "percent stiffer per 1 % more (angle: per 0.01 rad)"
     return coloured_table(titles, rows, found.components, "RdBu", label)
 
 
@@ -66,7 +66,7 @@ def rigid_figure(found: Guidelines, shown: list[tuple[Element, np.ndarray]]) -> 
         lines = [Line2D([], [], color=colour, linestyle=dash, label=name) for name, colour, dash in styles]
         dot = Line2D([], [], color="#444444", marker="o", markersize=4, linestyle="", label="within 1 %")
         figure.legend(handles=[*lines, dot], loc="outside right center", title="direction")
-        figure.suptitle(f"{found.machine.name}: from which stiffness on an element counts as rigid", fontsize=10)
+        figure.suptitle(f"{found.machine.name}: stiffness from which an element counts as rigid", fontsize=10)
         note_setting(figure, setting_of(found.machine))
         fix_layout(figure)
     return figure
@@ -88,7 +88,7 @@ def _curves(panel: Axes, found: Guidelines, element: Element, limits: np.ndarray
     if not rigid_now:
         panel.axvline(own, color="#888888", linewidth=0.8, linestyle=":")
         panel.text(own, 3.0, " now", fontsize=6.5, color="#666666", ha="left")
-    unit = f"stiffness ({element.unit})" if element.stiffness is not None else "times its present stiffness"
-    panel.set(xscale="log", ylim=(0.0, 104.0), xlabel=unit, ylabel="stiffness, % of that\nwith it rigid")
+    unit = f"stiffness ({element.unit})" if element.stiffness is not None else "multiple of the present stiffness"
+    panel.set(xscale="log", ylim=(0.0, 104.0), xlabel=unit, ylabel="stiffness, % of that with\na rigid element")
     panel.set_title(element.name)
     panel.margins(x=0.0)

@@ -13,22 +13,22 @@ from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.guidelines.moves import Move
 from kinetostat.studies.guidelines.roles import Roles
 from kinetostat.studies.guidelines.sentences import LEAST, MATTERS, statements
-from kinetostat.views.tables import number, numeric_table
+from kinetostat.views.tables import number, numeric_table, omitted
 
 TOPICS = {
     "yields": "What each direction depends on",
-    "weakest": "Where stiffness is spent best",
+    "weakest": "Where more stiffness helps most",
     "rigid": "What counts as rigid, within 1 %",
-    "design": "What the design does",
+    "design": "What each parameter does",
 }
 MOST = 0.5
 """Share from which on an element is printed in bold."""
 MOST_ROWS = 16
 """Parameters that are printed; all of them on demand."""
 MOST_NAMED = 8
-LEGEND = "· any stiffness will do; never: nothing else yields in that direction."
+LEGEND = "· any stiffness suffices; never: nothing else is compliant in that direction."
 """Of the table of limits."""
-ALIKE = "poses: at how many of them all arrows of the row point as they do here."
+ALIKE = "poses: share of the poses at which all arrows of the row point the same way as here."
 """Of the table of parameters."""
 
 
@@ -36,9 +36,9 @@ def print_guidelines(console: Console, found: Guidelines, full: bool = False) ->
     """Sentences and tables; every parameter, and a sentence for those that matter most, if `full`."""
     console.print(Text.assemble((found.machine.name, "bold"), "  design guidelines"))
     answered, poses = found.poses
-    about = f"Directions {' '.join(found.components)}: deflection under a load in the same direction, base axes."
+    about = f"Directions {' '.join(found.components)} (base axes): deflection under a load in the same direction."
     if poses:
-        about += f" Over {', '.join(found.ranges)}: {answered:,} of {poses:,} poses have an answer."
+        about += f" Over {', '.join(found.ranges)}: {answered:,} of {poses:,} poses have a result."
     console.print(about, style="dim", highlight=False)
     if found.here is None:
         return
@@ -71,7 +71,11 @@ def _print_equations(console: Console, found: Guidelines) -> None:
     """K as sums over elements, as the paper's equations 33-38."""
     if found.equations is None:
         return
-    console.print(Text.assemble(("K at this pose", "bold"), ", by the stiffness k of one part of each element (SI)"))
+    console.print(
+        Text.assemble(
+            ("K at this pose", "bold"), " as a sum over elements; k is the stiffness of one part of the element (SI)"
+        )
+    )
     for line in equations(found):
         console.print(f"  {line}", highlight=False)
     console.print()
@@ -89,7 +93,7 @@ def equations(found: Guidelines) -> list[str]:
 
 def element_table(found: Guidelines, here: Roles) -> Table:
     """What each element contributes to each direction."""
-    table = numeric_table("Shares in the diagonal of C", "element", found.components)
+    table = numeric_table("Attribution: share of each element in the diagonal of C", "element", found.components)
     for element, row in zip(found.found, here.shares[:, :, 0].tolist(), strict=True):
         table.add_row(element.name, *(_share(part) for part in row))
     return table
@@ -103,7 +107,9 @@ def _share(part: float) -> Text:
 
 def limit_table(found: Guidelines, here: Roles) -> Table:
     """From which stiffness on each element counts as rigid: absolute where it has one stiffness, else relative."""
-    table = numeric_table("Counts as rigid from (within 1 %)", "element", ["now", *found.components])
+    table = numeric_table(
+        "Stiffness from which an element counts as rigid (within 1 %)", "element", ["now", *found.components]
+    )
     for k, element in enumerate(found.found):
         row = here.rigid[k, :, 0].tolist()
         if element.stiffness is None:
@@ -140,7 +146,7 @@ def move_table(found: Guidelines, count: int) -> Table:
     """What each of the first parameters does to each direction."""
     grid = bool(found.poses[0])
     heads = ["parameter", *found.components, *(["poses"] if grid else [])]
-    title = "What one percent more does, of an angle 0.01 rad more: percent stiffer ▲ or softer ▼"
+    title = "Effect of 1 % more (of an angle: 0.01 rad more), percent stiffer ▲ or softer ▼"
     table = numeric_table(title, heads[0], heads[1:])
     for move in found.moves[:count]:
         table.add_row(
@@ -153,12 +159,12 @@ def left_out(found: Guidelines, count: int) -> Iterator[str]:
     """What the table of the first parameters does not show, in sentences."""
     hidden = len(found.moves) - count
     if hidden:
-        yield f"{hidden} more {'does' if hidden == 1 else 'do'} less; guidelines --full has all."
+        yield f"{omitted(hidden)} (--full shows them)."
     if found.idle:
         yield f"No direction depends on {_few(found.idle)}."
     for reason in dict.fromkeys(why for _, why in found.skipped):
         paths = [path for path, why in found.skipped if why == reason]
-        yield f"Left out {reason}: {_few(paths)}."
+        yield f"Omitted {reason}: {_few(paths)}."
 
 
 def _few(paths: tuple[str, ...] | list[str]) -> str:

@@ -40,7 +40,7 @@ def convergence(log: Log, title: str) -> Figure:
         figure = Figure(figsize=(6.8, 3.0), layout="constrained")
         left, right = figure.subplots(1, 2)
         scale = _scaled(objective, np.concatenate([best, mean]))
-        left.plot(steps, mean * scale.factor, color=COLOURS[1], label="mean of the kept", linestyle="--")
+        left.plot(steps, mean * scale.factor, color=COLOURS[1], label="mean of the population", linestyle="--")
         left.plot(steps, best * scale.factor, color=COLOURS[0], label="best")
         left.set(xlabel=across, ylabel=_axis(objective, scale))
         left.legend()
@@ -133,7 +133,7 @@ def front(found: Result) -> Figure:
             x, y = (_scaled(problem.objectives[k], best[:, k]) for k in (i, j))
             panel.scatter(
                 feasible[:, i] * x.factor, feasible[:, j] * y.factor, s=3, color="#c8c8c8", linewidths=0,
-                rasterized=True, label="designs that were judged",
+                rasterized=True, label="evaluated designs",
             )  # fmt: skip
             panel.plot(best[:, i] * x.factor, best[:, j] * y.factor, "o", markersize=3, color=COLOURS[0], label="front")
             knee = best[found.knee, [i, j]] * (x.factor, y.factor)

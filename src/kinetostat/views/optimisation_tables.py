@@ -24,7 +24,7 @@ def print_result(console: Console, found: Result) -> None:
     """All tables of a study that found something."""
     problem = found.problem
     console.print(f"{problem.study.name}: {problem.machine.name}", style="bold", highlight=False)
-    console.print(f"{message(found)} Judged at {problem.poses.told}; method {problem.method}.", highlight=False)
+    console.print(f"{message(found)} Evaluated at {problem.poses.told}; method {problem.method}.", highlight=False)
     if len(problem.objectives) > 1:
         console.print(front_table(found))
     console.print(worth_table(found))
@@ -41,7 +41,11 @@ def print_result(console: Console, found: Result) -> None:
 def worth_table(found: Result) -> Table:
     """Objectives and constraints before and after."""
     best = "knee of the front" if len(found.problem.objectives) > 1 else "best"
-    table = numeric_table("What it is worth", "", ["initial", best, "gain", "unit"])
+    table = numeric_table(
+        "Objectives and constraints" if found.problem.constraints else "Objectives",
+        "",
+        ["initial", best, "gain", "unit"],
+    )
     for k, objective in enumerate(found.problem.objectives):
         before, after = found.initial.objectives[0, k], found.outcome.objectives[0, k]
         gain = before / after if objective.sign > 0 else after / before
@@ -58,7 +62,9 @@ def variable_table(found: Result) -> Table:
     objectives = found.problem.objectives
     heads = ["% per %"] if len(objectives) == 1 else [f"% per % ({k + 1})" for k in range(len(objectives))]
     table = numeric_table(
-        "The design; % per %, of an angle per 0.01 rad", "variable", ["initial", "best", "at bound", *heads]
+        "Variables (% per %: change of the objective per 1 % more; of an angle, per 0.01 rad more)",
+        "variable",
+        ["initial", "best", "at bound", *heads],
     )
     influences = {one.name: one for one in found.influences}
     held = found.problem.space.values(found.genes)
@@ -85,7 +91,7 @@ def direction_table(found: Result) -> Table:
 def scatter_table(robustness: Robustness) -> Table:
     """How the objectives scatter under the tolerances."""
     title = f"Under the tolerances: {robustness.machines:,} random machines"
-    title += f" and {robustness.corners:,} with every tolerance at an end" if robustness.corners else ""
+    title += f" and {robustness.corners:,} corners (every tolerance at an end)" if robustness.corners else ""
     table = numeric_table(title, "", ["nominal", "mean", "std. dev.", "95 % within", "worst", "unit"])
     for one in robustness.scatters:
         figures = (_exact(value) for value in (one.nominal, one.mean))
@@ -96,7 +102,7 @@ def scatter_table(robustness: Robustness) -> Table:
 
 def failing(robustness: Robustness) -> str:
     """How many of the random machines are not feasible."""
-    return f"{robustness.failing:.3g} of the random machines are not feasible."
+    return f"{100.0 * robustness.failing:.3g} % of the random machines are not feasible."
 
 
 def front_table(found: Result) -> Table:
@@ -122,13 +128,15 @@ def remarks(found: Result) -> Iterator[str]:
     bounded = [one for one in found.influences if one.bound]
     if bounded and len(found.problem.objectives) == 1:
         names = ", ".join(f"{one.name} ({one.bound})" for one in bounded)
-        yield f"At its bounds: {names}. The objective would gain from wider ones, by the percentages above."
+        yield f"At a bound: {names}. Wider bounds would improve the objective, by the percentages above."
     lost = [one for one in found.directions if one.gain < MUCH]
     for one in lost:
         name = one.name.removeprefix("compliance_")
         yield f"The best design gives up {name}: {one.gain:.2g} of its stiffness is left; add a constraint to keep it."
     if len(found.problem.objectives) == 1:
-        yield from told(found.ridges, found.problem) or ([found.no_ridges] if found.no_ridges else ["No ridges."])
+        yield from told(found.ridges, found.problem) or (
+            [found.no_ridges] if found.no_ridges else ["There is no ridge: the optimum is a single design."]
+        )
 
 
 def _exact(value: float) -> str:

@@ -75,7 +75,9 @@ def print_summary(found: Reproduction, written: Sequence[Path]) -> None:
     """Every number beside the printed one, then equations, statements and the verdict."""
     console = terminal()
     console.print(_numbers_table(found.comparisons))
-    equations = text_table("Equations 1-32, by the paper's matrices and by ours", "eq.", "statement", "residual", "")
+    equations = text_table(
+        "Equations 1-32: matrices of the paper against those of kinetostat", "eq.", "statement", "residual", ""
+    )
     for check in found.checks:
         equations.add_row(
             check.equation, check.statement, f"{check.residual:.1e}", "holds" if check.holds else Text("FAILS", "red")

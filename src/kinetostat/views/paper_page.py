@@ -41,9 +41,9 @@ CAPTIONS = {
     "paper's figures are lost in the text this program was made from; the geometry is a reconstruction that the "
     "printed numbers fix completely.",
     "figure-4": "K_rz and K_y grow with the passive links, the other four do not depend on them at this pose.",
-    "figure-5": "The paper's section of the workspace. The machine itself cannot move along y: there, y shifts the "
+    "figure-5": "The paper's cut through the workspace. The machine itself cannot move along y: there, y shifts the "
     "plane of its passive leg, and the platform with it.",
-    "figure-6": "The paper's search again, with random numbers of our own. On the right, how far "
+    "figure-6": "The paper's search again, with other random numbers. The right panel shows how far "
     "best and mean still are from the last best.",
 }
 
@@ -59,8 +59,8 @@ def page(found: Reproduction, figures: Mapping[str, Figure]) -> str:
     body = [
         "<h1>Zhang and Gosselin's machine, reproduced</h1>",
         '<p class="soft">' + escape(printed.CITATION) + ", "
-        f"beside what kinetostat {escape(version('kinetostat'))} computes. Order of components: rx ry rz x y z; "
-        "SI units, base axes, at the platform point P.</p>",
+        f"compared with the results of kinetostat {escape(version('kinetostat'))}. "
+        "Order of components: rx ry rz x y z; SI units, base axes, at the platform point P.</p>",
         _tiles(found),
         "<h2>The machine</h2>",
         pictures["machine"],

@@ -6,7 +6,7 @@ from rich.table import Table
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.sensitivity import PER, Sensitivity, notes
 from kinetostat.views.display import family_of_names, spoken
-from kinetostat.views.tables import measured, numeric_table
+from kinetostat.views.tables import measured, numeric_table, omitted
 
 MOST_ROWS = 40
 """Parameters that are printed; `--json` has all."""
@@ -19,7 +19,7 @@ def print_sensitivity(console: Console, answer: Sensitivity) -> None:
     console.print(influence_table(answer, MOST_ROWS))
     hidden = len(answer.influences) - MOST_ROWS
     if hidden > 0:
-        console.print(f"{hidden} more have less influence; --json has all.")
+        console.print(f"{omitted(hidden)} (--json has all).")
     for note in notes(answer):
         console.print(note, highlight=False)
 
@@ -28,7 +28,7 @@ def influence_table(answer: Sensitivity, count: int) -> Table:
     """The first parameters by rank, with their values and what they do to each index."""
     group = family_of_names(answer.quantities)
     heads = [spoken(name.removeprefix(f"{group}_")) for name in answer.quantities]
-    title = f"{answer.machine.name}: {group}, {PER}" if group else f"{answer.machine.name}: {PER}"
+    title = f"{answer.machine.name}: {spoken(group)}, {PER}" if group else f"{answer.machine.name}: {PER}"
     table = numeric_table(title, "parameter", ["value", *heads])
     for one in answer.influences[:count]:
         name = with_leg(answer.machine, one.path)

@@ -12,12 +12,12 @@ from kinetostat.views.tables import numeric_table
 def print_study(console: Console, problem: Problem) -> None:
     """The question of a study: where it is judged, what is wanted, and what may change."""
     console.print(Text.assemble((problem.study.name, "bold"), f"  {problem.machine.name}"))
-    console.print(f"Judged at {problem.poses.told}; method {problem.method}.", highlight=False)
+    console.print(f"Evaluated at {problem.poses.told}; method {problem.method}.", highlight=False)
     for aim in aims(problem):
         console.print(aim, highlight=False)
     console.print(bounds_table(problem))
     if fixed := not_searched(problem):
-        console.print(f"Not searched: {fixed}.", highlight=False)
+        console.print(f"Not searched, as these have a tolerance only: {fixed}.", highlight=False)
 
 
 def aims(problem: Problem) -> list[str]:

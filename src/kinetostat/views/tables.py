@@ -127,6 +127,12 @@ def measured(value: float, kind: str) -> str:
     return f"{number(value + 0.0)} {KINDS[kind].unit}".rstrip()
 
 
+def omitted(count: int) -> str:
+    """Return the words for parameters that a table leaves out."""
+    noun, verb = ("parameter", "is") if count == 1 else ("parameters", "are")
+    return f"{count} {noun} with less effect {verb} omitted"
+
+
 def text_table(title: str, *columns: str) -> Table:
     """A table without rules between its rows."""
     table = _titled(title)

@@ -15,7 +15,12 @@ from kinetostat.views.tables import number, numeric_table
 def print_validation(console: Console, validation: Validation, agreed: float) -> None:
     """Ours, theirs, the difference by block, and a verdict: it agrees where no block differs by more than `agreed`."""
     family = validation.machine.family
-    console.print(Text.assemble((validation.machine.name, "bold"), f" beside {validation.engine} {validation.version}"))
+    console.print(
+        Text.assemble(
+            (validation.machine.name, "bold"),
+            f" compared with an independent engine, {validation.engine} {validation.version}",
+        )
+    )
     kept = list(family.components)
     titles = {"kinetostat": validation.ours, validation.engine: validation.theirs}
     for title, matrix in titles.items():
@@ -24,7 +29,8 @@ def print_validation(console: Console, validation: Validation, agreed: float) ->
     console.print(difference_table(validation))
     console.print(trial_table(validation))
     verdict = "agree" if validation.difference <= agreed else "DIFFER"
-    console.print(f"The two {verdict}: {validation.difference:.1e}, allowed {agreed:g}.", highlight=False)
+    largest = f"the largest relative difference is {validation.difference:.1e}, allowed is {agreed:g}"
+    console.print(f"The two {verdict}: {largest}.", highlight=False)
 
 
 def matrix_table(title: str, names: Sequence[str], matrix: Array) -> Table:
@@ -55,7 +61,7 @@ def difference_table(validation: Validation) -> Table:
 
 def trial_table(validation: Validation) -> Table:
     """How the engine's answer converges."""
-    table = numeric_table("How the engine comes to it", validation.varied, ["difference"])
+    table = numeric_table("Convergence of the engine", validation.varied, ["difference"])
     for scale, apart in validation.trials:
         table.add_row(f"{scale:.3g}", f"{apart:.1e}")
     return table

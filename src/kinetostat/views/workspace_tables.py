@@ -26,7 +26,7 @@ def print_workspace(console: Console, found: Workspace) -> None:
     if found.extents:
         _print_extents(console, found)
     if found.demands:
-        table = numeric_table("What it asks of the machine", "", ["from", "to", ""])
+        table = numeric_table("Demands on the machine within the workspace", "", ["from", "to", ""])
         for demand in found.demands:
             table.add_row(demand.title, number(demand.least), number(demand.greatest), demand.unit)
         console.print(table)
@@ -42,17 +42,20 @@ def _summary(found: Workspace) -> Iterator[str]:
         "standard errors)."
     )
     if not found.found:
-        yield "No pose of the box is inside; the table says why."
+        yield "No pose of the box is in the workspace; the table shows why."
     elif found.joined is None:
-        yield "The file's pose is not inside: whether the inside hangs together with it is not known."
+        yield "The pose of the file is outside the workspace, so it is unknown which part can be reached from it."
     elif found.joined < 1.0:
-        yield f"Only {100.0 * found.joined:.3g} % of the inside hangs together with the file's pose."
+        yield f"Only {100.0 * found.joined:.3g} % of the workspace is connected with the pose of the file."
     if not found.divided:
-        yield "Singularities are no borders here: they do not divide the machine's poses, or the file's is singular."
+        yield (
+            "Singularities are not borders here: they do not divide the poses of this machine, or the pose of the file "
+            "is singular."
+        )
 
 
 def _print_extents(console: Console, found: Workspace) -> None:
-    table = numeric_table("The inside extends", "", ["from", "to", ""])
+    table = numeric_table("Extent of the workspace", "", ["from", "to", ""])
     for dim, ends in found.extents.items():
         coordinate = found.dataset[dim]
         scale = coordinate_scale(coordinate.attrs["kind"], coordinate.attrs["units"], coordinate.values)
