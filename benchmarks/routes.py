@@ -14,10 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from cases import SUM, TWELVE, Case
-from kinetostat.engine.batch import evaluate
+from kinetostat.engine.batch import available_cores, evaluate
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Table
-from kinetostat.engine.threads import available_cores
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import with_values

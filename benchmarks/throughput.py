@@ -22,9 +22,8 @@ from pathlib import Path
 import numpy as np
 
 from cases import CASES, TWELVE, Case
-from kinetostat.engine.batch import evaluate
+from kinetostat.engine.batch import available_cores, evaluate
 from kinetostat.engine.points import Table
-from kinetostat.engine.threads import available_cores
 from kinetostat.machine.loading import load
 from kinetostat.studies.diagnosis.hardware import processor
 from routes import DIAGONAL_OF_C, TWELVE_OUTPUTS, Array, Route, routes_of

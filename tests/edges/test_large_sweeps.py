@@ -12,7 +12,7 @@ import xarray as xr
 
 from kinetostat.cli import BAD_INPUT, DONE, main
 from kinetostat.commands.common import STOPPED
-from kinetostat.engine import chunks, cluster
+from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
 from kinetostat.machine.loading import load
 from kinetostat.spec.errors import InputError
@@ -26,6 +26,7 @@ RANGES = ["x=-40 cm:40 cm:50", "z=40 cm:140 cm:50", "theta5=-70 deg:-50 deg:50"]
 NAMES = ["compliance_x", "compliance_z"]
 WORDS = ["map", MACHINE, *(word for text in RANGES for word in ("--over", text)), "--quantity", "compliance_x"]
 CHUNKS = 4
+HERE = chunks.here
 """In 125 000 points, where a chunk is one slab."""
 
 
@@ -163,14 +164,14 @@ def test_a_study_killed_while_its_file_is_made_begins_again(question, undisturbe
 
 def interrupted(work, numbers):
     """Ctrl-C while the third chunk is computed."""
-    yield from chunks.here(work, numbers[:2])
+    yield from HERE(work, numbers[:2])
     raise KeyboardInterrupt
 
 
 def test_ctrl_c_keeps_what_was_computed_and_the_same_command_goes_on(tmp_path, monkeypatch, capsys):
     command = [*WORDS, "-o", str(tmp_path / "study")]
     with monkeypatch.context() as patch:
-        patch.setattr(cluster, "here", interrupted)
+        patch.setattr(chunks, "here", interrupted)
         assert main(command) == STOPPED
     assert "same command goes on" in capsys.readouterr().err
     assert history(tmp_path / "study") == [0, 1]

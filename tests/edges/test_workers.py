@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from kinetostat.cli import BAD_INPUT, DONE, main
-from kinetostat.engine import chunks, cluster
+from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
-from kinetostat.engine.chunks import in_chunks
-from kinetostat.engine.cluster import Crew, hired
+from kinetostat.engine.chunks import Crew, hired, in_chunks
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values
@@ -66,7 +65,7 @@ def test_a_cluster_gives_the_same_bits(name, dask):
 @pytest.mark.parametrize("name", bundled())
 def test_a_worker_has_the_very_machine(name):
     machine = load(name)
-    assert values(cluster._machine(cluster.as_toml(machine))) == values(machine)
+    assert values(chunks._machine(chunks.as_toml(machine))) == values(machine)
 
 
 def test_commands_take_a_cluster_and_write_the_same_file(dask, tmp_path, monkeypatch, capsys):
@@ -97,7 +96,7 @@ def test_a_worker_that_dies_is_survived():
 def test_workers_started_here_leave_ctrl_c_to_the_one_that_gives_orders():
     before = signal.getsignal(signal.SIGINT)
     try:
-        cluster.dask_setup(None)
+        chunks.dask_setup(None)
         assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)
@@ -128,7 +127,7 @@ def test_a_cluster_that_fails_is_said(error, arguments, message):
     distributed = pytest.importorskip("distributed")
     client = Failing(attrgetter(error)(distributed)(*arguments))
     with pytest.raises(InputError, match=message):
-        next(cluster._computed(distributed, client, work_of(MACHINE), [0]))
+        next(chunks._computed(distributed, client, work_of(MACHINE), [0]))
 
 
 def test_another_version_on_a_worker_is_refused():
@@ -137,7 +136,7 @@ def test_another_version_on_a_worker_is_refused():
             return {"tcp://somewhere": "0.0.0"}
 
     with pytest.raises(InputError, match=r"tcp://somewhere runs kinetostat 0\.0\.0, here is"):
-        cluster._check_versions(Client())
+        chunks._check_versions(Client())
 
 
 @pytest.mark.parametrize("how", [["--workers", "2"], ["--cluster", "tcp://127.0.0.1:1"]])
@@ -149,7 +148,7 @@ def test_without_dask_the_fix_is_named(how, monkeypatch, capsys):
 
 def test_no_scheduler_at_an_address_is_said(monkeypatch, capsys):
     pytest.importorskip("distributed")
-    monkeypatch.setattr(cluster, "PATIENCE", "100 ms")
+    monkeypatch.setattr(chunks, "PATIENCE", "100 ms")
     assert main([*WORDS, "--cluster", "tcp://127.0.0.1:1"]) == BAD_INPUT
     assert 'no Dask scheduler answers at "tcp://127.0.0.1:1"' in capsys.readouterr().err
 

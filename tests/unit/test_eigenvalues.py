@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.eigenvalues import greatest_eigenvalue
-from kinetostat.engine.body import Body
 from kinetostat.engine.gradient import gradient
 from kinetostat.engine.interpreter import Interpreted
-from kinetostat.engine.trace import Graph
+from kinetostat.engine.trace import Body, Graph
 
 COUNT = 5000
 ROUNDINGS = 20 * np.finfo(float).eps

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from kinetostat.engine.batch import responses
 from kinetostat.engine.points import Axis, Grid
-from kinetostat.engine.responses import responses
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.elements import (
     LINKS_TOGETHER,

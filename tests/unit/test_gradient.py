@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.scalar import cos, sin, smaller, sqrt, where
-from kinetostat.engine.body import Body
 from kinetostat.engine.gradient import gradient, share_of, with_gradients
 from kinetostat.engine.interpreter import Interpreted
 from kinetostat.engine.native import Program
-from kinetostat.engine.trace import Graph, needed
+from kinetostat.engine.trace import Body, Graph, needed
 
 RULES = {
     "sum": lambda x, y: x + y + 2.0,

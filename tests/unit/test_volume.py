@@ -6,8 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from kinetostat.engine.points import Axis
-from kinetostat.engine.sampling import Cells
+from kinetostat.engine.points import Axis, Cells
 from kinetostat.studies.workspace.connected import connected_to
 from kinetostat.studies.workspace.surface import surface
 from kinetostat.studies.workspace.volume import estimate_volume

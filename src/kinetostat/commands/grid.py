@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from kinetostat.commands.common import Commands
-    from kinetostat.engine.cluster import Crew
+    from kinetostat.engine.chunks import Crew
     from kinetostat.studies.grid.grid import GridQuestion
 
 VARY = "FIELD=from:to:count[:log]"
@@ -91,13 +91,13 @@ def _grid(options: argparse.Namespace, stem: str) -> int:
 
 
 def _crew(options: argparse.Namespace) -> "Crew":
-    from kinetostat.engine.cluster import Crew
+    from kinetostat.engine.chunks import Crew
 
     return Crew(options.workers, options.cluster)
 
 
 def _in_memory(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
-    from kinetostat.engine.cluster import hired
+    from kinetostat.engine.chunks import hired
     from kinetostat.studies.grid.grid import answer
     from kinetostat.views.progress import progress_bar
 
@@ -155,7 +155,7 @@ def _show(dataset: "xr.Dataset", as_json: bool, written: Sequence[Path]) -> None
 
 
 def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
-    from kinetostat.engine.cluster import hired
+    from kinetostat.engine.chunks import hired
     from kinetostat.studies.grid.stored_grid import answer_into
     from kinetostat.views.progress import progress_bar
 

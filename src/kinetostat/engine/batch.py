@@ -4,6 +4,7 @@ Small batches run through NumPy, because that starts at once; large ones through
 same functions.
 """
 
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -13,10 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.engine.points import Array, Part, Points
-from kinetostat.engine.threads import available_cores
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.kinetostatics.response import respond
+from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, with_values
 
@@ -172,3 +172,23 @@ def _in_threads(task: Callable[[int], int], starts: Sequence[int], threads: int)
         while running:
             yield running.pop(0).result()
             running.extend(pool.submit(task, start) for start in islice(waiting, 1))
+
+
+def available_cores() -> int:
+    """Processors that the system lets this process run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def responses(machine: Machine, points: Points) -> Response:
+    """The response of a machine at all points: every scalar in it is an array [points] or the same at all of them.
+
+    For studies of some thousand points that need more than a few numbers of each. Results are meaningless where the status is not OK.
+
+    Args:
+        machine: gives all parameters that do not vary.
+        points: where; leaf paths of the machine's family and their values, SI.
+    """
+    with np.errstate(all="ignore"):
+        return respond(with_values(machine, points.columns(0, points.size)))

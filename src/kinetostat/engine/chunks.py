@@ -1,15 +1,25 @@
-"""A batch in chunks: runs of points that are computed, written and resumed one by one. Knows no file.
+"""A batch in chunks: runs of points computed one by one, in this process, in workers or on a Dask cluster. Knows no file.
 
-Chunks start where slabs do, so that a batch in chunks, whatever their size and wherever they run, gives the bits of the
-batch as a whole.
+Chunks start where slabs do, so that a batch in chunks gives the bits of the batch as a whole, whatever their size and
+wherever they run. Workers get the machine as text and the points as numbers, chunk by chunk, and send results back: one
+that dies loses only the chunk in hand, which Dask gives to another.
 """
 
+import signal
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import version
+from itertools import islice
+from typing import Any
 
 from kinetostat.engine.batch import NATIVE_SLAB, Evaluation, evaluate
 from kinetostat.engine.points import Points
+from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine
+from kinetostat.spec.document import parse
+from kinetostat.spec.errors import InputError
 
 CHUNK_NUMBERS = 1 << 20
 """Results of one chunk, 8 MB: a tenth of a second of work at least, and little to lose or to hold."""
@@ -60,3 +70,131 @@ def here(work: Work, numbers: Sequence[int]) -> Iterator[tuple[int, Evaluation]]
     """Compute chunks one after the other in this process, each on all processors."""
     for number in numbers:
         yield number, work.compute(number)
+
+
+MISSING = (
+    "--workers and --cluster need Dask, which is not installed; install it with `pip install 'kinetostat[cluster]'`."
+)
+AHEAD = 2
+"""Chunks handed out per thread of the cluster: one in hand and one waiting."""
+GO_ON = "What was written is kept: the same command goes on from there."
+PATIENCE = "10 s"
+"""How long a cluster may take to answer."""
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Who computes.
+
+    Attributes:
+        workers: so many processes on this machine.
+        address: of the scheduler of an existing cluster, e.g. "tcp://10.0.0.1:8786".
+    """
+
+    workers: int | None = None
+    address: str | None = None
+
+
+@contextmanager
+def hired(crew: Crew) -> Iterator[Compute]:
+    """A way to compute chunks with a crew, or in this process where the crew names nobody.
+
+    Raises:
+        InputError: Dask is not installed, the cluster does not answer, or its workers run another kinetostat.
+    """
+    if crew.workers is None and crew.address is None:
+        yield here
+        return
+    try:
+        import distributed
+    except ModuleNotFoundError:
+        raise InputError(MISSING) from None
+    with _client(distributed, crew) as client:
+        _check_versions(client)
+
+        def compute(work: Work, numbers: Sequence[int]) -> Iterator[tuple[int, Evaluation]]:
+            return _computed(distributed, client, work, numbers)
+
+        yield compute
+
+
+@contextmanager
+def _client(distributed: Any, crew: Crew) -> Iterator[Any]:
+    """A connection to the cluster of a crew; workers that were started for it end with it."""
+    if crew.address is not None:
+        try:
+            client = distributed.Client(crew.address, timeout=PATIENCE)
+        except (OSError, ValueError) as error:
+            raise InputError(f'no Dask scheduler answers at "{crew.address}" ({error}); check --cluster.') from None
+        with client:
+            yield client
+        return
+    cluster = distributed.LocalCluster(
+        n_workers=crew.workers,
+        threads_per_worker=1,
+        memory_limit=0,
+        dashboard_address="127.0.0.1:0",
+        silence_logs="CRITICAL",
+        preload=__name__,
+    )
+    with cluster, distributed.Client(cluster) as client:
+        yield client
+
+
+def dask_setup(_worker: Any) -> None:
+    """Called by Dask when a worker on this machine starts: Ctrl-C is for the process that gives the orders."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _check_versions(client: Any) -> None:
+    """See that all workers there are run this kinetostat, so that results are the same wherever they come from."""
+    ours = version("kinetostat")
+    try:
+        found = client.run(_version_here)
+    except ImportError as error:
+        raise InputError(f"a worker of the cluster lacks kinetostat {ours} ({error}); install it there.") from None
+    for worker, theirs in found.items():
+        if theirs != ours:
+            raise InputError(f"worker {worker} runs kinetostat {theirs}, here is {ours}; install the same everywhere.")
+
+
+def _version_here() -> str:
+    return version("kinetostat")
+
+
+def _computed(distributed: Any, client: Any, work: Work, numbers: Sequence[int]) -> Iterator[tuple[int, Evaluation]]:
+    """Compute chunks on a cluster, a few for each of its threads at a time; results as they come."""
+    text = as_toml(work.machine)
+    waiting = iter(numbers)
+
+    def hand_out(count: int) -> list[Any]:
+        chosen = islice(waiting, count)
+        return [client.submit(_compute, text, work.points, work.quantities, work.chunk, n, pure=False) for n in chosen]
+
+    try:
+        finished = distributed.as_completed(hand_out(_places(client)))
+        for future in finished:
+            number, found = future.result()
+            future.release()
+            finished.update(hand_out(max(1, _places(client) - finished.count())))
+            yield number, found
+    except distributed.KilledWorker:
+        raise InputError("worker after worker died over the same chunk; their logs say why. " + GO_ON) from None
+    except (distributed.CancelledError, OSError):
+        raise InputError("the connection to the cluster was lost. " + GO_ON) from None
+
+
+def _places(client: Any) -> int:
+    """How many chunks the cluster should hold; workers come and go."""
+    return AHEAD * max(1, sum(client.nthreads().values()))
+
+
+def _compute(text: str, points: Points, quantities: tuple[str, ...], chunk: int, number: int) -> tuple[int, Evaluation]:
+    """On a worker: one chunk, on one thread, because a worker takes as many chunks as it has threads."""
+    return number, Work(_machine(text), points, quantities, chunk).compute(number, threads=1)
+
+
+@lru_cache(8)
+def _machine(text: str) -> Machine:
+    """The machine of a file's text, made once for each process, so that its programs are compiled once."""
+    return build(parse(text, "the machine sent to this worker"), "the machine sent to this worker")

@@ -12,15 +12,14 @@ from typing import TypeAlias
 
 import numpy as np
 
-from kinetostat.engine.batch import NATIVE_SLAB, Fill, Progress, by_free_springs, in_slabs, silent
-from kinetostat.engine.body import Array, Codes, Runnable
+from kinetostat.engine.batch import NATIVE_SLAB, Fill, Progress, available_cores, by_free_springs, in_slabs, silent
 from kinetostat.engine.form import Form, Kind, angles, form_of, reduced
 from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.implicit import total_slopes
 from kinetostat.engine.interpreter import Interpreted
 from kinetostat.engine.points import Points
 from kinetostat.engine.questions import Weights, equations_of, objectives_of
-from kinetostat.engine.threads import available_cores
+from kinetostat.engine.trace import Array, Codes, Runnable
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine

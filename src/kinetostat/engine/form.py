@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar
-from kinetostat.engine.body import Array
-from kinetostat.engine.trace import Graph, Operand, Traced
+from kinetostat.engine.trace import Array, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values

@@ -14,8 +14,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero, plus, times, where
-from kinetostat.engine.body import Body
-from kinetostat.engine.trace import Condition, Node, Operand, Traced
+from kinetostat.engine.trace import Body, Condition, Node, Operand, Traced
 
 TURN = "turn"
 """Operation of a cosine or sine as derivatives see it; its operands are the angle and the derivative by it."""

@@ -5,7 +5,7 @@ Source: theory (34).
 
 import numpy as np
 
-from kinetostat.engine.body import Array
+from kinetostat.engine.trace import Array
 
 IDLE = 1e-9
 """Relative size of a singular value below which a combination of coordinates does not change the equations."""

@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.engine.body import Array, Body, Codes
 from kinetostat.engine.gradient import TURN, active_nodes, parents, rule, share_of
-from kinetostat.engine.trace import Node, Operand, Traced, needed
+from kinetostat.engine.trace import Array, Body, Codes, Node, Operand, Traced, needed
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     "add": np.add,

@@ -14,10 +14,9 @@ from functools import lru_cache
 import numpy as np
 
 from kinetostat.algebra.scalar import where
-from kinetostat.engine.body import Array, Body, Codes, Runnable
 from kinetostat.engine.form import Form, Kind, angles, form_of, number, reduced, traced
 from kinetostat.engine.native import Program
-from kinetostat.engine.trace import Traced
+from kinetostat.engine.trace import Array, Body, Codes, Runnable, Traced
 from kinetostat.kinematics.closed_form import closed_joints
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.status import Status

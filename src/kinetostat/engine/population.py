@@ -6,11 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
-from kinetostat.engine.batch import NATIVE_SLAB, Codes, by_free_springs, in_slabs
+from kinetostat.engine.batch import NATIVE_SLAB, Codes, available_cores, by_free_springs, in_slabs
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.kernel import slab_kernel
 from kinetostat.engine.points import Array
-from kinetostat.engine.threads import available_cores
 from kinetostat.machine.machine import Machine
 
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from kinetostat.algebra.scalar import Scalar, plus, times, where
-from kinetostat.engine.body import Body
 from kinetostat.engine.form import Form, Inputs, Kind, number, traced
-from kinetostat.engine.trace import Operand, Traced
+from kinetostat.engine.trace import Body, Operand, Traced
 from kinetostat.kinematics.closed_form import closed_joints
 from kinetostat.kinematics.closing import closing_equations
 from kinetostat.kinematics.closure import Joints

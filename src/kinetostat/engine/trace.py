@@ -5,11 +5,17 @@ computed. Every rewriting is exact in IEEE arithmetic, infinities and NaN includ
 """
 
 import math
-from collections.abc import Callable, Iterable
-from typing import Any, NoReturn, TypeAlias
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NoReturn, Protocol, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
 
 from kinetostat.engine.trigonometry import cos_and_sin
 
+Array = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.int8]
 Operand: TypeAlias = "Node | float"
 Bounds: TypeAlias = tuple[float, float]
 
@@ -187,6 +193,37 @@ class Graph:
             fixed = all(isinstance(operand, float) or operand.fixed for operand in operands)
             found = self._known[key] = kind(self, operation, operands, fixed, bounds_of(operation, operands))
         return found
+
+
+@dataclass(frozen=True)
+class Body:
+    """What is computed at each point.
+
+    Attributes:
+        fixed: inputs that are the same at all points.
+        columns: inputs that vary.
+        results: nodes, or numbers where a result depends on nothing.
+        code: a small integer beside the results: a node or a number.
+    """
+
+    fixed: Sequence[Traced]
+    columns: Sequence[Traced]
+    results: Sequence[Operand]
+    code: Operand
+
+
+class Runnable(Protocol):
+    """A body that can be evaluated."""
+
+    def run(self, fixed: Array, columns: Sequence[Array], results: Array, codes: Codes) -> None:
+        """Evaluate points.
+
+        Args:
+            fixed: values of the fixed inputs.
+            columns: values of the others [points], each contiguous.
+            results: where results go [results x points]; rows may lie apart, the points of a row may not.
+            codes: where the codes go [points].
+        """
 
 
 def needed(results: Iterable[Operand]) -> list[Node]:

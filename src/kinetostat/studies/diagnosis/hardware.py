@@ -5,7 +5,7 @@ import platform
 from collections.abc import Iterator
 from pathlib import Path
 
-from kinetostat.engine.threads import available_cores
+from kinetostat.engine.batch import available_cores
 from kinetostat.studies.diagnosis.check import Check, State, reinstall, tried
 
 GROUP = "machine"

@@ -11,9 +11,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import xarray as xr
 
-from kinetostat.engine.batch import Evaluation, evaluate
+from kinetostat.engine.batch import Evaluation, available_cores, evaluate
 from kinetostat.engine.points import Table
-from kinetostat.engine.threads import available_cores
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.machine.loading import load

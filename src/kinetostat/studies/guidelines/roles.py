@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.engine.batch import Progress
+from kinetostat.engine.batch import Progress, responses
 from kinetostat.engine.points import Points
-from kinetostat.engine.responses import responses
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.elements import (
     Element,

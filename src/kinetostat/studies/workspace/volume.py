@@ -8,7 +8,7 @@ from math import prod, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.engine.sampling import PER_CELL
+from kinetostat.engine.points import PER_CELL
 
 POWERS = {1: "", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶"}
 

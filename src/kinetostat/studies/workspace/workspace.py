@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from kinetostat.engine.batch import Progress, evaluate, silent
-from kinetostat.engine.sampling import Cells
+from kinetostat.engine.points import Cells
 from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, several

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from kinetostat.engine.threads import available_cores
+from kinetostat.engine.batch import available_cores
 from kinetostat.views.rendering.camera import axes_towards
 from kinetostat.views.rendering.visibility import Body, nearest_triangles
 from kinetostat.views.scene.looks import LOOKS, linear
