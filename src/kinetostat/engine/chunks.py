@@ -1,4 +1,4 @@
-"""A batch in chunks: runs of points computed one by one, in this process, in workers or on a Dask cluster. Knows no file.
+"""A batch in chunks, computed one by one in this process, in workers or on a Dask cluster. Knows no file.
 
 Chunks start where slabs do, so that a batch in chunks gives the bits of the batch as a whole, whatever their size and
 wherever they run. Workers get the machine as text and the points as numbers, chunk by chunk, and send results back: one
