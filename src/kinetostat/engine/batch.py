@@ -184,7 +184,8 @@ def available_cores() -> int:
 def responses(machine: Machine, points: Points) -> Response:
     """The response of a machine at all points: every scalar in it is an array [points] or the same at all of them.
 
-    For studies of some thousand points that need more than a few numbers of each. Results are meaningless where the status is not OK.
+    For studies that need more than a few numbers of each of some thousand points. Results are meaningless where the
+    status is not OK.
 
     Args:
         machine: gives all parameters that do not vary.
