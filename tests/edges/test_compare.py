@@ -8,8 +8,7 @@ import pytest
 from kinetostat.cli import main
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.comparison.designs import compare, read_design
-from kinetostat.studies.comparison.designs_data import as_json
+from kinetostat.studies.comparison.designs import as_json, compare, read_design
 from kinetostat.studies.grid.grid import evaluate_grid
 from kinetostat.views.design_figure import comparison_figure
 

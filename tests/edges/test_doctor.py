@@ -12,7 +12,7 @@ from rich.console import Console
 
 from kinetostat.cli import DONE, NO_ANSWER, main
 from kinetostat.studies.diagnosis import diagnosis, self_test, software
-from kinetostat.studies.diagnosis.check import Check, State
+from kinetostat.studies.diagnosis.diagnosis import Check, State
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.tables import table_3
 from kinetostat.views.diagnosis_tables import print_checks, print_verdict

@@ -12,7 +12,8 @@ from kinetostat.machine.loading import as_toml, build, load
 from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.grid.grid import evaluate_grid, failures, resolve_quantities
+from kinetostat.studies.grid.grid import evaluate_grid, failures
+from kinetostat.studies.grid.quantities import resolve_quantities
 from kinetostat.studies.storage import replacing, write_dataset, write_text
 from kinetostat.views.display import coordinate_scale, prefixed_scale
 from kinetostat.views.figures import contour_maps, curves

@@ -10,8 +10,7 @@ from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.guidelines.guidelines import guidelines
-from kinetostat.studies.guidelines.guidelines_data import as_json
-from kinetostat.studies.guidelines.sentences import statements
+from kinetostat.studies.guidelines.sentences import as_json, statements
 
 MACHINE = "zhang-gosselin-4dof"
 GRID = ["x=-2 cm:2 cm:5", "z=66 cm:70 cm:5"]

@@ -96,7 +96,7 @@ from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.problem import load_problem
 from kinetostat.studies.optimisation.front import front_of
 from kinetostat.studies.optimisation.search import search_into
-from kinetostat.studies.row_file import RowFile
+from kinetostat.studies.result_file import RowFile
 from kinetostat.studies.study_folder import StudyFolder
 
 left = [{done}]

@@ -16,7 +16,7 @@ from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.report import answers
-from kinetostat.studies.report.ranges import usual_ranges
+from kinetostat.studies.report.answers import usual_ranges
 from kinetostat.views.report import live, pdf
 from kinetostat.views.report.assembly import report_of
 from kinetostat.views.report.html_page import html_page

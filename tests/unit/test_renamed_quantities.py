@@ -6,7 +6,7 @@ import pytest
 
 from kinetostat import load
 from kinetostat.kinetostatics.response import respond
-from kinetostat.studies.grid.grid import resolve_quantities
+from kinetostat.studies.grid.quantities import resolve_quantities
 from kinetostat.studies.workspace.conditions import parse_condition
 
 COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from kinetostat.engine.points import Axis, Cells
-from kinetostat.studies.workspace.connected import connected_to
-from kinetostat.studies.workspace.surface import surface
-from kinetostat.studies.workspace.volume import estimate_volume
+from kinetostat.studies.workspace.region import estimate_volume, surface
+from kinetostat.studies.workspace.workspace import connected_to
 
 
 def cells(*counts, seed=0, ends=(-1.0, 1.0)):

@@ -46,7 +46,7 @@ def _compare(options: argparse.Namespace) -> int:
         found = compare(designs, options.ranges, progress)
     written = _write(found, options.output) if options.output else []
     if options.json:
-        from kinetostat.studies.comparison.designs_data import as_json
+        from kinetostat.studies.comparison.designs import as_json
 
         print_json(as_json(found))
     else:
@@ -61,7 +61,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _write(found: "Comparison", folder: Path) -> list[Path]:
-    from kinetostat.studies.comparison.designs_data import as_json
+    from kinetostat.studies.comparison.designs import as_json
     from kinetostat.studies.storage import write_text
     from kinetostat.views.design_figure import comparison_figure
     from kinetostat.views.figures import save

@@ -8,7 +8,7 @@ from kinetostat.commands.common import DONE, NO_ANSWER, add_command, print_json,
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
-    from kinetostat.studies.diagnosis.check import Check
+    from kinetostat.studies.diagnosis.diagnosis import Check
 
 
 def add_doctor_command(commands: "Commands") -> None:
@@ -39,8 +39,7 @@ def _doctor(options: argparse.Namespace) -> int:
 
 def _checks() -> "Iterator[Check]":
     """All findings; what pictures and the studio add to them is known here alone."""
-    from kinetostat.studies.diagnosis.check import Check, State, reinstall, tried
-    from kinetostat.studies.diagnosis.diagnosis import diagnose
+    from kinetostat.studies.diagnosis.diagnosis import Check, State, diagnose, reinstall, tried
     from kinetostat.studio.design.state_folder import usual_state
 
     yield from diagnose()

@@ -142,9 +142,9 @@ def _draw(dataset: "xr.Dataset", stem: Path, title: str) -> list[Path]:
 
 def _show(dataset: "xr.Dataset", as_json: bool, written: Sequence[Path]) -> None:
     if as_json:
-        from kinetostat.studies.grid.grid_data import as_plain_data
+        from kinetostat.studies.grid.grid import as_json
 
-        print_json(as_plain_data(dataset))
+        print_json(as_json(dataset))
         return
     from kinetostat.views.grid_tables import print_dataset, print_written
     from kinetostat.views.tables import terminal
@@ -165,9 +165,9 @@ def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) ->
     except KeyboardInterrupt:
         return stopped(f"the results so far are in {options.output}; the same command continues from there.")
     if options.json:
-        from kinetostat.studies.grid.grid_data import as_summary
+        from kinetostat.studies.grid.stored_grid import summary_json
 
-        print_json(as_summary(found))
+        print_json(summary_json(found))
     else:
         from kinetostat.views.grid_tables import print_stored, print_written
         from kinetostat.views.tables import terminal

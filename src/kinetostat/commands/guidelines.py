@@ -36,7 +36,7 @@ def add_guidelines_command(commands: "Commands") -> None:
 def _guidelines(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
     from kinetostat.studies.guidelines.guidelines import guidelines
-    from kinetostat.studies.guidelines.guidelines_data import as_json
+    from kinetostat.studies.guidelines.sentences import as_json
     from kinetostat.views.progress import progress_bar
 
     machine = load_machine(options)
@@ -59,7 +59,7 @@ def _show(found: "Guidelines", full: bool, written: list[Path]) -> None:
 
 
 def _write(found: "Guidelines", folder: Path) -> list[Path]:
-    from kinetostat.studies.guidelines.guidelines_data import as_json
+    from kinetostat.studies.guidelines.sentences import as_json
     from kinetostat.studies.storage import write_text
     from kinetostat.views.figures import save
     from kinetostat.views.guideline_figures import guideline_figures

@@ -57,9 +57,9 @@ def _workspace(options: argparse.Namespace) -> int:
         found = workspace(machine, options.ranges, options.conditions, progress, options.seed)
     written = _write(found, options.output) if options.output else []
     if options.json:
-        from kinetostat.studies.workspace.workspace_data import as_plain_data
+        from kinetostat.studies.workspace.workspace import as_json
 
-        print_json(as_plain_data(found))
+        print_json(as_json(found))
     else:
         from kinetostat.views.grid_tables import print_written
         from kinetostat.views.tables import terminal

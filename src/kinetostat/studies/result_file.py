@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import prod
 from pathlib import Path
+from types import TracebackType
 from typing import Any, BinaryIO
 
 import h5netcdf
@@ -22,6 +23,8 @@ import xarray as xr
 
 from kinetostat.spec.errors import InputError
 
+KIND = np.dtype("<f8")
+"""Numbers in a file of rows: float64, little-endian."""
 SPARE = 1 << 30
 """Bytes that are left free on a disk."""
 STEP = 1 << 24
@@ -159,3 +162,45 @@ def thinned(path: Path) -> xr.Dataset:
     with xr.open_dataset(path, engine="h5netcdf") as dataset:
         steps = {dim: slice(None, None, -(-size // SHOWN)) for dim, size in dataset.sizes.items()}
         return dataset.isel(steps).load()
+
+
+class RowFile:
+    """An open file of rows of one width."""
+
+    def __init__(self, path: Path, width: int) -> None:
+        self._path, self._width = path, width
+        with writing(path):
+            path.touch()
+            self._stream = path.open("r+b")
+
+    def __enter__(self) -> "RowFile":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stream.close()
+
+    def read(self, start: int, count: int) -> Array:
+        """Some rows [count x width], from number `start` on.
+
+        Raises:
+            InputError: they are not there.
+        """
+        size = self._width * KIND.itemsize
+        self._stream.seek(start * size)
+        data = self._stream.read(count * size)
+        if len(data) < count * size:
+            raise InputError(f'"{self._path}" has lost rows; remove its folder to begin again.')
+        return np.frombuffer(data, dtype=KIND).reshape(count, self._width).astype(float)
+
+    def write(self, start: int, rows: Array) -> None:
+        """Put rows at number `start`; when this returns they are on the disk.
+
+        Raises:
+            InputError: the disk is full or failing.
+        """
+        with writing(self._path):
+            self._stream.seek(start * self._width * KIND.itemsize)
+            self._stream.write(np.ascontiguousarray(rows, dtype=KIND).data)
+            settle(self._stream)

@@ -19,8 +19,8 @@ from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import Parameter, parameters, values
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.grid.absent import refuse_absent
-from kinetostat.studies.grid.grid import resolve_quantities
+from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
+from kinetostat.studies.plain_data import as_answer
 from kinetostat.units import KINDS
 
 WITHOUT_INFLUENCE = ("load", "limits")
@@ -206,32 +206,33 @@ def _one_percent_of(parameter: Parameter, held: dict[str, float], length: float)
 
 
 def as_json(answer: Sensitivity) -> dict[str, Any]:
-    """A sensitivity as plain data: SI numbers, null where there is none."""
-    names, found = answer.quantities, answer.found
-    return {
-        "name": answer.machine.name,
-        "status": answer.status.word,
-        "message": answer.message,
-        "characteristic_length": answer.length if answer.influences else None,
-        "indices": {
-            name: {"value": value if math.isfinite(value) else None, "units": QUANTITIES[name].unit}
-            for name, value in zip(names, found, strict=True)
-        },
-        "parameters": [_row(one, names) for one in answer.influences],
-        "without_influence": list(answer.none),
-        "without_derivative": dict(answer.skipped),
-    }
-
-
-def _row(one: Influence, names: Sequence[str]) -> dict[str, Any]:
-    return {
-        "path": one.path,
-        "value": one.value,
-        "units": KINDS[one.kind].unit,
-        "one_percent_of": {"measure": one.measure, "value": one.percent_of},
-        "derivatives": dict(zip(names, one.derivatives, strict=True)),
-        "percent_per_percent": dict(zip(names, one.percents, strict=True)),
-    }
+    """A sensitivity as plain data."""
+    names = answer.quantities
+    return as_answer(
+        {
+            "name": answer.machine.name,
+            "status": answer.status.word,
+            "message": answer.message,
+            "characteristic_length": answer.length if answer.influences else None,
+            "indices": {
+                name: {"value": value, "units": QUANTITIES[name].unit}
+                for name, value in zip(names, answer.found, strict=True)
+            },
+            "parameters": [
+                {
+                    "path": one.path,
+                    "value": one.value,
+                    "units": KINDS[one.kind].unit,
+                    "one_percent_of": {"measure": one.measure, "value": one.percent_of},
+                    "derivatives": dict(zip(names, one.derivatives, strict=True)),
+                    "percent_per_percent": dict(zip(names, one.percents, strict=True)),
+                }
+                for one in answer.influences
+            ],
+            "without_influence": answer.none,
+            "without_derivative": dict(answer.skipped),
+        }
+    )
 
 
 def notes(answer: Sensitivity) -> Iterator[str]:

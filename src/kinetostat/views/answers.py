@@ -13,15 +13,15 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.studies import analysis, sensitivity
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.comparison import designs_data
+from kinetostat.studies.comparison import designs
 from kinetostat.studies.comparison.designs import Comparison
-from kinetostat.studies.grid import grid_data
-from kinetostat.studies.guidelines import guidelines_data
+from kinetostat.studies.grid import grid
+from kinetostat.studies.guidelines import sentences
 from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.optimisation import result_data
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.sensitivity import Sensitivity
-from kinetostat.studies.workspace import workspace_data
+from kinetostat.studies.workspace import workspace
 from kinetostat.studies.workspace.workspace import Workspace
 from kinetostat.validation import comparison as validation
 from kinetostat.validation.comparison import Validation
@@ -89,16 +89,16 @@ KINDS = (
         xr.Dataset,
         lambda console, found: print_dataset(console, found, _names(found)),
         _grid_figures,
-        grid_data.as_plain_data,
+        grid.as_json,
     ),
-    Kind(Workspace, print_workspace, _workspace_figures, workspace_data.as_plain_data),
+    Kind(Workspace, print_workspace, _workspace_figures, workspace.as_json),
     Kind(Sensitivity, print_sensitivity, _sensitivity_figures, sensitivity.as_json),
-    Kind(Guidelines, print_guidelines, guideline_figures, guidelines_data.as_json),
+    Kind(Guidelines, print_guidelines, guideline_figures, sentences.as_json),
     Kind(
         Comparison,
         print_comparison,
         lambda found: {"comparison": comparison_figure(found)},
-        designs_data.as_json,
+        designs.as_json,
     ),
     Kind(Result, print_result, optimisation_figures.pictures, result_data.as_json),
     Kind(

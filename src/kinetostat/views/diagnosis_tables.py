@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from kinetostat.studies.diagnosis.check import Check, State
+from kinetostat.studies.diagnosis.diagnosis import Check, State
 
 MARKS = {State.SOUND: ("✓", "green"), State.ABSENT: ("–", "bright_black"), State.FAILED: ("✗", "bold red")}
 NAMES = 14

@@ -9,8 +9,7 @@ from rich.console import Console
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.studies.grid.grid import failures
-from kinetostat.studies.grid.stored_grid import StoredGrid
-from kinetostat.studies.grid.tally import Extremes
+from kinetostat.studies.grid.stored_grid import Extremes, StoredGrid
 from kinetostat.views.display import family_of_names, spoken
 from kinetostat.views.tables import number, numeric_table
 

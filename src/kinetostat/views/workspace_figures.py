@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from kinetostat.studies.workspace.conditions import Condition
-from kinetostat.studies.workspace.surface import surface
+from kinetostat.studies.workspace.region import surface
 from kinetostat.studies.workspace.verdicts import BEYOND, FAILS, INSIDE, LIMIT, PLAIN, phrase
 from kinetostat.views.display import coordinate_scale
 from kinetostat.views.figures import COLOURS, STYLE, Array, axis_values, fix_layout, set_axis_scales

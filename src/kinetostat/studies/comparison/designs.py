@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.engine.batch import Progress, silent
@@ -22,6 +23,7 @@ from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.ranges import parse_range
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.comparison.design_rows import Row, rows_at_poses, rows_over
+from kinetostat.studies.plain_data import as_answer
 
 MOST_DESIGNS = 12
 SEPARATOR = ";"
@@ -218,3 +220,48 @@ def _softest(design: Design) -> tuple[Blame, ...]:
             ]
             found.append(Blame(COMPONENTS[i], tuple(sorted(parts, key=lambda part: -part[1]))))
     return tuple(found)
+
+
+def as_json(comparison: Comparison) -> dict[str, Any]:
+    """The designs, the fields in which they differ, and every number of each, as plain data."""
+    grid = {
+        "over": comparison.ranges,
+        "designs": [{"answered": answered, "poses": poses} for answered, poses in comparison.poses],
+        "rows": [_row_json(row) for row in comparison.over],
+    }
+    return as_answer(
+        {
+            "designs": [
+                {
+                    "design": design.label,
+                    "name": design.machine.name,
+                    "family": design.machine.family.name,
+                    "components": design.analysis.components,
+                    "status": design.analysis.status.word,
+                    "message": design.analysis.message,
+                    "softest": [{"direction": one.component, "shares": dict(one.shares)} for one in softest],
+                }
+                for design, softest in zip(comparison.designs, comparison.softest, strict=True)
+            ],
+            "differences": {
+                field.path: [
+                    row if parameter else None for parameter, row in zip(field.parameters, field.values, strict=True)
+                ]
+                for field in comparison.differences
+            },
+            "rows": [_row_json(row) for row in comparison.rows],
+            "grid": grid if comparison.ranges else None,
+        }
+    )
+
+
+def _row_json(row: Row) -> dict[str, Any]:
+    return {
+        "group": row.group,
+        "name": row.name,
+        "units": row.unit,
+        "better": row.better,
+        "values": row.values,
+        "percent": row.percents,
+        "best": row.best,
+    }

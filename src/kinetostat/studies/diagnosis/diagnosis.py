@@ -1,10 +1,59 @@
 """Is this installation sound? All findings, one after the other; whatever is broken, the others are still made."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
 from importlib import import_module
 from typing import Any
 
-from kinetostat.studies.diagnosis.check import Check, State, reinstall
+
+class State(StrEnum):
+    """What became of a check."""
+
+    SOUND = "sound"
+    ABSENT = "absent"
+    """Not there, and nothing that is needed."""
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Check:
+    """A finding.
+
+    Attributes:
+        group: what it belongs to, a heading.
+        name: what was looked at.
+        state: what became of it.
+        said: one sentence or number for people.
+        fix: what to do about it, where there is something to do.
+    """
+
+    group: str
+    name: str
+    state: State
+    said: str
+    fix: str = ""
+
+
+class UnsoundError(Exception):
+    """A check that found something wrong; says what."""
+
+
+def tried(group: str, name: str, question: Callable[[], str], fix: str) -> Check:
+    """The answer to a question as a finding; whatever it raises is a failure, because anything may be broken here."""
+    try:
+        return Check(group, name, State.SOUND, question())
+    except UnsoundError as wrong:
+        return Check(group, name, State.FAILED, str(wrong), fix)
+    except Exception as trouble:
+        reason = str(trouble).partition("\n")[0]
+        return Check(group, name, State.FAILED, f"{type(trouble).__name__}: {reason}", fix)
+
+
+def reinstall(packages: str) -> str:
+    """The command that mends packages."""
+    return f"pip install --force-reinstall {packages}"
+
 
 PARTS = {"software": "software", "machine": "hardware", "self-test": "self_test"}
 """Modules of this package by what they look at: imported when their turn comes, so that none hides another."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from kinetostat.engine.batch import available_cores
-from kinetostat.studies.diagnosis.check import Check, State, reinstall, tried
+from kinetostat.studies.diagnosis.diagnosis import Check, State, reinstall, tried
 
 GROUP = "machine"
 

@@ -17,7 +17,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.diagnosis.check import Check, UnsoundError, reinstall, tried
+from kinetostat.studies.diagnosis.diagnosis import Check, UnsoundError, reinstall, tried
 from kinetostat.studies.grid.grid import evaluate_grid
 from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.problem import load_problem

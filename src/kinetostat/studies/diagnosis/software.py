@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError, metadata, requires, version
 
 from packaging.requirements import Requirement
 
-from kinetostat.studies.diagnosis.check import Check, State, reinstall
+from kinetostat.studies.diagnosis.diagnosis import Check, State, reinstall
 
 PACKAGE = "kinetostat"
 CORE, EXTRAS = "software", "extras"

@@ -1,7 +1,6 @@
 """Sweeps and maps: quantities of a machine over a grid of any of its parameters, as a labelled dataset."""
 
-import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
@@ -9,19 +8,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.engine.batch import Evaluation, Progress, evaluate, silent
 from kinetostat.engine.chunks import Compute, here, in_chunks
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
+from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import Parameter, find
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.ranges import Range, parse_range
-from kinetostat.spec.renamed import current_name
-from kinetostat.studies.grid.absent import refuse_absent
+from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
+from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.setting import frame_of, pose_of
 from kinetostat.units import KINDS
 
@@ -154,39 +152,6 @@ def _evaluated(question: GridQuestion, progress: Progress, compute: Compute) -> 
     return Evaluation(values, np.concatenate([part.status for part in ordered]))
 
 
-def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONENTS) -> list[str]:
-    """Names of quantities, with groups replaced by their members and repetitions dropped.
-
-    Args:
-        names: of quantities or groups.
-        components: that the machine has: rx ry rz x y z, or rz x y of a planar one.
-
-    Raises:
-        InputError: an unknown name, or one of a component that the machine does not have.
-    """
-    groups = {group: [name for name in members if _exists(name, components)] for group, members in GROUPS.items()}
-    found: list[str] = []
-    for name in (current_name(given, "quantity") for given in several(names)):
-        if name not in GROUPS and not (name in QUANTITIES and _exists(name, components)):
-            raise InputError(_no_quantity(name, groups, components))
-        found += groups.get(name, [name])
-    return list(dict.fromkeys(found))
-
-
-def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Sequence[str]) -> str:
-    """The sentence about an unknown quantity: which was probably meant, or all that there are."""
-    others = (other for other, quantity in QUANTITIES.items() if not quantity.components)
-    known = [*groups, *(member for group in groups.values() for member in group), *others]
-    near = difflib.get_close_matches(name, known, 1)
-    every = f"choose from {', '.join(known)}, or an entry such as compliance_{components[0]}_{components[-1]}."
-    return f'"{name}" is not a quantity; ' + (f"did you mean {near[0]}?" if near else every)
-
-
-def _exists(name: str, components: Sequence[str]) -> bool:
-    """Whether all components that a quantity is about exist."""
-    return all(part in components for part in QUANTITIES[name].components)
-
-
 def failures(dataset: xr.Dataset) -> dict[Status, int]:
     """How many points have each status other than OK."""
     codes, counts = np.unique(dataset["status"].values, return_counts=True)
@@ -203,3 +168,22 @@ ABOUT_STATUS = {
     "flag_values": [int(status) for status in Status],
     "flag_meanings": " ".join(status.word for status in Status),
 }
+
+
+def as_json(dataset: xr.Dataset) -> dict[str, Any]:
+    """A grid's dataset as plain data: coordinates, and nested lists with null where there is no finite value."""
+    dims = dataset["status"].dims
+    words = np.array([status.word for status in Status])[dataset["status"].values]
+    variables = {str(name): data for name, data in dataset.data_vars.items() if name != "status"}
+    return as_answer(
+        {
+            "name": dataset.attrs["machine"],
+            "coordinates": {
+                str(dim): {"units": dataset[dim].attrs["units"], "values": dataset[dim].values} for dim in dims
+            },
+            "variables": {
+                name: {"units": data.attrs["units"], "values": data.values} for name, data in variables.items()
+            },
+            "status": words,
+        }
+    )

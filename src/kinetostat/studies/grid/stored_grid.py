@@ -1,24 +1,55 @@
 """Grids of any size: answered chunk by chunk into the folder of a study, so that nothing is lost when it is stopped."""
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kinetostat.engine.batch import Evaluation, Progress, silent
 from kinetostat.engine.chunks import Compute, Work, here, in_chunks
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.grid.grid import ABOUT_STATUS, GridQuestion, about
-from kinetostat.studies.grid.tally import Tally, combined, tally
+from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.result_file import STATUS, UNKNOWN, ResultFile, check_space, create
 from kinetostat.studies.study_folder import Record, StudyFolder, holds_study, study_folder
 
 MOST_NUMBERS = 10_000_000_000
 """Points times quantities of one grid: 80 GB."""
 STUDY_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """Of one quantity, SI, over the points where it has a value; NaN where there is none."""
+
+    least: float
+    mean: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Over all points of a grid.
+
+    Attributes:
+        statuses: how many points have each status.
+        extremes: of each quantity.
+    """
+
+    statuses: dict[Status, int]
+    extremes: dict[str, Extremes]
+
+    @property
+    def answered(self) -> bool:
+        """Whether any point has results."""
+        return self.statuses.get(Status.OK, 0) > 0
 
 
 @dataclass(frozen=True)
@@ -161,3 +192,62 @@ def _compute_missing(
 def _keep(file: ResultFile, study: StudyFolder, number: int, start: int, found: Evaluation) -> None:
     file.write(start, found.values, found.status)
     study.note({"chunk": number, **tally(found)})
+
+
+def tally(found: Evaluation) -> dict[str, Any]:
+    """Counts and extremes of one chunk as plain data."""
+    codes, counts = np.unique(found.status, return_counts=True)
+    quantities = {}
+    for name, values in found.values.items():
+        known = values[~np.isnan(values)]
+        least, largest = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
+        quantities[name] = {"count": len(known), "least": least, "sum": float(known.sum()), "largest": largest}
+    return {
+        "status": {Status(int(code)).word: int(n) for code, n in zip(codes, counts, strict=True)},
+        "quantities": quantities,
+    }
+
+
+def combined(parts: Iterable[Mapping[str, Any]], names: Sequence[str]) -> Tally:
+    """Counts and extremes over several chunks."""
+    kept = list(parts)
+    words: Counter[str] = Counter()
+    for part in kept:
+        words.update(part["status"])
+    statuses = {status: words[status.word] for status in Status if words[status.word]}
+    return Tally(statuses, {name: _extremes([part["quantities"][name] for part in kept]) for name in names})
+
+
+def _extremes(parts: Sequence[Mapping[str, float]]) -> Extremes:
+    held = [part for part in parts if part["count"]]
+    if not held:
+        return Extremes(np.nan, np.nan, np.nan)
+    mean = sum(part["sum"] for part in held) / sum(part["count"] for part in held)
+    return Extremes(min(part["least"] for part in held), mean, max(part["largest"] for part in held))
+
+
+def summary_json(stored: StoredGrid) -> dict[str, Any]:
+    """A grid in a file as plain data: where it is, its axes, counts and extremes."""
+    question = stored.question
+    coordinates = {
+        dim: {
+            "units": question.labels[dim].attrs["units"],
+            "from": axis.values[0],
+            "to": axis.values[-1],
+            "count": len(axis.values),
+        }
+        for dim, axis in zip(question.dims, question.grid.axes, strict=True)
+    }
+    return as_answer(
+        {
+            "name": question.machine.name,
+            "file": str(stored.path),
+            "points": question.grid.size,
+            "coordinates": coordinates,
+            "variables": {
+                name: {"units": QUANTITIES[name].unit, **vars(extremes)}
+                for name, extremes in stored.tally.extremes.items()
+            },
+            "status": {status.word: count for status, count in stored.tally.statuses.items()},
+        }
+    )

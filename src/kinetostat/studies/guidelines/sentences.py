@@ -6,6 +6,8 @@ One kind of statement is one function, in the order of the paper's section 4.2.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +16,8 @@ from kinetostat.kinetostatics.elements import LINKS_TOGETHER, Element
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.guidelines.moves import Move
-from kinetostat.studies.guidelines.roles import ROUNDING, Array, Roles
+from kinetostat.studies.guidelines.roles import EXCESS, ROUNDING, Array, Roles
+from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
 
 MATTERS = 0.01
 """Share of an entry of C from which an element is named as one that decides it."""
@@ -241,3 +244,71 @@ def _where(found: Guidelines, directions: Sequence[int]) -> str:
 
 def _listed(words: Sequence[str], last: str = "and") -> str:
     return f" {last} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def as_json(found: Guidelines) -> dict[str, Any]:
+    """Guidelines as plain data, their sentences among them; directions by name."""
+    names, here = found.components, found.here
+    by_direction = partial(_by_direction, names)
+    return as_answer(
+        {
+            "name": found.machine.name,
+            "status": found.status.word,
+            "message": found.message,
+            "components": names,
+            "rigid_within": EXCESS,
+            "compliance_diagonal": found.compliance or None,
+            "elements": [_element_json(found, here, k) for k in range(len(found.found))] if here else [],
+            "stiffness_equations": found.equations
+            and {name: by_direction(row) for name, row in found.equations.items()},
+            "parameters": [_move_json(move, names) for move in found.moves],
+            "without_influence": found.idle,
+            "left_out": dict(found.skipped),
+            "statements": statements(found),
+            "grid": {"over": found.ranges, "poses": found.poses[1], "answered": found.poses[0]}
+            if found.ranges
+            else None,
+        }
+    )
+
+
+def _by_direction(names: Sequence[str], row: Any) -> dict[str, Any]:
+    return dict(zip(names, row, strict=True))
+
+
+def _element_json(found: Guidelines, here: Roles, k: int) -> dict[str, Any]:
+    element, over, actuator = found.found[k], _over(found), found.actuator
+    by_direction = partial(_by_direction, found.components)
+    limits = [None if element.stiffness is None else limit_of(element.stiffness, f) for f in here.rigid[k, :, 0]]
+    ratio = actuator.stiffness if actuator else None
+    data: dict[str, Any] = {
+        "name": element.name,
+        "parts": element.parts,
+        "actuated": element.actuated,
+        "units": element.unit or None,
+        "stiffness": stiffness_of_spring(element.stiffness),
+        "compliance_share": by_direction(here.shares[k, :, 0]),
+        "rigid_from_factor": by_direction(here.rigid[k, :, 0]),
+        "rigid_from": by_direction(limits),
+        "rigid_from_per_actuator": by_direction([limit and ratio and limit / ratio for limit in limits]),
+        "doubling_lowers_compliance": by_direction(here.gains[k, :, 0]),
+    }
+    if over is not None:
+        data["over_grid"] = {
+            "least_share": by_direction(over.shares[k].min(axis=1)),
+            "greatest_share": by_direction(over.shares[k].max(axis=1)),
+            "rigid_from_factor": by_direction(over.rigid[k].max(axis=1)),
+        }
+    return data
+
+
+def _move_json(move: Move, names: Sequence[str]) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        "path": move.path,
+        "one_percent": "0.01 rad" if move.turning else "1 %",
+        "stiffer_percent_per_percent": _by_direction(names, move.percents),
+    }
+    if move.stiffer:
+        data["stiffer_at"] = _by_direction(names, move.stiffer)
+        data["softer_at"] = _by_direction(names, move.softer)
+    return data

@@ -9,7 +9,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.renamed import current_name
 from kinetostat.spec.study import TermTable
-from kinetostat.studies.grid.absent import refuse_absent
+from kinetostat.studies.grid.quantities import refuse_absent
 from kinetostat.studies.optimisation.aggregate import parse_aggregate
 from kinetostat.studies.optimisation.poses import PoseSet
 from kinetostat.studies.optimisation.terms import PoseTerm, StrokeTerm, Term, VolumeTerm

@@ -12,7 +12,7 @@ from kinetostat.machine.parameters import find, values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.study import PosesTable
 from kinetostat.studies.grid.grid import GridQuestion, grid_question
-from kinetostat.studies.workspace.volume import unit_product
+from kinetostat.studies.workspace.region import unit_product
 from kinetostat.studies.workspace.workspace import workspace
 from kinetostat.units import UnitError, parse
 

@@ -18,7 +18,7 @@ from kinetostat.studies.optimisation.gradient import Gradient
 from kinetostat.studies.optimisation.hybrid import Hybrid
 from kinetostat.studies.optimisation.log import Log, Step, record_of
 from kinetostat.studies.optimisation.problem import Problem, problem_of
-from kinetostat.studies.row_file import KIND, RowFile
+from kinetostat.studies.result_file import KIND, RowFile
 from kinetostat.studies.study_folder import QUESTION, Record, StudyFolder, holds_study, study_folder
 
 ROWS = "designs.bin"

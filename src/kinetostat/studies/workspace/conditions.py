@@ -13,7 +13,7 @@ from kinetostat.engine.points import Array
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.renamed import current_name
-from kinetostat.studies.grid.grid import resolve_quantities
+from kinetostat.studies.grid.quantities import resolve_quantities
 from kinetostat.units import KINDS, UnitError, parse
 
 COMPARISONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}

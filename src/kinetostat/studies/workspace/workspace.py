@@ -6,9 +6,11 @@ What is drawn or printed of it is elsewhere (`views.workspace_figures`, `views.w
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy import ndimage
 
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import Cells
@@ -16,11 +18,11 @@ from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, several
 from kinetostat.studies.grid.grid import IN_MEMORY, MOST_DIMENSIONS, GridQuestion, answer, grid_question
+from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.workspace.conditions import Condition, parse_condition
-from kinetostat.studies.workspace.connected import connected_to
 from kinetostat.studies.workspace.demands import Demand, demands
+from kinetostat.studies.workspace.region import METHOD, Volume, estimate_volume
 from kinetostat.studies.workspace.verdicts import INSIDE, Codes, Judge, Mask, Numbers, Poses
-from kinetostat.studies.workspace.volume import METHOD, Volume, estimate_volume
 
 MOST_DEMANDS = 200_000
 """Inside nodes of which it is computed what they ask of the machine; of more, evenly chosen ones."""
@@ -158,6 +160,17 @@ def _seat(question: GridQuestion) -> tuple[int, ...] | None:
     return tuple(found)
 
 
+def connected_to(region: Mask, seed: tuple[int, ...]) -> Mask:
+    """Return the nodes of a region that are joined to one node by steps along the axes within the region.
+
+    Args:
+        region: over a grid of any number of dimensions.
+        seed: index of the node; outside the region, nothing is joined to it.
+    """
+    labels, _ = ndimage.label(region)
+    return np.asarray((labels == labels[seed]) & region[seed])
+
+
 def _extents(question: GridQuestion, inside: Mask) -> dict[str, tuple[float, float]]:
     found = {}
     for number, (dim, axis) in enumerate(zip(question.dims, question.grid.axes, strict=True)):
@@ -180,3 +193,36 @@ def _labelled(nodes: xr.Dataset, verdict: Codes, connected: Mask, judge: Judge, 
     )
     pose = {path: float(value) for path, value in values(judge.machine).items() if path.startswith("pose.")}
     return wanted.assign_attrs({**figures, "volume_method": METHOD, **pose})
+
+
+def as_json(workspace: Workspace) -> dict[str, Any]:
+    """Volume, counts and ranges as plain data; the nodes themselves are in the NetCDF file."""
+    dataset, volume = workspace.dataset, workspace.volume
+    coordinates = {
+        str(dim): {
+            "units": dataset[dim].attrs["units"],
+            "from": dataset[dim].values[0],
+            "to": dataset[dim].values[-1],
+            "count": dataset.sizes[dim],
+            "inside": workspace.extents.get(str(dim)),
+        }
+        for dim in dataset["verdict"].dims
+    }
+    return as_answer(
+        {
+            "name": dataset.attrs["machine"],
+            "coordinates": coordinates,
+            "volume": {
+                "value": volume.value,
+                "standard_error": volume.standard_error,
+                "units": volume.unit,
+                "share_of_box": volume.share,
+                "cells": volume.cells,
+                "method": METHOD,
+            },
+            "nodes": workspace.counts,
+            "connected": workspace.joined,
+            "singularities_divide": workspace.divided,
+            "demands": workspace.demands,
+        }
+    )

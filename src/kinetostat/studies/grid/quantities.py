@@ -1,0 +1,90 @@
+"""Which quantities a machine has: names that people write, and those that have no value for its parts or its file."""
+
+import difflib
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import GROUPS, PARTS, QUANTITIES
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.mass import moving_masses
+from kinetostat.machine.parameters import Parameter
+from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.renamed import current_name
+from kinetostat.units import KINDS
+
+UNDER_LOAD = ("actuator_force", "actuator_moment")
+
+
+def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONENTS) -> list[str]:
+    """Names of quantities, with groups replaced by their members and repetitions dropped.
+
+    Args:
+        names: of quantities or groups.
+        components: that the machine has: rx ry rz x y z, or rz x y of a planar one.
+
+    Raises:
+        InputError: an unknown name, or one of a component that the machine does not have.
+    """
+    groups = {group: [name for name in members if _exists(name, components)] for group, members in GROUPS.items()}
+    found: list[str] = []
+    for name in (current_name(given, "quantity") for given in several(names)):
+        if name not in GROUPS and not (name in QUANTITIES and _exists(name, components)):
+            raise InputError(_no_quantity(name, groups, components))
+        found += groups.get(name, [name])
+    return list(dict.fromkeys(found))
+
+
+def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Sequence[str]) -> str:
+    """The sentence about an unknown quantity: which was probably meant, or all that there are."""
+    others = (other for other, quantity in QUANTITIES.items() if not quantity.components)
+    known = [*groups, *(member for group in groups.values() for member in group), *others]
+    near = difflib.get_close_matches(name, known, 1)
+    every = f"choose from {', '.join(known)}, or an entry such as compliance_{components[0]}_{components[-1]}."
+    return f'"{name}" is not a quantity; ' + (f"did you mean {near[0]}?" if near else every)
+
+
+def _exists(name: str, components: Sequence[str]) -> bool:
+    """Whether all components that a quantity is about exist."""
+    return all(part in components for part in QUANTITIES[name].components)
+
+
+def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Parameter] = ()) -> None:
+    """Refuse quantities that have no value for a machine, whatever its pose.
+
+    Args:
+        machine: as its file has it.
+        names: of quantities.
+        varied: parameters that take other values than the file's.
+
+    Raises:
+        InputError: names the quantity, and what the machine lacks or its file must say.
+    """
+    if "mass" in names and not any(KINDS[one.quantity.kind].heavy for one in varied):
+        _refuse_unknown_mass(machine)
+    wanted = [name for name in names if name in PARTS]
+    if not wanted:
+        return
+    response = respond(machine)
+    for name in wanted:
+        if np.isnan(QUANTITIES[name].value(response)) and response.status == Status.OK:
+            raise InputError(f'"{name}" has no meaning here: {machine.name} lacks {PARTS[name]}; leave it out.')
+    loaded = any(machine.load.components()) or any(one.path.startswith("load.") for one in varied)
+    for name in UNDER_LOAD:
+        if name in names and not loaded:
+            raise InputError(
+                f'"{name}" is not known: nothing says which load {machine.name} bears; add to its file a table [load], '
+                'e.g. force = ["0 N", "0 N", "-500 N"].'
+            )
+
+
+def _refuse_unknown_mass(machine: Machine) -> None:
+    masses = moving_masses(machine, respond(machine).configuration)
+    if all(one.mass is None for one in masses):
+        raise InputError(
+            f'"mass" is not known: nothing says what {machine.name} weighs; give its links a cross-section with a '
+            'density or material, or its table [tool] mass = "12 kg".'
+        )
