@@ -57,7 +57,7 @@ def test_a_percent_more_changes_the_index_by_the_percentage():
 
 def test_what_is_zero_is_compared_with_a_measure():
     found = rows(MACHINE, "geometry.base_angle=0 deg")
-    length = analyze(load(MACHINE)).length
+    length = analyze(load(MACHINE)).characteristic_length
     assert found["pose.x"]["one_percent_of"] == {"measure": "length", "value": pytest.approx(length)}
     assert found["geometry.base_angle"]["one_percent_of"] == {"measure": "radian", "value": 1.0}
     assert found["geometry.platform_angle"]["one_percent_of"] == {"measure": "radian", "value": 1.0}

@@ -38,7 +38,7 @@ def test_written_links_weigh_density_times_area_times_length():
     assert found["z distal"] == pytest.approx(weight * np.linalg.norm(wrist - elbow), rel=1e-12)
     assert found["z carriage"] is None
     assert found[PLATFORM] == 4.0
-    assert analyze(machine).mass == pytest.approx(weight * 6 * 0.75 + 4.0, rel=1e-9)
+    assert analyze(machine).moving_mass == pytest.approx(weight * 6 * 0.75 + 4.0, rel=1e-9)
 
 
 def test_a_telescopic_leg_is_as_long_as_the_pose_makes_it():
@@ -47,12 +47,12 @@ def test_a_telescopic_leg_is_as_long_as_the_pose_makes_it():
         machine = load("hexapod", [*settings, f"pose.z={z}"])
         legs = [leg.passive for leg in respond(machine).configuration.legs]
         lengths = [math.dist(own[0].point.components(), own[-1].point.components()) for own in legs]
-        assert analyze(machine).mass == pytest.approx(2.0 + PER_METRE * sum(lengths), rel=1e-12)
+        assert analyze(machine).moving_mass == pytest.approx(2.0 + PER_METRE * sum(lengths), rel=1e-12)
 
 
 def test_links_that_a_family_has_in_pairs_count_twice():
     machine = load("delta", [f"stiffness.bar_axial={TUBE}"])
-    assert analyze(machine).mass == pytest.approx(6 * 0.8 * PER_METRE, rel=1e-12)
+    assert analyze(machine).moving_mass == pytest.approx(6 * 0.8 * PER_METRE, rel=1e-12)
 
 
 def test_a_removed_leg_weighs_nothing():
@@ -92,14 +92,14 @@ def test_it_can_be_differentiated_and_mapped():
         assert slope == pytest.approx((high - low) / (2 * step), rel=1e-7)
     grid = evaluate_grid(machine, ["pose.z=0.12:0.15:3"], ["mass"])
     assert float(grid["mass"][-1]) == pytest.approx(
-        analyze(load("hexapod", [f"stiffness.leg_axial={TUBE}", "pose.z=0.15"])).mass
+        analyze(load("hexapod", [f"stiffness.leg_axial={TUBE}", "pose.z=0.15"])).moving_mass
     )
 
 
 def test_a_file_of_it_reads_back():
     machine = load("delta", [f"stiffness.arm_bending={TUBE}", "tool.mass=1.5 kg"])
     text = as_toml(machine)
-    assert analyze(build(parse(text, "x"), "x")).mass == analyze(machine).mass
+    assert analyze(build(parse(text, "x"), "x")).mass == analyze(machine).moving_mass
     assert "linear_density" not in as_toml(load("delta"))
 
 
@@ -130,7 +130,7 @@ def test_mistakes_are_refused(machine, settings, said):
 
 
 def test_nothing_known_is_not_zero():
-    assert analyze(load("zhang-gosselin-4dof")).mass is None
+    assert analyze(load("zhang-gosselin-4dof")).moving_mass is None
 
 
 def test_a_post_on_the_base_does_not_move():
