@@ -99,6 +99,11 @@ def write(value: float, kind: str) -> str:
     return RIGID if math.isinf(value) else f"{value!r} {KINDS[kind].unit}".rstrip()
 
 
+def as_read(value: float, unit: str) -> tuple[float, str]:
+    """Return a value and its unit as people read them: angles in degrees, all else unchanged."""
+    return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
+
+
 def show(value: float, unit: str, digits: int = 4) -> str:
     """Return a value with its unit as people read it, e.g. "0.3124 m"; angles in rad are shown in degrees.
 
@@ -107,8 +112,7 @@ def show(value: float, unit: str, digits: int = 4) -> str:
         unit: as in `KINDS`; empty for a number without one.
         digits: significant digits.
     """
-    if unit == "rad":
-        value, unit = math.degrees(value), "deg"
+    value, unit = as_read(value, unit)
     return f"{value + 0.0:.{digits}g} {unit}".rstrip()  # + 0.0 turns -0.0 into 0.0
 
 

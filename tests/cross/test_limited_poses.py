@@ -1,5 +1,7 @@
 """Limits judged on floats, on NumPy arrays and by machine code: one status everywhere, and no code for none."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,6 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import parameters, values, with_values
-from kinetostat.studies.workspace.demands import EVERYTHING
 
 POSES = 300
 LOAD = ("load.force=[200, -100, 500]", "load.moment=[3, 5, -2]")
@@ -29,6 +30,20 @@ CASES = [
 ]
 
 
+FAR = {
+    "shortest_leg": -1e6,
+    "longest_leg": 1e6,
+    "travel_from": -1e6,
+    "travel_to": 1e6,
+    "base_joint_angle": math.pi / 2,
+    "platform_joint_angle": math.pi / 2,
+    "actuator_force": 1e20,
+    "actuator_moment": 1e20,
+    "leg_diameter": 1e-9,
+}
+"""Limits that are set but far away: what they are compared with is then known, and no pose passes them."""
+
+
 def poses(machine):
     """Poses around the file's, of all coordinates."""
     rng, length = np.random.default_rng(8), float(respond(machine).configuration.length)
@@ -39,19 +54,19 @@ def poses(machine):
 
 def limited(machine, columns, fields):
     """The machine with limits that about one pose in five passes, each within the range that the poses use."""
-    wanted = {f"limits.{name}": EVERYTHING[name] for name in fields}
+    wanted = {f"limits.{name}": FAR[name] for name in fields}
     watched = with_values(machine, wanted)
     single = [respond(at(watched, columns, i)) for i in range(POSES)]
     found = {}
     for name in fields:
         measures = np.array([measure(response, name) for response in single])
-        found[f"limits.{name}"] = float(np.nanquantile(measures, 0.2 if EVERYTHING[name] < 1e-6 else 0.8))
+        found[f"limits.{name}"] = float(np.nanquantile(measures, 0.2 if FAR[name] < 1e-6 else 0.8))
     return with_values(machine, found)
 
 
 def measure(response, name):
     """The extreme of what a limit is compared with, in its own unit."""
-    checks = [c for c in response.checks if c.field == name]
+    checks = [c for c in response.checks if c.limit.name == name]
     worst = (max if checks[0].at_most else min)(float(c.measure) for c in checks)
     if name.endswith("angle"):
         return np.arccos(np.sqrt(worst))
@@ -78,7 +93,7 @@ def test_floats_arrays_and_machine_code_give_one_status(name, load_settings, fie
     assert np.array_equal(codes, expected)
     passed = first_passed(machine, columns, fields)
     for i, response in enumerate(single):
-        broken = [check.field for check in response.checks if not check.kept]
+        broken = [check.limit.name for check in response.checks if not check.kept]
         if expected[i] == Status.JOINT_LIMIT:
             assert fields[passed[i]] == broken[0]
 
@@ -86,7 +101,7 @@ def test_floats_arrays_and_machine_code_give_one_status(name, load_settings, fie
 @pytest.mark.parametrize(("name", "load_settings", "fields"), CASES, ids=[case[0] for case in CASES])
 def test_what_is_used_is_what_single_poses_measure(name, load_settings, fields):
     machine = load(name, load_settings)
-    watched = with_values(machine, {f"limits.{field}": EVERYTHING[field] for field in fields})
+    watched = with_values(machine, {f"limits.{field}": FAR[field] for field in fields})
     columns = poses(machine)
     reached = [i for i in range(40) if respond(at(watched, columns, i)).status == Status.OK]
     columns = {path: column[reached] for path, column in columns.items()}
@@ -94,7 +109,7 @@ def test_what_is_used_is_what_single_poses_measure(name, load_settings, fields):
     every = [check for i in range(len(reached)) for check in respond(at(watched, columns, i)).checks]
     assert found.keys() == set(fields)
     for field, ends in found.items():
-        measures = [float(check.measure) for check in every if check.field == field]
+        measures = [float(check.measure) for check in every if check.limit.name == field]
         assert ends == pytest.approx((min(measures), max(measures)), rel=1e-9, abs=1e-12)
 
 

@@ -1,22 +1,23 @@
 """Limits of legs, joints and actuators: which parts they are about, their edges, and what people are told."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from kinetostat.algebra.segment import squared_distance
 from kinetostat.algebra.vector import ZERO, Vector
-from kinetostat.kinematics.limits import SLACK
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import pose_status, respond
-from kinetostat.machine.limits import Limits, rods
+from kinetostat.machine.limits import LIMITS
 from kinetostat.machine.loading import as_toml, build, bundled, load
 from kinetostat.machine.parameters import values, with_values
+from kinetostat.machine.rods import rods
 from kinetostat.spec import document
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.fields import quantities
 from kinetostat.studies.analysis import analyze
+from kinetostat.tolerances import LIMIT_SLACK
 
 JUST = 1e-6
 """How far beside a limit a pose is put to be surely within or beyond it."""
@@ -119,7 +120,7 @@ def test_rounding_does_not_refuse_the_limit_itself(name, settings, limit, measur
     )[::-1]
     excess = 0.1 * check.slack * (-1 if check.at_most else 1)
     assert check.slack > 0.0
-    assert type(check)(check.field, check.part, check.measure, check.measure + excess, check.at_most, check.slack).kept
+    assert replace(check, bound=check.measure + excess).kept
 
 
 @pytest.mark.parametrize("name", bundled())
@@ -234,7 +235,7 @@ def test_a_limit_that_cannot_be_meant_is_refused(name, settings, words):
 
 
 def test_a_limit_can_be_lifted():
-    machine = load("hexapod", [f"limits.{name}=none" for name in quantities(Limits)])
+    machine = load("hexapod", [f"limits.{name}=none" for name in LIMITS])
     assert machine == load("hexapod") or values(machine) == values(load("hexapod"))
 
 
@@ -247,4 +248,4 @@ def test_a_file_with_limits_is_written_and_read_back():
 
 
 def test_the_slack_is_beyond_rounding_and_below_what_anyone_measures():
-    assert 1e-14 < SLACK < 1e-7
+    assert 1e-14 < LIMIT_SLACK < 1e-7

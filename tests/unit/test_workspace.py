@@ -144,7 +144,7 @@ class TestVerdicts:
             response = respond(with_values(machine, pose))
             expected = INSIDE
             if response.status == Status.JOINT_LIMIT:
-                expected = "limits." + next(check.field for check in response.checks if not check.kept)
+                expected = "limits." + next(check.limit.name for check in response.checks if not check.kept)
             elif response.stiffness.entry(5, 5) <= 5e7:
                 expected = f"fails {self.WHERE[0]}"
             elif response.singularity_margin <= 0.1:

@@ -26,7 +26,7 @@ def first_passed(machine: Machine, columns: Mapping[str, Array], fields: Sequenc
     for part, checks in _checked(machine, columns):
         for check in checks:
             beyond = ~np.broadcast_to(check.kept, found[part].shape) & (found[part] < 0)
-            found[part][beyond] = fields.index(check.field)
+            found[part][beyond] = fields.index(check.limit.name)
     return found
 
 
@@ -40,8 +40,8 @@ def used(machine: Machine, columns: Mapping[str, Array]) -> dict[str, tuple[floa
     found: dict[str, tuple[float, float]] = {}
     for _, checks in _checked(machine, columns):
         for check in checks:
-            least, most = found.get(check.field, (np.inf, -np.inf))
-            found[check.field] = min(least, float(np.min(check.measure))), max(most, float(np.max(check.measure)))
+            least, most = found.get(check.limit.name, (np.inf, -np.inf))
+            found[check.limit.name] = min(least, float(np.min(check.measure))), max(most, float(np.max(check.measure)))
     return found
 
 

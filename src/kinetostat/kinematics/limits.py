@@ -1,24 +1,23 @@
-"""Whether a pose keeps within the limits of a machine's legs and joints, and if not, which it passes. Loads elsewhere.
+"""Whether a pose keeps within the limits of a machine, and if not, which it passes. Which limits there are: `machine`.
 
 Every comparison is between scalars without a branch, so that one pose, many and the compiled engine judge alike.
 
 Source: the definitions on the documentation's page on limits and workspace.
 """
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
-from kinetostat.algebra.scalar import Scalar, cos, reciprocal, times
-from kinetostat.algebra.segment import squared_distance
-from kinetostat.algebra.vector import Vector
-from kinetostat.machine.limits import Limits, Rod, driven_slides, is_set, rods
+from kinetostat.algebra.scalar import Scalar
+from kinetostat.machine.leg import Spring
+from kinetostat.machine.limits import LIMITS, About, Limit, Parts, limits_set
 from kinetostat.machine.machine import Chains, Configuration, Machine
+from kinetostat.machine.rods import driven_slides
+from kinetostat.tolerances import LIMIT_SLACK
+from kinetostat.units import show
 
-SLACK = 1e-9
-"""Relative excess up to which a pose counts as at its limit: whoever asks for the limit itself is not refused by
-rounding."""
+DIGITS = 6
+"""Digits of a value and of its limit in a message: with fewer, a limit that is just passed would look kept."""
 
 
 @dataclass(frozen=True)
@@ -26,20 +25,23 @@ class Check:
     """A limit and what it is compared with at a pose.
 
     Attributes:
-        field: the limit's name in [limits].
+        limit: the limit.
         part: what is limited, as people call it.
-        measure: what is compared; see `READINGS` for how it is read.
+        measure: what is compared, e.g. the square of a cosine; `limit.shown` makes a length or an angle of it.
         bound: what it is compared with.
-        at_most: whether `measure` must not exceed the bound, otherwise it must not fall short of it.
         slack: excess that counts as none.
     """
 
-    field: str
+    limit: Limit
     part: str
     measure: Scalar
     bound: Scalar
-    at_most: bool
     slack: Scalar
+
+    @property
+    def at_most(self) -> bool:
+        """Whether the measure must not exceed the bound, otherwise it must not fall short of it."""
+        return self.limit.at_most is not self.limit.falling
 
     @property
     def kept(self) -> Scalar:
@@ -50,7 +52,7 @@ class Check:
 
 
 def within(checks: Sequence[Check]) -> Scalar:
-    """Whether all limits are kept; plainly true where there are none."""
+    """Return whether all limits are kept; plainly true where there are none."""
     result: Scalar = True
     for check in checks:
         result = check.kept & result
@@ -58,135 +60,87 @@ def within(checks: Sequence[Check]) -> Scalar:
 
 
 def geometric_checks(machine: Machine, configuration: Configuration, joints: Sequence[Scalar]) -> list[Check]:
-    """All limits that do not depend on loads.
+    """Compare a pose with all limits that do not depend on loads.
 
     Args:
         machine: with its limits.
         configuration: it, placed.
         joints: its coordinates from the home pose (m, rad) where it is written leg by leg.
     """
-    limits, length = machine.tables["limits"], configuration.length
-    found = [*_lengths(limits, rods(configuration.legs), length)] if _any(limits, "shortest_leg", "longest_leg") else []
-    if machine.family.chains and joints and _any(limits, "travel_from", "travel_to"):
-        found += _travels(limits, machine.chains(), joints)
-    if _any(limits, "base_joint_angle", "platform_joint_angle"):
-        found += _tilts(limits, rods(configuration.legs), configuration.platform.rotation.z)
-    if is_set(limits.leg_diameter):
-        found += _clearances(limits, rods(configuration.legs))
-    return found
+    rows = [limit for limit in limits_set(machine.tables["limits"]) if limit.about is not About.LOAD]
+    if not rows:
+        return []
+    counted = machine.family.chains and joints and any(limit.about is About.TRAVEL for limit in rows)
+    slides = travels(machine.chains(), joints) if counted else []
+    return _checks(machine, rows, parts_of(machine, configuration, slides), configuration.length)
 
 
-def _any(limits: Limits, *names: str) -> bool:
-    return any(is_set(getattr(limits, name)) for name in names)
+def load_checks(
+    machine: Machine, configuration: Configuration, actuators: Sequence[tuple[Spring, Scalar]]
+) -> list[Check]:
+    """Compare the loads of actuators with their limits.
+
+    Args:
+        machine: with its limits.
+        configuration: it, placed.
+        actuators: each with the size of its load, N or N·m.
+    """
+    rows = [limit for limit in limits_set(machine.tables["limits"]) if limit.about is About.LOAD]
+    return _checks(machine, rows, parts_of(machine, configuration, (), actuators), configuration.length)
 
 
-def _between(names: tuple[str, str], limits: Limits, part: str, measure: Scalar, slack: Scalar) -> Iterator[Check]:
-    """The checks of a least and a greatest value."""
-    for name, at_most in zip(names, (False, True), strict=True):
-        if is_set(getattr(limits, name)):
-            yield Check(name, part, measure, getattr(limits, name), at_most, slack)
+def parts_of(
+    machine: Machine,
+    configuration: Configuration,
+    slides: Sequence[tuple[str, Scalar]] = (),
+    actuators: Sequence[tuple[Spring, Scalar]] = (),
+) -> Parts:
+    """Return the parts of a placed machine that limits are about; see `Parts` for slides and actuators."""
+    return Parts(configuration.legs, configuration.platform.rotation.z, machine.family.planar, slides, actuators)
 
 
-def _lengths(limits: Limits, legs: Sequence[Rod], length: Scalar) -> Iterator[Check]:
-    for rod in legs:
-        if rod.telescopic:
-            yield from _between(("shortest_leg", "longest_leg"), limits, rod.leg, rod.span.norm(), times(SLACK, length))
+def _checks(machine: Machine, rows: Sequence[Limit], parts: Parts, length: Scalar) -> list[Check]:
+    order = list(About)
+    found = []
+    for limit in rows:
+        bound = limit.compared(getattr(machine.tables["limits"], limit.name))
+        slack = LIMIT_SLACK * limit.scale(bound, length)
+        for place, part, measure in limit.measure(parts):
+            found.append((order.index(limit.about), place, Check(limit, part, measure, bound, slack)))
+    # Part by part, not limit by limit: the first limit that a pose passes is that of the first part that passes one.
+    return [check for _, _, check in sorted(found, key=lambda item: item[:2])]
 
 
-def _travels(limits: Limits, chains: Chains, joints: Sequence[Scalar]) -> Iterator[Check]:
-    """Coordinates of the actuated slides, leg by leg."""
+def travels(chains: Chains, joints: Sequence[Scalar]) -> list[tuple[str, Scalar]]:
+    """Return the actuated slides whose travel counts from the home pose, each with its coordinate (m), leg by leg."""
     coordinates = iter(joints)
+    found = []
     for steps in chains.legs:
         counted = driven_slides([step.element for step in steps])
         for i, step in enumerate(steps):
             amount = next(coordinates) if step.moves else None
             if i in counted:
-                name = step.element.name.removesuffix(" actuator")
-                yield from _between(("travel_from", "travel_to"), limits, name, amount, times(SLACK, chains.length))
-
-
-def _tilts(limits: Limits, legs: Sequence[Rod], platform_normal: Vector) -> Iterator[Check]:
-    """Squares of the cosines between straight legs and the normals: no square root, no arc."""
-    for rod in legs:
-        span = rod.span
-        square = span.dot(span)
-        ends = (
-            ("base_joint_angle", rod.on_base, span.z),
-            ("platform_joint_angle", rod.on_platform, span.dot(platform_normal)),
-        )
-        for name, there, along in ends:
-            limit = getattr(limits, name)
-            if there and is_set(limit):
-                yield Check(
-                    name,
-                    rod.leg,
-                    times(times(along, along), reciprocal(square)),
-                    times(cos(limit), cos(limit)),
-                    False,
-                    SLACK,
-                )
-
-
-def _clearances(limits: Limits, legs: Sequence[Rod]) -> Iterator[Check]:
-    """Squares of the distances of the axes of any two straight legs."""
-    square = times(limits.leg_diameter, limits.leg_diameter)
-    for one, other in combinations(legs, 2):
-        apart = squared_distance((one.start, one.end), (other.start, other.end))
-        yield Check("leg_diameter", f"{one.leg} and {other.leg}", apart, square, False, times(SLACK, square))
-
-
-@dataclass(frozen=True)
-class Reading:
-    """How a limit that is passed is told to people.
-
-    Attributes:
-        says: about the part, with its value in braces.
-        unit: of the value.
-        value: from what is compared to what people read.
-        advice: what may be done besides changing the limit.
-    """
-
-    says: str
-    unit: str
-    value: Callable[[float], float] = float
-    advice: str = "move the platform"
-
-
-def _angle(square: float) -> float:
-    return math.degrees(math.acos(min(1.0, math.sqrt(square))))
-
-
-READINGS = {
-    "shortest_leg": Reading("is {} long", "m"),
-    "longest_leg": Reading("is {} long", "m"),
-    "travel_from": Reading("has travelled {} from the home pose", "m"),
-    "travel_to": Reading("has travelled {} from the home pose", "m"),
-    "base_joint_angle": Reading("stands at {} to the base's z axis", "deg", _angle),
-    "platform_joint_angle": Reading("stands at {} to the platform's z axis", "deg", _angle),
-    "actuator_force": Reading("carries {}", "N", advice="lower the load"),
-    "actuator_moment": Reading("carries {}", "N·m", advice="lower the load"),
-    "leg_diameter": Reading("come within {} of each other", "m", math.sqrt),
-}
-"""By the name of the limit."""
+                found.append((step.element.part, amount))
+    return found
 
 
 def why_beyond(checks: Sequence[Check]) -> str:
-    """One sentence for each limit that is passed, on the part that passes it furthest; floats only."""
-    passed: dict[str, list[Check]] = {}
-    for check in checks:
-        if not check.kept:
-            passed.setdefault(check.field, []).append(check)
-    return " ".join(_sentence(found) for found in passed.values())
+    """Return one sentence for each limit that is passed, on the part that passes it furthest; floats only."""
+    sentences = (_sentence([c for c in checks if c.limit is limit and not c.kept]) for limit in _limits_of(checks))
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def _limits_of(checks: Sequence[Check]) -> list[Limit]:
+    return [LIMITS[name] for name in dict.fromkeys(check.limit.name for check in checks if not check.kept)]
 
 
 def _sentence(passed: Sequence[Check]) -> str:
-    """About the checks of one limit that are not kept."""
+    """Say that one limit is passed, from its checks that are not kept."""
     worst = max(passed, key=lambda check: abs(check.measure - check.bound))
-    reading = READINGS[worst.field]
-    value, limit = (f"{reading.value(float(number)):.6g} {reading.unit}" for number in (worst.measure, worst.bound))
+    limit = worst.limit
+    value, allowed = (show(limit.shown(float(number)), limit.unit, DIGITS) for number in (worst.measure, worst.bound))
     more = f" (and {len(passed) - 1} more pass it)" if len(passed) > 1 else ""
-    side = "at most" if worst.at_most or worst.field.endswith("angle") else "at least"
     return (
-        f"{worst.part[0].upper()}{worst.part[1:]} {reading.says.format(value)}, but limits.{worst.field} asks for "
-        f"{side} {limit}{more}; {reading.advice} or change the limit."
+        f"{worst.part[0].upper()}{worst.part[1:]} {limit.sentence.format(value)}, but limits.{limit.name} asks for "
+        f"{'at most' if limit.at_most else 'at least'} {allowed}{more}; {limit.advice} or change the limit."
     )

@@ -9,12 +9,12 @@ import math
 from collections.abc import Sequence
 
 from kinetostat.algebra.eigenvalues import greatest_eigenvalue
-from kinetostat.algebra.scalar import Scalar, is_zero, plus, reciprocal, smaller, sqrt, times, total, where
+from kinetostat.algebra.scalar import Scalar, plus, reciprocal, smaller, sqrt, times, total, where
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
+from kinetostat.kinetostatics.overload import actuator_loads
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.limits import rods
-from kinetostat.machine.machine import springs
+from kinetostat.machine.rods import rods
 
 ROTATIONS, TRANSLATIONS = range(3), range(3, 6)
 
@@ -100,12 +100,12 @@ def _scaled(value: Scalar, arm: Scalar, power: int) -> Scalar:
 
 def shortest_leg(response: Response) -> Scalar:
     """Least distance of the two joints of a leg with an actuated slide between them, m; NaN if there is no such leg."""
-    return _least([rod.span.norm() for rod in rods(response.configuration.legs) if rod.telescopic])
+    return _least([rod.length for rod in rods(response.configuration.legs) if rod.telescopic])
 
 
 def longest_leg(response: Response) -> Scalar:
     """Greatest such distance, m."""
-    return -_least([-rod.span.norm() for rod in rods(response.configuration.legs) if rod.telescopic])
+    return -_least([-rod.length for rod in rods(response.configuration.legs) if rod.telescopic])
 
 
 def actuator_load(response: Response, sliding: bool) -> Scalar:
@@ -113,9 +113,8 @@ def actuator_load(response: Response, sliding: bool) -> Scalar:
 
     Load in a spring: xi_e times w. NaN where the machine has no such actuator.
     """
-    pairs = zip(springs(response.configuration), response.statics.flexibility, strict=True)
-    driven = [(spring, twist) for spring, twist in pairs if spring.actuated and (spring.joint.point is None) is sliding]
-    return -_least([-abs(response.load.work(twist)) for spring, twist in driven if not is_zero(spring.stiffness)])
+    loads = actuator_loads(response.configuration, response.statics, response.load)
+    return -_least([-load for spring, load in loads if (spring.joint.point is None) is sliding])
 
 
 def _least(values: Sequence[Scalar]) -> Scalar:

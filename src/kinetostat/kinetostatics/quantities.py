@@ -23,6 +23,7 @@ from kinetostat.kinetostatics.extremes import (
     shortest_leg,
 )
 from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.limits import LIMITS
 
 
 @dataclass(frozen=True)
@@ -128,10 +129,5 @@ GROUPS = {
 }
 """Names that stand for several quantities: the six diagonal entries of C and of K, and the six 1/C_ii."""
 
-PARTS = {
-    "shortest_leg": "a leg with an actuated slide between two joints",
-    "longest_leg": "a leg with an actuated slide between two joints",
-    "actuator_force": "an actuated slide",
-    "actuator_moment": "an actuated revolute",
-}
+PARTS = {name: LIMITS[name].needs for name in ("shortest_leg", "longest_leg", "actuator_force", "actuator_moment")}
 """What a machine must have for a quantity to mean something; it is NaN where that is missing."""

@@ -1,23 +1,144 @@
-"""What the parts of a machine bear: the table [limits] of its file, and which parts each limit is about.
+"""The limits that a machine file may set in [limits]: one row each, with what it is compared with and how it is told.
 
-Whether a pose keeps within them is `kinematics.limits`' and, under load, `kinetostatics.overload`'s business.
+A row knows the parts of a machine, not how they are solved for: `kinematics.limits` places them and compares.
 
-Points are in the base frame.
+Source: the definitions on the documentation's page on limits and workspace. Points are in the base frame.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from enum import Enum
+from functools import cached_property, partial
+from itertools import combinations
 
-from kinetostat.algebra.scalar import Scalar
-from kinetostat.algebra.vector import Vector
-from kinetostat.machine.leg import Element, Joint, Leg, Spring
-from kinetostat.machine.link import Parallelogram
+from kinetostat.algebra.scalar import Scalar, cos
+from kinetostat.algebra.segment import squared_distance
+from kinetostat.algebra.vector import Z_AXIS, Vector
+from kinetostat.machine.leg import Leg, Spring
+from kinetostat.machine.rods import Rod, rods
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.fields import Quantity, quantities, table
+from kinetostat.spec.fields import Field, Quantity, made_table
+from kinetostat.units import KINDS, show
 
-RIGHT_ANGLE = math.pi / 2
+
+@dataclass(frozen=True)
+class Parts:
+    """The parts of a machine that limits are about, at one pose.
+
+    Attributes:
+        legs: of the machine.
+        normal: the platform's z axis, base frame.
+        planar: whether the machine moves in a plane; angles to z are then fixed.
+        slides: actuated slides that count from a home pose, each with its travel, m.
+        actuators: actuators, each with the size of its load, N or N·m.
+    """
+
+    legs: Sequence[Leg]
+    normal: Vector
+    planar: bool
+    slides: Sequence[tuple[str, Scalar]] = ()
+    actuators: Sequence[tuple[Spring, Scalar]] = ()
+
+    @cached_property
+    def rods(self) -> list[Rod]:
+        """The straight legs."""
+        return rods(self.legs)
+
+
+Measured = Iterator[tuple[int, str, Scalar]]
+"""For each part that a limit is about: its place among the parts, its name, and what the limit is compared with."""
+
+
+def _leg_lengths(parts: Parts) -> Measured:
+    return ((i, rod.leg, rod.length) for i, rod in enumerate(parts.rods) if rod.telescopic)
+
+
+def _travels(parts: Parts) -> Measured:
+    return ((i, name, travel) for i, (name, travel) in enumerate(parts.slides))
+
+
+def _base_tilts(parts: Parts) -> Measured:
+    tilting = [(i, rod) for i, rod in enumerate(parts.rods) if rod.on_base and not parts.planar]
+    return ((i, rod.leg, _squared_cosine(rod, Z_AXIS)) for i, rod in tilting)
+
+
+def _platform_tilts(parts: Parts) -> Measured:
+    tilting = [(i, rod) for i, rod in enumerate(parts.rods) if rod.on_platform and not parts.planar]
+    return ((i, rod.leg, _squared_cosine(rod, parts.normal)) for i, rod in tilting)
+
+
+def _squared_cosine(rod: Rod, normal: Vector) -> Scalar:
+    """Square of the cosine between a leg and a normal: it is compared without a square root or an arc cosine."""
+    along = rod.span.dot(normal)
+    return along * along * rod.inverse_square
+
+
+def _clearances(parts: Parts) -> Measured:
+    """Squares of the distances between the axes of any two straight legs."""
+    for i, (first, other) in enumerate(combinations(parts.rods, 2)):
+        apart = squared_distance((first.start, first.end), (other.start, other.end))
+        yield i, f"{first.leg} and {other.leg}", apart
+
+
+def _loads(parts: Parts, sliding: bool) -> Measured:
+    for i, (spring, load) in enumerate(parts.actuators):
+        if (spring.joint.point is None) is sliding:
+            yield i, spring.name, load
+
+
+class About(Enum):
+    """What a limit is about. A pose is checked in this order, so that the first limit it passes is well defined."""
+
+    LENGTH = "leg length"
+    TRAVEL = "slide travel"
+    ANGLE = "joint angle"
+    CLEARANCE = "clearance"
+    LOAD = "actuator load"
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A limit that files may set.
+
+    Attributes:
+        name: in the table [limits].
+        about: what it is about.
+        quantity: what may be written, and what it means.
+        at_most: whether it is a greatest value, otherwise a least one.
+        measure: from the parts of a machine to what the limit is compared with.
+        needs: what a machine must have for the limit to mean something.
+        sentence: about a part that passes the limit, with its value in braces.
+        phrase: in a few words, that it is passed.
+        title: of the measure, where its range over many poses is shown; limits with one measure share it.
+        compared: from the limit as written (SI) to the number that the measure is compared with.
+        shown: from the measure to the value as written, SI.
+        falling: whether the measure falls where the value rises, as a cosine does.
+        advice: what may be done besides changing the limit.
+    """
+
+    name: str
+    about: About
+    quantity: Quantity
+    at_most: bool
+    measure: Callable[[Parts], Measured]
+    needs: str
+    sentence: str
+    phrase: str
+    title: str
+    compared: Callable[[Scalar], Scalar] = lambda limit: limit
+    shown: Callable[[float], float] = float
+    falling: bool = False
+    advice: str = "move the platform"
+
+    @property
+    def unit(self) -> str:
+        return KINDS[self.quantity.kind].unit
+
+    def scale(self, bound: Scalar, length: Scalar) -> Scalar:
+        """The size beside which an excess is round-off: the machine's (m), that of a cosine, or the bound itself."""
+        sizes = {About.LENGTH: length, About.TRAVEL: length, About.ANGLE: 1.0}
+        return sizes.get(self.about, bound)
 
 
 def _least(kind: str, meaning: str, positive: bool = False) -> Quantity:
@@ -28,41 +149,136 @@ def _most(kind: str, meaning: str, positive: bool = True, most: float = math.inf
     return Quantity(kind, meaning, positive, most=most, unset=math.inf)
 
 
-@table
-class Limits:
-    """Table [limits], in any machine file; what is left out is not limited.
+def _squared(number: Scalar) -> Scalar:
+    return number * number
 
-    A limit that is not set is infinite by form, and no arithmetic is spent on it.
-    """
 
-    shortest_leg: Annotated[
-        float, _least("length", "least distance of the two joints of a leg with an actuated slide between them")
-    ] = -math.inf
-    longest_leg: Annotated[float, _most("length", "greatest such distance")] = math.inf
-    travel_from: Annotated[
-        float, _least("length", "actuated slides of other legs, written leg by leg: least travel from the home pose")
-    ] = -math.inf
-    travel_to: Annotated[float, _most("length", "their greatest travel", positive=False)] = math.inf
-    base_joint_angle: Annotated[
-        float,
-        _most("angle", "greatest angle of a straight leg at its base joint from the base's z axis", True, RIGHT_ANGLE),
-    ] = math.inf
-    platform_joint_angle: Annotated[
-        float,
-        _most(
-            "angle",
-            "greatest angle of a straight leg at its platform joint from the platform's z axis",
-            True,
-            RIGHT_ANGLE,
+def _angle(squared_cosine: float) -> float:
+    return math.acos(min(1.0, math.sqrt(squared_cosine)))
+
+
+_TELESCOPIC = "a leg with an actuated slide between two joints"
+_HOME = "a slide whose travel counts from a home pose (those of machines written leg by leg)"
+_TILT = "greatest angle of a straight leg at its {0} joint from the {0}'s z axis"
+
+LIMITS = {
+    limit.name: limit
+    for limit in (
+        Limit(
+            "shortest_leg",
+            About.LENGTH,
+            _least("length", "least distance of the two joints of a leg with an actuated slide between them"),
+            False,
+            _leg_lengths,
+            needs=_TELESCOPIC,
+            sentence="is {} long",
+            phrase="a leg is too short",
+            title="length of the legs",
         ),
-    ] = math.inf
-    actuator_force: Annotated[float, _most("force", "greatest force of an actuated slide under [load]")] = math.inf
-    actuator_moment: Annotated[float, _most("moment", "greatest moment of an actuated revolute under [load]")] = (
-        math.inf
+        Limit(
+            "longest_leg",
+            About.LENGTH,
+            _most("length", "greatest such distance"),
+            True,
+            _leg_lengths,
+            needs=_TELESCOPIC,
+            sentence="is {} long",
+            phrase="a leg is too long",
+            title="length of the legs",
+        ),
+        Limit(
+            "travel_from",
+            About.TRAVEL,
+            _least("length", "actuated slides of other legs, written leg by leg: least travel from the home pose"),
+            False,
+            _travels,
+            needs=_HOME,
+            sentence="has travelled {} from the home pose",
+            phrase="a slide at its lower end",
+            title="travel of the slides",
+        ),
+        Limit(
+            "travel_to",
+            About.TRAVEL,
+            _most("length", "their greatest travel", positive=False),
+            True,
+            _travels,
+            needs=_HOME,
+            sentence="has travelled {} from the home pose",
+            phrase="a slide at its upper end",
+            title="travel of the slides",
+        ),
+        Limit(
+            "base_joint_angle",
+            About.ANGLE,
+            _most("angle", _TILT.format("base"), most=math.pi / 2),
+            True,
+            _base_tilts,
+            needs="a straight leg that tilts against the base's z axis",
+            sentence="stands at {} to the base's z axis",
+            phrase="a base joint turned too far",
+            title="angle at the base joints",
+            compared=lambda limit: _squared(cos(limit)),
+            shown=_angle,
+            falling=True,
+        ),
+        Limit(
+            "platform_joint_angle",
+            About.ANGLE,
+            _most("angle", _TILT.format("platform"), most=math.pi / 2),
+            True,
+            _platform_tilts,
+            needs="a straight leg that tilts against the platform's z axis",
+            sentence="stands at {} to the platform's z axis",
+            phrase="a platform joint turned too far",
+            title="angle at the platform joints",
+            compared=lambda limit: _squared(cos(limit)),
+            shown=_angle,
+            falling=True,
+        ),
+        Limit(
+            "actuator_force",
+            About.LOAD,
+            _most("force", "greatest force of an actuated slide under [load]"),
+            True,
+            partial(_loads, sliding=True),
+            needs="an actuated slide",
+            sentence="carries {}",
+            phrase="an actuator overloaded (force)",
+            title="force of the actuators",
+            advice="lower the load",
+        ),
+        Limit(
+            "actuator_moment",
+            About.LOAD,
+            _most("moment", "greatest moment of an actuated revolute under [load]"),
+            True,
+            partial(_loads, sliding=False),
+            needs="an actuated revolute",
+            sentence="carries {}",
+            phrase="an actuator overloaded (moment)",
+            title="moment of the actuators",
+            advice="lower the load",
+        ),
+        Limit(
+            "leg_diameter",
+            About.CLEARANCE,
+            _least("length", "straight legs, as cylinders this thick between their joints, must not touch", True),
+            False,
+            _clearances,
+            needs="two straight legs",
+            sentence="come within {} of each other",
+            phrase="legs touch",
+            title="distance between leg axes",
+            compared=_squared,
+            shown=math.sqrt,
+        ),
     )
-    leg_diameter: Annotated[
-        float, _least("length", "straight legs, as cylinders this thick between their joints, must not touch", True)
-    ] = -math.inf
+}
+"""Every limit by name. To add one, add its row here and, if no row has it yet, its measure above."""
+
+Limits = made_table("Limits", {limit.name: Field(limit.quantity, limit.quantity.unset) for limit in LIMITS.values()})
+Limits.__doc__ = "Table [limits], in any machine file; a limit that is left out is infinite and costs no arithmetic."
 
 
 def is_set(limit: Scalar) -> bool:
@@ -70,126 +286,31 @@ def is_set(limit: Scalar) -> bool:
     return not (type(limit) is float and math.isinf(limit))
 
 
-@dataclass(frozen=True)
-class Rod:
-    """The straight part of a leg, between its only two passive joints.
-
-    Attributes:
-        leg: name of the leg.
-        start, end: centres of the joints on the base side and on the platform side, base frame, m.
-        telescopic: whether an actuated slide lies between them.
-        on_base, on_platform: whether the first joint stands on the base, the last one on the platform.
-    """
-
-    leg: str
-    start: Vector
-    end: Vector
-    telescopic: bool
-    on_base: bool
-    on_platform: bool
-
-    @property
-    def span(self) -> Vector:
-        """From its start to its end, m."""
-        return self.end - self.start
+def limits_set(limits: object) -> list[Limit]:
+    """Return the rows of the limits that a table [limits] sets."""
+    return [limit for limit in LIMITS.values() if is_set(getattr(limits, limit.name))]
 
 
-def rods(legs: Sequence[Leg]) -> list[Rod]:
-    """The straight parts of those legs that have one.
-
-    That is a leg with a slide between its two passive joints (U-P-S, R-P-S, R-P-R), and the rod of a crank between two
-    joints that both have several axes, or in a plane both have one.
-    """
-    return [rod for leg in legs if (rod := _rod(leg)) is not None]
-
-
-def _rod(leg: Leg) -> Rod | None:
-    places: dict[str, list[tuple[int, Vector]]] = {}
-    for i, element in enumerate(leg.chain):
-        if isinstance(element, Parallelogram):
-            return None
-        for joint in element.freedoms:
-            if joint.point is not None:
-                places.setdefault(joint.name, []).append((i, joint.point))
-    if len(places) != 2:
-        return None
-    first, last = places.values()
-    between = leg.chain[first[-1][0] + 1 : last[0][0]]
-    slides = any(_is_slide(element) for element in between)
-    if not slides and (len(first) == 1) != (len(last) == 1):
-        return None
-    return Rod(
-        leg.name,
-        first[0][1],
-        last[0][1],
-        any(_is_driven_slide(element) for element in between),
-        not any(_moves(element) for element in leg.chain[: first[0][0]]),
-        not any(_moves(element) for element in leg.chain[last[-1][0] + 1 :]),
-    )
-
-
-def _is_driven_slide(element: Element) -> bool:
-    return isinstance(element, Spring) and element.actuated and element.joint.point is None
-
-
-def _is_slide(element: Element) -> bool:
-    return _is_driven_slide(element) or (isinstance(element, Joint) and element.point is None)
-
-
-def _moves(element: Element) -> bool:
-    return isinstance(element, Joint) or (isinstance(element, Spring) and element.actuated)
-
-
-def driven_slides(chain: Sequence[Element]) -> list[int]:
-    """Which elements of a leg's chain are actuated slides whose travel is not the leg's length."""
-    rod = _rod(Leg("", tuple(chain)))
-    if rod is not None and rod.telescopic:
-        return []
-    return [i for i, element in enumerate(chain) if _is_driven_slide(element)]
-
-
-def check_limits(limits: Limits, legs: Sequence[Leg], planar: bool, written: bool, origin: str) -> None:
-    """Refuse limits that contradict each other, and those of parts that the machine does not have.
+def check_limits(limits: object, parts: Parts, origin: str) -> None:
+    """Refuse limits that contradict each other, and limits on parts that the machine does not have.
 
     Args:
-        limits: of the machine.
-        legs: of it, at any pose.
-        planar: whether it moves in a plane.
-        written: whether it is written leg by leg, so that slides have a home.
+        limits: the table [limits] of the machine.
+        parts: of the machine, at any pose.
         origin: name of the file.
 
     Raises:
         InputError: names the limits and what to change.
     """
-    for low, high in (("shortest_leg", "longest_leg"), ("travel_from", "travel_to")):
-        least, most = getattr(limits, low), getattr(limits, high)
-        if least > most:
+    for low, high in combinations(LIMITS.values(), 2):
+        least, most = getattr(limits, low.name), getattr(limits, high.name)
+        if low.measure is high.measure and least > most:
             raise InputError(
-                f'"{origin}": limits.{low} is {least:g} m and limits.{high} {most:g} m: nothing lies between them; '
-                "exchange or widen them."
+                f'"{origin}": limits.{low.name} is {show(least, low.unit)} and limits.{high.name} '
+                f"{show(most, high.unit)}: nothing lies between them; exchange or widen them."
             )
-    found = rods(legs)
-    lengths = any(rod.telescopic for rod in found)
-    travels = written and any(driven_slides(leg.chain) for leg in legs)
-    driven = [s for leg in legs for s in leg.springs if s.actuated]
-    has = {
-        "shortest_leg": (lengths, "a leg with an actuated slide between two joints"),
-        "longest_leg": (lengths, "a leg with an actuated slide between two joints"),
-        "travel_from": (travels, "a slide whose travel counts from a home pose (those of machines written leg by leg)"),
-        "travel_to": (travels, "a slide whose travel counts from a home pose (those of machines written leg by leg)"),
-        "base_joint_angle": (
-            not planar and any(rod.on_base for rod in found),
-            "a straight leg that tilts against the base's z axis",
-        ),
-        "platform_joint_angle": (
-            not planar and any(rod.on_platform for rod in found),
-            "a straight leg that tilts against the platform's z axis",
-        ),
-        "actuator_force": (any(s.joint.point is None for s in driven), "an actuated slide"),
-        "actuator_moment": (any(s.joint.point is not None for s in driven), "an actuated revolute"),
-        "leg_diameter": (len(found) > 1, "two straight legs"),
-    }
-    for name in quantities(Limits):
-        there, part = has[name]
-        if is_set(getattr(limits, name)) and not there:
-            raise InputError(f'"{origin}": limits.{name} has no meaning here: the machine lacks {part}; leave it out.')
+    for limit in limits_set(limits):
+        if not any(True for _ in limit.measure(parts)):
+            raise InputError(
+                f'"{origin}": limits.{limit.name} has no meaning here: the machine lacks {limit.needs}; leave it out.'
+            )

@@ -13,11 +13,13 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from kinetostat.algebra.scalar import Scalar
 from kinetostat.machine.catalogue import families
-from kinetostat.machine.leg import Leg
-from kinetostat.machine.limits import check_limits
+from kinetostat.machine.leg import Leg, Spring
+from kinetostat.machine.limits import Parts, check_limits
 from kinetostat.machine.machine import Family, Machine
 from kinetostat.machine.rigidities import resolve
+from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.written import family as written
 from kinetostat.machine.written.checking import check_numbers, completed
 from kinetostat.machine.written.document import by_name, check_paths, separate
@@ -87,7 +89,9 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
     family = _family(document.get("family"), origin)
     changed = documents.override(document, settings, _counts(family))
     machine = _validated(family, resolve(changed, family, origin), origin)
-    check_limits(machine.tables["limits"], machine.configure().legs, family.planar, False, origin)
+    placed = machine.configure()
+    parts = Parts(placed.legs, placed.platform.rotation.z, family.planar, (), _unloaded(placed.legs))
+    check_limits(machine.tables["limits"], parts, origin)
     return machine
 
 
@@ -99,12 +103,17 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     machine = _validated(written.family_of(plan), numbers, origin)
     check_numbers(plan, machine.tables, origin)
     whole = replace(machine, family=written.family_of(completed(plan, machine.family_tables)))
-    legs = [
-        Leg(leg.name, tuple(s.element for s in steps))
-        for leg, steps in zip(plan.legs, whole.chains().legs, strict=True)
-    ]
-    check_limits(machine.tables["limits"], legs, plan.planar, True, origin)
+    chains = whole.chains()
+    legs = [Leg(leg.name, tuple(s.element for s in steps)) for leg, steps in zip(plan.legs, chains.legs, strict=True)]
+    slides = [(leg.name, 0.0) for leg in legs for _ in driven_slides(leg.chain)]
+    parts = Parts(legs, chains.home.rotation.z, plan.planar, slides, _unloaded(legs))
+    check_limits(machine.tables["limits"], parts, origin)
     return whole
+
+
+def _unloaded(legs: Sequence[Leg]) -> list[tuple[Spring, Scalar]]:
+    """All actuators, for questions about which there are and not about what they carry."""
+    return [(spring, 0.0) for leg in legs for spring in leg.springs if spring.actuated]
 
 
 def _validated(family: Family, document: Document, origin: str) -> Machine:

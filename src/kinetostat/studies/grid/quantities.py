@@ -9,6 +9,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, PARTS, QUANTITIES
 from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.limits import LIMITS, About
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.mass import moving_masses
 from kinetostat.machine.parameters import Parameter
@@ -16,7 +17,7 @@ from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.renamed import current_name
 from kinetostat.units import KINDS
 
-UNDER_LOAD = ("actuator_force", "actuator_moment")
+UNDER_LOAD = tuple(limit.name for limit in LIMITS.values() if limit.about is About.LOAD)
 
 
 def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONENTS) -> list[str]:

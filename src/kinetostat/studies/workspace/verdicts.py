@@ -13,9 +13,8 @@ from kinetostat.engine.points import Array
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.aspect import aspect
 from kinetostat.kinetostatics.response import SINGULAR, respond
-from kinetostat.machine.limits import Limits, is_set
+from kinetostat.machine.limits import LIMITS, limits_set
 from kinetostat.machine.machine import Machine
-from kinetostat.spec.fields import quantities
 from kinetostat.studies.workspace.conditions import Condition
 
 Mask = npt.NDArray[np.bool_]
@@ -34,23 +33,11 @@ PLAIN = {
 """Verdicts of statuses; a limit that is passed is named instead."""
 LIMIT, FAILS = "limits.", "fails "
 """How the verdicts of limits and of conditions begin."""
-PHRASES = {
-    "shortest_leg": "a leg is too short",
-    "longest_leg": "a leg is too long",
-    "travel_from": "a slide at its lower end",
-    "travel_to": "a slide at its upper end",
-    "base_joint_angle": "a base joint turned too far",
-    "platform_joint_angle": "a platform joint turned too far",
-    "actuator_force": "an actuator overloaded (force)",
-    "actuator_moment": "an actuator overloaded (moment)",
-    "leg_diameter": "legs touch",
-}
-"""What a limit that is passed means, in a few words."""
 
 
 def phrase(label: str) -> str:
     """A verdict for people."""
-    return PHRASES.get(label.removeprefix(LIMIT), label)
+    return next((limit.phrase for limit in LIMITS.values() if label == f"{LIMIT}{limit.name}"), label)
 
 
 @dataclass(frozen=True)
@@ -77,8 +64,7 @@ class Judge:
     @property
     def limits(self) -> list[str]:
         """Names of the limits that are set."""
-        held = self.machine.tables["limits"]
-        return [name for name in quantities(Limits) if is_set(getattr(held, name))]
+        return [limit.name for limit in limits_set(self.machine.tables["limits"])]
 
     @property
     def labels(self) -> tuple[str, ...]:

@@ -1,0 +1,101 @@
+"""The straight parts of legs, between two passive joints: what limits of length, angle and clearance are about.
+
+They are read from the chains of the legs at a pose. Points are in the base frame.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from kinetostat.algebra.scalar import Scalar, reciprocal
+from kinetostat.algebra.vector import Vector
+from kinetostat.machine.leg import Element, Joint, Leg, Spring
+from kinetostat.machine.link import Parallelogram
+
+
+@dataclass(frozen=True)
+class Rod:
+    """The straight part of a leg, between its only two passive joints.
+
+    Attributes:
+        leg: name of the leg.
+        start, end: centres of the joints on the base side and on the platform side, base frame, m.
+        telescopic: whether an actuated slide lies between them.
+        on_base, on_platform: whether the first joint stands on the base, the last one on the platform.
+    """
+
+    leg: str
+    start: Vector
+    end: Vector
+    telescopic: bool
+    on_base: bool
+    on_platform: bool
+
+    @cached_property
+    def span(self) -> Vector:
+        """From its start to its end, m."""
+        return self.end - self.start
+
+    @cached_property
+    def length(self) -> Scalar:
+        """Distance of its two joints, m."""
+        return self.span.norm()
+
+    @cached_property
+    def inverse_square(self) -> Scalar:
+        """1 / length², m⁻², without a square root."""
+        return reciprocal(self.span.dot(self.span))
+
+
+def rods(legs: Sequence[Leg]) -> list[Rod]:
+    """Return the straight parts of those legs that have one.
+
+    That is a leg with a slide between its two passive joints (U-P-S, R-P-S, R-P-R), and the rod of a crank between two
+    joints that both have several axes, or in a plane both have one.
+    """
+    return [rod for leg in legs if (rod := _rod(leg)) is not None]
+
+
+def _rod(leg: Leg) -> Rod | None:
+    places: dict[str, list[tuple[int, Vector]]] = {}
+    for i, element in enumerate(leg.chain):
+        if isinstance(element, Parallelogram):
+            return None
+        for joint in element.freedoms:
+            if joint.point is not None:
+                places.setdefault(joint.name, []).append((i, joint.point))
+    if len(places) != 2:
+        return None
+    first, last = places.values()
+    between = leg.chain[first[-1][0] + 1 : last[0][0]]
+    slides = any(_is_slide(element) for element in between)
+    if not slides and (len(first) == 1) != (len(last) == 1):
+        return None
+    return Rod(
+        leg.name,
+        first[0][1],
+        last[0][1],
+        any(_is_driven_slide(element) for element in between),
+        not any(_moves(element) for element in leg.chain[: first[0][0]]),
+        not any(_moves(element) for element in leg.chain[last[-1][0] + 1 :]),
+    )
+
+
+def _is_driven_slide(element: Element) -> bool:
+    return isinstance(element, Spring) and element.actuated and element.joint.point is None
+
+
+def _is_slide(element: Element) -> bool:
+    return _is_driven_slide(element) or (isinstance(element, Joint) and element.point is None)
+
+
+def _moves(element: Element) -> bool:
+    return isinstance(element, Joint) or (isinstance(element, Spring) and element.actuated)
+
+
+def driven_slides(chain: Sequence[Element]) -> list[int]:
+    """Return which elements of a leg's chain are actuated slides whose travel is not the leg's length."""
+    rod = _rod(Leg("", tuple(chain)))
+    if rod is not None and rod.telescopic:
+        return []
+    return [i for i, element in enumerate(chain) if _is_driven_slide(element)]
