@@ -16,7 +16,7 @@ from kinetostat.studies.report.answers import gather
 from kinetostat.validation.comparison import validate
 from kinetostat.views.report.assembly import report_of
 from kinetostat.views.report.pdf import page_pictures
-from kinetostat.views.report.record import Origin
+from kinetostat.views.report.provenance import Origin
 
 ROOT = Path(__file__).parent.parent
 sys.path.append(str(ROOT / "tests" / "edges"))

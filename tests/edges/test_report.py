@@ -17,10 +17,10 @@ from kinetostat.machine.parameters import values
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.report import answers
 from kinetostat.studies.report.answers import usual_ranges
-from kinetostat.views.report import live, pdf
+from kinetostat.views.report import pdf, pictures
 from kinetostat.views.report.assembly import report_of
 from kinetostat.views.report.html_page import html_page
-from kinetostat.views.report.record import Origin
+from kinetostat.views.report.provenance import Origin
 from studies import SMALL
 
 LOAD = ["--set", 'load.force=["0 N","0 N","-500 N"]']
@@ -235,7 +235,7 @@ def test_without_typst_a_pdf_is_refused_at_once(tmp_path, capsys, monkeypatch):
 
 
 def test_without_the_renderer_a_page_shows_the_picture_and_says_so(monkeypatch):
-    monkeypatch.setattr(live, "renderer", lambda: None)
+    monkeypatch.setattr(pictures, "renderer", lambda: None)
     page = Page(quick(load(MACHINE)))
     assert "live-data" not in page.attached
     assert "img" in page.tags
@@ -284,7 +284,7 @@ def test_a_study_is_reported_with_its_best_design(tmp_path):
     found = told("optimize", str(file), "-o", str(folder))
     page = Page(reported(tmp_path / "r.html", file, *QUICK, "--without", "maps"))
     assert page.results["name"].endswith(", optimised")
-    worth = page.table("What it is worth")[1]
+    worth = page.table("Objectives: the original machine")[1]
     assert number(worth[2]) == pytest.approx(found["objective"], rel=1e-8)
     bounds = {row[0]: row[2:4] for row in page.table("Variables and their bounds")[1:]}
     assert bounds["geometry.base_radius"] == ["0.2 m", "0.26 m"]

@@ -1,1 +1,1 @@
-"""A report for a design review: what it says as plain data, and that data as one HTML page or one PDF."""
+"""Reports for design reviews: their content as plain data, and that data as one HTML page or one PDF."""

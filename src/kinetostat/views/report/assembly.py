@@ -1,4 +1,7 @@
-"""From answers to a report: title block and sections in order. Nothing is computed and no format is known here."""
+"""Assembly of a report: the title block and all sections in order.
+
+Nothing is computed here, and no format is known.
+"""
 
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -12,43 +15,41 @@ from kinetostat.views.report.content import Report
 from kinetostat.views.report.design import guideline_section, sensitivity_section
 from kinetostat.views.report.machine import data_section, machine_section
 from kinetostat.views.report.pictures import shown
-from kinetostat.views.report.record import Origin, method_section, record_section
-from kinetostat.views.report.stiffness import load_section, stiffness_section
+from kinetostat.views.report.provenance import Origin, method_section, record_section, validation_section
+from kinetostat.views.report.stiffness import load_section, stiffness_section, workspace_section
 from kinetostat.views.report.study import study_section
 from kinetostat.views.report.summary import summary_section
 from kinetostat.views.report.typesetting import typeset
-from kinetostat.views.report.validation import validation_section
-from kinetostat.views.report.workspace import workspace_section
 from kinetostat.views.tables import readable
 
 
 def report_of(
     answers: Answers, validation: Validation | str, origin: Origin, about: Mapping[str, str], live: bool
 ) -> Report:
-    """The report about a machine, or about a study and its best design.
+    """Assemble the report on a machine, or on a study and its best design.
 
     Args:
-        answers: of a pose whose status is OK.
+        answers: for a pose whose status is OK.
         validation: by an independent engine, or why there is none.
-        origin: what the report is made of.
+        origin: what the report is made from.
         about: further lines of the title block, by name.
         live: whether the report will be a page, which may show the machine in three dimensions.
 
     Raises:
-        ValueError: the pose has no answer.
+        ValueError: the status of the pose is not OK.
     """
-    found, result = answers.analysis, answers.result
-    if found.status is not Status.OK:
-        raise ValueError("a pose without an answer has no report")
-    pictures = shown(found)
+    analysis, result = answers.analysis, answers.result
+    if analysis.status is not Status.OK:
+        raise ValueError("a report needs a pose whose status is OK")
+    pictures = shown(analysis)
     engine = () if isinstance(validation, str) else (validation.engine, validation.version)
     sections = [
         summary_section(answers, validation),
         *([study_section(result)] if result else []),
-        machine_section(found, pictures, live),
-        data_section(found),
-        stiffness_section(found),
-        load_section(found, pictures),
+        machine_section(analysis, pictures, live),
+        data_section(analysis),
+        stiffness_section(analysis),
+        load_section(analysis, pictures),
         workspace_section(answers),
         guideline_section(answers),
         sensitivity_section(answers.sensitivity),
@@ -58,7 +59,7 @@ def report_of(
     ]
     return Report(
         "Stiffness report" if result is None else "Design study report",
-        found.machine.name if result is None else result.problem.study.name,
+        analysis.machine.name if result is None else result.problem.study.name,
         (*_title_block(answers), *about.items()),
         tuple(sections),
         {"machine.toml": origin.machine_file, "results.json": origin.results},
@@ -66,17 +67,17 @@ def report_of(
 
 
 def _title_block(answers: Answers) -> list[tuple[str, str]]:
-    found, machine = answers.analysis, answers.machine
+    analysis, machine = answers.analysis, answers.machine
     rows = [("Machine", machine.name), ("Family", machine.family.name), ("Pose", _pose(machine))]
     return [
         *rows,
-        ("Reference", f"{machine.reference}, {found.axes} axes, SI units"),
+        ("Reference", f"{machine.reference}, {analysis.axes} axes, SI units"),
         ("Program", f"kinetostat {version('kinetostat')}"),
     ]
 
 
 def _pose(machine: Machine) -> str:
-    held = values(machine)
+    current = values(machine)
     fields = [p for p in parameters(machine.family) if p.path.startswith("pose.") and len(p.leaves) == 1]
-    shown = [f"{p.path.removeprefix('pose.')} {readable([held[p.path]], p.quantity)}" for p in fields]
-    return typeset(", ".join(shown))
+    texts = [f"{p.path.removeprefix('pose.')} {readable([current[p.path]], p.quantity)}" for p in fields]
+    return typeset(", ".join(texts))

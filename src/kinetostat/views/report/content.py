@@ -1,6 +1,7 @@
-"""What a report says, as plain data that knows neither HTML nor PDF: sections of paragraphs, tables, figures, formulas.
+"""Content of a report as plain data: sections of paragraphs, lists, tables, figures, formulas and listings.
 
-All texts are plain: no writer reads markup in them. Sections, figures and tables are numbered by the writers.
+All texts are plain: no writer reads markup in them. The writers (`html_page`, `pdf`) number sections, figures and
+tables, and only they know a format.
 """
 
 from collections.abc import Mapping
@@ -10,7 +11,7 @@ from typing import Any, TypeAlias
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Sentences, after a word in bold if there is a `lead`."""
+    """Sentences, with the words of `lead` in bold before them."""
 
     text: str
     lead: str = ""
@@ -18,7 +19,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Points:
-    """A list of short statements, each with an aside in a softer voice or without one."""
+    """A list of short statements, each with a remark in grey, which may be empty."""
 
     items: tuple[tuple[str, str], ...]
 
@@ -31,8 +32,8 @@ class Table:
         caption: a phrase or a sentence.
         heads: of the columns.
         rows: as many texts each.
-        numeric: whether a column holds numbers; the others may be broken into lines, but for the first.
-        split: rows, and columns after the first, behind which a block ends; 0 for none.
+        numeric: whether a column holds numbers; of the other columns all but the first may be broken into lines.
+        split: number of rows, and of columns after the first, after which a rule is drawn; 0 for none.
     """
 
     caption: str
@@ -61,14 +62,15 @@ class Figure:
 
 @dataclass(frozen=True)
 class Formula:
-    """A formula of the theory, by its name in `formulas`."""
+    """A displayed formula in both notations: MathML for pages, Typst's mathematics for PDF."""
 
-    name: str
+    mathml: str
+    typst: str
 
 
 @dataclass(frozen=True)
 class Listing:
-    """A text to be read line by line as it is: a file, a command."""
+    """A text that keeps its lines as they are: a file, a command."""
 
     caption: str
     text: str
@@ -79,7 +81,7 @@ Block: TypeAlias = "Paragraph | Points | Table | Figure | Formula | Listing | Se
 
 @dataclass(frozen=True)
 class Section:
-    """A numbered heading and what stands under it, further sections included."""
+    """A numbered heading and the blocks below it, which may be sections themselves."""
 
     title: str
     blocks: tuple[Block, ...]
@@ -90,8 +92,8 @@ class Report:
     """A whole report.
 
     Attributes:
-        kind: what it is, over the title.
-        title: the machine or the study.
+        kind: of report, printed above the title.
+        title: name of the machine or the study.
         facts: name and text of each line of the title block.
         sections: in order.
         attachments: texts that the file carries along, by file name.

@@ -1,4 +1,7 @@
-"""Sections for the designer: guidelines with the tables behind them, and parameters by rank."""
+"""Sections for the designer: guidelines with the tables behind them, and the parameters ranked by influence.
+
+Nothing is computed here.
+"""
 
 from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.guidelines.roles import Roles
@@ -24,77 +27,71 @@ from kinetostat.views.report.typesetting import printed, typeset
 from kinetostat.views.sensitivity_tables import influence_table
 
 MOST_INFLUENCES = 24
-"""Parameters in the ranking."""
+"""Number of parameters in the ranking."""
 
 
 def guideline_section(answers: Answers) -> Section:
-    """What the stiffness depends on and what to change."""
-    found, title = answers.guidelines, "Guidelines"
-    if found is None or found.here is None:
-        return Section(title, (Paragraph("Guidelines were left out." if found is None else found.message),))
-    said = statements(found)
-    topics = [(heading, [one for one in said if one.topic == topic]) for topic, heading in TOPICS.items()]
-    parts = [
-        Section(
-            heading,
-            (Points(tuple((typeset(one.text), "" if one.holds is None else over_poses(one.holds)) for one in own)),),
-        )
-        for heading, own in topics
-        if own
-    ]
-    return Section(
-        title, (Paragraph(_about(found)), *parts, Section("Tables behind the sentences", _tables(found, found.here)))
-    )
+    """Write the section on what the stiffness depends on and what to change."""
+    advice, title = answers.guidelines, "Guidelines"
+    if advice is None or advice.here is None:
+        return Section(title, (Paragraph("Guidelines were left out." if advice is None else advice.message),))
+    parts = []
+    for topic, heading in TOPICS.items():
+        matching = [statement for statement in statements(advice) if statement.topic == topic]
+        remarks = ["" if statement.holds is None else over_poses(statement.holds) for statement in matching]
+        items = tuple((typeset(statement.text), remark) for statement, remark in zip(matching, remarks, strict=True))
+        parts += [Section(heading, (Points(items),))] if items else []
+    tables = Section("Tables behind the sentences", _tables(advice, advice.here))
+    return Section(title, (Paragraph(_about(advice)), *parts, tables))
 
 
-def _about(found: Guidelines) -> str:
-    answered, poses = found.poses
-    where = f" and tried at {answered:,} of {poses:,} poses of the range mapped above" if poses else ""
-    return f"Derived from this machine at its pose{where}. Directions are those of a load and of its motion."
+def _about(advice: Guidelines) -> str:
+    answered, poses = advice.poses
+    where = f" and checked at {answered:,} of {poses:,} poses of the range mapped above" if poses else ""
+    return f"Derived from this machine at its pose{where}. A direction is that of a load and of the motion it causes."
 
 
-def _tables(found: Guidelines, here: Roles) -> tuple[Block, ...]:
-    count = min(MOST_ROWS, len(found.moves))
-    blocks: list[Block] = [printed(element_table(found, here), "Shares of the elements in the diagonal of C.")]
-    sums = equations(found)
+def _tables(advice: Guidelines, here: Roles) -> tuple[Block, ...]:
+    count = min(MOST_ROWS, len(advice.moves))
+    blocks: list[Block] = [printed(element_table(advice, here), "Shares of the elements in the diagonal of C.")]
+    sums = equations(advice)
     if sums:
-        caption = "The diagonal of K, by the stiffness k of one part of each element (SI)."
+        caption = "Diagonal of K as a sum over the elements, k being the stiffness of one part of each (SI)."
         blocks.append(Listing(caption, "\n".join(sums)))
-    blocks.append(printed(limit_table(found, here), f"Stiffness from which an element counts as rigid. {LEGEND}"))
+    blocks.append(printed(limit_table(advice, here), f"Stiffness from which an element counts as rigid. {LEGEND}"))
     if count:
-        poses = f" {ALIKE[0].upper()}{ALIKE[1:]}" if found.poses[0] else ""
-        arrows = (
-            "What one percent more of a parameter does, or 0.01 rad more of an angle: percent stiffer ▲ or softer ▼."
-        )
-        caption = arrows + poses
-        blocks.append(printed(move_table(found, count), caption))
-    blocks += [Paragraph(typeset(line)) for line in (found.meaning, *left_out(found, count))]
-    limits = limit_figure(found)
+        poses = f" {ALIKE[0].upper()}{ALIKE[1:]}" if advice.poses[0] else ""
+        arrows = "Effect of 1 % more of a parameter, or of 0.01 rad more of an angle: percent stiffer ▲ or softer ▼."
+        blocks.append(printed(move_table(advice, count), arrows + poses))
+    blocks += [Paragraph(typeset(line)) for line in (advice.meaning, *left_out(advice, count))]
+    limits = limit_figure(advice)
     if limits is not None:
-        caption = "Stiffness of each direction against that of each element, as a share of that with the element rigid."
+        caption = (
+            "Stiffness in each direction over the stiffness of each element, relative to that with the element rigid."
+        )
         blocks.append(drawn(limits, caption))
     return tuple(blocks)
 
 
-def sensitivity_section(found: Sensitivity | None) -> Section:
-    """Which parameters matter, by rank."""
+def sensitivity_section(ranking: Sensitivity | None) -> Section:
+    """Write the section that ranks the parameters by their influence."""
     title = "Sensitivity"
-    if found is None:
+    if ranking is None:
         return Section(title, (Paragraph("Sensitivities were left out."),))
-    if not found.influences:
+    if not ranking.influences:
         return Section(title, (Paragraph("No parameter has an influence on the compliance here."),))
-    count = min(MOST_INFLUENCES, len(found.influences))
-    rest = len(found.influences) - count
-    more = f" {rest} more have less influence." if rest else ""
-    about = (
+    count = min(MOST_INFLUENCES, len(ranking.influences))
+    rest = len(ranking.influences) - count
+    more = f" {rest} parameters with less influence are omitted." if rest else ""
+    caption = (
         "Percent by which each entry of the diagonal of C changes per percent of a parameter, of an angle per 0.01 rad."
+        f"{more}"
     )
-    caption = f"{about}{more}"
     return Section(
         title,
         (
-            Paragraph("Exact derivatives at the pose, the greatest influence first."),
-            printed(influence_table(found, count), caption),
-            *(Paragraph(typeset(note)) for note in notes(found)),
+            Paragraph("Exact derivatives at the pose, largest influence first."),
+            printed(influence_table(ranking, count), caption),
+            *(Paragraph(typeset(note)) for note in notes(ranking)),
         ),
     )

@@ -1,4 +1,7 @@
-"""A report as one HTML page that asks nothing of any server: pictures, data and the renderer are inside it."""
+"""A report as one self-contained HTML page: pictures, data and the renderer are inside it, and no server is asked.
+
+The content comes from `content.Report`; nothing is said here that is not in it.
+"""
 
 import json
 from base64 import b64encode
@@ -19,21 +22,20 @@ from kinetostat.views.report.content import (
     Section,
     Table,
 )
-from kinetostat.views.report.formulas import FORMULAS
-from kinetostat.views.report.live import live_html
+from kinetostat.views.report.pictures import live_html
 
 STYLE = Path(__file__).with_name("report.css").read_text("utf-8")
 MEDIA_TYPES = {"json": "application/json", "toml": "text/plain"}
-"""Of attachments, by the end of their name."""
+"""Media types of attachments, by the ending of their name."""
 
 
 def html_page(report: Report) -> str:
-    """The page."""
+    """Write a report as an HTML page."""
     return whole_page(f"{report.title}: {report.kind.lower()}", STYLE, _Writer(report).body())
 
 
 class _Writer:
-    """Writes blocks in order and numbers what has a number."""
+    """Writer of the blocks, in order, which numbers figures, tables and formulas."""
 
     def __init__(self, report: Report) -> None:
         self._report = report
@@ -48,13 +50,14 @@ class _Writer:
             f'<header><p class="kind">{escape(report.kind)}</p><h1>{escape(report.title)}</h1>'
             f'<dl class="facts">{facts}</dl></header>'
         )
-        main = "\n".join(self._section(one, f"{n}") for n, one in enumerate(report.sections, 1))
+        main = "\n".join(self._section(section, f"{n}") for n, section in enumerate(report.sections, 1))
         attached = [_attachment(name, text) for name, text in report.attachments.items()]
         return [head, self._contents(), f"<main>\n{main}\n</main>", *attached, self._live]
 
     def _contents(self) -> str:
         entries = "".join(
-            f'<li><a href="#s{n}">{escape(one.title)}</a></li>' for n, one in enumerate(self._report.sections, 1)
+            f'<li><a href="#s{n}">{escape(section.title)}</a></li>'
+            for n, section in enumerate(self._report.sections, 1)
         )
         return f'<nav aria-label="contents"><ol>{entries}</ol></nav>'
 
@@ -62,8 +65,10 @@ class _Writer:
         level = 2 + number.count(".")
         inner, parts = count(1), []
         for block in section.blocks:
-            own = self._section(block, f"{number}.{next(inner)}") if isinstance(block, Section) else self._block(block)
-            parts.append(own)
+            if isinstance(block, Section):
+                parts.append(self._section(block, f"{number}.{next(inner)}"))
+            else:
+                parts.append(self._block(block))
         title = f'<h{level}><span class="number">{number}</span> {escape(section.title)}</h{level}>'
         return f'<section id="s{number}">{title}\n' + "\n".join(parts) + "\n</section>"
 
@@ -77,11 +82,9 @@ class _Writer:
                 return self._table(block)
             case Figure():
                 return self._figure(block)
-            case Formula(name):
-                mathml = FORMULAS[name].mathml
-                return (
-                    f'<p class="formula"><math display="block">{mathml}</math><span>({next(self._formulas)})</span></p>'
-                )
+            case Formula(mathml):
+                shown = f'<math display="block">{mathml}</math>'
+                return f'<p class="formula">{shown}<span>({next(self._formulas)})</span></p>'
             case Listing(caption, text):
                 return f'<p class="listing">{escape(caption)}</p><pre>{escape(text.rstrip())}</pre>'
         raise TypeError(f"a page cannot show {type(block).__name__}")
@@ -114,7 +117,7 @@ def _png(picture: bytes, caption: str) -> str:
 
 
 def _attachment(name: str, text: str) -> str:
-    """A text inside the page that no browser interprets: as a JSON string, without the end of a script in it."""
+    """A text inside the page as JSON, with "<" written as an escape, so that no text ends the script element."""
     kind = MEDIA_TYPES[name.rpartition(".")[2]]
-    held = text if kind == MEDIA_TYPES["json"] else json.dumps(text, ensure_ascii=False)
-    return f'<script type="{kind}" id="{escape(name)}">{held.replace("<", chr(92) + "u003c")}</script>'
+    data = text if kind == MEDIA_TYPES["json"] else json.dumps(text, ensure_ascii=False)
+    return f'<script type="{kind}" id="{escape(name)}">{data.replace("<", chr(92) + "u003c")}</script>'

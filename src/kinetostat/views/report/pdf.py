@@ -1,6 +1,6 @@
 """A report as a PDF: its content as data, and a Typst template that lays it out.
 
-Typst reads the content as JSON, so that nothing in a name or a file can be taken for a command.
+Typst reads the content as JSON, so that no text of a name or a file is taken for a command.
 """
 
 import json
@@ -16,26 +16,26 @@ import matplotlib as mpl
 
 from kinetostat.spec.errors import InputError
 from kinetostat.views.report.content import Block, Figure, Formula, Report, Section
-from kinetostat.views.report.formulas import FORMULAS
 
 TEMPLATE = Path(__file__).with_name("report.typ")
 INSTALL = "A PDF needs Typst; install it with: pip install 'kinetostat[report]', or write an HTML page: -o report.html."
 FAR = "\u2e80"
-"""From this character on, a text may need the fonts of the system; without it, bytes are the same on every machine."""
+"""From this character on, a text may need the fonts of the system. Without such characters the system's fonts are
+ignored, so that the bytes are the same on every computer."""
 
 
 def check_typst() -> None:
-    """Say how to get Typst where it is not installed.
+    """Check that Typst is installed.
 
     Raises:
-        InputError: it is not.
+        InputError: it is not; the message says how to install it.
     """
     if find_spec("typst") is None:
         raise InputError(INSTALL)
 
 
 def pdf_bytes(report: Report) -> bytes:
-    """The file; the same bytes from the same report.
+    """Write a report as a PDF; the same report gives the same bytes.
 
     Raises:
         InputError: Typst is not installed.
@@ -44,7 +44,7 @@ def pdf_bytes(report: Report) -> bytes:
 
 
 def page_pictures(report: Report, dots: float) -> list[bytes]:
-    """Every page as a PNG, with so many dots to an inch.
+    """Draw every page as a PNG, with so many dots to an inch.
 
     Raises:
         InputError: Typst is not installed.
@@ -61,7 +61,7 @@ def _compiled(report: Report, **form: Any) -> Any:
         "kind": report.kind,
         "title": report.title,
         "facts": report.facts,
-        "sections": [_section(one, files) for one in report.sections],
+        "sections": [_section(section, files) for section in report.sections],
         "attachments": dict(report.attachments),
     }
     text = json.dumps(content, ensure_ascii=False)
@@ -72,7 +72,7 @@ def _compiled(report: Report, **form: Any) -> Any:
 
 
 def _section(section: Section, files: dict[str, bytes]) -> dict[str, Any]:
-    return {"kind": "section", "title": section.title, "blocks": [_block(one, files) for one in section.blocks]}
+    return {"kind": "section", "title": section.title, "blocks": [_block(block, files) for block in section.blocks]}
 
 
 def _block(block: Block, files: dict[str, bytes]) -> dict[str, Any]:
@@ -83,13 +83,13 @@ def _block(block: Block, files: dict[str, bytes]) -> dict[str, Any]:
             name = f"figure-{len(files) + 1}.svg"
             files[name] = (picture if isinstance(picture, str) else _wrapped(picture)).encode()
             return {"kind": "figure", "caption": caption, "file": name, "width": width}
-        case Formula(name):
-            return {"kind": "formula", "typst": FORMULAS[name].typst}
+        case Formula(_, typst):
+            return {"kind": "formula", "typst": typst}
     return {"kind": type(block).__name__.lower(), **asdict(block)}
 
 
 def _wrapped(png: bytes) -> str:
-    """A PNG inside an SVG element, because files that are handed to Typst must be text."""
+    """A PNG inside an SVG element, because the files handed to Typst must be text."""
     width, height = struct.unpack(">II", png[16:24])
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}">'
     data = b64encode(png).decode()

@@ -1,6 +1,16 @@
-"""The machine as pictures of a report, as it stands and as it gives under load, and drawings in one scale."""
+"""The machine in a report: still pictures, the scene that turns under the mouse, and drawings as figures.
 
+A page shows the scene with the renderer of `views.scene.browser`, which is packed into the page, so that it needs no
+server; a PDF has the still pictures only.
+"""
+
+import gzip
+import json
+from base64 import b64encode
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure as Drawing
@@ -10,6 +20,8 @@ from kinetostat.studies.analysis import Analysis
 from kinetostat.views.figures import as_svg
 from kinetostat.views.picture import picture
 from kinetostat.views.report.content import Figure
+from kinetostat.views.scene import browser
+from kinetostat.views.scene.looks import looks_data
 from kinetostat.views.scene.machine_scene import machine_scene, proportions_of
 from kinetostat.views.scene.overlaid import overlays_of
 from kinetostat.views.scene.solids import Scene, Solid, as_data, solid_data
@@ -17,11 +29,14 @@ from kinetostat.views.scene.solids import Scene, Solid, as_data, solid_data
 SIZE = (1000, 700)
 """Pixels of a picture of the machine: 190 to an inch on A4."""
 SHARE = 0.8
-"""Of the width of the text that it takes."""
+"""Width of that picture as a share of the width of the text."""
 FULL = 7.4
-"""Inches of a drawing that takes the whole width of the text: its letters have then the size of captions."""
+"""Width of a drawing that takes the whole width of the text, inches: its letters then have the size of captions."""
 LOADED = ("load", "deflection")
 """Layers of a loaded machine."""
+SCRIPT = Path(__file__).with_name("live.js")
+WITHOUT = f" For a machine that turns under the mouse, make the report after {browser.INSTALL}."
+"""Sentence of a page that cannot show the scene, because the renderer's libraries are not installed."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +45,7 @@ class Shown:
 
     Attributes:
         scene: the machine.
-        overlays: compliance, load and deflected shape.
+        overlays: compliance ellipsoids, load and deflected shape.
         factor: by which deflections are exaggerated; None without a load.
     """
 
@@ -40,7 +55,7 @@ class Shown:
 
     @property
     def data(self) -> dict[str, Any]:
-        """All of it for the renderer of a page."""
+        """Scene and overlays as plain data for the renderer of a page."""
         return {
             "scene": {**as_data(self.scene), "fit": True},
             "overlays": [solid_data(solid) for solid in self.overlays],
@@ -56,14 +71,42 @@ class Shown:
         return picture(replace(self.scene, solids=(*self.scene.solids, *loaded)), SIZE)
 
 
-def shown(found: Analysis) -> Shown:
-    """The machine of an analysis, with all that can be shown of it."""
-    configuration = respond(found.machine).configuration
-    sizes = proportions_of(found.machine, configuration)
-    overlays, factor = overlays_of(found, sizes)
-    return Shown(machine_scene(found.machine, configuration, sizes), tuple(overlays), factor)
+def shown(analysis: Analysis) -> Shown:
+    """Build the solids of an analysed machine with its overlays."""
+    machine = analysis.machine
+    configuration = respond(machine).configuration
+    sizes = proportions_of(machine, configuration)
+    overlays, factor = overlays_of(analysis, sizes)
+    return Shown(machine_scene(machine, configuration, sizes), tuple(overlays), factor)
 
 
 def drawn(drawing: Drawing, caption: str) -> Figure:
-    """A drawing as a figure, in the same scale as all others."""
+    """Make a figure of a drawing, in the same scale as all others."""
     return Figure(caption, as_svg(drawing), min(1.0, drawing.get_figwidth() / FULL))
+
+
+@cache
+def renderer() -> dict[str, str] | None:
+    """Source of the renderer's modules by name; None where their libraries are not installed."""
+    return browser.modules()
+
+
+def can_be_live() -> bool:
+    """Whether a page can show a scene: the renderer's libraries are installed."""
+    return renderer() is not None
+
+
+def live_html(scene: Mapping[str, Any]) -> str:
+    """Elements that unpack the renderer and show a scene in the element with the id "live"; empty without libraries.
+
+    Renderer and scene are compressed together, without a time stamp: the same scene gives the same bytes.
+    """
+    modules = renderer()
+    if modules is None:
+        return ""
+    data = json.dumps(
+        {"modules": modules, "looks": looks_data(), **scene}, ensure_ascii=False, separators=(",", ":")
+    ).encode()
+    packed = b64encode(gzip.compress(data, 9, mtime=0)).decode()
+    script = SCRIPT.read_text("utf-8")
+    return f'<script type="text/plain" id="live-data">{packed}</script>\n<script>\n{script}</script>'

@@ -1,6 +1,14 @@
-"""Sections about the pose: K and C, attribution, indices, and the load case. Nothing is computed here."""
+"""Sections on the stiffness: K and C at the pose, attribution, indices, the load case, and maps over the poses.
 
+Nothing is computed here.
+"""
+
+import xarray as xr
+
+from kinetostat.kinematics.status import Status
 from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.grid.grid import failures
+from kinetostat.studies.report.answers import Answers
 from kinetostat.views.analysis_tables import (
     UNITS_OF_C,
     UNITS_OF_K,
@@ -14,80 +22,89 @@ from kinetostat.views.analysis_tables import (
     shares_table,
     stiffness_table,
 )
-from kinetostat.views.report.content import Block, Figure, Formula, Paragraph, Section
-from kinetostat.views.report.pictures import SHARE, Shown
+from kinetostat.views.figures import axis_values, contour_maps, curves
+from kinetostat.views.report.content import Block, Figure, Paragraph, Section, Table
+from kinetostat.views.report.pictures import SHARE, Shown, drawn
+from kinetostat.views.report.provenance import MOTION
 from kinetostat.views.report.typesetting import printed, typeset
+from kinetostat.views.tables import number
 
 BLOCKS = "Blocks: {}, {} and {} (rotation, coupling, translation)."
 NO_LOAD = (
-    "The machine file has no load. Add a table [load] with a force (N) and a moment (N·m) at the {} to have "
+    "The machine file has no load. Add a table [load] with a force (N) and a moment (N·m) at the {} to see "
     "deflections, actuator loads and joint reactions here."
 )
 
 
-def stiffness_section(found: Analysis) -> Section:
-    """K, C, who is to blame, and what is read off them."""
-    split = 3 if len(found.components) == 6 else 1
+def stiffness_section(analysis: Analysis) -> Section:
+    """Write the section with K and C at the pose, the attribution to parts, and the indices."""
+    split = 3 if len(analysis.components) == 6 else 1
     about = (
-        f"Components {' '.join(found.components)} at the {found.machine.reference}, {found.axes} axes; rotation first. "
-        "A load w (moment, force) and the small motion t (rotation, translation) that it causes belong together by"
+        f"Components {' '.join(analysis.components)} at the {analysis.machine.reference}, {analysis.axes} axes; "
+        "rotation first. A load w (moment, force) and the small motion t (rotation, translation) that it causes are "
+        "related by"
     )
     matrices: list[Block] = [
         Paragraph(about),
-        Formula("motion"),
-        printed(stiffness_table(found), f"Stiffness K. {BLOCKS.format(*UNITS_OF_K.split(', '))}", split),
-        printed(compliance_table(found), f"Compliance C. {BLOCKS.format(*UNITS_OF_C.split(', '))}", split),
+        MOTION,
+        printed(stiffness_table(analysis), f"Stiffness K. {BLOCKS.format(*UNITS_OF_K.split(', '))}", split),
+        printed(compliance_table(analysis), f"Compliance C. {BLOCKS.format(*UNITS_OF_C.split(', '))}", split),
     ]
-    if found.stiffness is None or found.compliance is None:
-        endless = "rigid: K is infinite there" if found.stiffness is None else "free: C is infinite there"
+    if analysis.stiffness is None or analysis.compliance is None:
+        endless = "rigid: K is infinite there" if analysis.stiffness is None else "free: C is infinite there"
         matrices.append(
-            Paragraph(f"Some directions are {endless}, so that the diagonal stands for the matrix. Rank {found.rank}.")
+            Paragraph(
+                f"Some directions are {endless}, so that the diagonal stands for the matrix. Rank {analysis.rank}."
+            )
         )
     return Section(
         "Stiffness at the pose",
         (
             Section("Stiffness and compliance", tuple(matrices)),
-            Section("Attribution", _attribution(found)),
-            Section("Indices", _indices(found)),
+            Section("Attribution", _attribution(analysis)),
+            Section("Indices", _indices(analysis)),
         ),
     )
 
 
-def _attribution(found: Analysis) -> tuple[Block, ...]:
-    states = [(names, word) for names, word in ((found.rigid, "Rigid"), (found.free, "Free")) if names]
+def _attribution(analysis: Analysis) -> tuple[Block, ...]:
+    states = [(names, word) for names, word in ((analysis.rigid, "Rigid"), (analysis.free, "Free")) if names]
     caption = "Shares of joints and links in the diagonal of C; each column adds up to 100 %."
     return (
         Paragraph(
-            "C is a sum over the springs of the machine: each share is exact. A dash stands where nothing yields."
+            "C is a sum over the springs of the machine: each share is exact. A dash stands where nothing deflects."
         ),
-        printed(shares_table(found), caption),
+        printed(shares_table(analysis), caption),
         *(Paragraph(f"{', '.join(names)}.", f"{word}:") for names, word in states),
     )
 
 
-def _indices(found: Analysis) -> tuple[Block, ...]:
-    blocks: list[Block] = [Paragraph(typeset(line)) for line in remarks(found)]
-    principal = principal_table(found)
+def _indices(analysis: Analysis) -> tuple[Block, ...]:
+    blocks: list[Block] = [Paragraph(typeset(line)) for line in remarks(analysis)]
+    principal = principal_table(analysis)
     if principal.row_count:
         caption = "Principal stiffnesses (N/m, N·m/rad) and their directions x y z, the other motions free or held."
         blocks.append(printed(principal, caption))
-    screws = eigenscrew_table(found.indices.eigenscrews if found.indices else (), found.machine.reference)
+    screws = eigenscrew_table(analysis.indices.eigenscrews if analysis.indices else (), analysis.machine.reference)
     if screws.row_count:
-        blocks.append(printed(screws, f"Eigenscrews of the stiffness; points from the {found.machine.reference}."))
+        blocks.append(printed(screws, f"Eigenscrews of the stiffness; points from the {analysis.machine.reference}."))
     return tuple(blocks)
 
 
-def load_section(found: Analysis, pictures: Shown) -> Section:
-    """The load case of the file, or how to have one."""
-    point = found.machine.reference
-    if found.load is None:
+def load_section(analysis: Analysis, pictures: Shown) -> Section:
+    """Write the section on the load of the file, or say how to add one."""
+    point = analysis.machine.reference
+    if analysis.load is None:
         return Section("Load case", (Paragraph(NO_LOAD.format(point)),))
     tables = [
-        (load_table(found.components, found.load), f"The load at the {point} (N·m, N) and its deflection (rad, m)."),
-        (actuator_table(found.load), "Actuators under the load."),
         (
-            reaction_table(found.load, found.axes),
-            f"Load that each joint passes on towards the base, at the joint (N·m, N; {found.axes} axes).",
+            load_table(analysis.components, analysis.load),
+            f"The load at the {point} (N·m, N) and its deflection (rad, m).",
+        ),
+        (actuator_table(analysis.load), "Actuators under the load."),
+        (
+            reaction_table(analysis.load, analysis.axes),
+            f"Load that each joint passes on towards the base, at the joint (N·m, N; {analysis.axes} axes).",
         ),
     ]
     blocks: list[Block] = [printed(table, caption) for table, caption in tables if table.row_count]
@@ -95,3 +112,47 @@ def load_section(found: Analysis, pictures: Shown) -> Section:
         caption = f"The load, and the deflected shape (red), {pictures.factor:,.6g} times as large as it is."
         blocks.append(Figure(caption, pictures.deflected(), SHARE))
     return Section("Load case", tuple(blocks))
+
+
+def workspace_section(answers: Answers) -> Section:
+    """Write the section with maps of the diagonal of C, and its extremes."""
+    title = "Over the poses"
+    if answers.maps is None:
+        return Section(title, (Paragraph(answers.refused.get("maps", "Maps were left out.")),))
+    return Section(title, tuple(_mapped(answers.maps)))
+
+
+def _mapped(maps: xr.Dataset) -> list[Block]:
+    names = [str(name) for name in maps.data_vars if name != "status"]
+    dims = [str(dim) for dim in maps["status"].dims]
+    spans = [
+        f"{label} from {values.min():.6g} to {values.max():.6g}"
+        for values, label in (axis_values(maps, d) for d in dims)
+    ]
+    count = " by ".join(str(maps.sizes[dim]) for dim in dims)
+    failed = failures(maps)
+    without = ", ".join(f"{count:,} {status.word.replace('_', ' ')}" for status, count in failed.items())
+    outcome = f"of {maps['status'].size:,} poses {without}" if failed else "every pose has an answer"
+    about = typeset(f"Over {' and '.join(spans)}: {count} points, all other values as in the data sheet; {outcome}.")
+    if (maps["status"] != int(Status.OK)).all():
+        return [Paragraph(about)]
+    draw = contour_maps if len(dims) == 2 else curves
+    return [
+        Paragraph(about),
+        drawn(draw(maps, names, ""), "Compliance in each direction over the poses."),
+        _extremes(maps, names),
+    ]
+
+
+def _extremes(maps: xr.Dataset, names: list[str]) -> Table:
+    """The least and the greatest value of each quantity."""
+    rows = []
+    for name in names:
+        known = maps[name].where(maps["status"] == int(Status.OK)).values
+        if (known == known).any():
+            least, most = float(maps[name].min()), float(maps[name].max())
+            ratio = number(most / least) if least > 0.0 else "–"
+            texts = [typeset(number(value, "free")) for value in (least, most)]
+            rows.append((name.replace("_", " "), *texts, typeset(ratio), maps[name].attrs["units"]))
+    heads = ("quantity", "least", "greatest", "ratio", "unit")
+    return Table("Extremes over these poses.", heads, tuple(rows), (False, True, True, True, False))

@@ -1,4 +1,7 @@
-"""The section about a study: what was asked, what was found, and what holds it there. Nothing is computed here."""
+"""The section on a design study: the question, the search and the answer.
+
+Nothing is computed here.
+"""
 
 from collections.abc import Iterator
 
@@ -30,32 +33,32 @@ METHODS = {
 }
 CAPTIONS = {
     "comparison": "Left: how many times stiffer each direction is. Right: each variable between its bounds.",
-    "convergence": "Best and mean of the designs that each step kept, and their distance from the last best.",
-    "front": "Designs over the objectives; on the front none beats another in everything.",
-    "tolerances": "Scatter of the objectives over the machines that manufacture makes of the best design.",
+    "convergence": "Best and mean of the designs that each step kept, and their distance from the final best.",
+    "front": "Designs over the objectives; on the front no design is better than another in all objectives.",
+    "tolerances": "Scatter of the objectives over machines made to the tolerances from the best design.",
 }
 
 
-def study_section(found: Result) -> Section:
-    """Question, history and answer of a study."""
+def study_section(result: Result) -> Section:
+    """Write the section on a study."""
     return Section(
         "Design study",
         (
-            Section("The question", _question(found.problem)),
-            Section("The search", _search(found)),
-            Section("The answer", _answer(found)),
+            Section("The question", _question(result.problem)),
+            Section("The search", _search(result)),
+            Section("The answer", _answer(result)),
         ),
     )
 
 
-def gains(found: Result) -> Iterator[str]:
-    """What each objective was and has become, a sentence each."""
-    for k, objective in enumerate(found.problem.objectives):
-        before, after = found.initial.objectives[0, k], found.outcome.objectives[0, k]
+def gains(result: Result) -> Iterator[str]:
+    """Yield a sentence on each objective, with its value before and after."""
+    for k, objective in enumerate(result.problem.objectives):
+        before, after = result.initial.objectives[0, k], result.outcome.objectives[0, k]
         unit = "" if objective.term.unit in ("1", "SI") else f" {objective.term.unit}"
         label = spoken(objective.term.label)
-        worth = f"{number(before)}{unit} before, {number(after)}{unit} now."
-        yield f"{label[0].upper()}{label[1:]} ({objective.goal}): {worth}"
+        change = f"{number(before)}{unit} before, {number(after)}{unit} now."
+        yield f"{label[0].upper()}{label[1:]} ({objective.goal}): {change}"
 
 
 def _question(problem: Problem) -> tuple[Block, ...]:
@@ -68,32 +71,32 @@ def _question(problem: Problem) -> tuple[Block, ...]:
     )
 
 
-def _search(found: Result) -> tuple[Block, ...]:
-    problem, figures = found.problem, pictures(found)
+def _search(result: Result) -> tuple[Block, ...]:
+    problem, figures = result.problem, pictures(result)
     settings = problem.study.optimizer
-    about = f"Method {problem.method}: {METHODS[problem.method]}; seed {settings.seed}. {message(found)}"
-    kept = (name for name in ("convergence", "front") if name in figures)
-    return (Paragraph(typeset(about)), *(drawn(figures[name], CAPTIONS[name]) for name in kept))
+    about = f"Method {problem.method}: {METHODS[problem.method]}; seed {settings.seed}. {message(result)}"
+    shown = (name for name in ("convergence", "front") if name in figures)
+    return (Paragraph(typeset(about)), *(drawn(figures[name], CAPTIONS[name]) for name in shown))
 
 
-def _answer(found: Result) -> tuple[Block, ...]:
-    figures, several = pictures(found), len(found.problem.objectives) > 1
+def _answer(result: Result) -> tuple[Block, ...]:
+    figures, several = pictures(result), len(result.problem.objectives) > 1
     best = "the knee of the front" if several else "the best design"
     blocks: list[Block] = [
-        printed(worth_table(found), f"What it is worth: the machine as it was, and {best}."),
+        printed(worth_table(result), f"Objectives: the original machine, and {best}."),
         printed(
-            variable_table(found),
-            f"Variables of {best}; what one percent of each does to the objectives, of an angle 0.01 rad.",
+            variable_table(result),
+            f"Variables of {best}, and the effect of 1 % of each on the objectives, of an angle of 0.01 rad.",
         ),
-        printed(direction_table(found), "Compliance before and after, the worst of all poses."),
+        printed(direction_table(result), "Compliance before and after, at the worst of all poses."),
         drawn(figures["comparison"], CAPTIONS["comparison"]),
     ]
     if several:
-        blocks.append(printed(front_table(found), "Designs of the front."))
-    if found.robustness:
-        blocks.append(printed(scatter_table(found.robustness), "Objectives under the tolerances."))
+        blocks.append(printed(front_table(result), "Designs of the front."))
+    if result.robustness:
+        blocks.append(printed(scatter_table(result.robustness), "Objectives under the tolerances."))
         blocks.append(drawn(figures["tolerances"], CAPTIONS["tolerances"]))
-        if found.robustness.failing:
-            blocks.append(Paragraph(failing(found.robustness)))
-    told = tuple((typeset(line), "") for line in remarks(found))
-    return (*blocks, Points(told)) if told else tuple(blocks)
+        if result.robustness.failing:
+            blocks.append(Paragraph(failing(result.robustness)))
+    items = tuple((typeset(line), "") for line in remarks(result))
+    return (*blocks, Points(items)) if items else tuple(blocks)

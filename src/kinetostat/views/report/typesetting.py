@@ -1,4 +1,7 @@
-"""Terminal tables and sentences as print has them: powers of ten, minus signs, degrees. No number changes its value."""
+"""Typesetting: sentences and tables of the terminal with proper powers of ten, minus signs and degrees.
+
+No number changes its value here.
+"""
 
 import re
 
@@ -18,22 +21,22 @@ _TIMES = re.compile(r"^(\d+) x ")
 
 
 def typeset(text: str) -> str:
-    """A text with numbers as print has them: 1.2e-05 as 1.2×10⁻⁵, -3 with a minus sign, 30 deg as 30°, m**2 as m²."""
-    text = _EXPONENT.sub(lambda found: found[1].translate(_SUPERSCRIPTS), text)
-    text = _ZEROS.sub(lambda found: _scientific(found[1], len(found[2])), text)
-    text = _POWER.sub(lambda found: "×10" + f"{found[1].replace('+', '')}{found[2]}".translate(_SUPERSCRIPTS), text)
+    """Typeset the numbers of a text: 1.2e-05 as 1.2×10⁻⁵, -3 with a minus sign, 30 deg as 30°, m**2 as m²."""
+    text = _EXPONENT.sub(lambda match: match[1].translate(_SUPERSCRIPTS), text)
+    text = _ZEROS.sub(lambda match: _scientific(match[1], len(match[2])), text)
+    text = _POWER.sub(lambda match: "×10" + f"{match[1].replace('+', '')}{match[2]}".translate(_SUPERSCRIPTS), text)
     text = _TIMES.sub("\\1 × ", _WHOLE.sub("", text))
     return _DEGREES.sub("°", _MINUS.sub("−", text))
 
 
 def _scientific(digits: str, zeros: int) -> str:
-    """A whole number, given by its leading digits and how many zeros follow, as people write large ones."""
+    """A large whole number, given by its leading digits and the number of zeros that follow, with a power of ten."""
     rest = f".{digits[1:]}" if digits[1:] else ""
     return f"{digits[0]}{rest}e{zeros + len(digits) - 1}"
 
 
 def printed(table: TerminalTable, caption: str, split: int = 0) -> Table:
-    """A table of a terminal as one for print.
+    """Convert a table of the terminal for a report.
 
     Args:
         table: from one of the `*_tables` of `views`.

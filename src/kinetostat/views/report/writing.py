@@ -1,4 +1,7 @@
-"""A report as a file: all that there is to say of a machine, asked, assembled, and written as a page or as PDF."""
+"""A report as a file: the answers are gathered, assembled, and written as a page or as a PDF.
+
+Sections are written in the modules beside this one; only the order of the work and the file are decided here.
+"""
 
 import json
 import shlex
@@ -21,19 +24,19 @@ from kinetostat.validation.comparison import Validation, choose, validate
 from kinetostat.views.report.assembly import report_of
 from kinetostat.views.report.html_page import html_page
 from kinetostat.views.report.pdf import check_typst, pdf_bytes
-from kinetostat.views.report.record import Origin
+from kinetostat.views.report.provenance import Origin
 
 SUFFIXES = (".html", ".pdf")
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a report is to hold.
+    """Options of a report.
 
     Attributes:
-        ranges: of the maps, "FIELD=from:to:count[:log]", one or two; none to choose them.
-        without: parts that take time and are left out, of `studies.report.answers.PARTS`.
-        engine: of the validation; None for the first that is installed.
+        ranges: of the maps, "FIELD=from:to:count[:log]", one or two; empty to choose them automatically.
+        without: parts to leave out because they take time, of `studies.report.answers.PARTS`.
+        engine: for the validation; None for the first that is installed.
         author, date: for the title block; None for none.
     """
 
@@ -44,7 +47,7 @@ class Wanted:
     date: str | None = None
 
     def options(self) -> list[str]:
-        """The words of the command line that ask for it."""
+        """Words of the command line that give the same options."""
         single = (("--engine", self.engine), ("--author", self.author), ("--date", self.date))
         pairs = [("--over", self.ranges), ("--without", self.without)]
         pairs += [(name, [value]) for name, value in single if value]
@@ -62,23 +65,23 @@ def report(
     date: str | None = None,
     progress: Progress = silent,
 ) -> Path:
-    """Write everything about a machine, or about a study and its best design, into one file for a design review.
+    """Write a report for a design review into one file: on a machine, or on a study and its best design.
 
     Args:
         about: a machine at a pose that has an answer, or the result of a study.
-        path: of the file, .html (the machine in three dimensions) or .pdf; one that is there is replaced.
-        ranges: of the maps, "FIELD=from:to:count[:log]", one or two; none to choose them.
-        without: what takes time and is left out: maps, guidelines, sensitivity, validation.
-        engine: of the validation, exudyn or pynite; None for the first that is installed.
+        path: of the file, .html (with the machine in three dimensions) or .pdf; an existing file is replaced.
+        ranges: of the maps, "FIELD=from:to:count[:log]", one or two; empty to choose them automatically.
+        without: parts to leave out because they take time: maps, guidelines, sensitivity, validation.
+        engine: for the validation, exudyn or pynite; None for the first that is installed.
         author, date: for the title block. Without a date, the same input gives the same bytes.
-        progress: told how far the work is.
+        progress: called with the number of steps done and of all steps.
 
     Returns:
         The path.
 
     Raises:
-        InputError: no answer at the pose, no design that meets the conditions, a bad range or part, a file that is no
-            report or cannot be written, a library that is missing.
+        InputError: the pose has no answer, no design meets the constraints, a range or part is not valid, the file is
+            neither .html nor .pdf or cannot be written, or a library is missing.
     """
     place, wanted = report_path(path), Wanted(ranges, without, engine, author, date)
     result = about if isinstance(about, Result) else None
@@ -94,10 +97,10 @@ def report(
 
 
 def report_path(path: str | Path) -> Path:
-    """The path of a report, before the work is done.
+    """Check the path of a report before the work begins.
 
     Raises:
-        InputError: the suffix is none of a report, or what writes it is not installed.
+        InputError: the suffix is neither .html nor .pdf, or the library for PDF is not installed.
     """
     place = Path(path)
     if place.suffix not in SUFFIXES:
@@ -110,18 +113,18 @@ def report_path(path: str | Path) -> Path:
 def write_report(
     answers: Answers, wanted: Wanted, subject: Sequence[str], inputs: Texts, path: Path, progress: Progress = silent
 ) -> None:
-    """Write what has been found, whole or not at all.
+    """Write a report from its answers; the file appears whole or not at all.
 
     Args:
-        answers: of a pose whose status is OK.
-        wanted: what the report holds besides.
+        answers: for a pose whose status is OK.
+        wanted: options of the report.
         subject: words of the command line that name the machine or study, with its overrides.
         inputs: name and text of each file that it was read from.
         path: from `report_path`.
-        progress: told of the last two of `STEPS`.
+        progress: called for the last two of `STEPS`.
 
     Raises:
-        InputError: an unknown engine, or a place that cannot be written.
+        InputError: an unknown engine, or a path that cannot be written.
     """
     command = shlex.join(["kinetostat", "report", *subject, *wanted.options(), "-o", path.name])
     results = json.dumps(as_json(answers.analysis), ensure_ascii=False, allow_nan=False, indent=1)
@@ -138,7 +141,7 @@ def write_report(
 
 
 def _validation(machine: Machine, wanted: Wanted) -> Validation | str:
-    """What an independent engine says, or why it says nothing."""
+    """Validate with an independent engine, or say why that was not possible."""
     if "validation" in wanted.without:
         return "Validation was left out."
     if wanted.engine:

@@ -1,0 +1,150 @@
+"""Sections on where the numbers come from: the independent engine, the theory, and how to make the report again.
+
+Nothing is computed here.
+"""
+
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+
+from kinetostat.studies.paper.printed import CITATION
+from kinetostat.validation.comparison import AGREED, Validation
+from kinetostat.views.report.content import Block, Formula, Listing, Paragraph, Section, Table
+from kinetostat.views.report.typesetting import printed, typeset
+from kinetostat.views.validation_tables import diagonal_table, difference_table, trial_table
+
+LIBRARIES = ("kinetostat", "numpy", "scipy", "llvmlite", "pymoo", "matplotlib")
+THEORY = (
+    "Every elastic part is described by its compliance, which is 0 for a rigid part: rigid and flexible parts are one "
+    "model, exact in the limit, and no large number stands in for infinity. Units are SI, in base axes; a twist is "
+    "(rotation, translation), a wrench (moment, force), both at the reference point. K and C hold for small motions."
+)
+LEGS = (
+    "A leg carries the wrenches W that do no work on its passive joints (unit twists J with index p). Under them it "
+    "deflects by its elastic coordinates (unit twists J with index e, compliances S):"
+)
+SUM = (
+    "The stiffnesses of the legs add up; where springs are rigid or the machine is overconstrained, the force method "
+    "is used instead:"
+)
+AGAIN = (
+    "The same command with the same input and the same versions makes this report again, byte for byte. The machine "
+    "with all digits (machine.toml) and the results (results.json) are inside this file."
+)
+
+
+def _matrix(letter: str, below: str = "", above: str = "") -> str:
+    """A bold letter with an index and a power, as MathML."""
+    base = f'<mi mathvariant="normal" class="matrix">{letter}</mi>'
+    if below and above:
+        return f"<msubsup>{base}{below}{above}</msubsup>"
+    return f"<msub>{base}{below}</msub>" if below else base
+
+
+_LEG, _ELASTIC, _PASSIVE, _TRANSPOSED = (f"<mi>{letter}</mi>" for letter in ("i", "e", "p", "T"))
+_INVERSE = "<mrow><mo>−</mo><mn>1</mn></mrow>"
+_EQUALS, _AND = "<mo>=</mo>", '<mo>,</mo><mspace width="2em"/>'
+_CARRIED = [_matrix("J", _PASSIVE, _TRANSPOSED), _matrix("W", _LEG), _EQUALS, "<mn>0</mn>"]
+_DEFLECTING = [
+    _matrix("G", _LEG), _EQUALS, _matrix("W", _LEG, _TRANSPOSED), _matrix("J", _ELASTIC), _matrix("S"),
+    _matrix("J", _ELASTIC, _TRANSPOSED), _matrix("W", _LEG),
+]  # fmt: skip
+
+MOTION = Formula(
+    "".join([
+        _matrix("w"), _EQUALS, _matrix("K"), _matrix("t"), _AND, _matrix("t"), _EQUALS, _matrix("C"), _matrix("w"),
+    ]),
+    "bold(w) = bold(K) thin bold(t), quad quad bold(t) = bold(C) thin bold(w)",
+)  # fmt: skip
+"""How a load and the small motion that it causes belong together."""
+LEG = Formula(
+    "".join([*_CARRIED, _AND, *_DEFLECTING]),
+    "bold(J)_p^T bold(W)_i = 0, quad quad bold(G)_i = bold(W)_i^T bold(J)_e bold(S) bold(J)_e^T bold(W)_i",
+)
+"""What a leg carries and how it deflects."""
+ASSEMBLY = Formula(
+    "".join([
+        _matrix("K"), _EQUALS, f"<munder><mo>∑</mo>{_LEG}</munder>", _matrix("W", _LEG), _matrix("G", _LEG, _INVERSE),
+        _matrix("W", _LEG, _TRANSPOSED),
+    ]),
+    "bold(K) = sum_i bold(W)_i bold(G)_i^(-1) bold(W)_i^T",
+)  # fmt: skip
+"""How the stiffnesses of the legs add up."""
+
+
+def verdict(validation: Validation | str) -> str:
+    """Say in a sentence whether an independent engine agrees, or why there is no comparison."""
+    if isinstance(validation, str):
+        return validation
+    agree = "agrees" if validation.difference <= AGREED else "DIFFERS"
+    return (
+        f"{validation.engine.capitalize()} {validation.version}, an independent engine, {agree}: compliances differ by "
+        f"{validation.difference:.1e} (relative, worst block); {AGREED:g} is allowed."
+    )
+
+
+def validation_section(validation: Validation | str) -> Section:
+    """Write the section that compares both compliances, or says why there is no comparison."""
+    title = "Validation"
+    if isinstance(validation, str):
+        return Section(title, (Paragraph(validation),))
+    about = (
+        "The machine was rebuilt in an independent engine from its geometry, cross-sections and springs alone; no "
+        f"Jacobian of kinetostat is used there. {verdict(validation)}"
+    )
+    blocks: list[Block] = [
+        Paragraph(typeset(about)),
+        printed(diagonal_table(validation), "The diagonal of the compliance, side by side."),
+        printed(difference_table(validation), "Relative difference by block, and how exact the engine itself is."),
+    ]
+    if len(validation.trials) > 1:
+        blocks.append(printed(trial_table(validation), "How the engine converges to its result."))
+    return Section(title, tuple(blocks))
+
+
+def method_section() -> Section:
+    """Write the section with the theory in two formulas."""
+    source = f"Source: {CITATION}, and the documentation of kinetostat, theory."
+    return Section(
+        "Method",
+        (Paragraph(THEORY), Paragraph(LEGS), LEG, Paragraph(SUM), ASSEMBLY, Paragraph(source)),
+    )
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a report was made from.
+
+    Attributes:
+        command: that makes it again.
+        inputs: name and text of each file, as written.
+        machine_file: the machine with all overrides, all digits.
+        results: the analysis as JSON.
+    """
+
+    command: str
+    inputs: tuple[tuple[str, str], ...]
+    machine_file: str
+    results: str
+
+
+def record_section(origin: Origin, engine: Sequence[str]) -> Section:
+    """Write the section with the command, the versions and the input.
+
+    Args:
+        origin: of the report.
+        engine: name and version of the independent engine; empty without one.
+    """
+    versions = [(name, version(name)) for name in LIBRARIES] + [("Python", platform.python_version())]
+    if engine:
+        versions.append((engine[0], engine[1]))
+    return Section(
+        "Record",
+        (
+            Paragraph(AGAIN),
+            Listing("Command.", origin.command),
+            Table("Versions.", ("program", "version"), tuple(versions), (False, False)),
+            *(Listing(f"Input: {name}.", text) for name, text in origin.inputs),
+        ),
+    )
