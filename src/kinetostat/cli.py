@@ -189,7 +189,7 @@ def _list(options: argparse.Namespace) -> int:
 
 def _new(options: argparse.Namespace) -> int:
     if options.urdf is not None:
-        from kinetostat.exchange.urdf_machine import machine_text
+        from kinetostat.exchange.urdf_import import machine_text
 
         print(machine_text(options.urdf), end="")
         return DONE

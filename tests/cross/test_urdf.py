@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from kinetostat.exchange.formats import choose
-from kinetostat.exchange.urdf import texts_of
+from kinetostat.exchange.urdf_export import texts_of
 from kinetostat.exchange.urdf_file import parse
-from kinetostat.exchange.urdf_machine import document_of, machine_text, read_machine
+from kinetostat.exchange.urdf_import import document_of, machine_text, read_machine
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import build, bundled, load
 from kinetostat.spec.document import LARGEST_FILE

@@ -8,7 +8,7 @@ import pytest
 from cad import needs_cad
 from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
 from kinetostat.commands.export import FORMATS
-from kinetostat.exchange import step
+from kinetostat.exchange import solids
 from kinetostat.exchange.formats import KNOWN
 from kinetostat.machine.loading import bundled
 
@@ -57,7 +57,7 @@ def test_step_is_for_cad_programs_by_either_suffix(tmp_path, capfd):
 
 
 def test_step_without_its_extra_is_one_sentence(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(step, "find_spec", lambda _: None)
+    monkeypatch.setattr(solids, "find_spec", lambda _: None)
     assert main(["export", MACHINE, "-o", str(tmp_path / "machine.step")]) == BAD_INPUT
     assert "pip install 'kinetostat[cad]'" in " ".join(capsys.readouterr().err.split())
     assert not list(tmp_path.iterdir())
@@ -67,7 +67,7 @@ def test_step_says_which_library_of_the_system_it_lacks(tmp_path, monkeypatch, c
     def failing(name):
         raise ImportError("libGL.so.1: cannot open shared object file")
 
-    monkeypatch.setattr(step, "import_module", failing)
+    monkeypatch.setattr(solids, "import_module", failing)
     assert main(["export", MACHINE, "-o", str(tmp_path / "machine.step")]) == BAD_INPUT
     assert "libGL.so.1: cannot open shared object file. On Debian" in " ".join(capsys.readouterr().err.split())
 

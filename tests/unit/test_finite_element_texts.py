@@ -1,10 +1,9 @@
-"""K for programs of finite elements: each text, read as its program does, gives back the matrix."""
+"""K for finite-element programs: each text, read as its program does, gives back the matrix."""
 
 import numpy as np
 import pytest
 
-from kinetostat.exchange import abaqus, ansys, nastran
-from kinetostat.exchange.tool_stiffness import tool_stiffness
+from kinetostat.exchange.finite_elements import abaqus_text, ansys_text, nastran_text, tool_stiffness
 from kinetostat.machine.loading import load
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
@@ -79,13 +78,13 @@ def read_matrix27(text):
 
 @pytest.mark.parametrize("name", MACHINES)
 @pytest.mark.parametrize(
-    ("module", "reader", "share"),
-    [(nastran, read_dmig, 1e-9), (abaqus, read_user_element, 1e-15), (ansys, read_matrix27, 1e-15)],
+    ("write", "reader", "share"),
+    [(nastran_text, read_dmig, 1e-9), (abaqus_text, read_user_element, 1e-15), (ansys_text, read_matrix27, 1e-15)],
     ids=["nastran", "abaqus", "ansys"],
 )
-def test_the_text_gives_back_the_matrix(module, reader, share, name):
+def test_the_text_gives_back_the_matrix(write, reader, share, name):
     found = analyze(load(name))
-    text = module.text_of(tool_stiffness(found))
+    text = write(tool_stiffness(found))
     assert same(reader(text), expected(found), share)
     assert "ux uy uz rotx roty rotz" in text
     assert text.isascii()
@@ -94,14 +93,14 @@ def test_the_text_gives_back_the_matrix(module, reader, share, name):
 def test_the_constants_of_ansys_are_those_of_its_manual():
     """The manual's example: a spring K along x has C1 = C58 = K and C7 = -K."""
     found = tool_stiffness(analyze(load("hexapod")))
-    constants = [c for line in ansys.text_of(found).splitlines() if line.startswith("R") for c in line.split(",")[1:]]
+    constants = [c for line in ansys_text(found).splitlines() if line.startswith("R") for c in line.split(",")[1:]]
     constants = [float(c) for c in constants[1:]]
     assert constants[0] == constants[57] == -constants[6] == found.matrix[0, 0]
 
 
 def test_nastran_fields_hold_any_number():
     found = analyze(load("zhang-gosselin-4dof", ["stiffness.passive_links=1e16"]))
-    text = nastran.text_of(tool_stiffness(found))
+    text = nastran_text(tool_stiffness(found))
     assert same(read_dmig(text), expected(found), 1e-8)
     assert all(len(line) <= 72 for line in text.splitlines() if not line.startswith("$"))
 

@@ -5,8 +5,11 @@ from itertools import pairwise
 
 import pytest
 
-from kinetostat.exchange.step_outlines import pieces
 from kinetostat.views.scene import shapes
+
+pytest.importorskip("OCP.STEPCAFControl", reason="Open CASCADE does not start", exc_type=ImportError)
+
+from kinetostat.exchange.step_solids import pieces
 
 
 def on_circle(radius, angles, centre=(0.0, 0.0)):

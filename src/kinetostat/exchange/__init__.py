@@ -1,1 +1,1 @@
-"""The machine and its results in the formats of other programs, and back."""
+"""Export of machines and results to other programs, and import of machines from them."""

@@ -1,4 +1,7 @@
-"""Which formats there are, and which of our modules writes each; a machine is exported by one of them."""
+"""The export formats: their names, their suffixes, and which function writes each; `export` chooses one and calls it.
+
+A format is added here as one row of `KNOWN`. Its writer is imported only when it is used, so that the list is cheap.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,14 +16,15 @@ from kinetostat.studies.analysis import Analysis, analyze
 
 @dataclass(frozen=True)
 class Format:
-    """A format of another program.
+    """A file format of another program.
 
     Attributes:
-        name: by which it is asked for.
+        name: as in `kinetostat export --to`.
         suffix: of its files.
-        writer: our module whose `write(analysis, path)` makes a file of it and returns the files that it made.
+        writer: "module.function" in this package; the function takes an analysis and a path, writes, and returns the
+            paths of the files it made.
         summary: what is in it, for lists.
-        other_suffixes: of its files, as some write them.
+        other_suffixes: suffixes that are also common for its files.
     """
 
     name: str
@@ -30,67 +34,89 @@ class Format:
     other_suffixes: tuple[str, ...] = ()
 
     def write(self, analysis: Analysis, path: Path) -> list[Path]:
-        """Write the machine, or its results at the pose, whole or not at all; returns what was written.
+        """Write the machine, or its results at the pose, whole or not at all, and return the paths of the files.
 
         Args:
             analysis: of the machine, at a pose where its status is OK.
             path: of the file; one that is there is replaced.
 
         Raises:
-            InputError: what the format cannot hold, or a place that cannot be written.
+            InputError: the format cannot hold this machine, or the file cannot be written.
         """
-        write: Callable[[Analysis, Path], list[Path]] = import_module(f"kinetostat.exchange.{self.writer}").write
+        module, _, function = self.writer.partition(".")
+        write: Callable[[Analysis, Path], list[Path]] = getattr(import_module(f"{__package__}.{module}"), function)
         return write(analysis, path)
 
 
 KNOWN = (
-    Format("mjcf", ".xml", "mjcf", "machine for MuJoCo: bodies, joints, springs, closed loops"),
-    Format("urdf", ".urdf", "urdf", "machine as URDF with closed loops and stiffnesses; read back by new --from"),
-    Format("glb", ".glb", "glb", "solids of the machine at its pose, for any 3-D viewer"),
-    Format("step", ".step", "step", "solids of the machine as exact bodies, an assembly for CAD programs", (".stp",)),
-    Format("csv", ".csv", "results_csv", "results at the pose, a number a line with its unit"),
-    Format("netcdf", ".nc", "results", "results at the pose, labelled, with units"),
-    Format("mat", ".mat", "mat", "K, C, pose and reference point for MATLAB"),
-    Format("nastran", ".bdf", "nastran", "K at the tool point as DMIG"),
-    Format("abaqus", ".inp", "abaqus", "K at the tool point as a linear user element"),
-    Format("ansys", ".mac", "ansys", "K at the tool point as MATRIX27, in APDL"),
+    Format("mjcf", ".xml", "mjcf.write", "machine for MuJoCo: bodies, joints, springs, closed loops"),
+    Format(
+        "urdf",
+        ".urdf",
+        "urdf_export.write",
+        "machine as URDF with closed loops and stiffnesses; read back by new --from",
+    ),
+    Format("glb", ".glb", "solids.write_glb", "solids of the machine at its pose, for any 3-D viewer"),
+    Format(
+        "step",
+        ".step",
+        "solids.write_step",
+        "solids of the machine as exact bodies, an assembly for CAD programs",
+        (".stp",),
+    ),
+    Format("csv", ".csv", "results_files.write_csv", "results at the pose, a number a line with its unit"),
+    Format("netcdf", ".nc", "results_files.write_netcdf", "results at the pose, labelled, with units"),
+    Format("mat", ".mat", "results_files.write_mat", "K, C, pose and reference point for MATLAB"),
+    Format("nastran", ".bdf", "finite_elements.write_nastran", "K at the tool point as DMIG"),
+    Format("abaqus", ".inp", "finite_elements.write_abaqus", "K at the tool point as a linear user element"),
+    Format("ansys", ".mac", "finite_elements.write_ansys", "K at the tool point as MATRIX27, in APDL"),
 )
 """Every format, machines first."""
 
 
 def choose(name: str | None, path: Path | None) -> Format:
-    """The format of that name, or the one to which the suffix of a file belongs.
+    """Return the format with a name or, without a name, the one that the suffix of a file belongs to.
 
     Raises:
-        InputError: if there is none.
+        InputError: the name or suffix belongs to none.
     """
     if name is not None:
-        known = {one.name: one for one in KNOWN}
+        known = {form.name: form for form in KNOWN}
         return known[choice(name, known, "--to")]
     suffix = "" if path is None else path.suffix.lower()
-    found = [one for one in KNOWN if suffix in (one.suffix, *one.other_suffixes)]
-    if not found:
-        names = ", ".join(f"{one.name} ({one.suffix})" for one in KNOWN)
-        raise InputError(f"No format is named; give --to, or a file with -o that ends as one of: {names}.")
-    return found[0]
+    for form in KNOWN:
+        if suffix in (form.suffix, *form.other_suffixes):
+            return form
+    names = ", ".join(f"{form.name} ({form.suffix})" for form in KNOWN)
+    raise InputError(f"The format is not clear; give --to, or a file with -o that ends as one of: {names}.")
 
 
 def export(machine: Machine, path: str | Path, to: str | None = None) -> list[Path]:
     """Write a machine, or its results at its pose, in the format of another program, whole or not at all.
 
     Args:
-        machine: at a pose that has an answer.
+        machine: at a pose where it can be analysed.
         path: of the file; one that is there is replaced.
         to: name of the format, as in `kinetostat export --to`; None to go by the suffix of the path.
 
     Returns:
-        What was written: some formats need several files.
+        The paths of the files: some formats need several.
 
     Raises:
-        InputError: an unknown format, no answer at the pose, what the format cannot hold, or a place that cannot be
-            written.
+        InputError: an unknown format, a pose without a result, a machine that the format cannot hold, or a file that
+            cannot be written.
     """
-    chosen, found = choose(to, Path(path)), analyze(machine)
-    if found.status is not Status.OK:
-        raise InputError(found.message)
-    return chosen.write(found, Path(path))
+    form, analysis = choose(to, Path(path)), analyze(machine)
+    if analysis.status is not Status.OK:
+        raise InputError(analysis.message)
+    return form.write(analysis, Path(path))
+
+
+def one_line(text: str) -> str:
+    """Return a name in one line and without characters that XML cannot hold: they become question marks."""
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
+def ascii_line(text: str) -> str:
+    """Return a name in one line of ASCII, as finite-element programs read it."""
+    return one_line(text).encode("ascii", "replace").decode("ascii")

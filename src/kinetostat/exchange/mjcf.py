@@ -1,6 +1,6 @@
-"""A machine as MuJoCo's XML (MJCF): bodies, joints with springs, closed loops by `connect` and `weld`, a look.
+"""A machine as MuJoCo's XML (MJCF): bodies, joints with springs, closed loops by `connect` and `weld`, and colours.
 
-What the machine consists of is `mjcf_model`'s, how fast it moves `mjcf_pace`'s.
+`mjcf_model` decides of which bodies the machine consists, `mjcf_pace` how fast it moves; here this becomes text.
 """
 
 from collections.abc import Iterable, Iterator
@@ -12,9 +12,9 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model, build
 from kinetostat.exchange.mjcf_pace import IMPEDANCE, LEAST_STEPS, Pace, pace_of
-from kinetostat.exchange.names import printable
 from kinetostat.exchange.results import reference_point
 from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.analysis import Analysis
@@ -31,9 +31,9 @@ NOTES = (
     "     machine file does not say are as great as those it says, or 1 kg. Constraints are soft: keep timestep,\n"
     "     solref and solimp as they are. "
 )
-"""What a reader of the file must know."""
+"""Comment at the top of the file, for its reader."""
 LEAST_EXTENT = 1e-3
-"""Size of a picture, m."""
+"""Smallest extent of a picture, m."""
 COLOURS = {
     "link": "0.75 0.78 0.82 1",
     "joint": "0.25 0.28 0.32 1",
@@ -43,20 +43,20 @@ COLOURS = {
     "base": "0.35 0.37 0.40 1",
     "tool": "0.85 0.15 0.15 1",
 }
-"""Red, green, blue and opacity of what one sees."""
+"""Red, green, blue and opacity of the materials."""
 
 
 def text_of(analysis: Analysis) -> str:
-    """The model: at rest, without gravity, unstressed at the pose; a wrench on the platform acts at the tool point.
+    """Return the model: unstressed and at rest at the pose; a wrench on the platform acts at the tool point.
 
     Raises:
-        InputError: if the machine has a part that cannot be told.
+        InputError: if the machine has a part that MuJoCo has no counterpart for.
     """
     model = build(respond(analysis.machine).configuration)
     pace = pace_of(analysis, model)
     middle, extent = _middle_and_extent(model)
     radius = THICKNESS * extent
-    root = Element("mujoco", model=printable(analysis.machine.name))
+    root = Element("mujoco", model=one_line(analysis.machine.name))
     root.append(ElementTree.Comment(NOTES))
     SubElement(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="false")
     option = SubElement(root, "option", timestep=_n(pace.step), gravity="0 0 0", integrator="Euler", solver="Newton")
@@ -128,7 +128,7 @@ def _joint(element: Element, freedom: Freedom, body: Body, pace: Pace) -> None:
 
 
 def _shapes(element: Element, body: Body, radius: float, material: str) -> None:
-    """The links of a body: rods from its origin to where others begin."""
+    """Draw the links of a body: rods from its origin to the points where other bodies begin."""
     for point in body.reach:
         if material == "base":
             SubElement(element, "geom", type="sphere", size=_n(1.6 * radius), pos=_n(*point), material=material)
@@ -142,7 +142,7 @@ def _rod(element: Element, start: Array, end: Array, radius: float, material: st
 
 
 def _joint_shape(element: Element, freedom: Freedom, body: Body, radius: float) -> None:
-    """A hinge is a pin, a slide a longer one; springs are coloured."""
+    """Draw a hinge as a pin and a slide as a longer one; springs are coloured."""
     material = "actuator" if freedom.actuated else "spring" if freedom.stiffness > 0.0 else "joint"
     middle = np.zeros(3) if freedom.point is None else freedom.point - body.at
     half = freedom.axis * radius * (4.0 if freedom.point is None else 1.8)
@@ -153,7 +153,7 @@ def _joint_shape(element: Element, freedom: Freedom, body: Body, radius: float) 
 
 
 def _platform(world: Element, model: Model, pace: Pace, radius: float, tool: Array) -> None:
-    """The platform: free, its centre of mass at the tool point, so that loads on it act there."""
+    """Add the platform: free, its centre of mass at the tool point, so that loads on it act there."""
     body = model.platform
     element = SubElement(world, "body", name=body.name, pos=_n(*body.at))
     SubElement(element, "freejoint", name=body.name)
@@ -183,7 +183,7 @@ def _constraints(root: Element, model: Model) -> None:
 
 
 def _n(*numbers: float) -> str:
-    """Numbers with all their digits."""
+    """Numbers with all their digits, separated by blanks."""
     return " ".join(_digits(numbers))
 
 
@@ -196,7 +196,7 @@ def write(analysis: Analysis, path: Path) -> list[Path]:
     """Write the model.
 
     Raises:
-        InputError: if the machine has a part that cannot be told.
+        InputError: if the machine has a part that MuJoCo has no counterpart for.
     """
     write_text(path, text_of(analysis))
     return [path]

@@ -1,6 +1,6 @@
-"""A placed machine as MuJoCo builds one: a tree of bodies with hinges and slides, and what closes its loops.
+"""A placed machine as a tree of bodies with hinges and slides, and the constraints that close its loops, for MuJoCo.
 
-Built from points, axes and springs (`validation.pieces`); the text is `mjcf`'s business, masses are `mjcf_pace`'s.
+It is built from points, axes and springs (`validation.pieces`); `mjcf` writes the text, `mjcf_pace` chooses the masses.
 All frames are parallel to the base frame, so that every axis is written as it is.
 """
 
@@ -15,14 +15,13 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.machine.leg import Joint, Leg, Spring
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration, Plane
+from kinetostat.tolerances import COINCIDENT_HINGES
 from kinetostat.validation.pieces import Piece, Strut, array, joint_of, moves_in, pieces
 
 Array = npt.NDArray[np.float64]
 
 MOST_FREEDOMS = 6
-"""Of one body."""
-SAME_POINT = 1e-9
-"""Distance of two points, m, below which hinges there share a body."""
+"""Degrees of freedom of one body."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class Freedom:
         axis: unit vector.
         point: on the axis of a hinge, base frame, m; None for a slide.
         stiffness: N·m/rad or N/m; 0 where it moves freely.
-        actuated: whether the spring is an actuator held by its servo.
+        actuated: whether the spring is that of an actuator.
     """
 
     name: str
@@ -51,7 +50,7 @@ class Body:
     Attributes:
         name: unique within the model.
         at: its frame's origin, base frame, m.
-        freedoms: between it and its parent, the parent's side first.
+        freedoms: between it and its parent, the nearest to the parent first.
         children: bodies that hang on it.
         reach: points to which a drawing connects its origin, base frame, m.
         leg: name of the leg that it belongs to.
@@ -65,17 +64,17 @@ class Body:
     leg: str = ""
 
     def every(self) -> list["Body"]:
-        """Itself and all bodies that hang on it, those nearer to it first."""
-        return [self, *(one for child in self.children for one in child.every())]
+        """Return the body and all bodies that hang on it, the nearer ones first."""
+        return [self, *(body for child in self.children for body in child.every())]
 
 
 @dataclass(frozen=True)
 class Closing:
-    """What closes a loop: a point (a ball joint) or all six components of two bodies held together.
+    """A constraint that closes a loop: two bodies share a point (a ball joint), or all six components.
 
     Attributes:
-        ball: whether only the point is held.
-        bodies: their names; the second is the platform's side.
+        ball: whether only the point is constrained.
+        bodies: their names; the second one is nearer to the platform.
         point: base frame, m.
     """
 
@@ -99,7 +98,7 @@ class Model:
 
     Attributes:
         world: the base.
-        platform: free, but for what closes the loops.
+        platform: free but for the constraints.
         closings, threads: constraints.
     """
 
@@ -110,16 +109,16 @@ class Model:
     _names: Counter[str] = field(default_factory=Counter)
 
     def unique(self, name: str) -> str:
-        """The name, with a number behind it if it was given before."""
+        """Return the name, with a number after it if it was given before."""
         self._names[name] += 1
         return name if self._names[name] == 1 else self.unique(f"{name} {self._names[name]}")
 
 
 def build(configuration: Configuration) -> Model:
-    """The machine at its pose, unstressed.
+    """Return the machine at its pose, unstressed.
 
     Raises:
-        InputError: if it has a part that another engine cannot be told.
+        InputError: if it has a part that cannot be built in another program.
     """
     model = Model(Body("world", np.zeros(3)), Body("platform", array(configuration.platform.translation)))
     for fixed in (model.world, model.platform):
@@ -130,7 +129,7 @@ def build(configuration: Configuration) -> Model:
 
 
 class _Chain:
-    """A leg while it is built: the body that was made last is where the next piece begins."""
+    """A leg while it is built; the next piece begins at the body that was made last."""
 
     def __init__(self, model: Model, leg: Leg, plane: Plane | None) -> None:
         self._model, self._leg, self._plane = model, leg, plane
@@ -141,13 +140,13 @@ class _Chain:
             self._add(piece, next(filter(None, map(_start, chain[i + 1 :])), None))
 
     def close(self) -> None:
-        """Hold the last body and the platform together."""
+        """Join the last body to the platform."""
         tip = self._body.reach[-1] if self._ball else self._body.at
         self._model.platform.reach.append(tip)
         self._model.closings.append(Closing(self._ball, (self._body.name, self._model.platform.name), tip))
 
     def _add(self, piece: Piece, after: Vector | None) -> None:
-        """A piece; `after` is where the next one begins that has a place."""
+        """Add a piece; `after` is the start of the next one that has a place."""
         if self._ball:
             self._after_strut()
         if isinstance(piece, Joint | Spring):
@@ -160,7 +159,7 @@ class _Chain:
             self._parallelogram(piece)
 
     def _grow(self, name: str, at: Array) -> Body:
-        """A new body at a point (base frame, m), hanging on the last one."""
+        """Add a body at a point (base frame, m), hanging on the last one."""
         body = Body(self._model.unique(name), at, leg=self._leg.name)
         self._body.reach.append(at)
         self._body.children.append(body)
@@ -168,7 +167,7 @@ class _Chain:
         return body
 
     def _free(self, name: str, joint: Joint, stiffness: float = 0.0, actuated: bool = False) -> None:
-        """A freedom of the last body; a screw is a hinge and a slide that a thread couples."""
+        """Give the last body a freedom; a screw is a hinge and a slide that a thread couples."""
         axis, point = array(joint.axis), None if joint.point is None else array(joint.point)
         hinge = Freedom(self._model.unique(name), axis, point, stiffness, actuated)
         self._body.freedoms.append(hinge)
@@ -178,7 +177,7 @@ class _Chain:
             self._model.threads.append(Thread(slide.name, hinge.name, float(joint.pitch)))
 
     def _joint(self, piece: Joint | Spring, after: Array) -> None:
-        """A joint or a spring: hinges about one point share a body, all others have one each.
+        """Add a joint or a spring: hinges about one point share a body, all others have one each.
 
         A slide has no place: it is put where the next piece begins, or half-way to there from the one before.
         """
@@ -195,22 +194,26 @@ class _Chain:
             self._free(name, joint)
 
     def _shares(self, joint: Joint, at: Array) -> bool:
-        own = self._body.freedoms
-        hinges = bool(own) and all(one.point is not None for one in own) and joint.point is not None
-        return hinges and len(own) < MOST_FREEDOMS - 1 and float(np.linalg.norm(self._body.at - at)) < SAME_POINT
+        freedoms = self._body.freedoms
+        hinges = bool(freedoms) and all(f.point is not None for f in freedoms) and joint.point is not None
+        return (
+            hinges
+            and len(freedoms) < MOST_FREEDOMS - 1
+            and float(np.linalg.norm(self._body.at - at)) < COINCIDENT_HINGES
+        )
 
     def _beam(self, beam: Beam) -> None:
-        """The springs at the middle of a beam; those that do not yield are left out."""
-        held = [spring for spring in beam.springs if np.isfinite(float(spring.stiffness))]
+        """Add the compliant springs at the middle of a beam; rigid ones are omitted."""
+        springs = [spring for spring in beam.springs if np.isfinite(float(spring.stiffness))]
         if self._plane is not None:
-            held = [spring for spring in held if moves_in(self._plane, spring)]
-        if held:
+            springs = [spring for spring in springs if moves_in(self._plane, spring)]
+        if springs:
             self._grow(beam.name, array((beam.start + beam.end) * 0.5))
-            for spring in held:
+            for spring in springs:
                 self._free(spring.name, spring.joint, float(spring.stiffness))
 
     def _strut(self, strut: Strut) -> None:
-        """A rod on a ball joint: two hinges across it, as its spin does nothing, and a slide if it yields."""
+        """Add a rod on a ball joint: two hinges across it, as its spin does nothing, and a slide if it is compliant."""
         start, end = array(strut.start), array(strut.end)
         along = (end - start) / np.linalg.norm(end - start)
         self._grow(strut.name, start)
@@ -224,7 +227,7 @@ class _Chain:
         self._ball = True
 
     def _after_strut(self) -> None:
-        """The ball joint at the end of a strut that does not reach the platform: three hinges."""
+        """Add the ball joint at the end of a strut that does not reach the platform: three hinges."""
         end = self._body.reach.pop()
         self._ball = False
         self._grow(f"{self._leg.name} ball", end)
@@ -232,7 +235,7 @@ class _Chain:
             self._free(f"{self._leg.name} ball", Joint(Vector(*axis), Vector(*end)))
 
     def _parallelogram(self, piece: Parallelogram) -> None:
-        """Two bars on hinges: the first carries the far side, the second is closed by a ball joint."""
+        """Add two bars on hinges: the first carries the far side, the second is closed by a ball joint."""
         near_side, normal = self._body, piece.normal
         tips = []
         for bar, (near, far) in enumerate(piece.bars, 1):
@@ -253,7 +256,7 @@ class _Chain:
 
 
 def _start(piece: Piece) -> Vector | None:
-    """Where a piece begins, if it has a place."""
+    """The point where a piece begins; None if it has no place."""
     if isinstance(piece, Joint | Spring):
         return joint_of(piece).point
     return piece.near if isinstance(piece, Parallelogram) else piece.start

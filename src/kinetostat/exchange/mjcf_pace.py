@@ -1,7 +1,9 @@
-"""Masses, time step, armature and damping of a machine in MuJoCo. Statics depend on none; rest and accuracy do.
+"""Masses, time step, armature and damping of a machine in MuJoCo. Static deflections depend on none of them.
 
-MuJoCo's constraints are soft: what closes a loop yields by about (1 - d) t² / m, with d at most 0.9999 and t at least
-two time steps. So the step follows from how much that may be beside the machine's own compliance.
+Accuracy and the time to come to rest do. MuJoCo's constraints are soft: a closed loop has a compliance of about
+(1 - d) t² / m, with d at most 0.9999 and t at least two time steps. So the step follows from how large that compliance
+may be compared with the machine's.
+
 Source: MuJoCo documentation, Computation, section on the constraint model (impedance and reference acceleration).
 """
 
@@ -14,25 +16,22 @@ import numpy as np
 from kinetostat.exchange.mjcf_model import Body, Model
 from kinetostat.machine.mass import PLATFORM, Mass
 from kinetostat.studies.analysis import Analysis
+from kinetostat.tolerances import RIGID_BLOCK, SOFT_CONSTRAINT
 
 NOMINAL_MASS = 1.0
 """kg, of every body where no mass is known: deflections do not depend on it."""
 GYRATION = 0.25
 """Radius of gyration of every body, as a share of the machine's characteristic length."""
 IMPEDANCE = 0.9999
-"""d: the stiffest that MuJoCo lets a constraint be."""
+"""d: the stiffest constraint that MuJoCo allows."""
 LEAST_STEPS = 2.0
-"""Time constant of a constraint in time steps: the shortest that MuJoCo lets it be."""
-YIELDING = 1e-6
-"""How far a constraint may yield, as a share of the machine's own compliance; a dozen of them add up to about 1e-5."""
+"""Time constant of a constraint in time steps: the shortest that MuJoCo allows."""
 DAMPING = 0.7
 """Damping ratio of the machine's slowest motion: it comes to rest after one swing."""
 CALM = 2.0
 """How much longer than the geometric mean of step and damping time the period of a spring's armature is."""
-NEGLIGIBLE = 1e-9
-"""Share of the other block of C below which a block does not yield."""
 UNKNOWN_COMPLIANCE = 1e-7
-"""m/N, where the machine is free or rigid, so that its own compliance says nothing."""
+"""m/N, assumed where the machine is free or rigid, so that its compliance says nothing."""
 
 
 @dataclass(frozen=True)
@@ -54,46 +53,48 @@ class Pace:
     gyration: float
 
     def damping(self, stiffness: float) -> float:
-        """Of a spring's joint, N·s/m or N·m·s/rad."""
+        """Damping of a joint with a spring, N·s/m or N·m·s/rad."""
         return stiffness * self.retardation
 
     def armature(self, stiffness: float) -> float:
-        """Inertia added to a spring's joint, kg or kg·m²: no spring is then too fast for the time step."""
+        """Inertia added to a joint with a spring, kg or kg·m², so that no spring is too fast for the time step."""
         return stiffness * CALM**2 * self.retardation * self.step
 
 
 def pace_of(analysis: Analysis, model: Model) -> Pace:
-    """What suits a machine: accurate constraints, springs that the time step can follow, quick rest."""
+    """Return a pace with accurate constraints, springs that the time step can follow, and little swinging."""
     masses = _masses(model, analysis.masses)
     length = float(analysis.characteristic_length or 1.0)
     gyration = GYRATION * length
     stiff, soft = min(_compliances(analysis, gyration)), max(_compliances(analysis, length))
-    step = math.sqrt(YIELDING * stiff * min(masses.values()) / (1.0 - IMPEDANCE)) / LEAST_STEPS
+    step = math.sqrt(SOFT_CONSTRAINT * stiff * min(masses.values()) / (1.0 - IMPEDANCE)) / LEAST_STEPS
     slowest = math.sqrt(soft * sum(masses.values()))
     return Pace(step, 2.0 * DAMPING * slowest, 20.0 * slowest, masses, gyration)
 
 
 def _compliances(analysis: Analysis, arm: float) -> list[float]:
-    """Sizes of the blocks of C that yield, m/N: rotation as it moves a point at an arm (m) under a force there."""
+    """Sizes of the compliant blocks of C, m/N; rotation as the motion of a point at an arm (m) under a force there."""
     if analysis.compliance is None:
         return [UNKNOWN_COMPLIANCE]
     matrix = np.array(analysis.compliance)
     turns = np.array([name.startswith("r") for name in analysis.components])
-    moving, turning = (float(np.linalg.norm(matrix[np.ix_(own, own)])) for own in (~turns, turns))
+    moving, turning = (float(np.linalg.norm(matrix[np.ix_(block, block)])) for block in (~turns, turns))
     sizes = moving, turning * arm**2
-    return [size for size in sizes if size > NEGLIGIBLE * max(sizes)] or [UNKNOWN_COMPLIANCE]
+    return [size for size in sizes if size > RIGID_BLOCK * max(sizes)] or [UNKNOWN_COMPLIANCE]
 
 
 def _masses(model: Model, known: Sequence[Mass]) -> dict[str, float]:
-    """Mass of every body, kg: what is known of a leg is spread evenly over its bodies, others are as heavy as those."""
+    """Mass of every body, kg: known masses of a leg are spread evenly over its bodies, others get the mean of those."""
     bodies = [body for body in model.world.every() if body is not model.world]
-    found = {body.name: _share(body, bodies, known) for body in bodies}
-    found[model.platform.name] = sum(float(one.mass) for one in known if one.name == PLATFORM and one.mass is not None)
-    weighed = [mass for mass in found.values() if mass > 0.0]
+    masses = {body.name: _share(body, bodies, known) for body in bodies}
+    masses[model.platform.name] = sum(
+        float(part.mass) for part in known if part.name == PLATFORM and part.mass is not None
+    )
+    weighed = [mass for mass in masses.values() if mass > 0.0]
     usual = sum(weighed) / len(weighed) if weighed else NOMINAL_MASS
-    return {name: mass or usual for name, mass in found.items()}
+    return {name: mass or usual for name, mass in masses.items()}
 
 
 def _share(body: Body, bodies: Sequence[Body], known: Sequence[Mass]) -> float:
-    own = [float(one.mass) for one in known if one.mass is not None and f"{one.name} ".startswith(f"{body.leg} ")]
-    return sum(own) / sum(other.leg == body.leg for other in bodies)
+    masses = [float(p.mass) for p in known if p.mass is not None and f"{p.name} ".startswith(f"{body.leg} ")]
+    return sum(masses) / sum(other.leg == body.leg for other in bodies)

@@ -1,8 +1,7 @@
-"""The results of an analysis as a labelled dataset, and as NetCDF. Nothing is computed here."""
+"""The results of an analysis as a labelled dataset, from which result files are made. Nothing is computed here."""
 
 import math
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,18 +11,17 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.loading import as_toml
-from kinetostat.machine.machine import springs
+from kinetostat.machine.machine import springs as springs_of
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.setting import frame_of
-from kinetostat.studies.storage import write_dataset
 from kinetostat.units import KINDS
 
 UNITS = {
     "stiffness": ("N·m/rad", "N/rad", "N/m"),
     "compliance": ("rad/(N·m)", "rad/N", "m/N"),
 }
-"""Of the entries of K and C: rotation, coupling, translation."""
+"""Units of the entries of K and C: rotation, coupling, translation."""
 ROTATIONS = COMPONENTS[:3]
 AXES = ("x", "y", "z")
 
@@ -31,49 +29,53 @@ Variable = tuple[tuple[str, ...], Any, dict[str, str]]
 
 
 def unit_of(matrix: str, row: str, column: str) -> str:
-    """The unit of an entry of "stiffness" or "compliance", by the names of its row and column."""
+    """Return the unit of an entry of "stiffness" or "compliance" by the names of its row and column."""
     return UNITS[matrix][2 - (row in ROTATIONS) - (column in ROTATIONS)]
 
 
 def reference_point(analysis: Analysis) -> list[float]:
-    """The tool point T, or P without a tool, in the base frame, m [3]."""
+    """Return the tool point T, or P without a tool, in the base frame, m [3]."""
     if analysis.platform is None:
-        raise ValueError("an analysis without an answer has no placement")
+        raise ValueError("an analysis without a result has no placement")
     position, rotation = analysis.platform
     offset = np.array(analysis.machine.tables["tool"].offset)
     return [float(c) for c in np.array(position) + np.array(rotation) @ offset]
 
 
 def as_dataset(analysis: Analysis) -> xr.Dataset:
-    """K, C, shares, indices and pose with named dimensions; `units` in the attributes of each variable, SI.
+    """Return K, C, contributions, indices and pose with named dimensions; `units` is an attribute of each variable, SI.
 
-    The attributes say of which machine, with its file, to which point and axes they refer, and who computed them.
+    The attributes name the machine with its file, the point and axes to which everything refers, and the program.
 
     Dimensions: `row` and `column` of K and C, `component` of diagonals, `spring`, `axis`, and `base_axis`. What is not
     finite (K where the machine is rigid, C where it is free) is left out.
     """
     if analysis.platform is None:
-        raise ValueError("an analysis without an answer has no results")
+        raise ValueError("an analysis without a result cannot be exported")
     machine = analysis.machine
     names = list(analysis.components)
     position, rotation = analysis.platform
-    found: dict[str, Variable] = {}
+    variables: dict[str, Variable] = {}
     for name, matrix in (("stiffness", analysis.stiffness), ("compliance", analysis.compliance)):
         if matrix is not None:
-            found[name] = (("row", "column"), matrix, _said(f"Cartesian {name} at T", ", ".join(UNITS[name])))
-    found |= _springs(analysis)
-    found |= _indices(analysis)
-    found["platform_position"] = (("base_axis",), list(position), _said("P in the base frame", "m"))
-    found["platform_rotation"] = (("base_axis", "axis"), rotation, _said("platform axes in the base frame", "1"))
-    found["tool_point"] = (("base_axis",), reference_point(analysis), _said("T in the base frame", "m"))
-    found |= pose_of(analysis)
+            variables[name] = (("row", "column"), matrix, _attributes(f"Cartesian {name} at T", ", ".join(UNITS[name])))
+    variables |= _springs(analysis)
+    variables |= _indices(analysis)
+    variables["platform_position"] = (("base_axis",), list(position), _attributes("P in the base frame", "m"))
+    variables["platform_rotation"] = (
+        ("base_axis", "axis"),
+        rotation,
+        _attributes("platform axes in the base frame", "1"),
+    )
+    variables["tool_point"] = (("base_axis",), reference_point(analysis), _attributes("T in the base frame", "m"))
+    variables |= pose_of(analysis)
     coordinates = {
         "row": names,
         "column": names,
         "component": names,
         "spring": [contribution.spring for contribution in analysis.attribution],
         "part": ("spring", [contribution.part for contribution in analysis.attribution]),
-        "spring_unit": ("spring", [_spring_unit(spring) for spring in springs(respond(machine).configuration)]),
+        "spring_unit": ("spring", [_spring_unit(spring) for spring in springs_of(respond(machine).configuration)]),
         "axis": list(AXES),
         "base_axis": list(AXES),
     }
@@ -88,35 +90,36 @@ def as_dataset(analysis: Analysis) -> xr.Dataset:
         "kinetostat": version("kinetostat"),
         "order": " ".join(names),
     }
-    return xr.Dataset(found, coordinates, attributes)
+    return xr.Dataset(variables, coordinates, attributes)
 
 
 def pose_of(analysis: Analysis) -> dict[str, Variable]:
-    """The coordinates of the pose as scalar variables `pose_...`, SI."""
-    held = values(analysis.machine)
-    found: dict[str, Variable] = {}
+    """Return the coordinates of the pose as scalar variables `pose_...`, SI."""
+    numbers = values(analysis.machine)
+    variables: dict[str, Variable] = {}
     for parameter in parameters(analysis.machine.family):
-        section, _, name = parameter.path.partition(".")
-        if section == "pose":
-            told = _said(parameter.quantity.meaning, KINDS[parameter.quantity.kind].unit)
-            found[f"pose_{name}"] = ((), float(held[parameter.path]), told)
-    return found
+        table, _, name = parameter.path.partition(".")
+        if table == "pose":
+            attributes = _attributes(parameter.quantity.meaning, KINDS[parameter.quantity.kind].unit)
+            variables[f"pose_{name}"] = ((), float(numbers[parameter.path]), attributes)
+    return variables
 
 
 def _springs(analysis: Analysis) -> dict[str, Variable]:
-    shares = analysis.attribution
+    springs = analysis.attribution
     by_matrix = {
-        "stiffness_share": ([one.stiffness_share for one in shares], "share of the diagonal of K"),
-        "compliance_share": ([one.compliance_share for one in shares], "share of the diagonal of C"),
+        "stiffness_share": ([spring.stiffness_share for spring in springs], "share of the diagonal of K"),
+        "compliance_share": ([spring.compliance_share for spring in springs], "share of the diagonal of C"),
     }
-    size = (len(shares), len(analysis.components))
-    found: dict[str, Variable] = {
-        name: (("spring", "component"), np.array(rows, dtype=float).reshape(size), _said(meaning, "1"))
+    size = (len(springs), len(analysis.components))
+    variables: dict[str, Variable] = {
+        name: (("spring", "component"), np.array(rows, dtype=float).reshape(size), _attributes(meaning, "1"))
         for name, (rows, meaning) in by_matrix.items()
     }
-    stiffness = [one.stiffness for one in shares]
-    found["spring_stiffness"] = (("spring",), stiffness, _said("of the spring; infinite if rigid", "N/m, N·m/rad"))
-    return found
+    stiffness = [spring.stiffness for spring in springs]
+    attributes = _attributes("of the spring; infinite if rigid", "N/m, N·m/rad")
+    variables["spring_stiffness"] = (("spring",), stiffness, attributes)
+    return variables
 
 
 def _spring_unit(spring: Spring) -> str:
@@ -141,23 +144,17 @@ def _indices(analysis: Analysis) -> dict[str, Variable]:
         ),
         "moving_mass": (analysis.moving_mass, "of what moves, as far as it is known", "kg"),
     }
-    found: dict[str, Variable] = {
-        name: ((), value, _said(meaning, unit))
+    variables: dict[str, Variable] = {
+        name: ((), value, _attributes(meaning, unit))
         for name, (value, meaning, unit) in scalars.items()
         if value is not None and math.isfinite(value)
     }
     for block, principal in ((indices and indices.principal_compliances) or {}).items():
         unit = UNITS["compliance"][0 if block == "rotation" else 2]
-        told = _said(f"principal compliances, {block}", unit)
-        found[f"principal_compliance_{block}"] = ((f"principal_{block}",), list(principal.compliances), told)
-    return found
+        attributes = _attributes(f"principal compliances, {block}", unit)
+        variables[f"principal_compliance_{block}"] = ((f"principal_{block}",), list(principal.compliances), attributes)
+    return variables
 
 
-def _said(meaning: str, unit: str) -> dict[str, str]:
+def _attributes(meaning: str, unit: str) -> dict[str, str]:
     return {"long_name": meaning, "units": unit}
-
-
-def write(analysis: Analysis, path: Path) -> list[Path]:
-    """Write the results as NetCDF-4."""
-    write_dataset(path, as_dataset(analysis))
-    return [path]

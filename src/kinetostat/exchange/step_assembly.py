@@ -1,6 +1,6 @@
-"""The solids of a scene as an assembly of Open CASCADE: who is part of what, where, by which name, in which colour.
+"""The solids of a scene as an assembly of Open CASCADE with places, names and colours. No file is written here.
 
-A part stands in the document once, however often and wherever it is built in. No file is written here.
+A part stands in the document once, however often and wherever it is built in.
 """
 
 import re
@@ -17,19 +17,19 @@ from OCP.UnitsMethods import UnitsMethods_LengthUnit_Millimeter
 from OCP.XCAFDoc import XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
 
 from kinetostat.algebra.vector import Displacement, Vector
-from kinetostat.exchange.names import printable
+from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.step_solids import point_of, solid_of
 from kinetostat.views.scene.looks import LOOKS, linear
 from kinetostat.views.scene.solids import BASE, Point3, Solid, solid_data
 
 COUNTED = re.compile(r" \d+$")
-"""The number at the end of a name: that of a place, not of the part which is built in there."""
+"""A number at the end of a name: it belongs to the place, not to the part that is built in there."""
 
 Key = tuple[str, Point3, str]
 
 
 class Assembly:
-    """A document with one assembly in mm and the axes of the base, which grows by a solid at a time."""
+    """A document with one assembly in mm and base axes, to which solids are added one by one."""
 
     def __init__(self, name: str) -> None:
         self._document = TDocStd_Document(_text("XCAF"))
@@ -42,12 +42,12 @@ class Assembly:
         self._names: Counter[str] = Counter()
 
     def add(self, solid: Solid) -> None:
-        """Build a solid in: under its leg, or under the body that its name begins with."""
+        """Add a solid under its leg, or under the body that its name begins with."""
         group = self._group(solid.leg or solid.name.partition("/")[0])
         self._build_in(group, self._part(solid), solid.name, solid.place)
 
     def document(self) -> TDocStd_Document:
-        """What there is so far, complete in itself."""
+        """Return the document with all solids added so far."""
         self._shapes.UpdateAssemblies()
         return self._document
 
@@ -58,7 +58,7 @@ class Assembly:
         return self._groups[name]
 
     def _part(self, solid: Solid) -> TDF_Label:
-        """The part that a solid is an instance of: of equal shape, to as many digits as a scene has, and look."""
+        """The part of which a solid is an instance: equal in shape, to as many digits as a scene has, and in look."""
         key = (str(solid_data(solid)["shape"]), solid.scale, solid.material)
         if key not in self._parts:
             kind = COUNTED.sub("", solid.name.rpartition("/")[2])
@@ -78,11 +78,11 @@ class Assembly:
 
 
 def step_text(text: str) -> str:
-    r"""A name as STEP's strings hold it: in one line, characters beyond ASCII by their numbers.
+    r"""Return a name as a STEP string holds it: in one line, characters beyond ASCII by their numbers.
 
     Source: ISO 10303-21:2016, encoding of strings: \X2\ and \X4\.
     """
-    return "".join(c if c.isascii() else _numbered(ord(c)) for c in printable(text))
+    return "".join(c if c.isascii() else _numbered(ord(c)) for c in one_line(text))
 
 
 def _numbered(code: int) -> str:

@@ -1,4 +1,4 @@
-"""A scene as a STEP file: the settings of Open CASCADE's writer, the header, and what would differ from day to day.
+"""A scene as a STEP file: the settings of Open CASCADE's writer, the header, and an order that is always the same.
 
 Source: ISO 10303-214:2010 (automotive design), which every CAD program reads; ISO 10303-21:2016 (the file).
 """
@@ -23,21 +23,21 @@ from kinetostat.exchange.step_assembly import Assembly, step_text
 from kinetostat.views.scene.solids import Scene
 
 BODIES = "machine"
-"""The layer whose solids are bodies; springs and frames are signs."""
+"""The layer whose solids are bodies; springs and frames are only signs."""
 SETTINGS = {"write.step.schema": "AP214IS", "write.step.unit": "MM", "write.surfacecurve.mode": "Off"}
-"""Of the writer. Without the curves of surfaces, which readers compute, a file is half as large."""
+"""Settings of the writer. Without the curves on surfaces, which readers compute, a file is half as large."""
 STRING = re.compile(rb"'[^']*'")
-"""A string of the file, which the writer breaks into lines, characters beyond ASCII not excepted."""
+"""A string of the file; the writer breaks long ones into lines, even within a character beyond ASCII."""
 UNDATED = "1970-01-01T00:00:00"
 """The time in the header: equal machines are equal files."""
 
 
 def step_bytes(scene: Scene, name: str) -> bytes:
-    """The solids of a scene as exact bodies in an assembly: mm, z up, in the base frame, with names and colours.
+    """Return the solids of a scene as exact bodies in an assembly: mm, z up, base frame, with names and colours.
 
     Args:
-        scene: what there is to see.
-        name: of the whole.
+        scene: the solids.
+        name: of the assembly.
 
     Returns:
         The file; the same bytes from the same scene and name.
@@ -72,28 +72,29 @@ def _sign(model: Interface_InterfaceModel, name: str) -> None:
 
 
 def _sort_styles(model: Interface_InterfaceModel) -> None:
-    """Bring looks, which come last, into the order of their solids, and colours before them.
+    """Sort the looks, which come last, into the order of their solids, with colours before them.
 
-    The writer has them in the order of addresses in memory.
+    The writer has them in the order of addresses in memory, so that files would differ from run to run.
     """
     entities = _entities(model)
-    numbers = {one: number for number, one in enumerate(entities)}
-    starts = [number for number, one in enumerate(entities) if isinstance(one, Presentation)]
+    numbers = {entity: number for number, entity in enumerate(entities)}
+    starts = [number for number, entity in enumerate(entities) if isinstance(entity, Presentation)]
     looks = [entities[start:end] for start, end in pairwise([*starts, len(entities)])]
     looks.sort(key=lambda look: numbers[look[0].ItemsValue(1).Item()])
-    colors = [one for one in entities if isinstance(one, StepVisual_ColourRgb)]
+    colors = [entity for entity in entities if isinstance(entity, StepVisual_ColourRgb)]
     colors.sort(key=lambda color: (color.Red(), color.Green(), color.Blue()))
-    wanted = [*colors, *(one for look in looks for one in look if one not in colors)]
-    for number, one in enumerate(wanted, starts[0]):
-        before = entities.index(one)
+    ordered = [*colors, *(entity for look in looks for entity in look if entity not in colors)]
+    for number, entity in enumerate(ordered, starts[0]):
+        before = entities.index(entity)
         if before != number:
             model.ChangeOrder(before + 1, number + 1)
             entities.insert(number, entities.pop(before))
 
 
 def _number_instances(model: Interface_InterfaceModel) -> None:
-    """Count instances from 1: the writer goes on from where its last file ended."""
-    instances = (one for one in _entities(model) if isinstance(one, StepRepr_NextAssemblyUsageOccurrence))
+    """Number instances from 1: the writer would go on from where its last file ended."""
+    entities = _entities(model)
+    instances = (entity for entity in entities if isinstance(entity, StepRepr_NextAssemblyUsageOccurrence))
     for number, instance in enumerate(instances, 1):
         instance.SetId(Text(str(number)))
 
@@ -103,10 +104,10 @@ def _entities(model: Interface_InterfaceModel) -> list[Any]:
 
 
 @contextmanager
-def _set(wanted: dict[str, str]) -> Iterator[None]:
-    """Settings of the writer, which are those of the whole process, for a while."""
+def _set(settings: dict[str, str]) -> Iterator[None]:
+    """Apply settings of the writer, which belong to the whole process, and undo them at the end."""
     with ExitStack() as undoing:
-        for name, value in wanted.items():
+        for name, value in settings.items():
             undoing.callback(Interface_Static.SetCVal_s, name, Interface_Static.CVal_s(name))
             Interface_Static.SetCVal_s(name, value)
         yield
@@ -114,7 +115,7 @@ def _set(wanted: dict[str, str]) -> Iterator[None]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Without the writer's words on the terminal, but for failures."""
+    """Keep the writer from printing on the terminal, but for failures."""
     with ExitStack() as undoing:
         for printer in Message.DefaultMessenger_s().Printers():
             undoing.callback(printer.SetTraceLevel, printer.GetTraceLevel())

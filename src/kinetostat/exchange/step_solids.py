@@ -1,10 +1,14 @@
-"""The shapes of a scene as exact solids of Open CASCADE, mm. Knows no place, no material and no file.
+"""The shapes of a scene as exact solids of Open CASCADE, mm, without place, material or file.
 
-Where a mesh has facets these are round: cylinders, cones, spheres and tori, and wires along smooth curves.
+Where a mesh has facets these are round: cylinders, cones, spheres and tori, and wires along smooth curves. For that,
+the lines and arcs of which an outline consists are recovered from its points.
 """
 
+import cmath
+import math
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
+from typing import TypeAlias
 
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_GTransform,
@@ -25,32 +29,37 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_ShapeEnum, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape
 
-from kinetostat.exchange.step_outlines import pieces
+from kinetostat.tolerances import EVEN_CHORDS, OPEN_CASCADE_POINT
 from kinetostat.views.scene.mesh import POINT
 from kinetostat.views.scene.solids import Extruded, Point2, Point3, Shape, Swept, Turned
 
+Piece: TypeAlias = tuple[Point2, Point2] | tuple[Point2, Point2, Point2]
+"""The ends of a line; or those of an arc, with a point of it between them."""
+
+CORNER = math.radians(30)
+"""Turn from one chord to the next, rad, from which on it is a corner: a scene rounds in finer steps."""
+FEWEST = 3
+"""Least number of chords of an arc: fewer do not show that they belong to a circle."""
 MILLIMETRES = 1e3
-"""In a metre. CAD programs work in mm, and Open CASCADE's tolerances are made for them."""
-SAME = 1e-7
-"""Distance of points that are one to Open CASCADE, mm."""
+"""Millimetres in a metre. CAD programs work in mm, and Open CASCADE's tolerances are made for them."""
 UNSCALED = (1.0, 1.0, 1.0)
 
 
 def solid_of(shape: Shape, scale: Point3 = UNSCALED) -> TopoDS_Shape:
-    """The solid that a shape stands for, in its own axes, scaled along them."""
+    """Return the exact solid of a shape in the axes of the shape, scaled along them."""
     match shape:
         case Turned():
-            made = _turned(shape)
+            solid_shape = _turned(shape)
         case Extruded():
-            made = _extruded(shape)
+            solid_shape = _extruded(shape)
         case Swept():
-            made = _swept(shape)
-    (solid,) = _within(made, TopAbs_SOLID)
+            solid_shape = _swept(shape)
+    (solid,) = _within(solid_shape, TopAbs_SOLID)
     return solid if scale == UNSCALED else _scaled(solid, scale)
 
 
 def point_of(x: float, y: float, z: float) -> gp_Pnt:
-    """A point whose coordinates are given in m."""
+    """Return the point with coordinates in m."""
     return gp_Pnt(x * MILLIMETRES, y * MILLIMETRES, z * MILLIMETRES)
 
 
@@ -68,7 +77,7 @@ def _extruded(shape: Extruded) -> TopoDS_Shape:
 
 
 def _rounded(prism: BRepPrimAPI_MakePrism, radius: float) -> TopoDS_Shape | None:
-    """A prism whose edges at both ends are round (mm); None where there is no room for that."""
+    """A prism with rounded edges at both ends (radius in mm); None where there is no room for that."""
     fillet = BRepFilletAPI_MakeFillet(prism.Shape())
     for end in (prism.FirstShape(), prism.LastShape()):
         for edge in _within(end, TopAbs_EDGE):
@@ -84,7 +93,7 @@ def _swept(shape: Swept) -> TopoDS_Shape:
     points = HArray1_gp_Pnt(1, len(shape.path))
     for number, corner in enumerate(shape.path, 1):
         points.SetValue(number, point_of(*corner))
-    smooth = GeomAPI_Interpolate(points, shape.closed, SAME)
+    smooth = GeomAPI_Interpolate(points, shape.closed, OPEN_CASCADE_POINT)
     smooth.Perform()
     curve, start, along = smooth.Curve(), gp_Pnt(), gp_Vec()
     curve.D1(curve.FirstParameter(), start, along)
@@ -94,7 +103,7 @@ def _swept(shape: Swept) -> TopoDS_Shape:
 
 
 def _face(outline: Sequence[Point2], placed: Callable[[float, float], gp_Pnt]) -> TopoDS_Face:
-    """What lies within an outline, which ends where it begins, in a plane of which `placed` gives the points."""
+    """The plane face within a closed outline; `placed` gives the points of the plane."""
     corners = [corner for corner, following in pairwise([*outline, outline[0]]) if corner != following]
     return _bounded([_edge([placed(*corner) for corner in piece]) for piece in pieces([corners[-1], *corners])])
 
@@ -125,3 +134,39 @@ def _scaled(solid: TopoDS_Shape, scale: Point3) -> TopoDS_Shape:
     for axis, factor in enumerate(scale, 1):
         stretch.SetValue(axis, axis, factor)
     return BRepBuilderAPI_GTransform(solid, stretch).Shape()
+
+
+def pieces(points: Sequence[Point2]) -> Iterator[Piece]:
+    """Yield a path through points as lines and arcs: an arc where points follow each other evenly round a circle.
+
+    An arc is at most half a circle, so that its three points lie well apart.
+
+    Args:
+        points: of the path, m; no two in a row coincide.
+    """
+    chords = [complex(x2 - x1, y2 - y1) for (x1, y1), (x2, y2) in pairwise(points)]
+    at = 0
+    while at < len(chords):
+        count = _chords_of_arc(chords, at)
+        if count < FEWEST:
+            yield points[at], points[at + 1]
+            at += 1
+        else:
+            yield points[at], points[at + count // 2], points[at + count]
+            at += count
+
+
+def _chords_of_arc(chords: Sequence[complex], start: int) -> int:
+    """Count the chords from `start` on that have one length and turn by one angle, up to half a circle.
+
+    As complex numbers, the ratio of a chord to the one before it holds both: its size and its phase.
+    """
+    if start + 1 == len(chords):
+        return 1
+    turn = chords[start + 1] / chords[start]
+    angle = abs(cmath.phase(turn))
+    if abs(abs(turn) - 1.0) > EVEN_CHORDS or not EVEN_CHORDS < angle < CORNER:
+        return 1
+    end = min(len(chords), start + math.floor(math.pi / angle + EVEN_CHORDS))
+    following = range(start + 1, end)
+    return next((i for i in following if abs(chords[i] / chords[i - 1] - turn) > EVEN_CHORDS), end) - start

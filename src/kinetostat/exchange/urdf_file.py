@@ -1,6 +1,7 @@
-"""A URDF file as links, joints and loops with their places at zero joint coordinates. Data only: nothing is resolved.
+"""A URDF file as links, joints and loops with their places at zero joint coordinates.
 
-No document type is accepted, so that no entity can be defined, let alone expanded; size and counts are bounded.
+Files may come from anywhere: no document type is accepted, so that no entity can be defined, let alone expanded, and
+size and counts are bounded. What a machine makes of the data is decided in `urdf_import`.
 """
 
 import math
@@ -18,11 +19,11 @@ from kinetostat.spec.errors import InputError, shorten
 Array = npt.NDArray[np.float64]
 
 MOST_JOINTS = 2000
-"""Joints of a file: more is a mistake."""
+"""Most joints of a file: more is a mistake."""
 AXISLESS = ("fixed", "spherical")
-"""Kinds of joints of which an axis, often written as 0 0 0, means nothing."""
+"""Kinds of joints whose axis, often written as 0 0 0, has no meaning."""
 LARGEST_NUMBER = 1e100
-"""Bound of every number in a file."""
+"""Bound of the size of every number in a file."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class FileJoint:
         name, kind: as written.
         parent, child: names of its links.
         frame: of itself and of its child, in the root link's frame, m [4 x 4].
-        axis: unit vector in the root link's frame; of a fixed joint without meaning.
+        axis: unit vector in the root link's frame; without meaning for a fixed joint.
         actuated: by a <transmission>, `independent`, or as its extension says.
         mimics: name and multiplier of the joint that it follows, None if it follows none.
         extension: attributes of its element <kinetostat>.
@@ -52,7 +53,7 @@ class FileJoint:
 
 @dataclass(frozen=True)
 class FileLoop:
-    """A closed loop: two links with the frame of the joint between them, seen from each [4 x 4], and its axis."""
+    """A closed loop: two links, the frame of the joint between them as seen from each [4 x 4], and its axis."""
 
     name: str
     kind: str
@@ -63,13 +64,13 @@ class FileLoop:
 
 @dataclass(frozen=True)
 class UrdfFile:
-    """What a file says.
+    """The content of a file.
 
     Attributes:
         origin: name of the file, for messages.
         name: of the robot.
         about: attributes of the element <kinetostat> of the robot.
-        root: name of the link that hangs on none.
+        root: name of the link that hangs on no joint.
         joints: by name of their child link.
         frames: of every link in the root link's frame, m [4 x 4].
         loops: in the order of the file.
@@ -85,7 +86,7 @@ class UrdfFile:
 
 
 class _NoDocumentType(TreeBuilder):
-    """Builds elements; a document type, in which entities are defined, ends the reading."""
+    """Builds elements, and refuses a document type, in which entities could be defined."""
 
     def doctype(self, name: str, *_identifiers: str | None) -> None:
         """Refuse it."""
@@ -93,10 +94,10 @@ class _NoDocumentType(TreeBuilder):
 
 
 def read(path: Path) -> UrdfFile:
-    """The links, joints and loops of a file.
+    """Return the links, joints and loops of a file.
 
     Raises:
-        InputError: no such file, too large, not XML, not URDF, or a joint or number that makes no sense.
+        InputError: there is no such file, it is too large, not XML or not URDF, or a joint or number makes no sense.
     """
     try:
         with path.open("rb") as stream:
@@ -109,18 +110,18 @@ def read(path: Path) -> UrdfFile:
 
 
 def parse(data: bytes, origin: str) -> UrdfFile:
-    """The same of the bytes of a file; `origin` names it in messages.
+    """Return the links, joints and loops from the bytes of a file; `origin` names it in messages.
 
     Raises:
-        InputError: as `read`.
+        InputError: it is not XML or not URDF, or a joint or number makes no sense.
     """
     parser = XMLParser(target=_NoDocumentType())
     try:
         parser.feed(data)
         robot = parser.close()
     except (ParseError, LookupError, ValueError) as error:
-        said = str(error) if isinstance(error, InputError) else f"it is not XML: {error}."
-        raise InputError(f'"{origin}": {said}') from None
+        reason = str(error) if isinstance(error, InputError) else f"it is not XML: {error}."
+        raise InputError(f'"{origin}": {reason}') from None
     if robot.tag != "robot":
         raise InputError(f'"{origin}" is not a URDF: its root is <{robot.tag}>, not <robot>.')
     return _Reader(robot, origin).read()
@@ -139,7 +140,7 @@ class _Reader:
             raise InputError(f'"{origin}" has {len(self._elements)} joints; it needs 1 to {MOST_JOINTS:,}.')
 
     def read(self) -> UrdfFile:
-        """Everything, placed."""
+        """Return everything, placed from the root outwards."""
         children: dict[str, list[Element]] = {}
         parents: dict[str, str] = {}
         for element in self._elements:
@@ -173,28 +174,28 @@ class _Reader:
 
     def _joint(self, element: Element, parent: str, frame: Array) -> FileJoint:
         where = self._where(element)
-        own = frame @ self._placement(element.find("origin"), where)
-        extension = element.find("kinetostat")
-        said = dict(extension.attrib if extension is not None else {})
+        placed = frame @ self._placement(element.find("origin"), where)
+        about = element.find("kinetostat")
+        extension = dict(about.attrib if about is not None else {})
         name = self._text(element, "name", "a joint")
-        driven = name in self._driven or "true" in (element.get("independent"), said.get("actuated"))
+        driven = name in self._driven or "true" in (element.get("independent"), extension.get("actuated"))
         return FileJoint(
             name,
             self._text(element, "type", where),
             parent,
             self._link(element, "child", where),
-            own,
-            own[:3, :3] @ self._axis(element, where),
+            placed,
+            placed[:3, :3] @ self._axis(element, where),
             driven,
             self._mimics(element, where),
-            said,
+            extension,
         )
 
     def _mimics(self, element: Element, where: str) -> tuple[str, float] | None:
-        found = element.find("mimic")
-        if found is None:
+        mimic = element.find("mimic")
+        if mimic is None:
             return None
-        return self._text(found, "joint", where), numbers(found.get("multiplier", "1"), 1, f"{where}: multiplier")[0]
+        return self._text(mimic, "joint", where), numbers(mimic.get("multiplier", "1"), 1, f"{where}: multiplier")[0]
 
     def _loops(self, frames: dict[str, Array]) -> Iterator[FileLoop]:
         for element in self._robot.findall("loop"):
@@ -218,26 +219,26 @@ class _Reader:
         value = element.get(key, "").strip()
         if not value:
             prefix = where if where.startswith('"') else f'"{self._origin}": {where}'
-            raise InputError(f"{prefix} has no {key}; every one needs it.")
+            raise InputError(f"{prefix} has no {key}; please add it.")
         return value
 
     def _link(self, element: Element, end: str, where: str) -> str:
-        found = element.find(end)
-        link = "" if found is None else found.get("link", "")
+        reference = element.find(end)
+        link = "" if reference is None else reference.get("link", "")
         if link not in self._links:
             raise InputError(f"{where}: its {end} link is {shorten(link)}, which the file does not define.")
         return link
 
     def _axis(self, element: Element, where: str) -> Array:
-        found = element.find("axis")
-        axis = np.array(numbers("1 0 0" if found is None else found.get("xyz", "1 0 0"), 3, f"{where}: axis"))
+        written = element.find("axis")
+        axis = np.array(numbers("1 0 0" if written is None else written.get("xyz", "1 0 0"), 3, f"{where}: axis"))
         size = float(np.linalg.norm(axis))
         if size == 0.0 and element.get("type") not in AXISLESS:
             raise InputError(f'{where}: its axis has no length; give a direction, e.g. <axis xyz="0 0 1"/>.')
         return axis / (size or 1.0)
 
     def _placement(self, element: Element | None, where: str) -> Array:
-        """A frame from xyz (m) and rpy (rad, fixed axes) [4 x 4]."""
+        """The frame that xyz (m) and rpy (rad, fixed axes) describe [4 x 4]."""
         frame = np.eye(4)
         if element is not None:
             frame[:3, 3] = numbers(element.get("xyz", "0 0 0"), 3, f"{where}: xyz")
@@ -246,19 +247,19 @@ class _Reader:
 
 
 def numbers(text: str, count: int, where: str) -> list[float]:
-    """So many finite numbers from a text with blanks between.
+    """Read `count` finite numbers from a text with blanks between them.
 
     Raises:
-        InputError: other words, or another number of them.
+        InputError: other words, or more or fewer numbers.
     """
     try:
-        found = [float(word) for word in text.split()]
+        result = [float(word) for word in text.split()]
     except ValueError:
-        found = []
-    if len(found) != count or not all(math.isfinite(c) and abs(c) < LARGEST_NUMBER for c in found):
+        result = []
+    if len(result) != count or not all(math.isfinite(c) and abs(c) < LARGEST_NUMBER for c in result):
         wanted = "a number" if count == 1 else f"{count} numbers"
-        raise InputError(f"{where} is {shorten(text)}; it must be {wanted}, SI.")
-    return found
+        raise InputError(f"{where} is {shorten(text)}; it must be {wanted} in SI units.")
+    return result
 
 
 def _turned(roll: float, pitch: float, yaw: float) -> Array:

@@ -1,4 +1,7 @@
-"""The machine's solids as STEP: what `views.scene` shows of it, for CAD programs."""
+"""The machine's solids at its pose as GLB for 3-D viewers and as STEP for CAD programs.
+
+The solids themselves are made by `views.scene`; Open CASCADE, which writes STEP, is imported only when STEP is wanted.
+"""
 
 from importlib import import_module
 from importlib.util import find_spec
@@ -8,6 +11,7 @@ from typing import Any
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import replacing
+from kinetostat.views.scene.glb import glb
 from kinetostat.views.scene.machine_scene import scene_of
 
 NEEDED = "STEP needs Open CASCADE, which "
@@ -15,19 +19,27 @@ MISSING = "is not installed; install it with: pip install 'kinetostat[cad]'."
 BROKEN = "does not start: {reason}. On Debian and Ubuntu: apt-get install libgl1 libx11-6."
 
 
-def write(analysis: Analysis, path: Path) -> list[Path]:
-    """Write the machine at its pose, in mm, z up.
+def write_glb(analysis: Analysis, path: Path) -> list[Path]:
+    """Write the machine at its pose as binary glTF: metres, y up."""
+    return _write(glb(scene_of(analysis.machine)), path)
+
+
+def write_step(analysis: Analysis, path: Path) -> list[Path]:
+    """Write the machine at its pose as STEP: mm, z up.
 
     Raises:
         InputError: Open CASCADE is not installed, or lacks a library of the system.
     """
-    content = _writer().step_bytes(scene_of(analysis.machine), analysis.machine.name)
+    return _write(_step_writer().step_bytes(scene_of(analysis.machine), analysis.machine.name), path)
+
+
+def _write(content: bytes, path: Path) -> list[Path]:
     with replacing(path) as temporary:
         temporary.write_bytes(content)
     return [path]
 
 
-def _writer() -> Any:
+def _step_writer() -> Any:
     if find_spec("OCP") is None:
         raise InputError(NEEDED + MISSING)
     try:
