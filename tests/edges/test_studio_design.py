@@ -54,7 +54,7 @@ def test_a_study_made_in_the_form_is_what_the_command_solves(tmp_path, capsys):
         saved.append(shown["lines"][0]["values"])
         result = page.one("run-result").content
         assert "geometry.base_radius" in result
-        assert "Times stiffer" in result
+        assert "times that of the initial design" in result
         await page.send("run-load", "click")
         saved.append(page.one("control geometry.base_radius")._props["text"])
         await page.send("undo", "click")
@@ -133,7 +133,7 @@ def test_stopped_reloaded_resumed_and_deleted(tmp_path):
         assert page.one("run-line").text.startswith("running")
         await page.send("run-stop", "click")
         await until(page, "stopped")
-        assert "Times stiffer" in page.one("run-result").content
+        assert "times that of the initial design" in page.one("run-result").content
         await page.send("run-play_arrow", "click")
         await until(page, "running")
         await page.send("run-stop", "click")
@@ -231,7 +231,7 @@ def test_a_favourite_of_another_kind_opens_as_another_machine(tmp_path):
         await page.send("favourite 1 load", "click")
         assert page.one("machines").value == "own"
         assert page.one("status").text == "ok"
-        assert page.one("study-about").text == "About six legs"
+        assert page.one("study-about").text == "Machine: six legs"
 
     on_page(steps, state=tmp_path)
 

@@ -165,7 +165,7 @@ def test_the_map_shows_any_quantity_over_any_two_coordinates():
         middle = shown["values"][20 * 41 + 20]
         assert middle == pytest.approx(analyze(load(MACHINE)).stiffness_diagonal[5])
         await page.choose("map-up", "geometry.base_radius")
-        assert "two different" in page.one("map-time").text
+        assert "two different axes" in page.one("map-time").text
 
     on_page(steps)
 

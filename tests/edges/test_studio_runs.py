@@ -108,7 +108,7 @@ def test_stopped_after_a_step_it_goes_on_to_the_same_end(runs, tmp_path):
     again = Runs(tmp_path)
     again.go_on(run.number)
     assert again.of(run.number).stage is Stage.RUNNING
-    with pytest.raises(InputError, match="only one that was stopped can go on"):
+    with pytest.raises(InputError, match="only a search that was stopped can be resumed"):
         again.go_on(run.number)
     follower = Follower(run)
     while follower.progress(run).steps <= found.steps:
@@ -157,7 +157,7 @@ def test_a_search_that_is_deleted_is_gone(kept):
     runs.delete(run.number)
     assert not runs.every()
     assert not run.folder.exists()
-    with pytest.raises(InputError, match="no longer kept"):
+    with pytest.raises(InputError, match="has been deleted"):
         runs.of(run.number)
 
 
@@ -183,7 +183,7 @@ def test_a_search_of_another_process_is_seen_to_run(kept):
 def test_a_draft_is_read_as_a_study_file_is():
     machine = load(MACHINE)
     draft = Draft("mine")
-    with pytest.raises(InputError, match="nothing may change yet"):
+    with pytest.raises(InputError, match="no variable yet"):
         draft.problem(machine)
     control = {one.path: one for one in controls(machine, 0.2)}["geometry.base_radius"]
     low, high = usual_bounds(control, 0.22)

@@ -1,4 +1,7 @@
-"""What a page wants to know of a machine, each as one function that runs in a thread. Touches no page; no formula."""
+"""The computations behind the page: a picture, a report, a map, curves, a ranking; each a function of a request.
+
+They run in threads (`lanes`), so they take and return frozen data and touch no page. The formulas are elsewhere.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -22,18 +25,19 @@ from kinetostat.views.scene.overlays import Measure, twist_solids
 from kinetostat.views.scene.profiles import Proportions
 from kinetostat.views.scene.solids import Scene, as_data, solid_data
 
-SIDE = 41
+MAP_POINTS = 41
 """Points of a map along each coordinate."""
 CURVE_POINTS = 61
 
 
 @dataclass(frozen=True)
 class PictureWish:
-    """The machine to draw, with the proportions it was loaded with.
+    """The machine to draw.
 
     Attributes:
-        machine, sizes: of it.
-        fit: whether the camera is to move so that all of it is seen.
+        machine: at its present pose.
+        sizes: proportions it was loaded with, so that balls and rods keep their thickness while it changes.
+        fit: whether the camera should move until all of it is seen.
     """
 
     machine: Machine
@@ -50,7 +54,7 @@ class Picture:
 
 
 def picture(wish: PictureWish) -> Picture:
-    """The machine at its pose; a singular pose can be drawn as well, with the motion that it leaves free."""
+    """Draw the machine at its pose; at a singular pose, together with the motion that stays free."""
     response = respond(wish.machine)
     status = Status(int(response.status))
     if status is not Status.OK and not _drawable(status, response):
@@ -62,12 +66,13 @@ def picture(wish: PictureWish) -> Picture:
 
 
 def _drawable(status: Status, response: Response) -> bool:
+    """Return whether a pose without an answer has a picture: it is singular, but every joint has its place."""
     points = [c for leg in response.configuration.legs for p in leg.path for c in p.components()]
     return status is Status.SINGULAR and all(math.isfinite(c) for c in points)
 
 
 def _with_free_twist(scene: Scene, response: Response, sizes: Proportions) -> Scene:
-    """The twist that the platform keeps with all actuators locked, unless it is a leg that locks up."""
+    """Add the twist that the platform keeps with all actuators locked; there is none where a leg itself is singular."""
     if not all(leg.singularity_margin > SINGULAR for leg in response.legs):
         return scene
     twist = free_twist(response.legs, float(response.configuration.length))
@@ -77,7 +82,7 @@ def _with_free_twist(scene: Scene, response: Response, sizes: Proportions) -> Sc
 
 @dataclass(frozen=True)
 class ReportWish:
-    """The machine to analyse, and the factor of its deflected shape; None to choose one."""
+    """The machine to analyse, and the factor by which its deflections are drawn larger; None to choose one."""
 
     machine: Machine
     sizes: Proportions
@@ -94,10 +99,10 @@ class Report:
 
 
 def report(wish: ReportWish) -> Report:
-    """Everything that one pose has to say."""
-    found = analyze(wish.machine)
-    solids, factor = overlays_of(found, wish.sizes, wish.exaggeration)
-    return Report(found, [solid_data(solid) for solid in solids], factor)
+    """Analyse the machine at its pose and make the solids that are drawn over it."""
+    analysis = analyze(wish.machine)
+    solids, factor = overlays_of(analysis, wish.sizes, wish.exaggeration)
+    return Report(analysis, [solid_data(solid) for solid in solids], factor)
 
 
 @dataclass(frozen=True)
@@ -111,7 +116,7 @@ class Ends:
 
 @dataclass(frozen=True)
 class MapWish:
-    """All that can be mapped over two fields of a machine; `since` is when the designer asked, s."""
+    """A map over two fields of a machine; `since` is the time at which the designer changed something, s."""
 
     machine: Machine
     across: Ends
@@ -120,24 +125,28 @@ class MapWish:
 
 
 def compliance_map(wish: MapWish) -> dict[str, Array]:
-    """Every quantity at 41 x 41 points, the second field running fastest; NaN where there is no answer.
+    """Evaluate every quantity of `map_quantities` at 41 x 41 points.
 
-    All coordinates of the pose are columns of the program, and the load is left out where it decides nothing, so that
-    one program serves every pose and load.
+    A program is compiled once and must then serve while the designer moves the machine. Therefore all coordinates of
+    the pose are its inputs, also those that do not vary over the map, and the load is left out where it has no effect.
+
+    Returns:
+        Values by quantity, the second field running fastest; NaN where there is no answer.
     """
     machine = _unloaded(wish.machine)
-    held, family = values(machine), machine.family
+    present, family = values(machine), machine.family
     axes = [
-        Axis(find(family, ends.path).leaves, np.linspace(ends.low, ends.high, SIDE)) for ends in (wish.across, wish.up)
+        Axis(find(family, ends.path).leaves, np.linspace(ends.low, ends.high, MAP_POINTS))
+        for ends in (wish.across, wish.up)
     ]
-    taken = {leaf for axis in axes for leaf in axis.paths}
-    rest = [path for path in held if path.startswith("pose.") and path not in taken]
-    grid = Grid([*axes, *(Axis((path,), np.array([float(held[path])])) for path in rest)])
+    varied = {leaf for axis in axes for leaf in axis.paths}
+    fixed = [path for path in present if path.startswith("pose.") and path not in varied]
+    grid = Grid([*axes, *(Axis((path,), np.array([float(present[path])])) for path in fixed)])
     return evaluate(machine, grid, list(map_quantities(machine)), repeated=True).values
 
 
 def _unloaded(machine: Machine) -> Machine:
-    """The machine without its load, unless its actuators have limits, which a load may exceed."""
+    """Remove the load, unless actuators have limits: a load may exceed them, and then decides the status."""
     limits = machine.tables["limits"]
     if is_set(limits.actuator_force) or is_set(limits.actuator_moment):
         return machine
@@ -162,36 +171,33 @@ class Curves:
 
 
 def curves(wish: CurveWish) -> Curves:
-    """The quantities along the field, at a constant factor from point to point."""
+    """Evaluate the quantities along the field, at a constant factor from point to point."""
     across = np.geomspace(wish.field.low, wish.field.high, CURVE_POINTS)
     grid = Grid([Axis(find(wish.machine.family, wish.field.path).leaves, across)])
-    found = evaluate(wish.machine, grid, wish.quantities)
-    return Curves(
-        across.tolist(),
-        {name: finite(found.values[name]) for name in wish.quantities},
-    )
+    lines = evaluate(wish.machine, grid, wish.quantities).values
+    return Curves(across.tolist(), {name: finite(lines[name]) for name in wish.quantities})
 
 
 def finite(values: Array) -> list[float | None]:
-    """Numbers for a page: None where there is no finite one."""
+    """Return numbers as JSON can hold them: None where a value is not finite."""
     return [value if math.isfinite(value) else None for value in values.tolist()]
 
 
 @dataclass(frozen=True)
 class RankingWish:
-    """A quantity of a machine whose sensitivities are asked for."""
+    """A machine and the quantity whose sensitivities to all parameters are wanted."""
 
     machine: Machine
     quantity: str
 
 
 def ranking(wish: RankingWish) -> Sensitivity:
-    """Which parameters decide about the quantity."""
+    """Rank the parameters by their influence on the quantity."""
     return sensitivity(wish.machine, [wish.quantity])
 
 
 def map_quantities(machine: Machine) -> dict[str, str]:
-    """Names and labels of what may be mapped: diagonals of C and K, 1/C_ii, and the singularity margin."""
+    """Return names and labels of what may be mapped: diagonals of C and K, 1/C_ii, and the singularity margin."""
     names, groups = machine.family.component_names, ("compliance", "stiffness", "free_stiffness")
-    found = {f"{group}_{name}": f"{group.replace('_', ' ')} {name}" for group in groups for name in names}
-    return {**found, "singularity_margin": "singularity margin"}
+    diagonals = {f"{group}_{name}": f"{group.replace('_', ' ')} {name}" for group in groups for name in names}
+    return {**diagonals, "singularity_margin": "singularity margin"}

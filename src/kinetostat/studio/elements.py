@@ -92,9 +92,12 @@ class QuantityRow(Labelled, component=COMPONENTS / "quantity_row.js"):
             self.update()
 
 
-def choice(options: dict[Any, str], label: str, on_change: Callable[[], None], mark: str) -> ui.select:
-    """A list to choose from; `mark` is the name by which tests know it."""
-    select = ui.select(options, label=label, on_change=on_change).mark(mark)
+def choice(
+    options: dict[Any, str] | list[str], label: str, on_change: Callable[..., None], mark: str,
+    value: Any = None, searchable: bool = False,
+) -> ui.select:  # fmt: skip
+    """A list to choose from, if `searchable` by typing; `mark` is the name by which tests know it."""
+    select = ui.select(options, label=label, value=value, on_change=on_change, with_input=searchable).mark(mark)
     return select.props("dense options-dense outlined").classes("field")
 
 
@@ -106,10 +109,13 @@ def toggle(options: Sequence[str], value: str, on_change: Callable[[], None], ma
 
 def icon_button(icon: str, text: str, action: Callable[[], object], mark: str) -> ui.button:
     """A button that shows an icon; `text` is its tooltip and what a screen reader says."""
-    # A quotation mark would end the property early; names of machines may contain one.
-    label = text.replace('"', "'").replace("\\", "/")
-    button = ui.button(icon=icon, on_click=action).props(f'flat round dense aria-label="{label}"')
+    button = ui.button(icon=icon, on_click=action).props(f'flat round dense aria-label="{in_quotes(text)}"')
     return button.tooltip(text).mark(mark)
+
+
+def in_quotes(text: str) -> str:
+    """Return text that can stand in the quotes of a property; a name with a quotation mark would end it early."""
+    return text.replace('"', "'").replace("\\", "/")
 
 
 def upload_field(on_upload: Callable[[Any], Any], refuse: Callable[[str], None], mark: str) -> ui.upload:

@@ -1,6 +1,6 @@
-"""The menu of what a machine can be written as beside its file: reports, and formats of other programs.
+"""The menu that writes the machine as a report or in the format of another program, and sends it to the browser.
 
-The work is that of the commands, in a process of its own, so that the page goes on meanwhile.
+The commands `report` and `export` do the work, in another process, so that the page answers meanwhile.
 """
 
 import asyncio
@@ -14,14 +14,15 @@ from tempfile import TemporaryDirectory
 from nicegui import background_tasks, ui
 
 from kinetostat.exchange.formats import KNOWN
+from kinetostat.studio.elements import icon_button
 from kinetostat.studio.session import Session
 
 REPORTS = (
     ("report, page", ".html", "for a design review, with the machine in three dimensions"),
-    ("report, PDF", ".pdf", "for a design review, on paper"),
+    ("report, PDF", ".pdf", "for a design review, to print"),
 )
 """Name, suffix and description of each kind of report."""
-BUSY = "A file is being written already; wait until it is done."
+BUSY = "Another file is being written; wait until it is done."
 
 
 class FilesMenu:
@@ -37,14 +38,13 @@ class FilesMenu:
         self._session, self._refuse = session, refuse
         self._process: asyncio.subprocess.Process | None = None
         self._busy = False
-        text = "Report, and formats of other programs"
-        self._button = ui.button(icon="ios_share").props(f'flat round dense aria-label="{text}"').mark("files")
-        with self._button.tooltip(text), ui.menu().props('auto-close max-height="90vh"'):
+        self._button = icon_button("ios_share", "Export: reports, and formats of other programs", lambda: None, "files")
+        with self._button, ui.menu().props('auto-close max-height="90vh"'):
             for name, suffix, summary in REPORTS:
                 self._item(name, suffix, summary, ["report"])
             ui.separator()
-            for one in KNOWN:
-                self._item(one.name, one.suffix, one.summary, ["export", "--to", one.name])
+            for known in KNOWN:
+                self._item(known.name, known.suffix, known.summary, ["export", "--to", known.name])
 
     def _item(self, name: str, suffix: str, summary: str, words: Sequence[str]) -> None:
         item = ui.menu_item(on_click=lambda: self._choose(words, suffix)).props("dense").mark(f"file-{name}")
@@ -67,38 +67,38 @@ class FilesMenu:
         try:
             with TemporaryDirectory() as folder:
                 (Path(folder) / name).write_bytes(machine)
-                refused = await self._run(Path(folder), [words[0], name, *words[1:], "-o", wanted])
+                reason = await self._run(Path(folder), [words[0], name, *words[1:], "-o", wanted])
                 (Path(folder) / name).unlink()
-                found = sorted(Path(folder).iterdir())
-                data = [(path.name, path.read_bytes()) for path in found]
+                data = [(path.name, path.read_bytes()) for path in sorted(Path(folder).iterdir())]
         finally:
             self._busy = False
             waiting.dismiss()
         with self._button:
             if not data:
-                self._refuse(refused)
+                self._refuse(reason)
             elif len(data) == 1:
                 ui.download(data[0][1], data[0][0])
             else:
                 ui.download(_packed(data), f"{Path(name).stem}.zip")
 
     async def _run(self, folder: Path, words: Sequence[str]) -> str:
-        """Run a command in a folder; returns what it says where it fails."""
+        """Run a command in a folder; returns its message, which is the reason if it has written nothing."""
         self._process = await asyncio.create_subprocess_exec(
             sys.executable, "-m", "kinetostat", *words, cwd=folder,
             stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.PIPE,
         )  # fmt: skip
-        _, said = await self._process.communicate()
-        return said.decode("utf-8", "replace").removeprefix("kinetostat: ").strip() or "The file could not be written."
+        _, message = await self._process.communicate()
+        text = message.decode("utf-8", "replace").removeprefix("kinetostat: ").strip()
+        return text or "The file could not be written."
 
     def close(self) -> None:
-        """Nobody waits for a file any more: the page is gone."""
+        """Stop writing, because the page is gone."""
         if self._process is not None and self._process.returncode is None:
             self._process.kill()
 
 
 def _packed(files: Sequence[tuple[str, bytes]]) -> bytes:
-    """Several files as one archive."""
+    """Pack several files into a ZIP archive."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in files:

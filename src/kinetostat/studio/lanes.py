@@ -1,4 +1,7 @@
-"""Work off the event loop, the latest wish first: what was asked for in between is never computed."""
+"""Work in threads, so that the page answers meanwhile; only the latest request is computed, older ones are dropped.
+
+A lane knows neither machines nor elements: it gets the function to run and the function that shows the result.
+"""
 
 import asyncio
 import logging
@@ -13,19 +16,19 @@ Wish = TypeVar("Wish")
 Result = TypeVar("Result")
 
 WORKERS = 2
-"""Threads of all pages: Python computes one thing at a time, and more would only keep the event loop waiting."""
+"""Threads for all pages: Python computes one thing at a time, so more of them would only delay the event loop."""
 
 log = logging.getLogger("kinetostat")
 
 
 class Lane(Generic[Wish, Result]):
-    """One kind of work of one page: at most one under way, at most one waiting."""
+    """One kind of work of one page: at most one request in progress, at most one waiting."""
 
     def __init__(self, work: Callable[[Wish], Result], deliver: Callable[[Wish, Result], None]) -> None:
-        """A lane.
+        """Create an idle lane.
 
         Args:
-            work: from a wish to its result, in a thread; touches no page.
+            work: computes the result of a request, in a thread; it must not touch the page.
             deliver: shows the result, on the event loop.
         """
         self._work, self._deliver = work, deliver
@@ -34,14 +37,14 @@ class Lane(Generic[Wish, Result]):
         self._open = True
 
     def ask(self, wish: Wish) -> None:
-        """Compute this next, instead of what else is waiting."""
+        """Compute this next, in place of the request that is waiting."""
         self._waiting = [wish]
         if not self.busy and self._open:
             self.busy = True
             background_tasks.create(self._run(), name="studio lane")
 
     def close(self) -> None:
-        """Finish what is under way and deliver nothing any more: the page is gone."""
+        """Deliver nothing any more, because the page is gone; what is in progress ends unseen."""
         self._open = False
         self._waiting.clear()
 

@@ -1,4 +1,7 @@
-"""One designer's page: session, panels, and what follows when the machine changes. No formula here."""
+"""The page of one designer: its session, its panels, and what is computed and shown when the machine changes.
+
+The order is always the same: the session changes, the map and the picture are requested, then the report of the pose.
+"""
 
 import time
 from collections.abc import Callable
@@ -9,10 +12,10 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.machine import Machine
-from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, PictureWish, Report, ReportWish, picture, report
 from kinetostat.studio.design.design_tab import DesignTab, Workshop
+from kinetostat.studio.elements import icon_button, toggle, upload_field
 from kinetostat.studio.files_menu import FilesMenu
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.map_panel import MapPanel
@@ -30,22 +33,22 @@ PANELS: tuple[type[Panel], ...] = (
 )  # fmt: skip
 """The linked views, in the order of their tabs."""
 ACCENT = "#0b5ea8"
-"""Colour of what can be pressed; style.css has it by name."""
+"""Colour of buttons and marks; style.css has it by name."""
 MODES = ("Explore", "Design")
 """What stands beside the machine: its numbers and linked views, or the design tab."""
 OTHER = "own"
-"""Key of a machine that is not bundled in the list of machines."""
+"""Key in the list of machines of one that is not bundled."""
 
 
 class StudioPage:
-    """A page with its own session; another tab has another."""
+    """The page of one browser tab, with a session that no other tab shares."""
 
     def __init__(self, memory: Memory, remember: Callable[[Memory], None], workshop: Workshop) -> None:
-        """Build the page around what is remembered, and start to compute.
+        """Build the page and request its first picture, map and report.
 
         Args:
-            memory: of this tab, or a new one.
-            remember: called with what is to be remembered of it, whenever that changes.
+            memory: state of this tab from which to go on.
+            remember: called with the new state whenever it changes.
             workshop: searches and favourites of the server.
         """
         self.session, self._remember = Session(memory), remember
@@ -75,25 +78,16 @@ class StudioPage:
             ui.html("kineto<b>stat</b> studio", sanitize=False).classes("wordmark")
             self.machines = ui.select({}, on_change=self._choose).mark("machines")
             self.machines.props('dense options-dense outlined aria-label="machine"').classes("field machine-choice")
-            self.undo = self._button("undo", "Undo (Ctrl+Z)", self._undo)
-            self.redo = self._button("redo", "Redo (Ctrl+Y)", self._redo)
-            self.reset = self._button("restart_alt", "Back to the machine as it was loaded", self._reset)
-            mode = ui.toggle(list(MODES), value=MODES[0], on_change=lambda event: self._to_front(str(event.value)))
-            mode.props("dense no-caps unelevated toggle-text-color=accent-ink").classes("choice mode").mark("mode")
+            self.undo = icon_button("undo", "Undo (Ctrl+Z)", self._undo, "undo")
+            self.redo = icon_button("redo", "Redo (Ctrl+Y)", self._redo, "redo")
+            self.reset = icon_button("restart_alt", "Back to the machine as it was loaded", self._reset, "restart_alt")
+            self.mode = toggle(MODES, MODES[0], self._to_front, "mode").classes("mode")
             ui.space()
-            self.upload = ui.upload(
-                on_upload=self._open_upload, on_rejected=lambda: self._refuse(TOO_LARGE), auto_upload=True,
-                max_file_size=LARGEST_FILE, max_files=1,
-            ).props('accept=".toml" aria-hidden="true"').classes("unseen").mark("upload")  # fmt: skip
-            self._button("folder_open", "Open a machine file", lambda: self.upload.run_method("pickFiles"), "open")
-            self._button("download", "Save the machine as a file", self._save, "save")
+            self.upload = upload_field(self._open_upload, self._refuse, "upload")
+            icon_button("folder_open", "Open a machine file", lambda: self.upload.run_method("pickFiles"), "open")
+            icon_button("download", "Save the machine as a file", self._save, "save")
             self.files = FilesMenu(self.session, self._refuse)
-            self._button("contrast", "Light or dark", self.dark.toggle, "theme")
-
-    @staticmethod
-    def _button(icon: str, text: str, action: Callable[[], object], name: str = "") -> ui.button:
-        button = ui.button(icon=icon, on_click=action).props(f'flat round dense aria-label="{text}"')
-        return button.tooltip(text).mark(name or icon)
+            icon_button("contrast", "Light or dark", self.dark.toggle, "theme")
 
     def _views(self) -> None:
         self.panels: dict[str, Panel] = {}
@@ -108,14 +102,14 @@ class StudioPage:
                 self.panels[panel.name] = panel
 
     def changed(self) -> None:
-        """The machine has other numbers: compute and show what follows from them."""
+        """Request map and picture for new numbers of the machine; the report follows the picture."""
         self.map.refresh(time.perf_counter())
         self._pictures.ask(PictureWish(self.session.machine, self._sizes))
         self.parameters.refresh()
         self._offer_history()
 
     def _loaded(self) -> None:
-        """Another machine has been loaded: everything is made anew."""
+        """Show another machine: every control, list and picture is made again."""
         machine = self.session.machine
         names = {name: name for name in bundled()}
         options = names if self.session.name else {OTHER: machine.name, **names}
@@ -137,9 +131,9 @@ class StudioPage:
         self.reset.set_enabled(self.session.machine is not self.session.origin)
         self._remember(self.session.memory)
 
-    def _show_picture(self, _wish: PictureWish, found: Picture) -> None:
-        """What the eye follows comes first, the figures after it."""
-        self.scene.draw(found)
+    def _show_picture(self, _wish: PictureWish, drawn: Picture) -> None:
+        """Draw, then let a waiting slider go on, then request the figures: the eye follows the picture first."""
+        self.scene.draw(drawn)
         self.parameters.go_on()
         self._report()
 
@@ -152,10 +146,10 @@ class StudioPage:
         self._remember(self.session.memory)
         self._report()
 
-    def _show_report(self, wish: ReportWish, found: Report) -> None:
-        self.scene.explain(found, wish.exaggeration is None)
-        if found.analysis.status is Status.OK:
-            self._latest = found
+    def _show_report(self, wish: ReportWish, new: Report) -> None:
+        self.scene.explain(new, wish.exaggeration is None)
+        if new.analysis.status is Status.OK:
+            self._latest = new
             self._show_front()
 
     def _show_front(self) -> None:
@@ -181,12 +175,13 @@ class StudioPage:
             return
         self._loaded()
 
-    def _to_front(self, mode: str) -> None:
-        self.main.classes(replace="studio designing" if mode == MODES[1] else "studio")
-        self.design.front(mode == MODES[1])
+    def _to_front(self) -> None:
+        designing = self.mode.value == MODES[1]
+        self.main.classes(replace="studio designing" if designing else "studio")
+        self.design.front(designing)
 
     def _take(self, machine: Machine) -> None:
-        """A design has been found or was kept: make it the machine of this page."""
+        """Make a design of a search, or a favourite, the machine of this page."""
         if self.session.take(machine):
             self.changed()
         else:
@@ -224,6 +219,3 @@ class StudioPage:
             part.close()
         for panel in self.panels.values():
             panel.close()
-
-
-TOO_LARGE = f"The file is larger than {LARGEST_FILE >> 20} MiB; a machine file is a short TOML text."

@@ -1,4 +1,7 @@
-"""The left side of the page: every number of the machine as a slider and as text, in four panels."""
+"""The left of the page: every number of the machine as a slider and as text, in four panels.
+
+Ranges and positions come from `controls`, changes go to the session; this panel only shows rows and passes events on.
+"""
 
 from collections.abc import Callable
 from functools import partial
@@ -21,18 +24,18 @@ OPEN = 12
 
 
 class ParametersPanel:
-    """Tabs of controls; rows of a group are made when it is first opened."""
+    """Tabs of controls; the rows of a group are made when it is first opened, because large machines have hundreds."""
 
     def __init__(self, session: Session, on_change: Callable[[], None], is_busy: Callable[[], bool]) -> None:
-        """A panel for a session.
+        """Build the panel.
 
         Args:
             session: whose numbers it shows and changes.
             on_change: called after every change of the machine.
-            is_busy: whether the last change has not been drawn yet: then a slider's next position waits for `go_on`.
+            is_busy: whether the last change is still being drawn; a slider's next position then waits for `go_on`.
         """
         self._session, self._on_change, self._is_busy = session, on_change, is_busy
-        self._held: tuple[str, int] | None = None
+        self._waiting: tuple[str, int] | None = None
         self._rows: dict[str, QuantityRow] = {}
         with ui.tabs().classes("panel-tabs").props("dense no-caps") as tabs:
             for panel in PANELS:
@@ -48,7 +51,7 @@ class ParametersPanel:
 
     def fill(self) -> None:
         """Make the controls of a machine that has just been loaded."""
-        self._held = None
+        self._waiting = None
         self._rows.clear()
         for panel, place in self._places.items():
             place.clear()
@@ -75,7 +78,7 @@ class ParametersPanel:
                 self._make(members)
 
     def _make(self, members: list[Control]) -> None:
-        held = self._session.values()
+        present = self._session.values()
         for control in members:
             row = QuantityRow(control.label, control.parameter.quantity.meaning, STEPS, control.slides)
             row.mark(f"control {control.path}")
@@ -83,25 +86,25 @@ class ParametersPanel:
             row.on("settle", partial(self._settle, control.path))
             row.on("write", partial(self._write, control.path))
             self._rows[control.path] = row
-            self._put(control, held[control.path])
+            self._put(control, present[control.path])
 
     def refresh(self) -> None:
         """Show the machine's present numbers."""
-        held = self._session.values()
+        present = self._session.values()
         for path in self._rows:
-            self._put(self._session.controls[path], held[path])
+            self._put(self._session.controls[path], present[path])
 
     def _put(self, control: Control, value: float) -> None:
         self._rows[control.path].put(shown(control.parameter.quantity, value), control.position_of(value))
 
     def go_on(self) -> None:
-        """Take the last position of a slider that had to wait."""
-        if self._held is not None:
-            (path, position), self._held = self._held, None
+        """Take the latest position of a slider that had to wait; positions before it are skipped."""
+        if self._waiting is not None:
+            (path, position), self._waiting = self._waiting, None
             self._try(path, lambda: self._session.slide(path, position))
 
     def _slide(self, path: str, event: GenericEventArguments) -> None:
-        self._held = path, int(event.args)
+        self._waiting = path, int(event.args)
         if not self._is_busy():
             self.go_on()
 

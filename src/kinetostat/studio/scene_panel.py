@@ -1,4 +1,7 @@
-"""The middle of the page: the machine, what is drawn over it, whether the pose has an answer, and its six figures."""
+"""The middle of the page: the machine with its overlays, the status of the pose, and the diagonal of C.
+
+What is drawn comes from `answers` as solids; this panel only places it on the page.
+"""
 
 from collections.abc import Callable
 
@@ -15,24 +18,24 @@ from kinetostat.studio.wording import engineering
 
 LAYERS = {
     "ellipsoids": "compliance ellipsoids",
-    "directions": "softest directions",
+    "directions": "most compliant directions",
     "deflection": "deflected shape",
     "springs": "virtual springs",
     "frames": "frames",
     "labels": "leg numbers",
 }
-"""What may be hidden, by its name in scenes."""
-SCALE = "how many times larger than it is the deflected shape is drawn; a number, or auto"
+"""Layers of the picture that can be hidden, and their names on the page."""
+EXAGGERATION = "factor by which the deflected shape is drawn larger than it is: a number, or auto"
 VIEWS = {"iso": "view from the corner", "front": "front view", "side": "side view", "top": "view from above"}
 THROTTLE = 0.03
 """Seconds between two positions of a slider that a browser sends."""
 
 
 class ScenePanel:
-    """The picture keeps the last pose that could be drawn; a pose without answer is explained below it."""
+    """The picture and figures of the machine; at a pose without an answer, they stay and the reason is shown."""
 
     def __init__(self, exaggerate: Callable[[float | None], None]) -> None:
-        """The view with its tools, the line about the pose, and the figures.
+        """Build the picture with its tools, the line about the pose, and the figures.
 
         Args:
             exaggerate: draws the deflected shape with another factor; None to choose one.
@@ -53,7 +56,7 @@ class ScenePanel:
                 button.props("flat dense no-caps").tooltip(text).mark(f"view-{view}")
         with ui.element("div").classes("scene-key"):
             self.key = ui.html("", sanitize=False).mark("scene-key")
-            self.scale = QuantityRow("deflection ×", SCALE, FACTOR_STEPS, slides=True).mark("exaggeration")
+            self.scale = QuantityRow("deflection ×", EXAGGERATION, FACTOR_STEPS, slides=True).mark("exaggeration")
             self.scale.classes("scene-scale").set_visibility(False)
         self.scale.on("slide", lambda event: self._exaggerate(factor_at(int(event.args))), throttle=THROTTLE)
         self.scale.on("write", self._written)
@@ -82,43 +85,44 @@ class ScenePanel:
         if picture.scene is not None:
             self.view.run_method("show", picture.scene)
 
-    def explain(self, report: Report, own: bool) -> None:
-        """Show the overlays and figures of a pose, or say why there are none and keep the last ones.
+    def explain(self, report: Report, automatic: bool) -> None:
+        """Show the overlays and figures of a pose; without an answer, show the reason and keep the last figures.
 
         Args:
             report: of the pose.
-            own: whether the factor of the deflected shape was chosen here.
+            automatic: whether the page chose the factor of the deflected shape.
         """
-        found = report.analysis
-        answered = found.status is Status.OK
+        analysis = report.analysis
+        answered = analysis.status is Status.OK
         self.line.classes(replace="pose-line" if answered else "pose-line refused")
-        self.status.set_text(found.status.word.replace("_", " "))
-        kept = "" if answered else " The picture and the figures are those of the last good pose."
-        self.message.set_text(found.message + kept)
+        self.status.set_text(analysis.status.word.replace("_", " "))
+        note = "" if answered else " The picture and the figures still show the last good pose."
+        self.message.set_text(analysis.message + note)
         if not answered:
             return
         self.view.run_method("overlay", report.solids, [])
         self.key.set_content(scene_key(report))
         self.scale.set_visibility(report.exaggeration is not None)
         if report.exaggeration is not None:
-            self.scale.put(factor_text(report.exaggeration, own), factor_position(report.exaggeration))
+            self.scale.put(factor_text(report.exaggeration, automatic), factor_position(report.exaggeration))
         self.figures.set_content(headline(report))
 
 
 def scene_key(report: Report) -> str:
-    """What the overlays are, with their scales."""
-    found, parts = report.analysis, []
+    """Return the key of the ellipsoids as HTML: the greatest compliance of each."""
+    indices = report.analysis.indices
     units = {"translation": "m/N", "rotation": "rad/(N·m)"}
-    principal = found.indices.principal_compliances if found.indices else None
-    for block, one in (principal or {}).items():
-        parts.append(f'<li class="key-{block}">{block}: softest {engineering(one.compliances[-1], units[block])}</li>')
-    return f"<ul>{''.join(parts)}</ul>"
+    lines = [
+        f'<li class="key-{name}">{name}: at most {engineering(block.compliances[-1], units[name])}</li>'
+        for name, block in ((indices and indices.principal_compliances) or {}).items()
+    ]
+    return f"<ul>{''.join(lines)}</ul>"
 
 
 def headline(report: Report) -> str:
-    """The diagonal of C: what a unit load along or about each axis moves along or about it."""
+    """Return the diagonal of C as HTML: the motion along or about each axis under a unit load along or about it."""
     tiles = []
-    for name, soft in zip(report.analysis.components, report.analysis.compliance_diagonal, strict=True):
-        value, _, unit = engineering(soft, QUANTITIES[f"compliance_{name}"].unit).partition(" ")
+    for name, compliance in zip(report.analysis.components, report.analysis.compliance_diagonal, strict=True):
+        value, _, unit = engineering(compliance, QUANTITIES[f"compliance_{name}"].unit).partition(" ")
         tiles.append(f"<div><dt>C {name}</dt><dd>{value} <small>{unit or '&nbsp;'}</small></dd></div>")
     return f"<dl>{''.join(tiles)}</dl>"

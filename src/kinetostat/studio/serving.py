@@ -1,4 +1,7 @@
-"""The studio as a web server on this computer: who may reach it, how much may be sent, what is served."""
+"""The studio as a web server on this computer: its address, its limits, and the page that it serves.
+
+What is on the page is the business of `page`.
+"""
 
 import asyncio
 import socket
@@ -22,10 +25,10 @@ STYLE = Path(__file__).parent / "style.css"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 """Names under which only this computer can be reached."""
 SWITCH = 0.0005
-"""Seconds after which a thread that computes lets the event loop have its turn; ten times as often as is usual, so that
-messages of many tabs do not pile up and are not taken for silence."""
-KEPT = "machine"
-"""Under which a tab's work is remembered while the server runs."""
+"""Seconds after which a computing thread lets the event loop run: a tenth of Python's default. With many tabs, messages
+would otherwise pile up until browsers take the silence for a lost connection."""
+MEMORY = "machine"
+"""Key under which the work of a tab is remembered while the server runs."""
 LARGEST_BODY = LARGEST_FILE + (64 << 10)
 """Bytes of a request: a machine file and what a form adds to it."""
 MARK = (
@@ -37,19 +40,19 @@ MARK = (
 
 
 class BoundedBody:
-    """Refuses requests that are larger than a machine file can be, while they arrive."""
+    """Middleware that cuts off requests larger than a machine file can be, while they arrive."""
 
     def __init__(self, served: ASGIApp, largest: int = LARGEST_BODY) -> None:
-        """Serve `served`, requests up to `largest` bytes."""
+        """Pass requests of up to `largest` bytes on to `served`."""
         self._served, self._largest = served, largest
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, cut off where it is too large."""
+        """Pass a request on, or refuse it: by its announced length at once, otherwise once too much has arrived."""
         if scope["type"] != "http":
             await self._served(scope, receive, send)
             return
-        said = next((value for name, value in scope["headers"] if name == b"content-length"), b"0")
-        if said.isdigit() and int(said) > self._largest:
+        announced = next((value for name, value in scope["headers"] if name == b"content-length"), b"0")
+        if announced.isdigit() and int(announced) > self._largest:
             await send({"type": "http.response.start", "status": 413, "headers": [(b"content-length", b"0")]})
             await send({"type": "http.response.body", "body": b""})
             return
@@ -68,15 +71,15 @@ def serve(machine: Machine, name: str, host: str, port: int, browser: bool, stat
     """Serve the studio until it is stopped; every page starts with this machine.
 
     Args:
-        machine: what a new page shows.
-        name: of it, if it is bundled; otherwise empty.
-        host: address to listen at.
-        port: to listen at.
+        machine: that a new page shows.
+        name: of the machine if it is bundled, else empty.
+        host: address at which to listen.
+        port: at which to listen.
         browser: whether to open a browser.
         state: folder of searches and favourites.
 
     Raises:
-        InputError: nothing can listen there.
+        InputError: the address is not one of this computer, or the port is in use.
     """
     _check_free(host, port)
     sys.setswitchinterval(SWITCH)
@@ -89,7 +92,7 @@ def serve(machine: Machine, name: str, host: str, port: int, browser: bool, stat
 
 
 def _check_free(host: str, port: int) -> None:
-    """Refuse an address that this computer does not have, or a port that is in use."""
+    """Refuse an address that this computer does not have, or a port that is in use, before anything is started."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         with socket.socket(family) as trial:
@@ -98,12 +101,12 @@ def _check_free(host: str, port: int) -> None:
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(
-            f"the studio cannot listen at {host}, port {port}: {reason}; choose another with --port or --host."
+            f"the studio cannot listen at {host}, port {port}: {reason}; choose another one with --port or --host."
         ) from None
 
 
 async def _announce(host: str, port: int) -> None:
-    """Say where the studio is, once it listens."""
+    """Print the address of the studio once it listens."""
     while not Server.instance.started:
         await asyncio.sleep(0.02)
     shown = f"[{host}]" if ":" in host else host
@@ -111,13 +114,14 @@ async def _announce(host: str, port: int) -> None:
 
 
 def prepare(machine: Machine, name: str, workshop: Workshop, hosts: Sequence[str] = ()) -> None:
-    """Make the page known to the server.
+    """Register the page with the server.
 
     Args:
-        machine: what a new page shows.
-        name: of it, if it is bundled; otherwise empty.
-        workshop: what all pages share.
-        hosts: names by which a browser may call this server: a page of another site cannot reach it under its own name.
+        machine: that a new page shows.
+        name: of the machine if it is bundled, else empty.
+        workshop: searches and favourites of all pages.
+        hosts: names by which a browser may address this server; any name if empty. The check stops pages of other
+            sites, whose own names could be made to point here.
     """
     app.add_middleware(BoundedBody)
     app.on_shutdown(workshop.close)
@@ -133,12 +137,12 @@ async def show(machine: Machine, name: str, workshop: Workshop) -> None:
     """Build the page of one browser tab; a tab that is loaded again goes on where it was.
 
     Args:
-        machine: what a new tab shows.
-        name: of it, if it is bundled; otherwise empty.
-        workshop: what all pages share.
+        machine: that a new tab shows.
+        name: of the machine if it is bundled, else empty.
+        workshop: searches and favourites of all pages.
     """
     ui.add_css(STYLE)
     await ui.context.client.connected()
     remembered = app.storage.tab
-    kept = remembered.get(KEPT) or Memory(machine, name)
-    StudioPage(kept, lambda memory: remembered.update({KEPT: memory}), workshop)
+    memory = remembered.get(MEMORY) or Memory(machine, name)
+    StudioPage(memory, lambda changed: remembered.update({MEMORY: changed}), workshop)

@@ -1,4 +1,7 @@
-"""One designer's machine: what it is now, what it was, how it changes. Knows no page."""
+"""The machine of one designer and its history: every change, undo and redo.
+
+No element of a page is known here, so that tests drive a session directly.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,13 +21,13 @@ REMEMBERED = 200
 
 @dataclass(frozen=True)
 class Memory:
-    """What a session remembers of a machine: nothing in it changes, so that it may be kept and shared.
+    """The state of a session as frozen data, kept by the server while the browser loads the page again.
 
     Attributes:
-        origin: as it was loaded.
+        origin: the machine as it was loaded.
         name: of a bundled machine; empty for any other.
-        now: as it is; `origin` if None.
-        past: what it was, the latest last.
+        now: the machine as it is; `origin` if None.
+        past: earlier states of the machine, the latest last.
         exaggeration: of the deflected shape; None to choose one for every load.
     """
 
@@ -39,14 +42,15 @@ class Session:
     """A machine and its history.
 
     Attributes:
-        machine: as it is now; it need not be able to reach its pose.
-        origin: as it was loaded; `name` if it is a bundled one.
-        controls: its numbers with their ranges, fixed when it was loaded.
+        machine: as it is now; its pose may be out of reach.
+        origin: as it was loaded.
+        name: of a bundled machine; empty for any other.
+        controls: its numbers with their ranges, which stay fixed so that sliders do not move under the hand.
         exaggeration: factor of its deflected shape, None to choose one for every load; it has no history.
     """
 
     def __init__(self, memory: Memory) -> None:
-        """A session that goes on from what is remembered."""
+        """Go on from what is remembered."""
         self._start(memory)
 
     def _start(self, memory: Memory) -> None:
@@ -54,7 +58,7 @@ class Session:
         self.origin = machine
         self.machine = memory.now or machine
         length = float(respond(machine).configuration.length)
-        self.controls: dict[str, Control] = {one.path: one for one in controls(machine, length)}
+        self.controls: dict[str, Control] = {control.path: control for control in controls(machine, length)}
         self.exaggeration = memory.exaggeration
         self._past = [*memory.past]
         self._future: list[Machine] = []
@@ -62,57 +66,50 @@ class Session:
 
     @property
     def memory(self) -> Memory:
-        """All that is needed to go on later."""
+        """The state from which another session can go on."""
         return Memory(self.origin, self.name, self.machine, tuple(self._past), self.exaggeration)
 
     def open(self, name: str) -> None:
-        """Take a bundled machine.
+        """Open a bundled machine.
 
         Raises:
-            InputError: no such machine; the session stays as it was.
+            InputError: there is no such machine; the session stays as it was.
         """
         if name not in bundled():
             raise InputError(f"{shorten(name)} is not a bundled machine; choose one of {', '.join(bundled())}.")
         self._start(Memory(load(name), name))
 
     def open_bytes(self, data: bytes, name: str) -> None:
-        """Take a machine file that was sent: data only, of bounded size.
+        """Open a machine file that was sent by the browser.
 
         Raises:
-            InputError: too large, not text, or a mistake in it; the session stays as it was.
+            InputError: it is too large, is not text, or has a mistake; the session stays as it was.
         """
-        if len(data) > LARGEST_FILE:
-            raise InputError(f'"{name}" is larger than {LARGEST_FILE >> 20} MiB; a machine file is a short TOML text.')
-        try:
-            text = data.decode("utf-8")
-        except UnicodeDecodeError:
-            raise InputError(f'"{name}" is not text; a machine file is TOML, saved as UTF-8.') from None
-        self._start(Memory(build(parse(text, name), name)))
+        self._start(Memory(build(parse(sent_text(data, name), name), name)))
 
     def take(self, machine: Machine) -> bool:
-        """Take another design; returns whether it is one step of the history, as any of a machine of the same kind is.
+        """Take another design: as a change that can be undone if it is of the same kind, else as a new machine.
 
-        A machine of another kind is taken as one that was loaded.
+        Returns:
+            Whether it is of the same kind, so that all controls are still valid.
         """
-        alike = (
-            machine.family.name == self.machine.family.name and values(machine).keys() == values(self.machine).keys()
-        )
+        same_family = machine.family.name == self.machine.family.name
+        alike = same_family and values(machine).keys() == values(self.machine).keys()
         if alike:
-            self._past = [*self._past[-REMEMBERED + 1 :], self.machine]
-            self._future.clear()
+            self._note()
             self.machine, self._dragged = machine, ()
         else:
             self._start(Memory(machine))
         return alike
 
     def value(self, path: str) -> float:
-        """The SI value of a control; of one for several entries the first."""
+        """The SI value of a control; the first one if it moves several entries."""
         return float(values(self.machine)[self.controls[path].parameter.leaves[0]])
 
     def values(self) -> dict[str, float]:
         """The SI values of all controls."""
-        held = values(self.machine)
-        return {path: float(held[control.parameter.leaves[0]]) for path, control in self.controls.items()}
+        present = values(self.machine)
+        return {path: float(present[control.parameter.leaves[0]]) for path, control in self.controls.items()}
 
     def slide(self, path: str, position: int) -> None:
         """Move a slider; all movements until `settle` are one step of the history.
@@ -123,10 +120,10 @@ class Session:
         self._change({path: self.controls[path].value_at(position)})
 
     def settle(self) -> None:
-        """Let go of what is being dragged: what was changed is now checked against everything else.
+        """End a drag, and check the numbers that changed against all others.
 
         Raises:
-            InputError: the numbers contradict each other; the machine is again what it was before.
+            InputError: the numbers contradict each other; the machine is again as it was before the drag.
         """
         dragged, self._dragged = self._dragged, ()
         if any(related(self.machine, path) for path in dragged):
@@ -137,17 +134,17 @@ class Session:
                 raise
 
     def write(self, path: str, text: str) -> None:
-        """Give a number as text with a unit.
+        """Set a number from text with a unit.
 
         Raises:
-            InputError: it is not one, or the machine cannot have it.
+            InputError: the text is not such a number, or the machine cannot have it.
         """
         self.settle()
         self._change({path: read_value(self.machine, path, text)})
         self.settle()
 
     def move(self, where: Mapping[str, float]) -> None:
-        """Set several numbers at once, SI, as by a click on a map; repeated moves of the same are one step.
+        """Set several numbers at once, in SI, as a click on the map does; repeated moves of the same are one step.
 
         Raises:
             InputError: the machine cannot have them.
@@ -158,19 +155,22 @@ class Session:
         new = changed(self.machine, numbers)
         paths = tuple(numbers)
         if self._dragged != paths:
-            self._past = [*self._past[-REMEMBERED + 1 :], self.machine]
+            self._note()
         self._dragged = paths
         self._future.clear()
         self.machine = new
 
+    def _note(self) -> None:
+        """Add the present machine to the history; a new branch begins, so nothing can be redone."""
+        self._past = [*self._past[-REMEMBERED + 1 :], self.machine]
+        self._future.clear()
+
     @property
     def can_undo(self) -> bool:
-        """Whether there is a step to undo."""
         return bool(self._past)
 
     @property
     def can_redo(self) -> bool:
-        """Whether there is an undone step."""
         return bool(self._future)
 
     def undo(self) -> None:
@@ -180,7 +180,7 @@ class Session:
             self.machine, self._dragged = self._past.pop(), ()
 
     def redo(self) -> None:
-        """Take back an undo, if there is one."""
+        """Take back the last undo, if there is one."""
         if self._future:
             self._past.append(self.machine)
             self.machine, self._dragged = self._future.pop(), ()
@@ -188,11 +188,28 @@ class Session:
     def reset(self) -> None:
         """Return to the machine as it was loaded; this can be undone."""
         if self.machine is not self.origin:
-            self._past.append(self.machine)
-            self._future.clear()
+            self._note()
             self.machine, self._dragged = self.origin, ()
 
     def as_file(self) -> tuple[str, bytes]:
         """A file name and the machine as TOML."""
-        kept = "".join(c if c.isalnum() and c.isascii() else "-" for c in self.machine.name.lower()).strip("-")
-        return f"{kept or 'machine'}.toml", as_toml(self.machine).encode()
+        name = "".join(c if c.isalnum() and c.isascii() else "-" for c in self.machine.name.lower()).strip("-")
+        return f"{name or 'machine'}.toml", as_toml(self.machine).encode()
+
+
+def sent_text(data: bytes, name: str) -> str:
+    """Return the text of a file that was sent by a browser; a limit on its size protects the server.
+
+    Args:
+        data: content of the file.
+        name: of the file, for messages.
+
+    Raises:
+        InputError: it is too large or is not text.
+    """
+    if len(data) > LARGEST_FILE:
+        raise InputError(f'"{name}" is larger than {LARGEST_FILE >> 20} MiB; the file should be a short TOML text.')
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f'"{name}" is not text; the file should be TOML, saved as UTF-8.') from None

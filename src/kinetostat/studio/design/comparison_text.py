@@ -1,4 +1,7 @@
-"""Designs side by side as HTML: where they differ, how stiff each is, who gains what. Rounds, and computes nothing."""
+"""Two to four designs side by side as HTML: how stiff each is, where they differ, and what makes each compliant.
+
+The numbers come from `studies.comparison`; here they are only rounded and arranged.
+"""
 
 import math
 import string
@@ -10,41 +13,44 @@ from kinetostat.studio.wording import DASH, engineering, gains, heading, paragra
 from kinetostat.views.tables import readable
 
 SAME = 0.05
-"""Percent up to which there is no difference worth a number."""
+"""Percent of difference up to which two values are shown as equal."""
 MOST_SHARES = 3
+"""Parts that are named for a direction."""
+LEAST_SHARE = 0.005
+"""Share below which a part is not named: it would read 0 %."""
 
 
-def comparison_text(found: Comparison) -> str:
-    """Everything that the comparison has to say."""
-    letters = string.ascii_uppercase[: len(found.designs)]
+def comparison_text(comparison: Comparison) -> str:
+    """Return the whole comparison: gains, values at the pose of each design, differences, contributions."""
+    letters = string.ascii_uppercase[: len(comparison.designs)]
     parts = [
-        _legend(found, letters),
-        heading("Times stiffer than A; softer in orange; bars are logarithmic"),
-        _gains(found, letters),
+        _legend(comparison, letters),
+        heading("Stiffness, times that of A (logarithmic bars; orange: less stiff)"),
+        _gains(comparison, letters),
     ]
-    parts += [heading("At the pose of each design"), _rows(found, letters)]
-    parts += [heading("Where they differ"), _differences(found, letters)]
-    if any(found.softest):
-        blame = [[letter, *_softest(own)] for letter, own in zip(letters, found.softest, strict=True)]
+    parts += [heading("At the pose of each design"), _rows(comparison, letters)]
+    parts += [heading("Where they differ"), _differences(comparison, letters)]
+    if any(comparison.softest):
+        parts_of = [[letter, *_softest(weakest)] for letter, weakest in zip(letters, comparison.softest, strict=True)]
         title = "Largest contributions in the softest directions"
-        parts += [heading(title), table(title, ["", "rotation", "translation"], blame, "words")]
+        parts += [heading(title), table(title, ["", "rotation", "translation"], parts_of, "words")]
     return "".join(parts)
 
 
-def _legend(found: Comparison, letters: str) -> str:
+def _legend(comparison: Comparison, letters: str) -> str:
     items = []
-    for letter, design in zip(letters, found.designs, strict=True):
-        why = "" if design.answered else f": {design.analysis.message}"
-        items.append(f"<li><b>{letter}</b> {escape(design.label + why)}</li>")
+    for letter, design in zip(letters, comparison.designs, strict=True):
+        reason = "" if design.answered else f": {design.analysis.message}"
+        items.append(f"<li><b>{letter}</b> {escape(design.label + reason)}</li>")
     return f'<ul class="legend">{"".join(items)}</ul>'
 
 
-def _gains(found: Comparison, letters: str) -> str:
-    """Compliance of A over that of each other design."""
-    own = [row for row in found.rows if row.group == "compliance"]
+def _gains(comparison: Comparison, letters: str) -> str:
+    """Return bars of the compliance of A over that of each other design."""
+    compliances = [row for row in comparison.rows if row.group == "compliance"]
     columns = []
     for k, letter in enumerate(letters[1:], 1):
-        known = [(row.name.removeprefix("C_"), _gain(row, k)) for row in own]
+        known = [(row.name.removeprefix("C_"), _gain(row, k)) for row in compliances]
         shown = gains(f"{letter} against A", [(name, gain) for name, gain in known if gain is not None])
         columns.append(f"<div><h4>{letter}</h4>{shown}</div>")
     return f'<div class="gains">{"".join(columns)}</div>'
@@ -57,9 +63,9 @@ def _gain(row: Row, k: int) -> float | None:
     return first / other
 
 
-def _rows(found: Comparison, letters: str) -> str:
+def _rows(comparison: Comparison, letters: str) -> str:
     head = "".join(f'<th scope="col">{letter}</th>' for letter in letters)
-    body = "".join(_row(row) for row in found.rows)
+    body = "".join(_row(row) for row in comparison.rows)
     caption = "<caption>At the pose of each design</caption>"
     return f'<table class="figures">{caption}<thead><tr><th></th>{head}</tr></thead><tbody>{body}</tbody></table>'
 
@@ -83,25 +89,26 @@ def _change(row: Row, percent: float | None) -> str:
     return f' <span class="change {kind}">{shown}</span>'
 
 
-def _differences(found: Comparison, letters: str) -> str:
+def _differences(comparison: Comparison, letters: str) -> str:
     rows = []
-    for one in found.differences:
-        pairs = zip(one.values, one.parameters, strict=True)
-        rows.append([one.path, *(readable(values, p.quantity) if p else DASH for values, p in pairs)])
-    families = [design.machine.family.name for design in found.designs]
+    for difference in comparison.differences:
+        pairs = zip(difference.values, difference.parameters, strict=True)
+        rows.append([difference.path, *(readable(values, p.quantity) if p else DASH for values, p in pairs)])
+    families = [design.machine.family.name for design in comparison.designs]
     if len(set(families)) > 1:
         rows = [["family", *families], *rows]
-    return table("Where they differ", ["", *letters], rows) if rows else paragraph("They do not differ.")
+    return table("Where they differ", ["", *letters], rows) if rows else paragraph("The designs do not differ.")
 
 
-def _softest(own: tuple[Blame, ...]) -> list[str]:
-    turning = next((one for one in own if one.component.startswith("r")), None)
-    sliding = next((one for one in own if not one.component.startswith("r")), None)
-    return [_blame(turning), _blame(sliding)]
+def _softest(weakest: tuple[Blame, ...]) -> list[str]:
+    """Write the most compliant rotation and translation of a design, each with the parts that contribute most."""
+    turning = next((each for each in weakest if each.component.startswith("r")), None)
+    sliding = next((each for each in weakest if not each.component.startswith("r")), None)
+    return [_contributions(turning), _contributions(sliding)]
 
 
-def _blame(one: Blame | None) -> str:
-    if one is None:
+def _contributions(weakest: Blame | None) -> str:
+    if weakest is None:
         return DASH
-    parts = [f"{name} {100 * share:.0f} %" for name, share in one.shares[:MOST_SHARES] if share >= 0.005]
-    return f"{one.component}: {', '.join(parts)}"
+    parts = [f"{name} {100 * share:.0f} %" for name, share in weakest.shares[:MOST_SHARES] if share >= LEAST_SHARE]
+    return f"{weakest.component}: {', '.join(parts)}"

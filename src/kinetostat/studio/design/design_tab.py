@@ -1,4 +1,7 @@
-"""The design tab: a study on the left, the search and its answer on the right; the machine stays between them."""
+"""The design tab: a study on the left, searches and their results on the right, the machine between them.
+
+It only arranges the panels of this package and connects them; `Workshop` holds what outlives the page.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -34,18 +37,18 @@ class Workshop:
 
 
 class DesignTab:
-    """Everything of the tab on one page; what it shows outlives the page in the workshop."""
+    """The panels of the tab on one page."""
 
     def __init__(
         self, session: Session, workshop: Workshop, load: Callable[[Machine], None], refuse: Callable[[str], None]
     ) -> None:
-        """Build it, to the left and to the right of the machine.
+        """Build the panels to the left and to the right of the machine.
 
         Args:
             session: whose machine is designed.
-            workshop: of the server.
+            workshop: searches and favourites of the server.
             load: takes a machine into the session.
-            refuse: told what could not be done.
+            refuse: shows a message about something that could not be done.
         """
         self._session, self._workshop = session, workshop
         with ui.element("section").classes("design left").props('aria-label="study"'):
@@ -67,18 +70,18 @@ class DesignTab:
                         self.favourites = FavouritesPanel(session, workshop.favourites, load, refuse, _confirm)
 
     def front(self, on: bool) -> None:
-        """Whether the tab is in front: only then are searches looked at."""
+        """Note whether the tab is in front: only then the page follows its searches."""
         self.runs.timer.active = on
         if on:
             self.favourites.fill()
             self.runs.refresh()
 
     def renew(self) -> None:
-        """Another machine has been loaded."""
+        """Adapt the form to another machine that has been loaded."""
         self.form.renew()
 
     def close(self) -> None:
-        """The page is gone; the searches go on."""
+        """Stop following the searches, because the page is gone; they go on."""
         self.runs.close()
         self.favourites.close()
 
@@ -89,11 +92,11 @@ class DesignTab:
 
 
 def _confirm(question: str, action: Callable[[], None]) -> None:
-    """Ask before something is lost."""
+    """Ask before something is deleted."""
     with ui.dialog(value=True) as window, ui.element("div").classes("confirm-window"):
         ui.label(question)
         with ui.element("div").classes("confirm-buttons"):
-            ui.button("Keep it", on_click=window.close).props("flat no-caps").mark("confirm-no")
+            ui.button("Cancel", on_click=window.close).props("flat no-caps").mark("confirm-no")
 
             def agreed() -> None:
                 action()

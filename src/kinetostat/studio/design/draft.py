@@ -1,4 +1,7 @@
-"""A study in the making: what the form shows of it, and what it carries along unseen. Knows no page."""
+"""A study while it is being written: what the form shows, and what it carries along from a study file.
+
+A draft becomes a `StudyFile` by the same reader as a file does, so that the form and `kinetostat optimize` agree.
+"""
 
 import math
 from dataclasses import dataclass, field
@@ -7,7 +10,7 @@ from typing import Any
 from kinetostat.machine.loading import as_toml, build, bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
-from kinetostat.spec.document import LARGEST_FILE, Document, parse
+from kinetostat.spec.document import Document, parse
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.study import OptimizerTable, StudyFile, read_study
 from kinetostat.spec.study_text import study_toml
@@ -16,13 +19,14 @@ from kinetostat.studies.optimisation.catalogue import ALONG
 from kinetostat.studies.optimisation.problem import Problem, problem_of, settings_of
 from kinetostat.studio.controls import USUAL_STIFFNESS, Control
 from kinetostat.studio.design.state_folder import slug
+from kinetostat.studio.session import sent_text
 from kinetostat.studio.wording import shown
 
 AROUND = 0.2
-"""How far a variable may go about its present value, unless the designer says otherwise."""
+"""Bounds of a new variable, as a share of its present value."""
 FORM = "the study"
-"""What messages call it."""
-MOST_AIMS = 4
+"""Name of a draft in messages, where a file would have its path."""
+MOST_OBJECTIVES = 4
 """Objectives that the form offers; a file may have more."""
 SEARCH = OptimizerTable()
 """The search that is offered first."""
@@ -34,10 +38,9 @@ class Draft:
 
     Attributes:
         name: of the study.
-        machine: that it is about; None for whatever machine is at hand.
-        variables, objectives: tables as in a study file, changed in place by the form.
-        optimizer: likewise.
-        rest: tables that the form does not show.
+        machine: that it is about; None for the machine of the session.
+        variables, objectives, optimizer: tables as in a study file, changed in place by the form.
+        rest: tables of a study file that the form does not show.
     """
 
     name: str
@@ -52,13 +55,13 @@ class Draft:
     rest: dict[str, Any] = field(default_factory=dict)
 
     def study(self, machine: str) -> StudyFile:
-        """The study, about a machine of this name.
+        """The study as a file would hold it, about a machine of this name.
 
         Raises:
-            InputError: what a study file may not say, in the words of `kinetostat optimize`.
+            InputError: a value is not valid; the message is that of `kinetostat optimize`.
         """
         if not self.variables:
-            raise InputError("nothing may change yet; add a variable to the study.")
+            raise InputError("the study has no variable yet; add at least one.")
         document: Document = {
             "schema": 1,
             "name": self.name,
@@ -70,88 +73,90 @@ class Draft:
         }
         return read_study(document, FORM)
 
-    def problem(self, at_hand: Machine) -> Problem:
-        """What is to be solved.
+    def problem(self, present: Machine) -> Problem:
+        """The problem to solve; `present` is the machine of the session.
 
         Raises:
-            InputError: as `study`; or what does not fit the machine.
+            InputError: a value is not valid or does not fit the machine.
         """
-        machine = self.machine or at_hand
+        machine = self.machine or present
         return problem_of(self.study(machine.name), machine)
 
-    def as_file(self, at_hand: Machine) -> tuple[str, bytes]:
-        """A file name and the study as TOML, about a bundled machine with changes, or about a file beside it.
+    def as_file(self, present: Machine) -> tuple[str, bytes]:
+        """A file name and the study as TOML: about a bundled machine with changes, or about a machine file beside it.
 
         Raises:
-            InputError: as `study`.
+            InputError: a value is not valid.
         """
-        machine = self.machine or at_hand
-        name, changes = _named(machine)
+        machine = self.machine or present
+        name, changes = _reference(machine)
         study = self.study(name).model_copy(update={"changes": changes})
         head = "" if name in bundled() else f"# Save the machine beside this file, as {name}.\n"
         return f"{slug(self.name, 'study')}.toml", (head + study_toml(study)).encode()
 
     def unseen(self) -> list[str]:
-        """What the study has that the form does not show, in words."""
+        """Short descriptions of what the study has but the form does not show."""
         poses = self.rest.get("poses", {})
-        found = [f"poses {', '.join(poses['over'])}"] if "over" in poses else []
-        found += [f"{len(poses['list'])} poses"] if "list" in poses else []
+        parts = [f"poses over {', '.join(poses['over'])}"] if "over" in poses else []
+        parts += [_counted(len(poses["list"]), "pose")] if "list" in poses else []
         count = len(self.rest.get("constraints", []))
-        found += [f"{count} constraint{'s' if count > 1 else ''}"] if count else []
+        parts += [_counted(count, "constraint")] if count else []
         tolerances = sum("tolerance" in table for table in self.variables)
-        found += [f"{tolerances} tolerances"] if tolerances else []
-        return found
+        return parts + ([_counted(tolerances, "tolerance")] if tolerances else [])
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def draft_of(study: StudyFile, machine: Machine | None) -> Draft:
-    """A draft from a study that has been read."""
-    held = study.model_dump(mode="json", by_alias=True, exclude_none=True, exclude_defaults=True)
+    """Return a draft of a study that has been read; `machine` None stands for the machine of the session."""
+    tables = study.model_dump(mode="json", by_alias=True, exclude_none=True, exclude_defaults=True)
     known = ("schema", "name", "machine", "set", "variables", "objectives", "optimizer")
     search = {key: getattr(study.optimizer, key) for key in ("population", "generations", "seed")}
     return Draft(
         study.name,
         machine,
-        held["variables"],
-        held["objectives"],
-        {**search, **held.get("optimizer", {})},
-        {key: value for key, value in held.items() if key not in known},
+        tables["variables"],
+        tables["objectives"],
+        {**search, **tables.get("optimizer", {})},
+        {key: value for key, value in tables.items() if key not in known},
     )
 
 
 def bundled_draft(name: str) -> Draft:
-    """The draft of a bundled study."""
+    """Return the draft of a bundled study."""
     study = study_of(name)
     return draft_of(study, load(study.machine, list(settings_of(study.changes))))
 
 
-def sent_draft(data: bytes, name: str, at_hand: Machine) -> Draft:
-    """The draft of a study file that was sent: about a bundled machine, otherwise about the one at hand.
+def sent_draft(data: bytes, name: str, present: Machine) -> Draft:
+    """Return the draft of a study file that was sent by the browser.
 
-    Files of the computer that serves the page are never read for it.
+    A study of a bundled machine is about that machine. Any other is taken to be about the machine of the session,
+    because a path in the file would be one on the server, and no file of the server is ever read for a page.
+
+    Args:
+        data: content of the file.
+        name: of the file, for messages.
+        present: machine of the session.
 
     Raises:
-        InputError: too large, not text, or a mistake in it.
+        InputError: the file is too large, is not text, has a mistake, or does not fit the machine.
     """
-    if len(data) > LARGEST_FILE:
-        raise InputError(f'"{name}" is larger than {LARGEST_FILE >> 20} MiB; a study file is a short TOML text.')
-    try:
-        text = data.decode("utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f'"{name}" is not text; a study file is TOML, saved as UTF-8.') from None
-    study = read_study(parse(text, name), name)
+    study = read_study(parse(sent_text(data, name), name), name)
     changes = list(settings_of(study.changes))
     if study.machine in bundled():
-        found = draft_of(study, load(study.machine, changes))
+        machine: Machine | None = load(study.machine, changes)
     else:
-        found = draft_of(
-            study, build(parse(as_toml(at_hand), at_hand.name), at_hand.name, changes) if changes else None
-        )
-    found.problem(at_hand)
-    return found
+        machine = build(parse(as_toml(present), present.name), present.name, changes) if changes else None
+    draft = draft_of(study, machine)
+    draft.problem(present)
+    return draft
 
 
 def usual_bounds(control: Control, value: float) -> tuple[str, str]:
-    """Bounds about a present value as text: 20 % of it, or of half its slider where that is nothing."""
+    """Return bounds for a new variable as text: 20 % about its value, or of the slider's end if that is zero."""
     quantity = control.parameter.quantity
     middle = value if math.isfinite(value) and (value or not quantity.stiff) else USUAL_STIFFNESS
     around = AROUND * abs(middle) if middle else AROUND * max(control.high, 1e-9)
@@ -160,12 +165,12 @@ def usual_bounds(control: Control, value: float) -> tuple[str, str]:
 
 
 def needs_direction(quantity: str) -> bool:
-    """Whether an objective is along or about a direction."""
+    """Return whether an objective is taken along or about a direction."""
     return quantity in ALONG
 
 
-def _named(machine: Machine) -> tuple[str, dict[str, str]]:
-    """A bundled machine of the same name with what differs from it, or the name of a file."""
+def _reference(machine: Machine) -> tuple[str, dict[str, str]]:
+    """Return how a study file refers to a machine: a bundled one and what differs from it, or the name of a file."""
     for name, text in bundled().items():
         document = parse(text, name)
         if document["name"] != machine.name or document["family"] != machine.family.name:
@@ -177,9 +182,8 @@ def _named(machine: Machine) -> tuple[str, dict[str, str]]:
 
 
 def _changes(machine: Machine, old: dict[str, Any]) -> dict[str, str]:
-    held = values(machine)
     quantities = {leaf: p.quantity for p in parameters(machine.family) for leaf in p.leaves}
-    return {path: quantities[path].show(value) for path, value in held.items() if value != old[path]}
+    return {path: quantities[path].show(value) for path, value in values(machine).items() if value != old[path]}
 
 
 def _without_none(table: dict[str, Any]) -> dict[str, Any]:

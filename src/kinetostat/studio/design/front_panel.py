@@ -1,4 +1,7 @@
-"""A Pareto front on the page: two objectives as a plot, a third one as colour, and all of its designs as a table."""
+"""A Pareto front on the page: two objectives as a plot, a third one as colour, and all designs as a table.
+
+A design is named by its place in the front, sorted by the first objective; clicks on plot and table pass it on.
+"""
 
 from collections.abc import Callable
 
@@ -6,24 +9,25 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from kinetostat.studio.design.progress import Progress
-from kinetostat.studio.elements import DesignTable, FrontView
+from kinetostat.studio.elements import DesignTable, FrontView, choice
 from kinetostat.studio.wording import shown
 from kinetostat.views.display import spoken
 
 NONE = -1
 """The choice of no objective for the colour."""
 DIGITS = 5
-NO_FRONT = "A search for two to four objectives ends in a front; its designs are listed here."
+NO_FRONT = "A study with two to four objectives ends in a Pareto front; its designs will be listed here."
+AXES = {"across": "horizontal axis", "up": "vertical axis", "colour": "colour"}
 
 
 class FrontPanel:
-    """The designs of a front that can be looked at from any two of its objectives; a click takes one."""
+    """The plot of a front over any two of its objectives, and its table."""
 
     def __init__(self, pick: Callable[[int], None]) -> None:
-        """The plot and the choice of its axes; the table has a place of its own.
+        """Build the plot and the choice of its axes; `table` builds the table elsewhere on the page.
 
         Args:
-            pick: told the number of a design, by the first objective, that is wanted.
+            pick: called with the place of the design that was clicked.
         """
         self._pick = pick
         self._progress: Progress | None = None
@@ -31,37 +35,35 @@ class FrontPanel:
         self._asking = False
         with ui.element("div").classes("front-plot") as self.plot:
             with ui.row().classes("panel-tools") as self.tools:
-                self.across, self.up, self.coloured = (self._choice(what) for what in ("across", "up", "colour"))
-            self.view = FrontView("designs that no other beats; arrow keys and Enter, or a click, load one")
+                self.across, self.up, self.coloured = (
+                    choice({}, label, self._chosen_axis, f"front-{mark}") for mark, label in AXES.items()
+                )
+            self.view = FrontView("designs of the Pareto front; a click, or arrow keys and Enter, load one")
             self.view.mark("run-front").on("pick", self._picked)
-
-    def _choice(self, what: str) -> ui.select:
-        choice = ui.select({}, label=what, on_change=self._chosen_axis).mark(f"front-{what}")
-        return choice.props("dense options-dense outlined").classes("field")
 
     def table(self) -> None:
         """Put the table of all designs on the page."""
         self.without = ui.label(NO_FRONT).classes("note")
-        self.rows = DesignTable("designs that no other beats").mark("front-table")
+        self.rows = DesignTable("designs of the Pareto front").mark("front-table")
         self.rows.on("pick", self._picked)
 
     def reveal(self, several: bool) -> None:
-        """Make room for a front, or take it away where there is but one objective."""
+        """Show plot and table where the study has several objectives, else hide them."""
         self.plot.set_visibility(several)
         self.rows.set_visibility(several)
         self.without.set_visibility(not several)
 
     def show(self, progress: Progress, chosen: int | None) -> None:
-        """Show the front of a search with several objectives; `chosen` is the design that was loaded."""
+        """Show the front of a search with several objectives; `chosen` is the place of the design that was loaded."""
         self._progress, self._chosen = progress, chosen
-        names = {k: one.term.label for k, one in enumerate(progress.problem.objectives)}
+        names = {k: objective.term.label for k, objective in enumerate(progress.problem.objectives)}
         if self.across.options != names:
             self._offer(names)
         self._draw()
         self.rows.put(*_table(progress), progress.knee, chosen)
 
     def _offer(self, names: dict[int, str]) -> None:
-        """Axes and colour among other objectives; the choice is worth its place from three on."""
+        """Offer the objectives as axes and colour; with only two, the choice is hidden."""
         self._asking = False
         self.tools.set_visibility(len(names) > 2)
         self.across.set_options(names, value=0)
@@ -84,7 +86,7 @@ class FrontPanel:
                 "points": progress.objectives,
                 "axes": [self.across.value, self.up.value],
                 "coloured": None if self.coloured.value == NONE else self.coloured.value,
-                "labels": [axis_label(one.term.label, one.term.unit) for one in progress.problem.objectives],
+                "labels": [axis_label(aim.term.label, aim.term.unit) for aim in progress.problem.objectives],
                 "knee": progress.knee,
                 "initial": initial if initial and None not in initial else None,
                 "chosen": self._chosen,
@@ -96,20 +98,20 @@ class FrontPanel:
 
 
 def axis_label(label: str, unit: str) -> str:
-    """What an axis says."""
+    """Return the label of an axis, with its unit if it has one."""
     return label if unit == "1" else f"{label} ({unit})"
 
 
 def _table(progress: Progress) -> tuple[list[str], list[list[float]], list[list[str]]]:
-    """Names of the columns, numbers to sort by, and texts: objectives first, then what makes the design."""
+    """Return names of columns, numbers to sort by, and texts: the objectives first, then the variables."""
     space = progress.problem.space
-    goals = [f"{one.goal} {axis_label(spoken(one.term.label), one.term.unit)}" for one in progress.problem.objectives]
+    goals = [f"{aim.goal} {axis_label(spoken(aim.term.label), aim.term.unit)}" for aim in progress.problem.objectives]
     designs = [] if progress.genes is None else space.values(progress.genes).tolist()
     values, texts = [], []
-    for worth, design in zip(progress.objectives, designs, strict=True):
-        values.append([*worth, *design])
-        held = zip(space.searched, design, strict=True)
-        sizes = [one.shown(size) if one.choices is not None else shown(one.quantity, size) for one, size in held]
-        texts.append([*(f"{value:.{DIGITS}g}" for value in worth), *sizes])
+    for objectives, design in zip(progress.objectives, designs, strict=True):
+        values.append([*objectives, *design])
+        pairs = zip(space.searched, design, strict=True)
+        sizes = [v.shown(size) if v.choices is not None else shown(v.quantity, size) for v, size in pairs]
+        texts.append([*(f"{value:.{DIGITS}g}" for value in objectives), *sizes])
     names = [spoken(variable.name.removeprefix("geometry.")) for variable in space.searched]
     return [*goals, *names], values, texts

@@ -1,4 +1,7 @@
-"""How far a search is, read from its folder while another process is at work there. Knows no page."""
+"""The progress of a search, read from its folder while another process writes there.
+
+Only what is new since the last look is read. Nothing of a page is known here.
+"""
 
 import json
 from dataclasses import dataclass, field
@@ -17,18 +20,20 @@ from kinetostat.studio.design.runs import FAILURE, RESULT, Run, Stage
 
 @dataclass(frozen=True)
 class Progress:
-    """What is known of a search.
+    """The state of a search.
 
     Attributes:
-        run: as it is now.
+        run: the search as it is listed now.
         problem: that it solves.
-        steps: made, of `total` (0 if not known yet).
-        designs: judged.
-        best, mean: objective after each step; None where there is none. Empty for several objectives.
-        objectives: of the designs that none of those kept beats, by the first one [designs x objectives].
+        steps: that are done.
+        total: steps of the whole search; 0 if not known yet.
+        designs: that have been evaluated.
+        best, mean: objective after each step, None where no design was feasible; empty for several objectives.
+        objectives: of the Pareto front (for one objective, of the best design), sorted by the first
+            [designs x objectives].
         genes: of these designs [designs x variables].
-        knee: place among them of the one that is called the best.
-        result: as `optimize --json` has it; None while it is not written.
+        knee: place of the recommended design among them.
+        result: as `optimize --json` prints it; None until it is written.
     """
 
     run: Run
@@ -44,17 +49,17 @@ class Progress:
     result: dict[str, Any] | None = None
 
     def design(self, place: int) -> Machine:
-        """A design of the front, or with one objective the best design, as a machine."""
+        """The design at a place of the front as a machine; with one objective, place 0 is the best design."""
         if self.genes is None or not 0 <= place < len(self.genes):
             raise IndexError(place)
         return designed(self.problem, self.genes[place])
 
 
 class Follower:
-    """Reads what is new in the folder of one search."""
+    """Reads the records that a search adds to its folder, each once."""
 
     def __init__(self, run: Run) -> None:
-        """Follow a search.
+        """Follow a search from its beginning.
 
         Raises:
             InputError: its folder cannot be read.
@@ -66,7 +71,7 @@ class Follower:
         self._place = 0
 
     def progress(self, run: Run) -> Progress:
-        """How far it is."""
+        """Read what is new, and return the state of the search."""
         new, self._place = noted(self._folder, self._place)
         self._records += [{key: record.get(key) for key in ("best", "mean", "designs")} for record in new]
         self._last = new[-1] if new else self._last
@@ -93,13 +98,13 @@ class Follower:
 
 def _result(folder: Path) -> dict[str, Any] | None:
     try:
-        found = json.loads((folder / RESULT).read_text("utf-8"))
+        result = json.loads((folder / RESULT).read_text("utf-8"))
     except (OSError, ValueError):
         return None
-    return found if isinstance(found, dict) else None
+    return result if isinstance(result, dict) else None
 
 
 def failure(run: Run) -> str:
-    """Why a search could not go on; empty where it could."""
+    """Return the reason why a search failed; empty if it did not."""
     path = run.folder / FAILURE
     return path.read_text("utf-8") if run.stage is Stage.FAILED and path.exists() else ""

@@ -1,4 +1,7 @@
-"""The answer to a study as HTML: the best design beside the machine as it was. Nothing is computed but rounding."""
+"""The result of a study as HTML: the best design next to the initial one.
+
+The numbers are those of `optimize --json`; here they are only rounded and arranged.
+"""
 
 import math
 from typing import Any
@@ -7,58 +10,58 @@ from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studio.design.progress import Progress
 from kinetostat.studio.wording import DASH, engineering, gains, heading, paragraph, shown, table
 
-MUCH = 0.01
-"""Stiffness that is left, as a share, below which the loss is pointed out."""
-FEW = 1e-4
+SACRIFICED = 0.01
+"""Share of the stiffness below which the loss in a direction is pointed out."""
+NEGLIGIBLE = 1e-4
 """Percent per percent below which a 0 is shown."""
 EXACT = 9
 """Digits of an objective."""
 
 
 def result_text(progress: Progress) -> str:
-    """All tables of a search that has an answer; what is known so far of one that has none yet."""
-    found = progress.result
-    if found is None:
+    """Return all tables of a search that has ended, or the best design so far of one that has not."""
+    result = progress.result
+    if result is None:
         return _so_far(progress)
-    if found["status"] != "ok":
-        return paragraph(str(found["message"]), "lead")
-    several = found["objective"] is None
-    parts = [paragraph(str(found["message"]), "note"), _worth(found, "knee" if several else "best")]
-    parts += [_design(progress.problem, found), _directions(found), _robustness(found)]
-    return "".join(parts + [paragraph(line) for line in _remarks(found)])
+    if result["status"] != "ok":
+        return paragraph(str(result["message"]), "lead")
+    several = result["objective"] is None
+    parts = [paragraph(str(result["message"]), "note"), _objectives(result, "knee" if several else "best")]
+    parts += [_design(progress.problem, result), _directions(result), _robustness(result)]
+    return "".join(parts + [paragraph(line) for line in _remarks(result)])
 
 
 def _so_far(progress: Progress) -> str:
     if not progress.objectives:
         return paragraph("No feasible design has been found so far." if progress.steps else "The search is starting.")
     if len(progress.problem.objectives) > 1:
-        return paragraph(
-            f"{len(progress.objectives)} designs that none beats so far. Click one in the plot to load it."
-        )
+        count = len(progress.objectives)
+        return paragraph(f"The Pareto front has {count} designs so far. Click one in the plot to load it.")
     aim = progress.problem.objectives[0]
     rows = [[f"{aim.goal} {aim.term.label}", _exact(progress.objectives[0][0], aim.term.unit)]]
     if progress.genes is not None:
         space = progress.problem.space
-        held = zip(space.searched, space.values(progress.genes[0]), strict=True)
-        rows += [[variable.name, variable.shown(value)] for variable, value in held]
+        pairs = zip(space.searched, space.values(progress.genes[0]), strict=True)
+        rows += [[variable.name, variable.shown(value)] for variable, value in pairs]
     return heading("Best so far") + table("Best so far", ["", "best"], rows)
 
 
-def _worth(found: dict[str, Any], best: str) -> str:
+def _objectives(result: dict[str, Any], best: str) -> str:
     rows = []
-    for label, after in found["objectives"].items():
-        before = found["initial"]["objectives"][label]
+    for label, after in result["objectives"].items():
+        before = result["initial"]["objectives"][label]
         rows.append([label, _exact(before), _exact(after), _ratio(before, after)])
-    for label, after in found["constraints"].items():
-        rows.append([label, _exact(found["initial"]["constraints"][label]), _exact(after), ""])
-    return heading("Worth") + table("Worth", ["", "initial", best, "ratio"], rows)
+    for label, after in result["constraints"].items():
+        rows.append([label, _exact(result["initial"]["constraints"][label]), _exact(after), ""])
+    title = "Objectives and constraints" if result["constraints"] else "Objectives" if len(rows) > 1 else "Objective"
+    return heading(title) + table(title, ["", "initial", best, "ratio"], rows)
 
 
-def _design(problem: Problem, found: dict[str, Any]) -> str:
+def _design(problem: Problem, result: dict[str, Any]) -> str:
     rows = []
-    bounds, slopes = found["at_bounds"], found["sensitivity"]
+    bounds, slopes = result["at_bounds"], result["sensitivity"]
     first = {variable.name: variable for variable in problem.space.searched}
-    for path, value in found["variables"].items():
+    for path, value in result["variables"].items():
         variable = first.get(path)
         if variable is None or variable.choices is not None:
             before, after = DASH, f"{value:.6g}"
@@ -67,34 +70,37 @@ def _design(problem: Problem, found: dict[str, Any]) -> str:
             before, after = (shown(variable.quantity, v) for v in (variable.initial, value))
         percents = slopes.get(path, {}).get("percent_per_percent", [])
         rows.append([path, before, after, bounds.get(path, ""), ", ".join(_percent(p) for p in percents)])
-    note = paragraph("% per %: of the objective per percent of the variable, of an angle per 0.01 rad.", "note")
+    note = paragraph("% per %: change of the objective per percent of the variable; of an angle, per 0.01 rad.", "note")
     return heading("Design") + table("Design", ["", "initial", "best", "bound", "% per %"], rows, "design") + note
 
 
-def _directions(found: dict[str, Any]) -> str:
-    rows = [(one["name"].removeprefix("compliance_"), one["gain"]) for one in found["directions"]]
-    over = "" if found["poses"]["count"] == 1 else ", the worst of all poses"
-    return heading(f"Times stiffer{over}") + gains("times stiffer", [row for row in rows if row[1] is not None])
+def _directions(result: dict[str, Any]) -> str:
+    rows = [(each["name"].removeprefix("compliance_"), each["gain"]) for each in result["directions"]]
+    over = "" if result["poses"]["count"] == 1 else " (worst of all poses)"
+    title = f"Stiffness, times that of the initial design{over}"
+    return heading(title) + gains("stiffness gain", [row for row in rows if row[1] is not None])
 
 
-def _robustness(found: dict[str, Any]) -> str:
-    scatter = found["robustness"]
+def _robustness(result: dict[str, Any]) -> str:
+    scatter = result["robustness"]
     if scatter is None:
         return ""
     keys = ("nominal", "mean", "percentile_95", "worst")
-    rows = [[label, *(_exact(one[key], digits=6) for key in keys)] for label, one in scatter["objectives"].items()]
-    title = f"Under the tolerances, {scatter['machines']:,} machines"
+    rows = [
+        [label, *(_exact(spread[key], digits=6) for key in keys)] for label, spread in scatter["objectives"].items()
+    ]
+    title = f"With tolerances: {scatter['machines']:,} machines"
     return heading(title) + table(title, ["", "nominal", "mean", "95 % within", "worst"], rows)
 
 
-def _remarks(found: dict[str, Any]) -> list[str]:
-    bounded = [f"{name} ({bound})" for name, bound in found["at_bounds"].items()]
-    said = [f"At its bounds: {', '.join(bounded)}; wider ones would be used."] if bounded else []
-    for one in found["directions"]:
-        if one["gain"] is not None and one["gain"] < MUCH:
-            name = one["name"].removeprefix("compliance_")
-            said.append(f"The best design gives up {name}: {one['gain']:.2g} of its stiffness is left.")
-    return said + (found["ridges_told"] if found["front"] is None else [])
+def _remarks(result: dict[str, Any]) -> list[str]:
+    bounded = [f"{name} ({bound})" for name, bound in result["at_bounds"].items()]
+    remarks = [f"At a bound: {', '.join(bounded)}. Wider bounds would allow a better design."] if bounded else []
+    for each in result["directions"]:
+        if each["gain"] is not None and each["gain"] < SACRIFICED:
+            name = each["name"].removeprefix("compliance_")
+            remarks.append(f"In {name}, the best design keeps only {each['gain']:.2g} of the initial stiffness.")
+    return remarks + (result["ridges_told"] if result["front"] is None else [])
 
 
 def _exact(value: float | None, unit: str = "", digits: int = EXACT) -> str:
@@ -108,4 +114,4 @@ def _ratio(before: float | None, after: float | None) -> str:
 
 
 def _percent(value: float | None) -> str:
-    return DASH if value is None else "0" if abs(value) < FEW else f"{value:.3g}"
+    return DASH if value is None else "0" if abs(value) < NEGLIGIBLE else f"{value:.3g}"

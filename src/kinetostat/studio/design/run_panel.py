@@ -1,4 +1,7 @@
-"""Searches on the page: which there are, how far one is, its plot and its answer, stop and go on."""
+"""Searches on the page: the list, and of one search its progress, plot, result, stop and resume.
+
+`runs` starts and stops processes, `progress` reads their folders; this panel looks at them twice a second, in a thread.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,20 +14,22 @@ from kinetostat.studio.design.front_panel import FrontPanel, axis_label
 from kinetostat.studio.design.progress import Follower, Progress, failure
 from kinetostat.studio.design.result_text import result_text
 from kinetostat.studio.design.runs import Run, Runs, Stage
-from kinetostat.studio.elements import CurveView
+from kinetostat.studio.elements import MAIN_BUTTON, CurveView, choice, icon_button
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.wording import paragraph
 
-NOTHING = "Nothing has been searched yet: say on the left what may change and what is wanted, then start."
+NOTHING = "There is no search yet. Choose variables and objectives on the left, then start one."
 GLANCE = 0.5
 """Seconds between two looks at a search."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """What a page wants to know: the searches there are, and how far one of them is (0 for none).
+    """A request for the list of searches and the progress of one of them.
 
-    `follower` is of the search that was looked at last.
+    Attributes:
+        number: of the search; 0 for the latest.
+        follower: of the search that was shown last, which has read a part of its records already.
     """
 
     number: int
@@ -33,7 +38,7 @@ class Look:
 
 @dataclass(frozen=True)
 class Seen:
-    """All searches; progress of one, or why it cannot be shown."""
+    """All searches, and the progress of one or the reason why it cannot be shown."""
 
     runs: list[Run]
     follower: Follower | None = None
@@ -42,7 +47,7 @@ class Seen:
 
 
 class RunPanel:
-    """A list of searches with the one in front: progress, plot, answer."""
+    """The list of searches, and one of them in front with its progress, plot and result."""
 
     def __init__(
         self,
@@ -51,13 +56,13 @@ class RunPanel:
         refuse: Callable[[str], None],
         confirm: Callable[[str, Callable[[], None]], None],
     ) -> None:
-        """A panel.
+        """Build the panel without the result, for which `answer` makes a place.
 
         Args:
-            runs: of the server.
+            runs: searches of the server.
             load: takes a machine into the session.
-            refuse: told what could not be done.
-            confirm: asks before something is deleted.
+            refuse: shows a message about something that could not be done.
+            confirm: asks a question, then does something.
         """
         self._runs, self._load, self._refuse, self._confirm = runs, load, refuse, confirm
         self._lane = Lane(self._look, self._deliver)
@@ -66,48 +71,42 @@ class RunPanel:
         self._shown: object = None
         self._place: int | None = None
         with ui.element("div").classes("design-head"):
-            self.choice = ui.select({}, label="search", on_change=self._chosen).mark("run-choice")
-            self.choice.props("dense options-dense outlined").classes("field grow")
-            self.stop = self._button("stop", "Stop after this step; all that was found is kept", self._stop)
-            self.go_on = self._button("play_arrow", "Go on where it was stopped", self._go_on)
-            self.delete = self._button("delete", "Delete this search", self._delete)
+            self.choice = choice({}, "search", self._chosen, "run-choice").classes("grow")
+            self.stop = icon_button("stop", "Stop after this step; all results are kept", self._stop, "run-stop")
+            self.go_on = icon_button("play_arrow", "Resume where it was stopped", self._go_on, "run-play_arrow")
+            self.delete = icon_button("delete", "Delete this search", self._delete, "run-delete")
         self.bar = ui.linear_progress(0.0, show_value=False, size="4px").props('aria-label="progress"').mark("run-bar")
         self.line = ui.label("").classes("run-line").props('role="status"').mark("run-line")
-        self.curve = CurveView("objective of the best design and mean over the steps").mark("run-curve")
+        self.curve = CurveView("objective of the best design and mean of all, over the steps").mark("run-curve")
         self.front = FrontPanel(self._take)
         self.timer = ui.timer(GLANCE, self.refresh, active=False)
 
     def answer(self) -> None:
-        """Put the place of the answer on the page, once the table of the front has its own."""
+        """Make the place of the result; the table of the front must have its place already."""
         with ui.element("div").classes("design-head"):
             self.best = ui.button("Load the best design", icon="input", on_click=self._load_best)
-            self.best.props("unelevated no-caps text-color=accent-ink dense").mark("run-load")
+            self.best.props(MAIN_BUTTON).mark("run-load")
         self.text = ui.html(paragraph(NOTHING), sanitize=False).mark("run-result")
         self._offer(None)
 
-    @staticmethod
-    def _button(icon: str, text: str, action: Callable[[], None]) -> ui.button:
-        button = ui.button(icon=icon, on_click=action).props(f'flat round dense aria-label="{text}"')
-        return button.tooltip(text).mark(f"run-{icon}")
-
     def refresh(self) -> None:
-        """Look how far the search is."""
+        """Request the progress of the search in front."""
         self._lane.ask(Look(int(self.choice.value or 0), self._follower))
 
     def follow(self, run: Run) -> None:
-        """Bring a search to the front that has just been started."""
-        self._list([run, *(one for one in self._runs.every() if one.number != run.number)], run.number)
+        """Bring a search that has just been started to the front."""
+        self._list([run, *(other for other in self._runs.every() if other.number != run.number)], run.number)
         self.refresh()
 
     def close(self) -> None:
-        """Look no longer; the searches go on."""
+        """Stop looking; the searches go on."""
         self.timer.deactivate()
         self._lane.close()
 
     def _look(self, wish: Look) -> Seen:
         runs = self._runs.every()
         number = wish.number or (runs[0].number if runs else 0)
-        run = next((one for one in runs if one.number == number), None)
+        run = next((listed for listed in runs if listed.number == number), None)
         if run is None:
             return Seen(runs)
         try:
@@ -117,7 +116,7 @@ class RunPanel:
         except InputError as error:
             return Seen(runs, problem=str(error))
         except OSError:
-            return Seen(runs)
+            return Seen(runs)  # deleted while it was read
 
     def _deliver(self, wish: Look, seen: Seen) -> None:
         if wish.number != int(self.choice.value or 0):
@@ -148,7 +147,7 @@ class RunPanel:
             self.choice.set_options(options, value=chosen)
 
     def _offer(self, progress: Progress | None) -> None:
-        """Enable what can be done."""
+        """Enable what can be done with a search in this stage."""
         stage = progress.run.stage if progress else None
         several = progress is not None and len(progress.problem.objectives) > 1
         self.stop.set_enabled(stage is Stage.RUNNING)
@@ -217,6 +216,6 @@ def _curve(progress: Progress, label: str) -> dict[str, object]:
 
 def _line(progress: Progress) -> str:
     total = f" of {progress.total}" if progress.total else ""
-    said = f"{progress.run.stage}: {progress.steps}{total} steps, {progress.designs:,} designs"
+    line = f"{progress.run.stage}: {progress.steps}{total} steps, {progress.designs:,} designs"
     best = progress.best[-1] if progress.best else None
-    return said if best is None else f"{said}, best {best:.9g}"
+    return line if best is None else f"{line}, best {best:.9g}"

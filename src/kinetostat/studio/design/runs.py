@@ -24,7 +24,7 @@ from kinetostat.studies.study_folder import QUESTION, in_use, noted
 from kinetostat.studio.design.state_folder import numbered, slug
 
 MOST_RUNNING = 2
-"""Searches at a time; each takes what the machine has."""
+"""Searches at a time; each of them uses all cores."""
 MOST_RUNS = 60
 """Searches that are kept."""
 WORKER = "kinetostat.studio.design.runs"
@@ -34,7 +34,7 @@ FAILURE = "failed.txt"
 
 
 class Stage(StrEnum):
-    """Where a search is."""
+    """The stage of a search."""
 
     RUNNING = "running"
     STOPPING = "stopping"
@@ -44,7 +44,7 @@ class Stage(StrEnum):
 
     @property
     def active(self) -> bool:
-        """Whether a process is at work."""
+        """Whether a process works on it."""
         return self in (Stage.RUNNING, Stage.STOPPING)
 
 
@@ -53,10 +53,10 @@ class Run:
     """A search that is kept.
 
     Attributes:
-        number: of it.
-        folder: of it.
+        number: of the search.
+        folder: that holds its problem, its records and its result.
         name: of its study.
-        stage: where it is.
+        stage: at the time of the listing.
     """
 
     number: int
@@ -66,76 +66,76 @@ class Run:
 
 
 class Runs:
-    """All searches of a state folder; one object of a server."""
+    """All searches of a state folder; a server has one such object, which knows the processes it started."""
 
     def __init__(self, state: Path) -> None:
         """Searches below `state`; nothing is written before the first one."""
         self._place = state / "runs"
-        self._mine: dict[Path, subprocess.Popen[bytes]] = {}
+        self._processes: dict[Path, subprocess.Popen[bytes]] = {}
         self._names: dict[Path, str] = {}
         self._turn = threading.Lock()
 
     def every(self) -> list[Run]:
-        """All of them, the latest first."""
-        held = numbered(self._place).items()
-        return [Run(n, path, self._name(path), self._stage(path)) for n, path in held if (path / QUESTION).exists()]
+        """All searches, the latest first."""
+        folders = numbered(self._place).items()
+        return [Run(n, path, self._name(path), self._stage(path)) for n, path in folders if (path / QUESTION).exists()]
 
     def of(self, number: int) -> Run:
-        """The one of that number.
+        """The search of this number.
 
         Raises:
             InputError: it has been deleted.
         """
         path = numbered(self._place).get(number)
         if path is None or not (path / QUESTION).exists():
-            raise InputError(f"search {number} is no longer kept; choose another one.")
+            raise InputError(f"search {number} has been deleted; choose another one.")
         return Run(number, path, self._name(path), self._stage(path))
 
     def start(self, problem: Problem) -> Run:
-        """Begin a search; returns at once.
+        """Begin a search in a new process, and return at once.
 
         Raises:
-            InputError: too many run, or are kept, or the folder cannot be written.
+            InputError: too many searches run or are kept, or the folder cannot be written.
         """
         with self._turn:
             self._check_free()
-            held = numbered(self._place)
-            if len(held) >= MOST_RUNS:
-                raise InputError(f"{MOST_RUNS} searches are kept already; delete one that is no longer needed.")
-            number = max(held, default=0) + 1
+            present = numbered(self._place)
+            if len(present) >= MOST_RUNS:
+                raise InputError(f"{MOST_RUNS} searches are kept, the most there may be; delete one of them.")
+            number = max(present, default=0) + 1
             folder = self._place / f"{number:04d}-{slug(problem.study.name, 'study')}"
             begin_search(problem, folder)
             self._work(folder)
         return self.of(number)
 
     def go_on(self, number: int) -> None:
-        """Go on with a search that was stopped.
+        """Resume a search that was stopped.
 
         Raises:
-            InputError: too many run, or it runs already or is done.
+            InputError: too many searches run, or this one runs already or is done.
         """
         with self._turn:
             run = self.of(number)
             if run.stage not in (Stage.STOPPED, Stage.FAILED):
-                raise InputError(f"search {number} is {run.stage}; only one that was stopped can go on.")
+                raise InputError(f"search {number} is {run.stage}; only a search that was stopped can be resumed.")
             self._check_free()
             self._work(run.folder)
 
     def stop(self, number: int) -> None:
-        """Let a search end after its step; all that was found is kept.
+        """Let a search end after its present step; all results are kept.
 
         Raises:
-            InputError: it is the search of another studio.
+            InputError: another studio started it.
         """
         run = self.of(number)
-        process = self._mine.get(run.folder)
+        process = self._processes.get(run.folder)
         if run.stage.active and (process is None or process.stdin is None):
-            raise InputError(f"search {number} was started by another studio that still runs; stop it there.")
+            raise InputError(f"search {number} was started by another studio, which still runs; stop it there.")
         if process is not None and process.stdin is not None:
             process.stdin.close()
 
     def delete(self, number: int) -> None:
-        """Forget a search that is not running.
+        """Delete a search that is not running.
 
         Raises:
             InputError: it is running.
@@ -147,14 +147,14 @@ class Runs:
             shutil.rmtree(run.folder, ignore_errors=True)
 
     def close(self) -> None:
-        """Let all searches of this server end after their step."""
-        for process in self._mine.values():
+        """Let all searches of this server end after their present step."""
+        for process in self._processes.values():
             if process.stdin is not None:
                 process.stdin.close()
 
     def wait(self, number: int) -> None:
-        """Until the process of a search of this server has ended."""
-        process = self._mine.get(self.of(number).folder)
+        """Wait until the process of a search of this server has ended."""
+        process = self._processes.get(self.of(number).folder)
         if process is not None:
             process.wait()
 
@@ -162,20 +162,20 @@ class Runs:
         active = [run for run in self.every() if run.stage.active]
         if len(active) >= MOST_RUNNING:
             names = " and ".join(f"{run.number} ({run.name})" for run in active)
-            raise InputError(f"searches {names} are running; wait until one is done, or stop one.")
+            raise InputError(f"searches {names} are running; wait until one of them is done, or stop one.")
 
     def _work(self, folder: Path) -> None:
         (folder / FAILURE).unlink(missing_ok=True)
-        ended = self._mine.pop(folder, None)
+        ended = self._processes.pop(folder, None)
         if ended is not None and ended.stdin is not None:
             ended.stdin.close()
         words = [sys.executable, "-m", WORKER, str(folder)]
-        self._mine[folder] = subprocess.Popen(
+        self._processes[folder] = subprocess.Popen(
             words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
 
     def _stage(self, folder: Path) -> Stage:
-        process = self._mine.get(folder)
+        process = self._processes.get(folder)
         if process is not None and process.poll() is None:
             return Stage.STOPPING if process.stdin is None or process.stdin.closed else Stage.RUNNING
         if process is None and in_use(folder):
@@ -187,15 +187,15 @@ class Runs:
     def _name(self, folder: Path) -> str:
         if folder not in self._names:
             try:
-                held = json.loads((folder / QUESTION).read_text("utf-8"))
-                self._names[folder] = str(held["optimisation"]["name"])
+                question = json.loads((folder / QUESTION).read_text("utf-8"))
+                self._names[folder] = str(question["optimisation"]["name"])
             except (OSError, ValueError, KeyError, TypeError):
                 return folder.name
         return self._names[folder]
 
 
 def _complete(folder: Path) -> bool:
-    """Whether all steps are made and the answer is written."""
+    """Return whether all steps are done and the result is written."""
     steps, _ = noted(folder)
     return bool(steps) and len(steps) >= steps[-1].get("of", len(steps)) and (folder / RESULT).exists()
 

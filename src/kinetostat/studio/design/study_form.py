@@ -1,4 +1,7 @@
-"""The left side of the design tab: a study as a form, from a bundled or uploaded study or from nothing."""
+"""The left of the design tab: a form in which a study is written, new or from a bundled or uploaded one.
+
+The form edits the tables of a `Draft` in place and is built again whenever a row is added or removed.
+"""
 
 from collections.abc import Callable
 from functools import partial
@@ -9,19 +12,19 @@ from nicegui import events, ui
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find, values
-from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.bundled import bundled_studies
 from kinetostat.studies.optimisation.catalogue import known_terms, more_is_better
 from kinetostat.studio.controls import Control, controls
 from kinetostat.studio.design.draft import (
-    MOST_AIMS,
+    MOST_OBJECTIVES,
     Draft,
     bundled_draft,
     needs_direction,
     sent_draft,
     usual_bounds,
 )
+from kinetostat.studio.elements import choice, icon_button, upload_field
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import full_label
 
@@ -29,33 +32,28 @@ Change: TypeAlias = events.ValueChangeEventArguments[Any]
 
 NEW, SENT = "new", "sent"
 METHODS = {1: ["genetic", "gradient", "hybrid"], 2: ["nsga2"]}
-"""Ways to search, by the number of objectives, the usual one first."""
-GOALS = {"minimize": "least", "maximize": "greatest"}
-TOO_LARGE = f"The file is larger than {LARGEST_FILE >> 20} MiB; a study file is a short TOML text."
+"""Methods of search by the number of objectives, the usual one first."""
+GOALS = {"minimize": "minimise", "maximize": "maximise"}
 
 
 class StudyForm:
-    """Variables with bounds, objectives, and how to search; what else a study has is carried along."""
+    """Variables with bounds, objectives, and the search; other tables of a study are carried along and named."""
 
     def __init__(self, session: Session, start: Callable[[Draft], None]) -> None:
-        """A form for the machine of a session.
+        """Build the form, with a new study for the machine of the session.
 
         Args:
             session: whose machine a new study is about.
-            start: called with the study that is to be run; raises InputError where it cannot be.
+            start: starts a study; raises InputError where it cannot.
         """
         self._session, self._start = session, start
         self.draft = self._blank()
         self._filling = False
         with ui.element("div").classes("design-head"):
-            self.source = ui.select({}, label="study", on_change=self._chosen).mark("study-source")
-            self.source.props("dense options-dense outlined").classes("field grow")
-            self._button("upload_file", "Open a study file", lambda: self.upload.run_method("pickFiles"), "study-open")
-            self._button("download", "Save the study as a file", self._save, "study-save")
-            self.upload = ui.upload(
-                on_upload=self._sent, on_rejected=lambda: self._refuse(TOO_LARGE), auto_upload=True,
-                max_file_size=LARGEST_FILE, max_files=1,
-            ).props('accept=".toml" aria-hidden="true"').classes("unseen").mark("study-upload")  # fmt: skip
+            self.source = choice({}, "study", self._chosen, "study-source").classes("grow")
+            icon_button("upload_file", "Open a study file", lambda: self.upload.run_method("pickFiles"), "study-open")
+            icon_button("download", "Save the study as a file", self._save, "study-save")
+            self.upload = upload_field(self._sent, self._refuse, "study-upload")
         self._body = ui.element("div").classes("design-form")
         with ui.element("div").classes("design-foot"):
             self.problem = ui.label("").classes("form-problem").props('role="alert"').mark("study-problem")
@@ -65,11 +63,6 @@ class StudyForm:
         self._offer(NEW)
         self._fill()
 
-    @staticmethod
-    def _button(icon: str, text: str, action: Callable[[], object], mark: str) -> ui.button:
-        button = ui.button(icon=icon, on_click=action).props(f'flat round dense aria-label="{text}"')
-        return button.tooltip(text).mark(mark)
-
     @property
     def _machine(self) -> Machine:
         return self.draft.machine or self._session.machine
@@ -78,7 +71,7 @@ class StudyForm:
         return Draft(f"{self._session.machine.name}"[:60] + ", stiffer")
 
     def renew(self) -> None:
-        """Another machine has been loaded: a study about the machine at hand begins again."""
+        """Begin again after another machine has been loaded, unless the study is about a machine that it names."""
         if self.draft.machine is None:
             self.draft = self._blank()
             self._offer(NEW)
@@ -86,8 +79,8 @@ class StudyForm:
 
     def _offer(self, chosen: str) -> None:
         self._filling = True
-        named = {NEW: "new, for this machine", **{name: name for name in bundled_studies()}}
-        self.source.set_options(named | ({SENT: self.draft.name} if chosen == SENT else {}), value=chosen)
+        studies = {NEW: "new study of this machine", **{name: name for name in bundled_studies()}}
+        self.source.set_options(studies | ({SENT: self.draft.name} if chosen == SENT else {}), value=chosen)
         self._filling = False
 
     def _chosen(self) -> None:
@@ -129,43 +122,44 @@ class StudyForm:
         self.problem.set_text(message)
 
     def _fill(self) -> None:
-        """Make the form anew from the draft."""
+        """Build all rows from the draft."""
         self._refuse("")
         self._body.clear()
         with self._body:
-            ui.label(f"About {self._machine.name}").classes("form-about").mark("study-about")
-            ui.html("<h3>May change</h3>", sanitize=False)
+            ui.label(f"Machine: {self._machine.name}").classes("form-about").mark("study-about")
+            ui.html("<h3>Variables</h3>", sanitize=False)
             known = self._controls()
             for place, table in enumerate(self.draft.variables):
                 self._variable(place, table, known)
             self._more_variables(known)
-            ui.html("<h3>Is wanted</h3>", sanitize=False)
+            ui.html("<h3>Objectives</h3>", sanitize=False)
             for place, table in enumerate(self.draft.objectives):
                 self._objective(place, table)
-            if len(self.draft.objectives) < MOST_AIMS:
-                self._add("add objective", "study-add-objective", self._add_objective)
+            if len(self.draft.objectives) < MOST_OBJECTIVES:
+                self._add("add an objective", "study-add-objective", self._add_objective)
             ui.html("<h3>Search</h3>", sanitize=False)
             self._search()
             if unseen := self.draft.unseen():
-                ui.label(f"Also from the study file: {', '.join(unseen)}.").classes("note").mark("study-unseen")
+                ui.label(f"Taken over from the study file: {', '.join(unseen)}.").classes("note").mark("study-unseen")
 
     @staticmethod
     def _add(text: str, mark: str, action: Callable[[], None]) -> None:
         ui.button(text, icon="add", on_click=action).props("flat dense no-caps").classes("form-add").mark(mark)
 
     def _controls(self) -> dict[str, Control]:
-        """The numbers of the machine that the study is about."""
+        """The controls of the machine that the study is about."""
         machine = self.draft.machine
         if machine is None:
             return self._session.controls
-        return {one.path: one for one in controls(machine, float(respond(machine).configuration.length))}
+        length = float(respond(machine).configuration.length)
+        return {control.path: control for control in controls(machine, length)}
 
     def _variable(self, place: int, table: dict[str, Any], known: dict[str, Control]) -> None:
-        fields = [str(one) for one in table.get("paths") or [table["path"]]]
-        own = known.get(find(self._machine.family, fields[0]).path)
-        title = (brief(own) if own else fields[0]) + (" and others" if fields[1:] else "")
+        paths = [str(path) for path in table.get("paths") or [table["path"]]]
+        control = known.get(find(self._machine.family, paths[0]).path)
+        title = (brief(control) if control else paths[0]) + (" and others" if paths[1:] else "")
         with ui.element("div").classes("form-row"):
-            ui.label(title).classes("form-name").tooltip(", ".join(fields))
+            ui.label(title).classes("form-name").tooltip(", ".join(paths))
             if "choices" in table:
                 ui.label(", ".join(table.get("labels", [f"{len(table['choices'])} choices"]))).classes("form-fixed")
             elif table.get("fixed"):
@@ -173,7 +167,8 @@ class StudyForm:
             else:
                 for key in ("from", "to"):
                     self._text(table, key, f"{title}, {key}", f"variable {place} {key}")
-            self._remove(partial(self._drop, self.draft.variables, place), f"Hold {title}", f"variable {place} remove")
+            drop = partial(self._drop, self.draft.variables, place)
+            self._remove(drop, f"Remove {title}", f"variable {place} remove")
 
     def _text(self, table: dict[str, Any], key: str, label: str, mark: str) -> None:
         def write(event: Change) -> None:
@@ -183,8 +178,7 @@ class StudyForm:
         box.classes("form-text").mark(mark)
 
     def _remove(self, action: Callable[[], None], text: str, mark: str) -> None:
-        button = ui.button(icon="close", on_click=action).props(f'flat round dense size="sm" aria-label="{text}"')
-        button.classes("form-remove").mark(mark)
+        icon_button("close", text, action, mark).props('size="sm"').classes("form-remove")
 
     def _drop(self, tables: list[dict[str, Any]], place: int) -> None:
         del tables[place]
@@ -192,13 +186,13 @@ class StudyForm:
         self._fill()
 
     def _more_variables(self, known: dict[str, Control]) -> None:
-        """Offer what may change still; loads and limits are no design."""
+        """Offer the other numbers of the machine; loads and limits are not part of a design."""
         taken = {str(table.get("path")) for table in self.draft.variables}
-        free = {path: one for path, one in known.items() if one.slides and one.panel != "Load" and path not in taken}
-        if free:
-            offered = {path: brief(one) for path, one in free.items()}
-            choice = ui.select(offered, label="add a variable", with_input=True, on_change=self._add_variable)
-            choice.props("dense options-dense outlined").classes("field form-more").mark("study-add-variable")
+        free = [control for path, control in known.items() if control.slides and path not in taken]
+        offered = {control.path: brief(control) for control in free if control.panel != "Load"}
+        if offered:
+            add = choice(offered, "add a variable", self._add_variable, "study-add-variable", searchable=True)
+            add.classes("form-more")
 
     def _add_variable(self, event: Change) -> None:
         control = self._controls().get(str(event.value))
@@ -225,8 +219,8 @@ class StudyForm:
         if needs_direction(name):
             with ui.element("div").classes("form-row"):
                 ui.label("direction x, y, z").classes("form-name")
-                shown = ", ".join(f"{one:g}" for one in table.get("direction") or ())
-                box = ui.input(value=shown, on_change=partial(self._direct, table)).classes("form-text wide")
+                direction = ", ".join(f"{entry:g}" for entry in table.get("direction") or ())
+                box = ui.input(value=direction, on_change=partial(self._direct, table)).classes("form-text wide")
                 box.props('dense borderless aria-label="direction"').mark(f"objective {place} direction")
 
     def _aim(self, table: dict[str, Any], key: str, event: Change) -> None:
@@ -234,8 +228,8 @@ class StudyForm:
             return
         table[key] = event.value
         if key == "quantity":
-            for own in ("goal", "weights", "direction"):
-                table.pop(own, None)
+            for former in ("goal", "weights", "direction"):  # they belonged to the former quantity
+                table.pop(former, None)
             if needs_direction(str(event.value)):
                 table["direction"] = [0.0, 0.0, 1.0]
             self._fill()
@@ -262,11 +256,8 @@ class StudyForm:
     def _search(self) -> None:
         search, methods = self.draft.optimizer, self._methods()
         with ui.element("div").classes("form-search"):
-            kind = ui.select(
-                methods, label="method", value=search.get("method") or methods[0],
-                on_change=lambda event: search.update(method=event.value),
-            )  # fmt: skip
-            kind.props("dense options-dense outlined").classes("field").mark("study-method")
+            method = search.get("method") or methods[0]
+            choice(methods, "method", lambda event: search.update(method=event.value), "study-method", method)
             for key in ("population", "generations", "seed"):
                 box = ui.input(key, value=str(search[key]), on_change=partial(self._count, key))
                 box.props("dense outlined").classes("field").mark(f"study-{key}")
@@ -276,12 +267,12 @@ class StudyForm:
 
 
 def brief(control: Control) -> str:
-    """The name of a variable; geometry, which most of them are, goes without saying."""
+    """Return the name of a variable; the table is left out if it is the geometry, where most variables are."""
     return full_label(control.parameter).removeprefix("geometry: ")
 
 
 def _number(text: str) -> int | float | str:
-    """What was typed as a number where it is one; otherwise as it is, for the message that it gets."""
+    """Return a number, or the text itself if it is none: reading the study then refuses it with the proper message."""
     for kind in (int, float):
         try:
             return kind(text)
