@@ -28,3 +28,43 @@ SOFT_CONSTRAINT = 1e-6
 """Compliance of a MuJoCo constraint as a share of the machine's; a dozen constraints add up to about 1e-5."""
 RIGID_BLOCK = 1e-9
 """Share of the other diagonal block of C below which a block counts as rigid."""
+
+# Kinematics: joints that close the legs
+
+CLOSED = 1e-10
+"""Largest gap of a closed leg or a reached pose, rad or in units of the machine's length: far above round-off, far
+below what a micrometre is to a machine of a metre."""
+NEWTON_SETTLED = 1e-14
+"""Gap, in the same units, at which nothing but round-off is left and Newton's method ends."""
+LEAST_NORM_DAMPING = 1e-15
+"""Damping as a share of the trace of the squared rates: far below what a regular direction weighs, enough for a joint
+coordinate that moves nothing."""
+NO_ANGLE_RATES = 1e-9
+"""Relative singular value below which roll and yaw have no separate rates (at pitch = +-90 deg)."""
+UNDETERMINED = 1e-4
+"""Share of undamped motion above which nothing but the damping determines where the platform is."""
+NO_COORDINATE = 1e-9
+"""Coordinates of a pose below this, m or rad, are round-off of zero when they are offered to a reader."""
+PURE_TRANSLATION = 1e-9
+"""Share of rotation below which a twist counts as a translation without rotation."""
+DEPENDENT = 1e-6
+"""Singular value of unit screws below which they are dependent: half of the digits are lost in a square root."""
+NEGLIGIBLE_COMPONENT = 1e-9
+"""Share of a screw's largest component below which another one is round-off and is not written out."""
+PARALLEL_AXES = 1e-12
+"""Sine of the angle between axes up to which they are parallel as written in a file."""
+NO_LINK = 1e-9
+"""Length of a link, m, below which it has no direction."""
+
+# Engine: derivatives
+
+SAME_DERIVATIVE = 1e-6
+"""Relative difference up to which two ways to a derivative agree: both keep some nine digits near regular poses, and
+a closed form that does not hold differs in the first."""
+ROUND_OFF_DERIVATIVE = 1e-9
+"""Share of the largest derivative below which another one may be round-off."""
+IDLE_COORDINATES = 1e-9
+"""Relative singular value below which a combination of joint coordinates does not change the closing equations."""
+OPENING = 1e-8
+"""Share of an equation's largest rate beyond which it cannot be satisfied when a parameter changes alone: a leg would
+open."""

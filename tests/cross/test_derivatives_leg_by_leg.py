@@ -6,6 +6,8 @@ from test_leg_by_leg import TASKS, known, moved, pose_of, written
 
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Table
+from kinetostat.kinematics.closure import CLOSED_FORMS, solver_of
+from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values, with_values
 
 SAME = 1e-8
@@ -42,3 +44,35 @@ def test_along_the_pose_and_by_the_actuators(name, amount):
     softer = [path for path in values(file) if path.endswith(".stiffness")]
     actuators = [path for path in values(machine) if path.startswith("stiffness.actuator.")]
     assert_same(shares(file, names, softer), shares(there, names, actuators))
+
+
+def turned(machine, turn):
+    """The machine turned about the base's z axis by an angle of this cosine and sine, at its home pose."""
+    numbers = values(machine)
+    vectors = {path[:-2] for path in numbers if path.startswith(("legs.", "platform.point")) and path[-2:] == ".0"}
+    changed = {}
+    for name in vectors:
+        x, y = numbers[f"{name}.0"], numbers[f"{name}.1"]
+        changed |= {f"{name}.0": turn[0] * x - turn[1] * y, f"{name}.1": turn[1] * x + turn[0] * y}
+    changed |= {"pose.x": changed["platform.point.0"], "pose.y": changed["platform.point.1"]}
+    return with_values(machine, {**changed, "pose.z": numbers["platform.point.2"]})
+
+
+def test_machines_of_one_plan_are_judged_by_their_own_numbers():
+    """Closed forms hold for a machine whose axes are parallel, not for one of the same form where an axis tilts.
+
+    At the home pose the legs close in either, so that only derivatives tell the difference.
+    """
+    parallel, axis = turned(load("tripteron"), (0.6, 0.8)), "legs.x.elbow.axis"
+    longer = {f"{axis}.{k}": 1.7 * values(parallel)[f"{axis}.{k}"] for k in (0, 1)}
+    parallel = with_values(parallel, longer)
+    tilted = with_values(parallel, {f"{axis}.1": 1.1 * longer[f"{axis}.1"]})
+    assert parallel.family is tilted.family
+    assert solver_of(tilted) is CLOSED_FORMS
+    points = Table({f"pose.{c}": np.array([values(parallel)[f"pose.{c}"]]) for c in "xyz"})
+    for machine in (parallel, tilted):
+        found, expected = (
+            evaluate_gradient(machine, points, "compliance_x", points.paths, repeated=native)
+            for native in (True, False)
+        )
+        np.testing.assert_allclose(found.gradients, expected.gradients, rtol=1e-6)

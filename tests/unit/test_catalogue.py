@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinetostat.kinematics.reach import why_out_of_reach
+from kinetostat.kinematics.closing import why_out_of_reach
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.leg import leg_compliance
 from kinetostat.kinetostatics.response import respond

@@ -1,4 +1,4 @@
-"""Closing equations: zero where the legs meet at the pose, and their rates those of the joints' screws (`closure`)."""
+"""Closing equations: zero where the legs meet at the pose, and their rates those of the joints' screws (`gaps_at`)."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.vector import IDENTITY, Displacement, Vector
-from kinetostat.kinematics.closing import closing_equations
-from kinetostat.kinematics.closure import gaps_at, pose_of, solve_joints, units_of
+from kinetostat.kinematics.closing import closing_equations, gaps_at, pose_of, units_of
+from kinetostat.kinematics.closure import solve_joints
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Chains, Step
@@ -63,7 +63,7 @@ def test_gaps_of_legs_change_by_the_difference_of_their_screws():
     found = np.zeros(12)
     gaps = gaps_at(chains, found[None], np.array([[0.5]]))
     assert np.array(closing_equations(chains, found)) == pytest.approx(0.0, abs=1e-15)
-    assert rates(chains, found)[:6] == pytest.approx(in_metres(chains, gaps.closure_rates[0]), abs=1e-9)
+    assert rates(chains, found)[:6] == pytest.approx(-in_metres(chains, gaps.closure_rates[0]), abs=1e-9)
     assert rates(chains, found)[6] == pytest.approx(-in_metres(chains, gaps.pose_rates[0])[0], abs=1e-9)
 
 

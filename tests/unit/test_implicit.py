@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinetostat.engine.implicit import total_slopes
+from kinetostat.engine.derivatives import total_slopes
 
 
 def test_a_point_on_a_circle_follows_its_radius():

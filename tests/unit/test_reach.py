@@ -2,7 +2,7 @@
 
 import pytest
 
-from kinetostat.kinematics.reach import clearance, why_out_of_reach, within_reach
+from kinetostat.kinematics.closing import clearance, why_out_of_reach, within_reach
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import SINGULAR, pose_status
 from kinetostat.machine.loading import load

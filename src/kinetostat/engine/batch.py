@@ -13,6 +13,7 @@ from itertools import islice
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.engine.kernel import Fill, fill_some, slab_kernel
 from kinetostat.engine.points import Array, Part, Points
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -84,9 +85,6 @@ def evaluate(
     return Evaluation(dict(zip(quantities, results, strict=True)), status)
 
 
-Fill = Callable[[Mapping[str, Array], Array, Codes], None]
-"""From the varying parameters of a slab [points] to its results [quantities x points] and status codes, in place."""
-
 Method = Callable[[Machine, Sequence[str], Sequence[str]], Fill]
 """A way to evaluate slabs: from a machine, its varying paths and names of quantities."""
 
@@ -131,14 +129,13 @@ def by_free_springs(machine: Machine, paths: Sequence[str], quantities: Sequence
         if not free.any():
             ordinary(columns, results, status)
             return
+        # One fill for each pattern of springs that are free together: a handful, because few stiffnesses vary.
         for pattern in np.unique(free, axis=1).T:
             chosen = (free == pattern[:, None]).all(axis=0)
             fixed = {path: 0.0 for path, zero in zip(watched, pattern, strict=True) if zero}
-            kept = {path: values[chosen] for path, values in columns.items() if path not in fixed}
-            found, codes = np.empty((len(results), int(chosen.sum()))), np.empty(int(chosen.sum()), dtype=status.dtype)
-            part = method(with_values(machine, fixed), [*kept], quantities) if fixed else ordinary
-            part(kept, found, codes)
-            results[:, chosen], status[chosen] = found, codes
+            others = {path: values for path, values in columns.items() if path not in fixed}
+            part = method(with_values(machine, fixed), [*others], quantities) if fixed else ordinary
+            fill_some(chosen, part, others, results, status)
 
     return fill
 
@@ -156,8 +153,6 @@ def _numpy_fill(machine: Machine, _paths: Sequence[str], quantities: Sequence[st
 
 
 def _program_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str]) -> Fill:
-    from kinetostat.engine.kernel import slab_kernel  # LLVM takes 0.1 s to load: only where it pays
-
     return slab_kernel(machine, paths, quantities).run
 
 

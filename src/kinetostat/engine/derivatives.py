@@ -1,7 +1,9 @@
 """Many points at once with exact derivatives: the engine chooses arithmetic and slab size. Holds no formula.
 
 Few points go through NumPy and many through machine code, both from the same graph and by the same rules. Where the
-joints of a machine written leg by leg follow from equations, so do their derivatives.
+joints of a machine written leg by leg follow from equations, so do their derivatives, by linear systems pose by pose.
+
+Source: theory (34).
 """
 
 import math
@@ -12,18 +14,17 @@ from typing import TypeAlias
 
 import numpy as np
 
-from kinetostat.engine.batch import NATIVE_SLAB, Fill, Progress, available_cores, by_free_springs, in_slabs, silent
-from kinetostat.engine.form import Form, Kind, angles, form_of, reduced
+from kinetostat.engine.batch import NATIVE_SLAB, Progress, available_cores, by_free_springs, in_slabs, silent
+from kinetostat.engine.form import Form, Kind, Weights, angles, equations_of, form_of, joint_columns, objectives_of
 from kinetostat.engine.gradient import with_gradients
-from kinetostat.engine.implicit import total_slopes
 from kinetostat.engine.interpreter import Interpreted
+from kinetostat.engine.kernel import Fill, closes_inside, falling_back, program_columns
 from kinetostat.engine.points import Points
-from kinetostat.engine.questions import Weights, equations_of, objectives_of
 from kinetostat.engine.trace import Array, Codes, Runnable
-from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.tolerances import IDLE_COORDINATES, OPENING, ROUND_OFF_DERIVATIVE, SAME_DERIVATIVE
 
 MACHINE_CODE_FROM = 20_000
 """Points from which compiling pays: NumPy differentiates some ten thousand poses/s."""
@@ -31,8 +32,6 @@ SMALL_SLAB = 512
 """Points per slab of NumPy calls and of linear systems: some thousand arrays of it wait in memory at once."""
 KEPT = 32
 """Programs kept in memory."""
-SAME, ROUNDED = 1e-6, 1e-9
-"""Relative difference up to which two ways to a derivative agree, and share of the largest that may be rounding."""
 NEAR, TRIED = 0.03, 5
 """How far from a machine's own numbers, as a share of them, and at how many points closed forms are tried."""
 
@@ -77,62 +76,76 @@ def evaluate_gradient(
         repeated: whether the same will be asked at other points again and again, as by a search: then compiling pays
             for few points as well, once.
     """
-    wanted = [objectives] if isinstance(objectives, str | Mapping) else list(objectives)
-    weights = tuple(((one, 1.0),) if isinstance(one, str) else tuple(one.items()) for one in wanted)
+    several = [objectives] if isinstance(objectives, str | Mapping) else list(objectives)
+    weights = tuple(((entry, 1.0),) if isinstance(entry, str) else tuple(entry.items()) for entry in several)
     native = repeated or points.size >= MACHINE_CODE_FROM
     slab = NATIVE_SLAB if native else SMALL_SLAB
     threads = available_cores() if native and points.size > slab else 1
 
-    def method(one: Machine, varying: Sequence[str], _names: Sequence[str]) -> Fill:
-        return _fill(one, varying, weights, tuple(paths), native)
+    def method(part: Machine, varying: Sequence[str], _names: Sequence[str]) -> Fill:
+        return _fill(part, tuple(varying), weights, tuple(paths), native)
 
     fill = by_free_springs(machine, points.paths, (), method)
     count, rows = len(weights), len(weights) * (1 + len(paths))
     results, status = in_slabs(points, fill, rows, slab, threads, progress)
     values, slopes = results[:count], results[count:].reshape(count, len(paths), points.size)
-    for value, own in zip(values, slopes, strict=True):
-        own[:, ~np.isfinite(value)] = math.nan
+    for value, slope in zip(values, slopes, strict=True):
+        slope[:, ~np.isfinite(value)] = math.nan
     return Gradients(values, slopes, status)
 
 
 def _fill(
-    machine: Machine, varying: Sequence[str], weights: tuple[Weights, ...], paths: tuple[str, ...], native: bool
+    machine: Machine, varying: tuple[str, ...], weights: tuple[Weights, ...], paths: tuple[str, ...], native: bool
 ) -> Fill:
     """Evaluates slabs of points of one machine: objectives, then their derivatives by each path."""
-    given = _Given(machine, varying, weights, paths, native)
+    ways = _Ways(machine, varying, weights, paths, native)
     if machine.family.chains is None:
-        return given.direct()
-    if native and _closed_forms_hold(Kind(machine), given.form, weights, paths):
-        return given.closed()
-    return given.followed
+        return ways.direct()
+    if native and _closed_forms_hold(Kind(machine), tuple(values(machine).items()), varying, weights, paths):
+        return falling_back(ways.direct(closed=True), lambda: ways.by_equations)
+    return ways.by_equations
 
 
 @lru_cache(KEPT)
-def _closed_forms_hold(kind: Kind, form: Form, weights: tuple[Weights, ...], paths: tuple[str, ...]) -> bool:
+def _closed_forms_hold(
+    kind: Kind,
+    numbers: tuple[tuple[str, float], ...],
+    varying: tuple[str, ...],
+    weights: tuple[Weights, ...],
+    paths: tuple[str, ...],
+) -> bool:
     """Whether closed forms hold while parameters change: near the machine's own pose both ways must agree.
 
     They do not where a parameter changes what they take as given: that axes are parallel, say, or that the platform
     keeps the coordinates that its pose does not give. (At the home pose itself legs close whatever their axes.)
-    """
-    from kinetostat.engine.kernel import needs_iteration
 
-    if needs_iteration(kind.machine):
+    The answer depends on the machine's numbers, not only on its kind and form, so that all of them are in the key.
+
+    Args:
+        kind: of the machine.
+        numbers: all its parameters, by leaf path.
+        varying: leaf paths of the parameters that vary.
+        weights: the objectives.
+        paths: leaf paths of the parameters to differentiate by.
+    """
+    machine, centre = with_values(kind.machine, dict(numbers)), dict(numbers)
+    if not closes_inside(machine):
         return False
-    held, given = values(kind.machine), _Given(kind.machine, form.varying, weights, paths, native=False)
-    drawn = np.random.default_rng(0).uniform(-NEAR, NEAR, (len(form.varying), TRIED))
-    columns = {path: held[path] + (abs(held[path]) or 1.0) * row for path, row in zip(form.varying, drawn, strict=True)}
-    direct, followed = np.empty((2, len(weights) * (1 + len(paths)), TRIED))
+    ways = _Ways(machine, varying, weights, paths, native=False)
+    drawn = np.random.default_rng(0).uniform(-NEAR, NEAR, (len(varying), TRIED))
+    columns = {path: centre[path] + (abs(centre[path]) or 1.0) * row for path, row in zip(varying, drawn, strict=True)}
+    direct, expected = np.empty((2, len(weights) * (1 + len(paths)), TRIED))
     status = np.empty(TRIED, dtype=np.int8)
-    for fill, results in ((given.direct(closed=True), direct), (given.followed, followed)):
+    for fill, results in ((ways.direct(closed=True), direct), (ways.by_equations, expected)):
         fill(columns, results, status)
-    direct, followed = direct[:, status == Status.OK], followed[:, status == Status.OK]
-    rounded = ROUNDED * np.nan_to_num(np.abs(followed)).max(initial=0.0)
-    agree = np.allclose(direct, followed, rtol=SAME, atol=rounded, equal_nan=True)
+    direct, expected = direct[:, status == Status.OK], expected[:, status == Status.OK]
+    round_off = ROUND_OFF_DERIVATIVE * np.nan_to_num(np.abs(expected)).max(initial=0.0)
+    agree = np.allclose(direct, expected, rtol=SAME_DERIVATIVE, atol=round_off, equal_nan=True)
     return bool((status == Status.OK).any()) and agree
 
 
-class _Given:
-    """What is differentiated by what, and the ways to do it."""
+class _Ways:
+    """The ways to objectives and derivatives of one machine: from one program, or with the closing equations."""
 
     def __init__(
         self,
@@ -142,62 +155,43 @@ class _Given:
         paths: tuple[str, ...],
         native: bool,
     ) -> None:
-        at_ends = {path: slope for path, slope in _at_ends(machine).items() if path in paths and path not in varying}
+        known = {path: slope for path, slope in _at_ends(machine).items() if path in paths and path not in varying}
         self._machine, self._weights, self._paths, self._native = machine, weights, paths, native
-        self._ends, self._by = at_ends, tuple(path for path in paths if path not in at_ends)
-        self.form, self._fixed = form_of(machine, varying, self._by)
+        self._known, self._by = known, tuple(path for path in paths if path not in known)
+        self._form, self._fixed = form_of(machine, varying, self._by)
         self._angles = angles(machine)
 
     def direct(self, closed: bool = False) -> Fill:
-        """All from one program: the family places the joints, or they are `closed` forms."""
+        """All from one program: the family places the joints, or they are in `closed` form."""
         program = self._program(self._weights, closed)
 
         def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-            given = self._columns(columns)
-            if self._ends:
+            given = program_columns(columns, self._form.varying, self._angles)
+            if self._known:
                 self._spread(*program.slopes(self._fixed, given, status), results)
             else:
                 program.runnable.run(self._fixed, given, results, status)
 
         return fill
 
-    def followed(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-        """Fill with joints by Newton's method and their slopes from the closing equations."""
-        joints = solve_joints(with_values(self._machine, columns))
-        found = [np.broadcast_to(c, status.shape) for c in (*joints.coordinates, joints.status)]
-        given = self._columns(columns) + [np.ascontiguousarray(column, dtype=float) for column in found]
+    def by_equations(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        """Fill with joints found first, and with their slopes from the closing equations."""
+        given = program_columns(columns, self._form.varying, self._angles)
+        given += joint_columns(self._machine, columns, len(status))
         rates = self._program(()).slopes(self._fixed, given, np.empty_like(status))[1]
-        values, partial = self._program(self._weights).slopes(self._fixed, given, status)
-        self._spread(values, _followed(partial, rates, len(self._by)), results)
+        objectives, partial = self._program(self._weights).slopes(self._fixed, given, status)
+        self._spread(objectives, _following(partial, rates, len(self._by)), results)
 
-    def closed(self) -> Fill:
-        """Fill in closed form, and with joints by Newton's method where closed forms do not close the legs."""
-        direct = self.direct(closed=True)
-
-        def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-            direct(columns, results, status)
-            left = np.flatnonzero(status == Status.NOT_CONVERGED)
-            if left.size:
-                found, codes = np.empty((len(results), left.size)), np.empty(left.size, dtype=status.dtype)
-                self.followed({path: column[left] for path, column in columns.items()}, found, codes)
-                results[:, left], status[left] = found, codes
-
-        return fill
-
-    def _spread(self, found: Array, slopes: Array, results: Array) -> None:
+    def _spread(self, objectives: Array, slopes: Array, results: Array) -> None:
         """Put objectives and slopes in their rows, and what is known by rigid and free springs."""
         count = len(self._weights)
-        results[:count] = found
+        results[:count] = objectives
         rows = results[count:].reshape(count, len(self._paths), results.shape[1])
         for k, path in enumerate(self._paths):
-            rows[:, k] = self._ends[path] if path in self._ends else slopes[:, self._by.index(path)]
-
-    def _columns(self, columns: Mapping[str, Array]) -> list[Array]:
-        served = {path: np.ascontiguousarray(columns[path], dtype=float) for path in self.form.varying}
-        return [reduced(column) if path in self._angles else column for path, column in served.items()]
+            rows[:, k] = self._known[path] if path in self._known else slopes[:, self._by.index(path)]
 
     def _program(self, weights: tuple[Weights, ...], closed: bool = False) -> "_Program":
-        return _program(Kind(self._machine), self.form, weights, self._by, self._native, closed)
+        return _program(Kind(self._machine), self._form, weights, self._by, self._native, closed)
 
 
 def _at_ends(machine: Machine) -> dict[str, float]:
@@ -207,11 +201,44 @@ def _at_ends(machine: Machine) -> dict[str, float]:
     return {path: ends[value] for path, value in values(machine).items() if path in stiff and value in ends}
 
 
-def _followed(slopes: Array, rates: Array, count: int) -> Array:
+def _following(slopes: Array, rates: Array, count: int) -> Array:
     """Derivatives of objectives by parameters with the joints following, from those by parameters and joints."""
     by_point = [np.moveaxis(part, 2, 0) for part in (slopes, rates)]
-    (own, by_joints), (given, joint_rates) = (np.split(part, [count], axis=2) for part in by_point)
-    return np.moveaxis(total_slopes(own, by_joints, joint_rates, given), 0, 2)
+    (by_paths, by_joints), (path_rates, joint_rates) = (np.split(part, [count], axis=2) for part in by_point)
+    return np.moveaxis(total_slopes(by_paths, by_joints, joint_rates, path_rates), 0, 2)
+
+
+def total_slopes(slopes: Array, by_joints: Array, joint_rates: Array, rates: Array) -> Array:
+    """Derivatives with the joints following: J_p + J_q dq/dp, where F_q dq/dp = -F_p, of least norm.
+
+    Joint coordinates q(p) satisfy F(p, q) = 0; there may be more equations than coordinates, and coordinates that no
+    equation needs.
+
+    Args:
+        slopes: J_p, by parameters [n x results x parameters].
+        by_joints: J_q, by joint coordinates [n x results x coordinates].
+        joint_rates: F_q, of the equations by joint coordinates [n x equations x coordinates].
+        rates: F_p, by parameters [n x equations x parameters].
+
+    Returns:
+        [n x results x parameters]; NaN for a parameter that cannot change alone without breaking an equation, and
+        where anything is not finite.
+    """
+    result = np.full(slopes.shape, np.nan)
+    sound = np.isfinite(joint_rates).all(axis=(1, 2)) & np.isfinite(by_joints).all(axis=(1, 2))
+    if not sound.any():
+        return result
+    left, sizes, right = np.linalg.svd(joint_rates[sound], full_matrices=False)
+    kept = sizes > IDLE_COORDINATES * sizes[:, :1]
+    inverse = np.divide(1.0, sizes, where=kept, out=np.zeros_like(sizes))
+    work = np.swapaxes(left, 1, 2) @ rates[sound]
+    motion = -np.swapaxes(right, 1, 2) @ (inverse[:, :, None] * work)
+    remaining = np.abs(rates[sound] + joint_rates[sound] @ motion).max(axis=1, initial=0.0)
+    largest = np.abs(rates[sound]).max(axis=(1, 2), initial=0.0)
+    follows = remaining <= OPENING * largest[:, None]
+    total = slopes[sound] + by_joints[sound] @ motion
+    result[sound] = np.where(follows[:, None, :], total, np.nan)
+    return result
 
 
 @dataclass(frozen=True)
@@ -224,9 +251,9 @@ class _Program:
 
     def slopes(self, fixed: Array, columns: Sequence[Array], codes: Codes) -> tuple[Array, Array]:
         """Results [results x points] and their derivatives [results x inputs x points]; codes in place."""
-        found = np.empty((self.results * (1 + self.inputs), len(codes)))
-        self.runnable.run(fixed, columns, found, codes)
-        return found[: self.results], found[self.results :].reshape(self.results, self.inputs, len(codes))
+        rows = np.empty((self.results * (1 + self.inputs), len(codes)))
+        self.runnable.run(fixed, columns, rows, codes)
+        return rows[: self.results], rows[self.results :].reshape(self.results, self.inputs, len(codes))
 
 
 @lru_cache(KEPT)
@@ -234,10 +261,10 @@ def _program(
     kind: Kind, form: Form, weights: tuple[Weights, ...], paths: tuple[str, ...], native: bool, closed: bool
 ) -> _Program:
     """The program of objectives and their derivatives; without weights, that of the closing equations."""
-    asked = objectives_of(kind, form, weights, paths, closed) if weights else equations_of(kind, form, paths)
-    count, inputs = len(asked.body.results), len(asked.inputs)
+    formula = objectives_of(kind, form, weights, paths, closed) if weights else equations_of(kind, form, paths)
+    count, inputs = len(formula.body.results), len(formula.inputs)
     if not native:
-        return _Program(Interpreted(asked.body, asked.inputs), count, inputs)
+        return _Program(Interpreted(formula.body, formula.inputs), count, inputs)
     from kinetostat.engine.native import Program  # LLVM takes 0.1 s to load: only where it pays
 
-    return _Program(Program(with_gradients(asked.body, asked.inputs)), count, inputs)
+    return _Program(Program(with_gradients(formula.body, formula.inputs)), count, inputs)

@@ -1,14 +1,23 @@
-"""How a program takes a machine's parameters: as constants, fixed inputs or columns. Nothing is evaluated here."""
+"""A machine as the body of a program: its parameters as constants, fixed inputs or columns, its results traced.
+
+Nothing is compiled or evaluated here, and nothing depends on a machine's numbers beyond its form.
+"""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar
-from kinetostat.engine.trace import Array, Graph, Operand, Traced
+from kinetostat.algebra.scalar import Scalar, plus, times, where
+from kinetostat.engine.trace import Array, Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
+from kinetostat.kinematics.closing import closing_equations
+from kinetostat.kinematics.closure import CLOSED_FORMS, Joints, solve_joints
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 
@@ -126,6 +135,89 @@ def traced(kind: Kind, form: Form) -> Inputs:
     return Inputs(graph, fixed, columns, {**used, **columns}, machine)
 
 
-def number(value: Scalar) -> Operand:
+Weights: TypeAlias = tuple[tuple[str, float], ...]
+"""A weighted sum of quantities: their names and weights."""
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A body, and the inputs that its results are differentiated by: parameters by path, then joint coordinates."""
+
+    body: Body
+    inputs: tuple[Traced, ...]
+
+
+def objectives_of(
+    kind: Kind, form: Form, objectives: Sequence[Weights], paths: Sequence[str] = (), closed: bool = False
+) -> Formula:
+    """Trace weighted sums of quantities as functions of the parameters; NaN where the status is not OK.
+
+    Args:
+        kind: of the machine.
+        form: how its parameters enter.
+        objectives: weighted sums of quantities.
+        paths: leaf paths of the parameters to differentiate by.
+        closed: whether joints are computed inside the program, in closed form. Otherwise their coordinates and a
+            status are further columns, unless the family places the joints itself.
+    """
+    given = traced(kind, form)
+    joints, columns = _joints(given, closed)
+    response = respond(given.machine, joints)
+    accepted = response.status < Status.OK + 0.5
+    results = [_number(where(accepted, _weighted(response, weights), math.nan)) for weights in objectives]
+    return _formula(given, columns, results, _number(response.status), paths)
+
+
+def equations_of(kind: Kind, form: Form, paths: Sequence[str]) -> Formula:
+    """Trace the closing equations of a machine written leg by leg; columns are those of objectives that are not closed.
+
+    Args:
+        kind: of the machine.
+        form: how its parameters enter.
+        paths: leaf paths of the parameters to differentiate by.
+    """
+    given = traced(kind, form)
+    _, columns = _joints(given, closed=False)
+    results = [_number(gap) for gap in closing_equations(given.machine.chains(), columns[:-1])]
+    return _formula(given, columns, results, 0.0, paths)
+
+
+def _formula(
+    given: Inputs, joints: Sequence[Traced], results: Sequence[Operand], code: Operand, paths: Sequence[str]
+) -> Formula:
+    body = Body(given.fixed, [*given.columns.values(), *joints], results, code)
+    return Formula(body, (*(given.parameters[path] for path in paths), *joints[:-1]))
+
+
+def _joints(given: Inputs, closed: bool) -> tuple[Joints | None, tuple[Traced, ...]]:
+    """The joints of a traced machine, and the columns that bring them: coordinates and a status."""
+    if given.machine.family.chains is None:
+        return None, ()
+    if closed:
+        return CLOSED_FORMS.over_scalars(given.machine), ()
+    columns = tuple(given.graph.input() for _ in range(given.machine.chains().size + 1))
+    return Joints(columns[:-1], columns[-1]), columns
+
+
+def joint_columns(machine: Machine, columns: Mapping[str, Array], count: int) -> list[Array]:
+    """Solve for the joints of a machine at many points: the columns of a program that does not close the legs itself.
+
+    Args:
+        machine: gives all parameters that do not vary.
+        columns: values of the others by leaf path, SI [points].
+        count: number of points.
+    """
+    joints = solve_joints(with_values(machine, columns))
+    return [np.array(np.broadcast_to(c, (count,)), dtype=float) for c in (*joints.coordinates, joints.status)]
+
+
+def _weighted(response: Response, weights: Weights) -> Scalar:
+    value: Scalar = 0.0
+    for name, weight in weights:
+        value = plus(value, times(float(weight), QUANTITIES[name].value(response)))
+    return value
+
+
+def _number(value: Scalar) -> Operand:
     """A result as a program takes it: a node, or a float where it depends on nothing."""
     return float(value) if isinstance(value, int | float) else value

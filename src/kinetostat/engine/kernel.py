@@ -2,31 +2,57 @@
 
 Fixed parameters that are exactly 0 or infinite become part of the code, so that what they multiply is not computed at
 all, what cancels by form is not computed either, and where all springs are ordinary the code for rigid and free ones is
-left out. A new machine of the same form,
-with other numbers, uses the same program.
+left out. A new machine of the same form, with other numbers, uses the same program.
 """
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
-from kinetostat.algebra.scalar import where
-from kinetostat.engine.form import Form, Kind, angles, form_of, number, reduced, traced
-from kinetostat.engine.native import Program
-from kinetostat.engine.trace import Array, Body, Codes, Runnable, Traced
-from kinetostat.kinematics.closed_form import closed_joints
-from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.engine.form import Form, Kind, angles, form_of, joint_columns, objectives_of, reduced
+from kinetostat.engine.trace import Array, Codes, Runnable
+from kinetostat.kinematics.closure import solver_of
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import with_values
 
 KEPT = 64
 """Programs kept in memory, of some 20 kB each."""
+
+Fill = Callable[[Mapping[str, Array], Array, Codes], None]
+"""From the varying parameters of a slab [points] to its results [quantities x points] and status codes, in place."""
+
+
+def fill_some(chosen: Any, fill: Fill, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+    """Evaluate some points of a slab by a fill of their own.
+
+    Args:
+        chosen: an index of the points: numbers or a mask.
+        fill: evaluates them.
+        columns: values of the varying parameters of all points by leaf path, SI [points].
+        results, status: of all points; only those of the chosen ones are written.
+    """
+    part, codes = np.ascontiguousarray(results[:, chosen]), status[chosen]
+    fill({path: column[chosen] for path, column in columns.items()}, part, codes)
+    results[:, chosen], status[chosen] = part, codes
+
+
+def falling_back(first: Fill, other: Callable[[], Fill]) -> Fill:
+    """Compose two fills: the other takes the points at which the first finds no joints (NOT_CONVERGED).
+
+    Closed forms inside a program and the equations outside it are so composed; the other fill is made when the first
+    point needs it, because it costs a compilation.
+    """
+
+    def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        first(columns, results, status)
+        left = np.flatnonzero(status == Status.NOT_CONVERGED)
+        if left.size:
+            fill_some(left, other(), columns, results, status)
+
+    return fill
 
 
 @dataclass(frozen=True)
@@ -40,7 +66,8 @@ class Kernel:
         angles: leaf paths of all angles.
         machine: of which this is the program.
         quantities: names of its results.
-        iterated: whether joint coordinates are found slab by slab, by Newton's method, and are columns of the program.
+        closed: whether it computes joint coordinates itself, in closed form. Otherwise they are found slab by slab and
+            are further columns, unless the family places the joints.
     """
 
     program: Runnable
@@ -49,7 +76,7 @@ class Kernel:
     angles: frozenset[str]
     machine: Machine
     quantities: tuple[str, ...]
-    iterated: bool
+    closed: bool
 
     def run(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab of points; other threads run meanwhile.
@@ -60,68 +87,58 @@ class Kernel:
                 may lie apart, the points of a row may not.
             status: where the `Status` codes go [points].
         """
-        served = [np.ascontiguousarray(columns[path], dtype=float) for path in self.varying]
-        given = [reduced(c) if p in self.angles else c for p, c in zip(self.varying, served, strict=True)]
-        if self.iterated:
-            joints = solve_joints(with_values(self.machine, columns))
-            found = (*joints.coordinates, joints.status)
-            given += [np.ascontiguousarray(np.broadcast_to(c, status.shape), dtype=float) for c in found]
+        fill = falling_back(self._fill, self._outside) if self.closed else self._fill
+        fill(columns, results, status)
+
+    def _fill(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        given = program_columns(columns, self.varying, self.angles)
+        if self.machine.family.chains is not None and not self.closed:
+            given += joint_columns(self.machine, columns, len(status))
         self.program.run(self.fixed, given, results, status)
-        if not self.iterated and self.machine.family.chains is not None:
-            self._iterate(columns, results, status)
 
-    def _iterate(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-        """Find by Newton's method the joints at those points where closed forms do not close the legs."""
-        left = np.flatnonzero(status == Status.NOT_CONVERGED)
-        if left.size:
-            found, codes = np.empty((len(results), left.size)), np.empty(left.size, dtype=status.dtype)
-            kernel = slab_kernel(self.machine, self.varying, self.quantities, True)
-            kernel.run({path: column[left] for path, column in columns.items()}, found, codes)
-            results[:, left], status[left] = found, codes
+    def _outside(self) -> Fill:
+        """The program of the same quantities with joints as columns."""
+        return _kernel(self.machine, self.varying, self.quantities, closed=False).run
 
 
-def slab_kernel(
-    machine: Machine, varying: Sequence[str], quantities: Sequence[str], iterated: bool | None = None
-) -> Kernel:
+def program_columns(columns: Mapping[str, Array], varying: Sequence[str], turning: frozenset[str]) -> list[Array]:
+    """The varying parameters as a program takes them: contiguous, angles within what traced cosines take.
+
+    Args:
+        columns: values by leaf path, SI [points].
+        varying: leaf paths, in the order of the program's columns.
+        turning: leaf paths of all angles.
+    """
+    served = [np.ascontiguousarray(columns[path], dtype=float) for path in varying]
+    return [reduced(column) if path in turning else column for path, column in zip(varying, served, strict=True)]
+
+
+def slab_kernel(machine: Machine, varying: Sequence[str], quantities: Sequence[str]) -> Kernel:
     """The program for slabs of points of a machine; about 0.1 s unless one of the same form has been compiled.
 
     Args:
         machine: its family, and all parameters that do not vary.
         varying: leaf paths of the parameters that vary.
         quantities: names from `QUANTITIES`.
-        iterated: see `Kernel`; None to decide.
     """
-    if iterated is None:
-        iterated = needs_iteration(machine)
+    return _kernel(machine, varying, quantities, closes_inside(machine))
+
+
+def closes_inside(machine: Machine) -> bool:
+    """Whether a program for a machine can compute its joint coordinates itself."""
+    return machine.family.chains is not None and solver_of(machine, traced=True).traceable
+
+
+def _kernel(machine: Machine, varying: Sequence[str], quantities: Sequence[str], closed: bool) -> Kernel:
     form, numbers = form_of(machine, varying)
     names = tuple(quantities)
-    program = _program(Kind(machine), form, names, iterated)
-    return Kernel(program, numbers, form.varying, angles(machine), machine, names, iterated)
-
-
-def needs_iteration(machine: Machine) -> bool:
-    """Whether Newton's method has to find the joints of a machine, judged at its pose."""
-    if machine.family.chains is None:
-        return False
-    closed = closed_joints(machine.chains())
-    return closed is None or closed[1] == Status.NOT_CONVERGED or solve_joints(machine).status == Status.SINGULAR
+    return Kernel(
+        _program(Kind(machine), form, names, closed), numbers, form.varying, angles(machine), machine, names, closed
+    )
 
 
 @lru_cache(KEPT)
-def _program(kind: Kind, form: Form, quantities: tuple[str, ...], iterated: bool) -> Runnable:
-    given = traced(kind, form)
-    joints = [given.graph.input() for _ in range(kind.machine.chains().size + 1)] if iterated else []
-    response = respond(given.machine, _joints(given.machine, joints))
-    accepted = response.status < Status.OK + 0.5
-    results = [where(accepted, QUANTITIES[name].value(response), math.nan) for name in quantities]
-    numbers = [number(result) for result in results]
-    body = Body(given.fixed, [*given.columns.values(), *joints], numbers, number(response.status))
-    return Program(body)
+def _program(kind: Kind, form: Form, quantities: tuple[str, ...], closed: bool) -> Runnable:
+    from kinetostat.engine.native import Program  # LLVM takes 0.1 s to load: only where it pays
 
-
-def _joints(machine: Machine, columns: Sequence[Traced]) -> Joints | None:
-    """Joint coordinates and status: columns if they are found elsewhere, else in closed form."""
-    if columns:
-        return Joints(tuple(columns[:-1]), columns[-1])
-    closed = closed_joints(machine.chains()) if machine.family.chains else None
-    return Joints(tuple(closed[0]), closed[1]) if closed else None
+    return Program(objectives_of(kind, form, [((name, 1.0),) for name in quantities], closed=closed).body)

@@ -1,26 +1,101 @@
-"""The equations that joint coordinates of a machine written leg by leg satisfy, over any scalar. They are not solved.
+"""The conditions under which the legs of a machine close at its pose: what links can bridge, and equations for joints.
 
-What solves them is in `closure`; how their solution changes with the machine and its pose follows from them alone.
+They are stated here once, over any scalar, with their rates from the joints' screws. Nothing is solved here: `closure`
+finds the joint coordinates, and their derivatives follow from the same equations (`engine.derivatives`).
 
-Source: theory (19)-(21), in the base frame.
+Source: theory section 4 for links that meet, theory (19)-(21) for equations, (23) for legs of three revolutes;
+placements are in the base frame.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, cos, minus, sin, sqrt, times
-from kinetostat.algebra.vector import ZERO, Displacement, Rotation
-from kinetostat.kinematics.closed_form import platform_placement
-from kinetostat.machine.machine import Chains
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.algebra.scalar import Scalar, cos, minus, plus, sin, smaller, sqrt, times
+from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector, rotation_x, rotation_y, rotation_z
+from kinetostat.machine.leg import Joint, Turn
+from kinetostat.machine.machine import Chains, Closure, Configuration
 from kinetostat.machine.written.family import place
+from kinetostat.tolerances import NO_ANGLE_RATES
 
-ANGLES = ("roll", "pitch", "yaw")
+Array = npt.NDArray[np.float64]
+
+POINT, ANGLES = ("x", "y", "z"), ("roll", "pitch", "yaw")
+
+
+def clearance(closure: Closure) -> Scalar:
+    """How far the leg is from its nearest limit, m; negative where it cannot close."""
+    return smaller(closure.longest - closure.span, closure.span - closure.shortest)
+
+
+def within_reach(configuration: Configuration) -> Scalar:
+    """Whether every leg closes."""
+    result: Scalar = True
+    for closure in configuration.closures:
+        result = (clearance(closure) >= 0.0) & result
+    return result
+
+
+def why_out_of_reach(configuration: Configuration) -> str:
+    """One sentence for each leg that does not close, with its figures in m and the way out."""
+    sentences = []
+    for closure in configuration.closures:
+        if clearance(closure) >= 0.0:
+            continue
+        far = closure.span > closure.longest
+        limit = f"at most {closure.longest:.6g} m" if far else f"at least {closure.shortest:.6g} m"
+        advice = "move the platform nearer or lengthen" if far else "move the platform away or make more equal"
+        sentences.append(
+            f"The {closure.leg} would have to span {closure.span:.6g} m, but its links bridge {limit}; "
+            f"{advice} its links."
+        )
+    return " ".join(sentences)
+
+
+def platform_placement(chains: Chains) -> Displacement:
+    """Placement of the platform at the pose; coordinates that the pose does not give are those of the home pose."""
+    given, home = chains.pose, chains.home.translation
+    roll, pitch, yaw = (given.get(name, 0.0) for name in ANGLES)
+    turn = rotation_z(cos(yaw), sin(yaw)) @ rotation_y(cos(pitch), sin(pitch)) @ rotation_x(cos(roll), sin(roll))
+    return Displacement(turn, Vector(given.get("x", home.x), given.get("y", home.y), given.get("z", home.z)))
+
+
+@dataclass(frozen=True)
+class LegEnd:
+    """Where a leg takes the platform.
+
+    Attributes:
+        platform: its placement, base frame.
+        movers: the freedoms of the leg's joints there, in order; their unit twists are the rates of the placement.
+    """
+
+    platform: Displacement
+    movers: tuple[Joint, ...]
+
+
+def leg_ends(chains: Chains, coordinates: Sequence[Scalar | Turn]) -> list[LegEnd]:
+    """Follow every leg from base to platform.
+
+    Args:
+        chains: the legs at the home pose.
+        coordinates: of their joints leg by leg, from the home pose, rad (or turns) or m.
+    """
+    remaining = iter(coordinates)
+    ends = []
+    for steps in chains.legs:
+        chain, motion = place([step for step in steps if step.moves], remaining)
+        ends.append(LegEnd(motion @ chains.home, tuple(element.mover for element in chain)))  # type: ignore[attr-defined]
+    return ends
 
 
 def closing_equations(chains: Chains, coordinates: Sequence[Scalar]) -> list[Scalar]:
-    """What vanishes where all legs take the platform to one place and that place has the given pose.
+    """Return what vanishes where all legs take the platform to one placement and that placement has the given pose.
 
     Exact to first order there: rotations are half the sum of r x r' over their columns, the rotation vector between
-    two placements that all but agree.
+    two placements that all but agree. So there is no arc function, and formulas can be traced; see `gaps_at` for
+    what Newton's method needs further away.
 
     Args:
         chains: the legs at the home pose, and the pose.
@@ -30,20 +105,24 @@ def closing_equations(chains: Chains, coordinates: Sequence[Scalar]) -> list[Sca
         Six numbers for each leg after the first, then one for each pose coordinate; m, rotations (rad) times the
         machine's length.
     """
-    remaining = iter(coordinates)
-    ends = [place(steps, remaining)[1] @ chains.home for steps in chains.legs]
-    gaps = [gap for end in ends[1:] for gap in _apart(ends[0], end, chains.length)]
-    return [*gaps, *_off_pose(chains, ends[0])]
+    ends = leg_ends(chains, coordinates)
+    return [*_between_legs(ends, chains.length), *_off_pose(chains, ends[0].platform)]
 
 
-def _apart(one: Displacement, other: Displacement, length: Scalar) -> list[Scalar]:
-    return [*_turned(one.rotation, other.rotation, length), *(other.translation - one.translation).components()]
+def _between_legs(ends: Sequence[LegEnd], length: Scalar) -> list[Scalar]:
+    """The displacements from where the other legs take the platform to where the first one takes it."""
+    first = ends[0].platform
+    return [gap for end in ends[1:] for gap in _apart(end.platform, first, length)]
 
 
-def _turned(one: Rotation, other: Rotation, length: Scalar) -> list[Scalar]:
+def _apart(start: Displacement, end: Displacement, length: Scalar) -> list[Scalar]:
+    return [*_turned(start.rotation, end.rotation, length), *(end.translation - start.translation).components()]
+
+
+def _turned(start: Rotation, end: Rotation, length: Scalar) -> list[Scalar]:
     """The rotation vector from one rotation to another, times the length."""
     turn = ZERO
-    for a, b in ((one.x, other.x), (one.y, other.y), (one.z, other.z)):
+    for a, b in ((start.x, end.x), (start.y, end.y), (start.z, end.z)):
         turn = turn + a.cross(b)
     return list((turn * times(0.5, length)).components())
 
@@ -51,8 +130,7 @@ def _turned(one: Rotation, other: Rotation, length: Scalar) -> list[Scalar]:
 def _off_pose(chains: Chains, end: Displacement) -> list[Scalar]:
     """What is left from a placement to the pose, for each coordinate that is given."""
     given = chains.pose
-    points = {"x": end.translation.x, "y": end.translation.y, "z": end.translation.z}
-    gaps = [minus(given[name], reached) for name, reached in points.items() if name in given]
+    gaps = [minus(given[name], getattr(end.translation, name)) for name in POINT if name in given]
     if all(name in given for name in ANGLES):
         return gaps + _turned(end.rotation, platform_placement(chains).rotation, chains.length)
     sides = _sides(end.rotation)
@@ -67,3 +145,126 @@ def _sides(turn: Rotation) -> dict[str, tuple[Scalar, Scalar]]:
     """Cosine and sine of roll, pitch and yaw of Q = Rz(yaw) Ry(pitch) Rx(roll), each up to a common factor."""
     flat = sqrt(times(turn.x.x, turn.x.x) + times(turn.x.y, turn.x.y))
     return {"roll": (turn.z.z, turn.y.z), "pitch": (flat, -turn.x.z), "yaw": (turn.x.x, turn.x.y)}
+
+
+def squared_distance(start: Displacement, end: Displacement, length: Scalar) -> Scalar:
+    """Square of how far two placements differ, rad and units of the length; 0 only where they are the same."""
+    shift = (end.translation - start.translation) * (1.0 / length)
+    turns = ((start.rotation.x, end.rotation.x), (start.rotation.y, end.rotation.y), (start.rotation.z, end.rotation.z))
+    square: Scalar = shift.dot(shift)
+    for column in [a - b for a, b in turns]:
+        square = plus(square, times(0.5, column.dot(column)))
+    return square
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """How far a machine is from closed and from its pose, in rad and in units of the machine's length [n x rows].
+
+    Attributes:
+        closure, pose: what is left to do.
+        closure_rates, pose_rates: how joint coordinates, slides in those units, reduce it [n x rows x coordinates].
+        platform: its placement, where the first leg takes it.
+        platform_rates: twist of the platform per unit of each joint coordinate, in the same units [n x 6 x
+            coordinates].
+    """
+
+    closure: Array
+    pose: Array
+    closure_rates: Array
+    pose_rates: Array
+    platform: Displacement
+    platform_rates: Array
+
+    @property
+    def left(self) -> Array:
+        """All that is left to do [n x rows]."""
+        return np.hstack([self.closure, self.pose])
+
+    @property
+    def rates(self) -> Array:
+        """How joint coordinates reduce it [n x rows x coordinates]."""
+        return np.concatenate([self.closure_rates, self.pose_rates], axis=1)
+
+    @property
+    def largest(self) -> Array:
+        """The largest of all that is left to do [n]."""
+        return np.asarray(np.max(np.abs(self.left), axis=1, initial=0.0))
+
+
+def gaps_at(chains: Chains, coordinates: Array, goal: Array) -> Gaps:
+    """The closing equations and their rates for arrays of poses.
+
+    Rates come from the joints' screws instead of differences. Angles of the pose are compared as angles, not by a sine
+    as in `closing_equations`: on the way from the home pose they may be far apart, and a sine vanishes half a turn away
+    as well.
+
+    Args:
+        chains: the legs at the home pose.
+        coordinates: of their joints [n x coordinates], rad or m.
+        goal: coordinates of the pose, in the order of the chains' pose [n x given], rad or m.
+    """
+    count = len(coordinates)
+    length = np.broadcast_to(np.asarray(chains.length, dtype=float), (count,))
+    ends = leg_ends(chains, list(coordinates.T))
+    scale = np.stack([np.ones(count)] * 3 + [1.0 / length] * 3, axis=1)[:, :, None] * units_of(chains, length)[:, None]
+    twists = [block * scale for block in _platform_twists(ends, count)]
+    closure = stacked(_between_legs(ends, length), count) / length[:, None]
+    closure_rates = [np.zeros((count, 0, chains.size)), *(block - twists[0] for block in twists[1:])]
+    pose, pose_rates = _pose_gaps(ends[0].platform, twists[0], chains, goal, length)
+    return Gaps(closure, pose, np.concatenate(closure_rates, axis=1), pose_rates, ends[0].platform, twists[0])
+
+
+def units_of(chains: Chains, length: Array) -> Array:
+    """The unit of each joint coordinate: 1 rad, or the machine's length of a slide, m [n x coordinates]."""
+    slides = np.array([step.element.mover.point is None for steps in chains.legs for step in steps if step.moves])
+    return np.where(slides, length[:, None], 1.0)
+
+
+def _platform_twists(ends: Sequence[LegEnd], count: int) -> list[Array]:
+    """Of each leg, the platform's twist per unit of every joint coordinate: 0 for those of other legs [n x 6 x all]."""
+    blocks, first = [], 0
+    size = sum(len(end.movers) for end in ends)
+    for end in ends:
+        block = np.zeros((count, 6, size))
+        for k, mover in enumerate(end.movers, first):
+            block[:, :, k] = stacked(mover.twist(end.platform.translation).components(), count)
+        first += len(end.movers)
+        blocks.append(block)
+    return blocks
+
+
+def stacked(scalars: Sequence[Scalar], count: int) -> Array:
+    """Scalars as columns [n x scalars]."""
+    if not scalars:
+        return np.zeros((count, 0))
+    return np.stack([np.broadcast_to(np.asarray(s, dtype=float), (count,)) for s in scalars], axis=1)
+
+
+def _pose_gaps(end: Displacement, twists: Array, chains: Chains, goal: Array, length: Array) -> tuple[Array, Array]:
+    reached, given = pose_of(end), [*chains.pose]
+    turning = any(name in ANGLES for name in given)
+    changes = _angle_rates(end.rotation, len(goal)) @ twists[:, :3] if turning else twists[:, :3]
+    gaps, rows = [], []
+    for name, wanted in zip(given, goal.T, strict=True):
+        left = wanted - reached[name]
+        if name in POINT:
+            gaps.append(left / length)
+            rows.append(twists[:, 3 + POINT.index(name)])
+        else:
+            gaps.append(np.arctan2(np.sin(left), np.cos(left)))
+            rows.append(changes[:, ANGLES.index(name)])
+    return np.stack(gaps, axis=1), np.stack(rows, axis=1)
+
+
+def pose_of(end: Displacement) -> dict[str, Array]:
+    """Pose coordinates of a placement: P (m), and the angles of Q = Rz(yaw) Ry(pitch) Rx(roll), rad; arrays [n]."""
+    angles = {name: np.arctan2(sine, cosine) for name, (cosine, sine) in _sides(end.rotation).items()}
+    return {name: np.asarray(getattr(end.translation, name)) for name in POINT} | angles
+
+
+def _angle_rates(turn: Rotation, count: int) -> Array:
+    """Rates of roll, pitch and yaw per unit angular velocity [n x 3 x 3]; least norm at pitch = +-90 deg."""
+    yaw = np.arctan2(turn.x.y, turn.x.x)
+    axes = [turn.x.components(), (-np.sin(yaw), np.cos(yaw), 0.0), (0.0, 0.0, 1.0)]
+    return np.linalg.pinv(np.stack([stacked(axis, count) for axis in axes], axis=2), rcond=NO_ANGLE_RATES)

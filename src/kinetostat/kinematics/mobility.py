@@ -16,9 +16,7 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.singularity import Array, columns
 from kinetostat.machine.leg import Joint, Leg
 from kinetostat.machine.machine import Configuration
-
-DEPENDENT = 1e-6
-"""Singular value of unit screws below which they are dependent: what is exact loses half of its digits in a root."""
+from kinetostat.tolerances import DEPENDENT
 
 SPATIAL = 6
 

@@ -1,6 +1,6 @@
-"""Singularities of one pose from its screws: which leg locks up, and which twist the locked machine leaves free.
+"""One pose from its screws: which leg locks up, which twist the locked machine leaves free, how actuators move it.
 
-Source: theory sections 2 and 8; screws are at one reference point, in base axes.
+Source: theory (3) and sections 2 and 8; screws are at one reference point, in base axes.
 """
 
 from collections.abc import Sequence
@@ -9,10 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.algebra.screw import COMPONENTS, Screw, Wrench
-from kinetostat.machine.leg import LegScrews
-
-PURE = 1e-9
-"""Share of rotation below which a twist counts as a pure translation."""
+from kinetostat.machine.leg import LegScrews, Spring
+from kinetostat.tolerances import NEGLIGIBLE_COMPONENT, PURE_TRANSLATION
 
 Array = npt.NDArray[np.float64]
 
@@ -58,7 +56,7 @@ def free_twist(legs: Sequence[LegScrews], length: float) -> list[float]:
     wrenches = [wrench for leg in legs for wrench in leg.wrenches]
     left, _, _ = np.linalg.svd(columns(wrenches, 1.0 / length, 1.0))
     angular, linear = left[:3, -1] / length, left[3:, -1]
-    turning = np.linalg.norm(angular) * length > PURE
+    turning = np.linalg.norm(angular) * length > PURE_TRANSLATION
     size = np.linalg.norm(angular if turning else linear)
     return [float(c / size) for c in (*angular, *linear)]
 
@@ -88,6 +86,38 @@ def describe(screw: Sequence[float], units: tuple[str, str]) -> str:
     shown = [
         f"{name} {value:+.4g} {units[i // 3]}"
         for i, (name, value) in enumerate(zip(COMPONENTS, screw, strict=True))
-        if abs(value) > 1e-9 * size
+        if abs(value) > NEGLIGIBLE_COMPONENT * size
     ]
     return ", ".join(shown)
+
+
+def actuator_jacobian(
+    legs: Sequence[LegScrews], springs: Sequence[Sequence[Spring]], length: float, guide: Sequence[Wrench] = ()
+) -> Array:
+    """Platform twist per unit rate of each actuator, W^T t = (J_e^T W)^T rates with rates of actuators alone.
+
+    Where legs impose constraints twice, the equations agree for rates that the machine can have.
+
+    Args:
+        legs: their screws at one reference point, base axes.
+        springs: of each leg, in the order of its screws.
+        length: characteristic length, m; compares moments with forces where equations do not agree.
+        guide: of a planar machine, the wrenches against twists that do not exist there.
+
+    Returns:
+        Twists [6 x actuators] at that point: rad and m per rad or m of the actuator.
+    """
+    wrenches = [*(wrench for leg in legs for wrench in leg.wrenches), *guide]
+    rates = []
+    at = 0
+    for leg, leg_springs in zip(legs, springs, strict=True):
+        for spring, loads in zip(leg_springs, leg.loads, strict=True):
+            if spring.actuated and float(spring.stiffness) > 0.0:
+                rate = np.zeros(len(wrenches))
+                rate[at : at + len(loads)] = [float(load) for load in loads]
+                rates.append(rate)
+        at += len(leg.wrenches)
+    if not rates:
+        return np.zeros((6, 0))
+    scaled = np.linalg.pinv(columns(wrenches, 1.0 / length, 1.0).T) @ np.array(rates).T
+    return np.asarray(scaled / np.repeat([length, 1.0], 3)[:, None])

@@ -12,9 +12,9 @@ from kinetostat.algebra.scalar import Scalar, smaller, where
 from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import Vector
+from kinetostat.kinematics.closing import within_reach
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.limits import Check, geometric_checks, within
-from kinetostat.kinematics.reach import within_reach
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_statics, stiffness_matrix
 from kinetostat.kinetostatics.overload import actuator_checks

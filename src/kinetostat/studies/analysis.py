@@ -13,9 +13,8 @@ import numpy as np
 from kinetostat.algebra.screw import COMPONENTS, Screw
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import IDENTITY, Rotation
-from kinetostat.kinematics.jacobian import actuator_jacobian
 from kinetostat.kinematics.mobility import Mobility, mobility
-from kinetostat.kinematics.singularity import conditioning, describe, independent
+from kinetostat.kinematics.singularity import actuator_jacobian, conditioning, describe, independent
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, stiffness_matrix
 from kinetostat.kinetostatics.conditioning import twist_condition

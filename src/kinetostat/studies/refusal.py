@@ -3,11 +3,10 @@
 import math
 from collections.abc import Sequence
 
-from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinematics.closing import why_out_of_reach
+from kinetostat.kinematics.closure import nearest_pose, solve_joints
 from kinetostat.kinematics.limits import why_beyond
 from kinetostat.kinematics.mobility import Kind, Mobility, mobility
-from kinetostat.kinematics.nearest import nearest_pose
-from kinetostat.kinematics.reach import why_out_of_reach
 from kinetostat.kinematics.singularity import describe, why_singular
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import SINGULAR, Response

@@ -13,11 +13,7 @@ from kinetostat.algebra.scalar import Scalar, minus, plus, reciprocal, sqrt, tim
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.machine import Closure, Step
-
-PARALLEL = 1e-12
-"""Sine of an angle between axes up to which they are parallel as written."""
-LEAST_LINK = 1e-9
-"""Length of a link, m, below which it has no direction."""
+from kinetostat.tolerances import NO_LINK, PARALLEL_AXES
 
 
 @dataclass(frozen=True)
@@ -111,12 +107,12 @@ def closed_form(name: str, steps: Sequence[Step]) -> ParallelAxes | None:
         return None
     axes = np.array([joint.axis.components() for joint in movers], dtype=float)
     axis = axes[turning[0]]
-    if np.linalg.norm(np.cross(axes, axis), axis=1).max() > PARALLEL:
+    if np.linalg.norm(np.cross(axes, axis), axis=1).max() > PARALLEL_AXES:
         return None
     points = np.array([_point(movers[i]).components() for i in turning], dtype=float)
     lower, upper = (link - axis * (link @ axis) for link in np.diff(points, axis=0))
     bend = float(np.cross(upper, lower) @ axis)
-    if min(np.linalg.norm(lower), np.linalg.norm(upper)) < LEAST_LINK or bend == 0.0:
+    if min(np.linalg.norm(lower), np.linalg.norm(upper)) < NO_LINK or bend == 0.0:
         return None
     signs = tuple(float(np.sign(one @ axis)) for one in axes)
     first, middle, last = turning
