@@ -67,8 +67,8 @@ def solver_of(machine: Machine, traced: bool = False) -> "ClosedForms | Newton":
 
     Args:
         machine: written leg by leg.
-        traced: whether the solver is to be part of a program, which one that iterates is not (`traceable`). A program cannot test pose by pose whether the given
-            coordinates determine the platform, so that this is tested once, at the machine's own pose.
+        traced: whether the solver is to be part of a program. A program neither iterates nor tests pose by pose whether
+            the given coordinates determine the platform, so that this is tested once, at the machine's own pose.
     """
     chains = machine.chains()
     if any(inverse is None for inverse in chains.inverses) or len(chains.inverses) < len(chains.legs):
