@@ -10,6 +10,7 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 SMALL = 22
 """Nodes of a body up to which functions may be alike: a property that passes one thing on."""
 CALLED_FROM_OUTSIDE = {
+    "WITH_CRANKS": "the catalogue takes every family that a module defines",
     "dask_setup": "called by workers of a cluster, by this name",
     "error": "called by argparse, by this name",
     "doctype": "called by the parser of XML, by this name",

@@ -11,7 +11,7 @@ import pytest
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.exchange.mjcf import text_of
 from kinetostat.machine.loading import build, bundled, load
-from kinetostat.machine.written.family import NAME
+from kinetostat.machine.written.plan import NAME
 from kinetostat.studies.analysis import analyze
 
 AGREED = 1e-4

@@ -4,7 +4,7 @@ import pytest
 
 from kinetostat.cli import DONE, main
 from kinetostat.machine.loading import bundled, load
-from kinetostat.machine.plausible import doubts
+from kinetostat.machine.parameters import doubts
 
 
 @pytest.mark.parametrize("name", bundled())

@@ -14,8 +14,7 @@ from kinetostat.exchange.urdf_file import Array, FileJoint, FileLoop, UrdfFile, 
 from kinetostat.kinematics.mobility import task_coordinates
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.written.family import NAME
-from kinetostat.machine.written.plan import BASE, PLANAR_POSE, PLATFORM, SPATIAL_POSE
+from kinetostat.machine.written.plan import BASE, NAME, PLANAR_POSE, PLATFORM, SPATIAL_POSE
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.validation import SCHEMA_VERSION

@@ -5,6 +5,7 @@ Elastic constants are typical values for preliminary design; a file may give its
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, minus, plus, reciprocal, smaller, times
 from kinetostat.machine.leg import RIGID
@@ -116,3 +117,52 @@ def rigidity(young: Scalar, slide: Scalar, profile: CrossSection, shear: bool = 
         shear_y=sheared,
         shear_z=sheared,
     )
+
+
+SHAPES = {
+    "round": ("diameter",),
+    "tube": ("outer_diameter", "inner_diameter"),
+    "rectangle": ("width", "height"),
+    "own": ("area", "second_moment_y", "second_moment_z", "torsion_constant"),
+}
+"""The shapes of cross-sections that files may name, and the numbers that give them."""
+
+SHAPE_KINDS = {
+    "diameter": "length",
+    "outer_diameter": "length",
+    "inner_diameter": "length",
+    "width": "length",
+    "height": "length",
+    "area": "area",
+    "second_moment_y": "second moment of area",
+    "second_moment_z": "second moment of area",
+    "torsion_constant": "second moment of area",
+}
+"""Kind of quantity of each of these numbers."""
+
+
+def rigidity_of(shape: str, data: Any, shear: bool) -> Rigidity:
+    """The rigidity of a bar with a cross-section of the file.
+
+    Args:
+        shape: a key of `SHAPES`.
+        data: an instance of its table.
+        shear: whether it yields in shear (Timoshenko).
+    """
+    return rigidity(data.youngs_modulus, data.shear_modulus, _profile(shape, data), shear)
+
+
+def linear_density_of(shape: str, data: Any) -> Scalar:
+    """Mass per length of such a bar, kg/m; arguments as for `rigidity_of`."""
+    return times(data.density, _profile(shape, data).area)
+
+
+def _profile(shape: str, data: Any) -> CrossSection:
+    poisson = 0.5 * data.youngs_modulus / data.shear_modulus - 1.0
+    if shape == "round":
+        return tube(data.diameter, 0.0, poisson)
+    if shape == "tube":
+        return tube(data.outer_diameter, data.inner_diameter, poisson)
+    if shape == "rectangle":
+        return rectangle(data.width, data.height)
+    return CrossSection(data.area, data.second_moment_y, data.second_moment_z, data.torsion_constant, 5.0 / 6.0)

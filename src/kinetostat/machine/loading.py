@@ -23,7 +23,8 @@ from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.written import family as written
 from kinetostat.machine.written.checking import check_numbers, completed
 from kinetostat.machine.written.document import by_name, check_paths, separate
-from kinetostat.machine.written.schema import written_schema
+from kinetostat.machine.written.plan import NAME, SUMMARY
+from kinetostat.machine.written.tables import written_schema
 from kinetostat.spec import document as documents
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
@@ -84,7 +85,7 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
         document = documents.parse(document, origin)
     if documents.is_study(document):
         raise InputError(f'"{origin}" {STUDY}')
-    if document.get("family") == written.NAME:
+    if document.get("family") == NAME:
         return _build_written(document, origin, settings)
     family = _family(document.get("family"), origin)
     changed = documents.override(document, settings, _counts(family))
@@ -135,7 +136,7 @@ def _family(name: object, origin: str) -> Family:
     found = families()
     if isinstance(name, str) and name in found:
         return found[name]
-    known = [*found, written.NAME]
+    known = [*found, NAME]
     if name is None:
         raise InputError(f'"{origin}": family is missing; add family = "..." with one of: {", ".join(known)}.')
     near = difflib.get_close_matches(str(name), known, 1)
@@ -145,7 +146,7 @@ def _family(name: object, origin: str) -> Family:
 
 def kinds_of_machine() -> dict[str, str]:
     """Every kind of machine that a file may name, with one line about each."""
-    return {**{family.name: family.summary for family in families().values()}, written.NAME: written.SUMMARY}
+    return {**{family.name: family.summary for family in families().values()}, NAME: SUMMARY}
 
 
 def as_toml(machine: Machine) -> str:
@@ -187,7 +188,7 @@ def template(family: str) -> str:
     Raises:
         InputError: no such family.
     """
-    wanted = family if family == written.NAME else _family(family, "kinetostat new").name
+    wanted = family if family == NAME else _family(family, "kinetostat new").name
     simplest = sorted(bundled().items(), key=lambda item: len(item[0]))
     return next(text for _, text in simplest if documents.parse(text, "")["family"] == wanted)
 

@@ -1,6 +1,10 @@
-"""The scalars of a machine by path ("geometry.base_radius", "stiffness.passive_links.0"): list, find, replace."""
+"""The scalars of a machine by path ("geometry.base_radius", "stiffness.passive_links.0"): list, find, replace.
+
+Numbers that are hardly what was meant are pointed out here too (`doubts`); what is refused is up to `spec`.
+"""
 
 import difflib
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,6 +16,13 @@ from kinetostat.spec.fields import Quantity, leaves, quantities
 
 LEG_BY_LEG = ("_angles", "crank_turn", "stiffness.actuator")
 """Ends of the fields of families that have an entry for each leg."""
+
+
+FULL_TURN = 2.0 * math.pi
+BEYOND = 100.0
+"""How many times the longest of all other lengths a length may be."""
+SOFTEST = 100.0
+"""N/m: what gives 10 mm under 1 N is no drive and no link of a machine."""
 
 
 @dataclass(frozen=True)
@@ -101,3 +112,27 @@ def with_leg(machine: Machine, path: str) -> str:
     legs = [leg.name for leg in machine.configure().legs if leg.name.startswith("leg ")]
     count = next(len(p.leaves) for p in parameters(machine.family) if p.path == field)
     return f"{path} ({legs[int(entry)] if len(legs) == count else f'leg {int(entry) + 1}'})"
+
+
+def doubts(machine: Machine) -> Iterator[str]:
+    """A sentence for each implausible number: an angle beyond a turn, one length beyond all, no stiffness."""
+    found = list(_numbers(machine))
+    for path, field, kind, value in found:
+        if kind == "angle" and abs(value) > FULL_TURN * (1.0 + 1e-9):
+            yield f'{path} is {value:g} rad, more than a turn; if degrees are meant, write "{value:g} deg".'
+        others = [abs(v) for _, other, k, v in found if k == kind == "length" and other != field]
+        if 0.0 < BEYOND * max(others, default=0.0) < abs(value):
+            yield f'{path} is {value:g} m, over {BEYOND:g} times all others; if mm are meant, write "{value:g} mm".'
+        if kind == "linear stiffness" and 0.0 < value < SOFTEST:
+            yield f'{path} is {value:g} N/m, next to nothing; if N/um are meant, write "{value:g} N/um".'
+
+
+def _numbers(machine: Machine) -> Iterator[tuple[str, str, str, float]]:
+    """Path, field, kind and value of every finite number; once for all entries of a field that are alike."""
+    held = values(machine)
+    fields = {p.path: p for p in parameters(machine.family)}
+    entries = {leaf for p in fields.values() if p.quantity.count for leaf in p.leaves}
+    for field in (p for p in fields.values() if p.path not in entries):
+        own = {leaf: float(held[leaf]) for leaf in field.leaves if math.isfinite(held[leaf])}
+        alike = {field.path: next(iter(own.values()))} if len(set(own.values())) == 1 else own
+        yield from ((path, field.path, field.quantity.kind, value) for path, value in alike.items())

@@ -1,4 +1,4 @@
-"""Parts that a machine has only where its file says so: links that yield, joints that a servo holds.
+"""Parts that families are built from: joints that a servo holds, links that are flexible where the file says so, bars.
 
 A stiffness that is infinite by form (the float itself, as a default is) leaves no spring behind, one that is zero by
 form leaves a free joint; arrays and traced values always leave a spring, whatever they hold.
@@ -8,11 +8,22 @@ Points and axes are in the base frame.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, times
 from kinetostat.algebra.vector import Z_AXIS, Displacement, Vector
-from kinetostat.machine.leg import RIGID, Joint, Spring, series
-from kinetostat.machine.link import link_axes
+from kinetostat.machine.leg import RIGID, Element, Joint, Line, Spring, series
+from kinetostat.machine.link import Parallelogram, link_axes
+from kinetostat.spec.fields import Quantity, table
+
+
+@table
+class Translations:
+    """Table [pose] of a machine whose platform moves along x, y and z and does not turn."""
+
+    x: Annotated[float, Quantity("length", "x of the platform point P")]
+    y: Annotated[float, Quantity("length", "y of the platform point P")]
+    z: Annotated[float, Quantity("length", "z of the platform point P")]
 
 
 def is_rigid(stiffness: Scalar) -> bool:
@@ -93,3 +104,49 @@ class Arm:
         """The link after a rigid displacement of the whole machine."""
         ends = motion.apply(self.start), motion.apply(self.end)
         return Arm(*ends, self.name, motion.rotation.apply(self.up), self.bending, self.torsion)
+
+
+@dataclass(frozen=True)
+class BarPair:
+    """Two parallel bars on spherical joints, between a link of a leg and the platform, as in a Delta (theory (16)).
+
+    Attributes:
+        name: of the leg it belongs to.
+        near, far: middles between the two bars at the leg and at the platform, base frame, m.
+        side: unit vector from one bar to the other; not along the bars.
+        length, spacing: of the bars and between them, m.
+        axial: E A of each bar, N.
+    """
+
+    name: str
+    near: Vector
+    far: Vector
+    side: Vector
+    length: Scalar
+    spacing: Scalar
+    axial: Scalar
+
+    @property
+    def along(self) -> Vector:
+        """Unit vector of the bars."""
+        return (self.far - self.near) * reciprocal(self.length)
+
+    @property
+    def chain(self) -> tuple[Element, ...]:
+        """The same freedoms as a chain: R about the side, R about the bars, parallelogram, R about the side.
+
+        They span what does no work with a force along either bar, and no more (theory section 4).
+        """
+        bar = per_length(self.axial, self.length)
+        return (
+            Joint(self.side, self.near, f"{self.name} elbow"),
+            Joint(self.along, self.near, f"{self.name} bars"),
+            Parallelogram(f"{self.name} bars", self.near, self.far, self.side, self.spacing, bar),
+            Joint(self.side, self.far, f"{self.name} platform joint"),
+        )
+
+    @property
+    def lines(self) -> tuple[Line, Line]:
+        """The lines of both bars: all that they carry."""
+        half = self.side * (0.5 * self.spacing)
+        return Line(self.far + half, self.along), Line(self.far - half, self.along)

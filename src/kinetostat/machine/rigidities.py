@@ -10,10 +10,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from kinetostat.machine.cross_section import MATERIALS
+from kinetostat.machine.cross_section import MATERIALS, SHAPE_KINDS, SHAPES, linear_density_of, rigidity_of
 from kinetostat.machine.machine import Family
-from kinetostat.machine.written.plan import SHAPES
-from kinetostat.machine.written.tables import SHAPE_KINDS, linear_density_of, rigidity_of
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import quantities
@@ -76,7 +74,10 @@ def _resolved(value: object, which: str, where: str) -> tuple[object, Densities]
 def _rigidity(table: Mapping[str, object], which: str, where: str) -> tuple[float, float]:
     rest = dict(table)
     shape = choice(rest.pop("shape", None), SHAPES, f"{where}: shape")
-    numbers = {size: _size(rest.pop(size, None), SHAPE_KINDS[size], f"{where}: {size}") for size in SHAPES[shape]}
+    numbers = {
+        size: _size(rest.pop(size, None), SHAPE_KINDS[size], f"{where}: {size}", size == "inner_diameter")
+        for size in SHAPES[shape]
+    }
     if "material" in rest or not rest.keys() & set(MODULI):
         material = MATERIALS[choice(rest.pop("material", None), MATERIALS, f"{where}: material")]
         numbers |= {name: getattr(material, name) for name in (*MODULI, "density")}
@@ -96,12 +97,12 @@ def _rigidity(table: Mapping[str, object], which: str, where: str) -> tuple[floa
     return float(getattr(rigidity_of(shape, data, shear=False), which)), float(linear_density_of(shape, data))
 
 
-def _size(value: object, kind: str, where: str) -> float:
+def _size(value: object, kind: str, where: str, may_be_zero: bool = False) -> float:
     try:
         number = parse(value, kind)
     except UnitError as error:
         said = "missing" if value is None else shorten(value)
         raise InputError(f"{where} is {said}: {error}.") from None
-    if number < 0.0 or (number == 0.0 and not where.endswith("inner_diameter")):
+    if number < 0.0 or (number == 0.0 and not may_be_zero):
         raise InputError(f"{where} is {shorten(value)}; it must be greater than 0.")
     return number

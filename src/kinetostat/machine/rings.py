@@ -1,14 +1,20 @@
-"""Two rings of joints, on the base and on the platform: how most families say where their legs begin and end.
+"""Machines between two rings of joints, on the base and on the platform: where their legs begin and end, and the legs.
 
-Points are in the base frame, those of the platform's ring before it is moved in its own.
+A family says where its platform is and what guides it; the actuated legs, struts (U-P-S) or cranks (R-U-S), come from
+here. Points are in the base frame, those of the platform's ring before it is moved in its own.
 """
 
-from collections.abc import Sequence
-from typing import Annotated
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Displacement, Vector, polar, ring
-from kinetostat.spec.fields import Quantity, table
+from kinetostat.machine.crank import CRANK_LINKS, CrankLinks, Cranks, crank_legs, outward
+from kinetostat.machine.leg import RIGID, Leg, two_force_legs
+from kinetostat.machine.links import LinkKind, straight_legs
+from kinetostat.machine.machine import Closure, Configuration, Family
+from kinetostat.spec.fields import Field, Quantity, made_table, quantities, table
 
 Three = tuple[float, float, float]
 
@@ -61,3 +67,85 @@ def four_joints(radius: Scalar, angle: Scalar) -> list[Vector]:
     """Joint centres at `radius` (m) and the angles T, 90 deg + T, -(90 deg + T), -T for T = `angle` (rad)."""
     p = polar(radius, angle)
     return [p, Vector(-p.y, p.x, 0.0), Vector(-p.y, -p.x, 0.0), Vector(p.x, -p.y, 0.0)]
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A platform at its pose, without its actuated legs; base frame, m.
+
+    Attributes:
+        platform: its placement; the translation is P.
+        joints: base joints and platform joints of the actuated legs, in order.
+        passive: the passive legs that guide it.
+        closures: what these need to close.
+    """
+
+    platform: Displacement
+    joints: tuple[Sequence[Vector], Sequence[Vector]]
+    passive: tuple[Leg, ...] = ()
+    closures: tuple[Closure, ...] = ()
+
+    def moved_by(self, legs: Sequence[Leg], size: Scalar, closures: Sequence[Closure] = ()) -> Configuration:
+        """The machine with its actuated legs, their closures, and its characteristic length (m)."""
+        return Configuration(self.platform, (*self.passive, *legs), (*self.closures, *closures), size)
+
+
+Placed = Callable[[Any, Any, Any], Placement]
+"""From the tables geometry, stiffness and pose (SI) to the platform in closed form, NaN where it cannot be."""
+
+
+def with_struts(
+    name: str, summary: str, tables: Mapping[str, type], placed: Placed, links: Sequence[LinkKind] = ()
+) -> Family:
+    """The family whose actuated legs are U-P-S: forces along lines between the joints.
+
+    Args:
+        name, summary: as of `Family`.
+        tables: geometry (`Rings`), stiffness (with `actuator` and `leg_axial`) and pose.
+        placed: the platform and what guides it.
+        links: of what guides it, those with a mass.
+    """
+
+    def configure(geometry: Any, stiffness: Any, pose: Any) -> Configuration:
+        found = placed(geometry, stiffness, pose)
+        return found.moved_by(two_force_legs(*found.joints, stiffness.actuator, stiffness.leg_axial), geometry.size)
+
+    legs = LinkKind("legs", ("leg_axial",), straight_legs)
+    return Family(name=name, summary=summary, tables=tables, configure=configure, links=(legs, *links))
+
+
+def with_cranks(
+    name: str, summary: str, tables: Mapping[str, type], placed: Placed, links: Sequence[LinkKind] = ()
+) -> Family:
+    """The family whose actuated legs are R-U-S: the same machine with cranks and rods instead of struts.
+
+    The cranks turn in vertical planes, outward where the platform is above the base. NaN where a rod does not reach.
+
+    Args:
+        name, summary, tables, placed, links: as for `with_struts`; tables are those of the family with struts.
+    """
+
+    def configure(geometry: Any, stiffness: Any, pose: Any) -> Configuration:
+        found = placed(geometry, stiffness, pose)
+        sides = outward(found.joints[0], geometry.base_radius, geometry.crank_turn)
+        bars = CrankLinks(geometry.crank_length, geometry.rod_length, stiffness.crank_bending, stiffness.leg_axial)
+        legs, limits = crank_legs(found.joints, sides, stiffness.actuator, bars)
+        return found.moved_by(legs, geometry.size, limits)
+
+    cranked = {**tables, **_crank_tables(tables["geometry"], tables["stiffness"])}
+    return Family(name=name, summary=summary, tables=cranked, configure=configure, links=(*CRANK_LINKS, *links))
+
+
+def _crank_tables(geometry: type, stiffness: type) -> dict[str, type]:
+    count = quantities(stiffness)["actuator"].count
+    turn = Quantity("angle", "turn of each crank's plane about z, from the radial direction", count=count)
+    changed = {
+        "actuator": Field(Quantity("torsional stiffness", "stiffness of the actuated revolutes", count=count)),
+        "leg_axial": Field(Quantity("axial rigidity", "axial rigidity of the rods, EA"), RIGID),
+        "crank_bending": Field(Quantity("bending rigidity", "bending rigidity of the cranks, EI"), RIGID),
+    }
+    turns = {"crank_turn": Field(turn, (0.0,) * (count or 1))}
+    return {
+        "geometry": made_table("Geometry", turns, (geometry, Cranks)),
+        "stiffness": made_table("Stiffness", changed, (stiffness,)),
+    }

@@ -11,8 +11,7 @@ from rich.table import Table
 
 from kinetostat.machine.loading import kinds_of_machine
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import parameters, values
-from kinetostat.machine.plausible import doubts
+from kinetostat.machine.parameters import doubts, parameters, values
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.study import StudyFile
 from kinetostat.units import KINDS

@@ -1,4 +1,4 @@
-"""The families: one file each, found by itself. A module here with a `FAMILY` is in the catalogue; nothing else is."""
+"""The families of machines in closed form. Every `Family` that a module here defines is in the catalogue."""
 
 import importlib
 import pkgutil
@@ -9,6 +9,7 @@ from kinetostat.machine.machine import Family
 
 @cache
 def families() -> dict[str, Family]:
-    """Every family by name, in alphabetical order."""
-    modules = (importlib.import_module(f"{__name__}.{found.name}") for found in pkgutil.iter_modules(__path__))
-    return {family.name: family for family in sorted((m.FAMILY for m in modules), key=lambda family: family.name)}
+    """Return every family by name, in alphabetical order."""
+    modules = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
+    found = [value for module in modules for value in vars(module).values() if isinstance(value, Family)]
+    return {family.name: family for family in sorted(found, key=lambda family: family.name)}

@@ -8,12 +8,11 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import IDENTITY, Z_AXIS, Displacement, Vector, polar, ring
-from kinetostat.machine.bars import BarPair
 from kinetostat.machine.crank import CrankLinks, place
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
-from kinetostat.machine.parts import Arm
+from kinetostat.machine.parts import Arm, BarPair, Translations
 from kinetostat.machine.rings import Rings, Three
 from kinetostat.spec.fields import Quantity, table
 
@@ -44,16 +43,7 @@ class Stiffness:
     arm_torsion: Annotated[float, Quantity("torsional rigidity", "torsional rigidity of the arms, GJ")] = RIGID
 
 
-@table
-class Pose:
-    """Table [pose]: the three task coordinates; the platform does not turn."""
-
-    x: Annotated[float, Quantity("length", "x of the platform point P")]
-    y: Annotated[float, Quantity("length", "y of the platform point P")]
-    z: Annotated[float, Quantity("length", "z of the platform point P, negative: below the base")]
-
-
-def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
+def configure(geometry: Geometry, stiffness: Stiffness, pose: Translations) -> Configuration:
     """The machine at a pose, in closed form, elbows outward; NaN where the bars do not reach.
 
     Args:
@@ -87,7 +77,7 @@ def _leg(
 FAMILY = Family(
     name="delta",
     summary="Delta: 3 actuated cranks with pairs of bars; freedoms x, y, z",
-    tables={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
+    tables={"geometry": Geometry, "stiffness": Stiffness, "pose": Translations},
     configure=configure,
     links=(
         LinkKind("arms", ("arm_bending", "arm_torsion"), in_each_leg("arm", "arm_length")),

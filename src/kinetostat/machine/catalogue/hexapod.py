@@ -7,9 +7,8 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import Displacement, Vector, rotation_x, rotation_y, rotation_z
-from kinetostat.machine.between_rings import Placement, with_struts
 from kinetostat.machine.leg import RIGID
-from kinetostat.machine.rings import Rings, ends
+from kinetostat.machine.rings import Placement, Rings, ends, with_cranks, with_struts
 from kinetostat.spec.fields import Quantity, table
 
 LEGS = 6
@@ -62,5 +61,10 @@ def placed(geometry: Geometry, _stiffness: Stiffness, pose: Pose) -> Placement:
     return Placement(platform, joints)
 
 
-SECTIONS = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
-FAMILY = with_struts("hexapod", "6 U-P-S legs (Gough-Stewart); freedoms x, y, z, roll, pitch, yaw", SECTIONS, placed)
+TABLES = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
+FAMILY = with_struts("hexapod", "6 U-P-S legs (Gough-Stewart); freedoms x, y, z, roll, pitch, yaw", TABLES, placed)
+
+WITH_CRANKS = with_cranks(
+    "hexapod-rus", "6 R-U-S legs with actuated cranks; freedoms x, y, z, roll, pitch, yaw", TABLES, placed
+)
+"""The same machine with R-U-S legs: actuated cranks and rods in the place of struts (theory section 4)."""

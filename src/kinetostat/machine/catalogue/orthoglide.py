@@ -10,11 +10,10 @@ from typing import Annotated
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.triangle import slide_travel
 from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector
-from kinetostat.machine.bars import BarPair
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
-from kinetostat.machine.parts import Arm
+from kinetostat.machine.parts import Arm, BarPair, Translations
 from kinetostat.machine.rings import Three
 from kinetostat.spec.fields import Quantity, table
 
@@ -45,16 +44,7 @@ class Stiffness:
     foot_torsion: Annotated[float, Quantity("torsional rigidity", "torsional rigidity of the feet, GJ")] = RIGID
 
 
-@table
-class Pose:
-    """Table [pose]: the three task coordinates; the platform does not turn."""
-
-    x: Annotated[float, Quantity("length", "x of the platform point P")]
-    y: Annotated[float, Quantity("length", "y of the platform point P")]
-    z: Annotated[float, Quantity("length", "z of the platform point P")]
-
-
-def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configuration:
+def configure(geometry: Geometry, stiffness: Stiffness, pose: Translations) -> Configuration:
     """The machine at a pose, in closed form, the slides behind the platform; NaN where the bars do not reach.
 
     Args:
@@ -90,7 +80,7 @@ def _leg(
 FAMILY = Family(
     name="orthoglide",
     summary="Orthoglide: 3 actuated slides along x, y, z with pairs of bars; freedoms x, y, z",
-    tables={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
+    tables={"geometry": Geometry, "stiffness": Stiffness, "pose": Translations},
     configure=configure,
     links=(
         LinkKind("feet", ("foot_bending", "foot_torsion"), in_each_leg("foot", "foot_length")),

@@ -7,11 +7,10 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import AXES, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector, rotation_x, rotation_y
-from kinetostat.machine.between_rings import Placement, with_struts
 from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes
 from kinetostat.machine.links import LinkKind, from_origin
 from kinetostat.machine.parts import in_series, servo
-from kinetostat.machine.rings import Three, ThreeLegs, ends
+from kinetostat.machine.rings import Placement, Three, ThreeLegs, ends, with_cranks, with_struts
 from kinetostat.spec.fields import Quantity, table
 
 LEGS = 3
@@ -69,7 +68,12 @@ def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
 RAM = LinkKind("ram", ("ram_bending", "ram_torsion"), from_origin("ram"))
 
 
-SECTIONS = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
+TABLES = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
 FAMILY = with_struts(
-    "passive-leg-3dof-pu", "3 U-P-S legs and a passive P-U ram; freedoms z, theta1, theta2", SECTIONS, placed, (RAM,)
+    "passive-leg-3dof-pu", "3 U-P-S legs and a passive P-U ram; freedoms z, theta1, theta2", TABLES, placed, (RAM,)
 )
+
+WITH_CRANKS = with_cranks(
+    "passive-leg-3dof-pu-rus", "3 R-U-S legs and a passive P-U ram; freedoms z, theta1, theta2", TABLES, placed, (RAM,)
+)
+"""The same machine with R-U-S legs: actuated cranks and rods in the place of struts (theory section 4)."""

@@ -9,12 +9,11 @@ from typing import Annotated
 from kinetostat.algebra.scalar import Scalar, cos, sin
 from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import Y_AXIS, Displacement, Rotation, Vector, rotation_x, rotation_y
-from kinetostat.machine.between_rings import Placement, with_struts
 from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes
 from kinetostat.machine.links import LinkKind, listed
 from kinetostat.machine.machine import Closure
 from kinetostat.machine.parts import bent_links, servo
-from kinetostat.machine.rings import Rings, four_joints
+from kinetostat.machine.rings import Placement, Rings, four_joints, with_cranks, with_struts
 from kinetostat.spec.fields import Quantity, table
 
 LEGS = 4
@@ -125,9 +124,18 @@ def _passive_leg(
 PASSIVE_LINKS = LinkKind("passive_links", ("passive_link_bending",), listed("passive link", "passive_links"), count=2)
 
 
-SECTIONS = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
+TABLES = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
 FAMILY = with_struts(
     "passive-leg-4dof",
     "4 U-P-S legs and a passive R-R-Hooke leg (Zhang and Gosselin); freedoms x, z, theta5, theta6",
-    SECTIONS, placed, (PASSIVE_LINKS,),
+    TABLES, placed, (PASSIVE_LINKS,),
 )  # fmt: skip
+
+WITH_CRANKS = with_cranks(
+    "passive-leg-4dof-rus",
+    "4 R-U-S legs and a passive R-R-Hooke leg; freedoms x, z, theta5, theta6",
+    TABLES,
+    placed,
+    (PASSIVE_LINKS,),
+)
+"""The same machine with R-U-S legs: actuated cranks and rods in the place of struts (theory section 4)."""

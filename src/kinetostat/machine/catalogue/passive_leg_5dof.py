@@ -9,7 +9,6 @@ from typing import Annotated
 from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin, sqrt
 from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import X_AXIS, Y_AXIS, ZERO, Displacement, Rotation, Vector, rotation_x
-from kinetostat.machine.between_rings import Placement, with_struts
 from kinetostat.machine.catalogue.passive_leg_4dof import (
     PASSIVE_LINKS,
     PassiveLegStiffness,
@@ -19,7 +18,7 @@ from kinetostat.machine.catalogue.passive_leg_4dof import (
 from kinetostat.machine.leg import Joint, Leg, Spring, revolutes
 from kinetostat.machine.machine import Closure
 from kinetostat.machine.parts import bent_links, servo
-from kinetostat.machine.rings import ends
+from kinetostat.machine.rings import Placement, ends, with_cranks, with_struts
 from kinetostat.spec.fields import Quantity, table
 
 LEGS = 5
@@ -100,8 +99,17 @@ def _passive_leg(
     return Leg("passive leg", chain)
 
 
-SECTIONS = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
+TABLES = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
 FAMILY = with_struts(
     "passive-leg-5dof", "5 U-P-S legs and a passive U-R-U leg; freedoms x, y, z, theta5, theta6",
-    SECTIONS, placed, (PASSIVE_LINKS,),
+    TABLES, placed, (PASSIVE_LINKS,),
 )  # fmt: skip
+
+WITH_CRANKS = with_cranks(
+    "passive-leg-5dof-rus",
+    "5 R-U-S legs and a passive U-R-U leg; freedoms x, y, z, theta5, theta6",
+    TABLES,
+    placed,
+    (PASSIVE_LINKS,),
+)
+"""The same machine with R-U-S legs: actuated cranks and rods in the place of struts (theory section 4)."""

@@ -7,11 +7,10 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import Y_AXIS, ZERO, Displacement, rotation_x, rotation_y
-from kinetostat.machine.between_rings import Placement, with_struts
 from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes
 from kinetostat.machine.links import LinkKind, from_origin
 from kinetostat.machine.parts import in_series, servo
-from kinetostat.machine.rings import Three, ThreeLegs, ends
+from kinetostat.machine.rings import Placement, Three, ThreeLegs, ends, with_cranks, with_struts
 from kinetostat.spec.fields import Quantity, table
 
 LEGS = 3
@@ -68,11 +67,16 @@ def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
 TUBE = LinkKind("tube", ("tube_bending", "tube_torsion"), from_origin("tube"))
 
 
-SECTIONS = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
+TABLES = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
 FAMILY = with_struts(
     "tricept",
     "3 U-P-S legs and a passive U-P tube (Tricept); freedoms theta1, theta2, length",
-    SECTIONS,
+    TABLES,
     placed,
     (TUBE,),
 )
+
+WITH_CRANKS = with_cranks(
+    "tricept-rus", "3 R-U-S legs and a passive U-P tube; freedoms theta1, theta2, length", TABLES, placed, (TUBE,)
+)
+"""The same machine with R-U-S legs: actuated cranks and rods in the place of struts (theory section 4)."""

@@ -12,6 +12,7 @@ from kinetostat.machine.leg import Joint
 from kinetostat.machine.machine import Plane
 from kinetostat.machine.written.closed_form import closed_form
 from kinetostat.machine.written.family import chains, place
+from kinetostat.machine.written.joints import JOINT_TYPES
 from kinetostat.machine.written.plan import JointPlan, LegPlan, LinkPlan, Plan
 from kinetostat.spec.errors import InputError
 
@@ -65,9 +66,8 @@ def _check_axes(data: Any, where: str) -> None:
 
 def _check_plane(joint: JointPlan, data: Any, where: str) -> None:
     axis = getattr(data, "axis", (0.0, 0.0, 1.0))
-    turning = joint.kind == "revolute" and math.hypot(axis[0], axis[1]) < PARALLEL * math.hypot(*axis)
-    sliding = joint.kind == "prismatic" and abs(axis[2]) < PARALLEL * math.hypot(*axis)
-    if not (turning or sliding or joint.kind == "fixed"):
+    sizes = {"normal": math.hypot(axis[0], axis[1]), "along": abs(axis[2]), "always": 0.0, "": math.inf}
+    if not sizes[JOINT_TYPES[joint.kind].in_plane] < PARALLEL * math.hypot(*axis):
         raise InputError(
             f"{where}: in a planar machine joints are revolute about z, prismatic in the x-y plane, or fixed; "
             'mend its axis, or write space = "spatial".'

@@ -9,15 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.machine.cross_section import MATERIALS
+from kinetostat.machine.cross_section import MATERIALS, SHAPES
+from kinetostat.machine.written.joints import JOINT_TYPES, ONE_FREEDOM
 from kinetostat.machine.written.plan import (
     BASE,
-    JOINT_TYPES,
     LINK_MODELS,
-    ONE_FREEDOM,
     PLANAR_POSE,
     PLATFORM,
-    SHAPES,
     SPATIAL_POSE,
     JointPlan,
     LegPlan,
@@ -172,7 +170,7 @@ def _joint(name: str, part: dict[str, Any], where: str) -> JointPlan:
             f"{where} is {kind}; only {', '.join(ONE_FREEDOM)} joints may be actuated or have a stiffness."
         )
     if actuated and not sprung:
-        example = "20 N/um" if kind == "prismatic" else "1e5 N*m/rad"
+        example = "20 N/um" if JOINT_TYPES[kind].stiffness == "linear stiffness" else "1e5 N*m/rad"
         raise InputError(
             f'{where} is actuated but has no stiffness; add stiffness = "{example}", or "rigid" if its servo is ideal.'
         )

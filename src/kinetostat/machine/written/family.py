@@ -7,19 +7,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any
 
-from kinetostat.algebra.scalar import Scalar, is_zero, plus, reciprocal, sqrt, times, total, where
+from kinetostat.algebra.scalar import Scalar, is_zero, plus, sqrt, times, total, where
 from kinetostat.algebra.vector import AXES, IDENTITY, X_AXIS, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector
-from kinetostat.machine.leg import Element, Joint, Leg, Spring, Turn, revolutes
-from kinetostat.machine.link import Beam, Parallelogram, lumped_springs, matrix_springs
+from kinetostat.machine.cross_section import linear_density_of, rigidity_of
+from kinetostat.machine.leg import Element, Leg, Spring, Turn
+from kinetostat.machine.link import Beam, lumped_springs, matrix_springs
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
-from kinetostat.machine.written.plan import JointPlan, LegPlan, LinkPlan, Plan, literals
-from kinetostat.machine.written.tables import linear_density_of, rigidity_of, tables_of
-
-NAME = "legs"
-"""As machine files name this kind."""
-
-SUMMARY = "any machine, written leg by leg: joints by point and axis at the home pose, and the links between them"
-
+from kinetostat.machine.written.joints import JOINT_TYPES
+from kinetostat.machine.written.plan import NAME, SUMMARY, JointPlan, LegPlan, LinkPlan, Plan, literals
+from kinetostat.machine.written.tables import tables_of
 
 KEPT = 64
 """Families that are kept, so that machines with one plan share tables, models of files, and compiled programs."""
@@ -94,27 +90,14 @@ def chain_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[S
     return steps
 
 
-def _elements(title: str, joint: JointPlan, data: Any) -> list[Element]:
+def _elements(title: str, joint: JointPlan, data: Any) -> Sequence[Element]:
     """The movable elements of a joint, in order."""
-    point = Vector(*data.point)
-    if joint.kind == "fixed":
-        return []
-    if joint.kind == "spherical":
-        return list(revolutes(point, AXES, title))
-    if joint.kind == "universal":
-        return list(revolutes(point, [unit(data.first_axis), unit(data.second_axis)], title))
-    axis = unit(data.axis)
-    if joint.kind == "parallelogram":
-        return [Parallelogram(title, point, Vector(*data.far), axis, data.width, data.bar_stiffness)]
-    if joint.kind == "cylindrical":
-        return [Joint(axis, point, title), Joint(axis, None, title)]
-    where_ = None if joint.kind == "prismatic" else point
-    carriage = point if joint.kind == "prismatic" else None
-    freedom = Joint(axis, where_, title, data.pitch if joint.kind == "helical" else 0.0, carriage)
+    elements = JOINT_TYPES[joint.kind].elements(title, data)
     if not joint.sprung:
-        return [freedom]
+        return elements
+    (freedom,) = elements
     name = f"{title} actuator" if joint.actuated else f"{title} hinge"
-    return [Spring(name, freedom, data.stiffness, title, joint.actuated, not joint.actuated)]
+    return (Spring(name, freedom, data.stiffness, title, joint.actuated, not joint.actuated),)
 
 
 def _yielding(
@@ -161,12 +144,6 @@ def _any_up(ends: tuple[Vector, Vector]) -> Vector:
         chosen = [where(nearer, a, b) for a, b in zip(axis.components(), best.components(), strict=True)]
         best, least = Vector(*chosen), where(nearer, size, least)
     return best
-
-
-def unit(axis: Sequence[Scalar]) -> Vector:
-    """The unit vector along an axis as written."""
-    vector = Vector(*axis)
-    return vector * reciprocal(vector.norm())
 
 
 def _length(plan: Plan, tables: Mapping[str, Any]) -> Scalar:

@@ -5,23 +5,13 @@ from dataclasses import dataclass
 
 from kinetostat.machine.machine import Inverse
 
+NAME = "legs"
+"""As machine files name this kind."""
+
+SUMMARY = "any machine, written leg by leg: joints by point and axis at the home pose, and the links between them"
+
 BASE, PLATFORM = "base", "platform"
 """Names of the two bodies that every leg joins."""
-
-JOINT_TYPES = {
-    "revolute": "turns about `axis` through `point`",
-    "prismatic": "slides along `axis`",
-    "cylindrical": "turns about and slides along `axis` through `point`",
-    "universal": "turns about `first_axis`, then about `second_axis`, both through `point` (Hooke joint)",
-    "spherical": "turns about `point`",
-    "helical": "turns about `axis` through `point` and advances by `pitch` per radian",
-    "parallelogram": "two bars from the short side at `point` to the one at `far`, short sides along `axis`",
-    "fixed": "joins two bodies at `point` and does not move",
-}
-"""Types of joints, and what their numbers mean at the home pose in the base frame."""
-
-ONE_FREEDOM = ("revolute", "prismatic", "helical")
-"""Types that may have an actuator or a spring of their own."""
 
 LINK_MODELS = {
     "rigid": "does not yield",
@@ -31,14 +21,6 @@ LINK_MODELS = {
     "matrix": "a 6x6 compliance of its own, of its end against its beginning, at the end",
 }
 """How a link may yield."""
-
-SHAPES = {
-    "round": ("diameter",),
-    "tube": ("outer_diameter", "inner_diameter"),
-    "rectangle": ("width", "height"),
-    "own": ("area", "second_moment_y", "second_moment_z", "torsion_constant"),
-}
-"""Cross-sections and the numbers that give them."""
 
 SPATIAL_POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 PLANAR_POSE = ("x", "y", "yaw")
@@ -53,7 +35,7 @@ class JointPlan:
 
     Attributes:
         name: unique within the leg.
-        kind: a key of `JOINT_TYPES`.
+        kind: a key of `joints.JOINT_TYPES`.
         joins: names of the bodies on its base side and on its platform side.
         actuated: whether a servo holds it.
         sprung: whether it has a stiffness, as an actuator or a flexure hinge.
@@ -111,7 +93,7 @@ class Plan:
 
     Attributes:
         legs: in the order of the file.
-        shapes: of the cross-sections, by name: keys of `SHAPES`.
+        shapes: of the cross-sections, by name: keys of `cross_section.SHAPES`.
         materials: of the cross-sections, by name: keys of `cross_section.MATERIALS`, or empty where E and G are given.
         pose: coordinates that the pose gives; the others follow from the legs.
         planar: whether the platform moves in the x-y plane only.

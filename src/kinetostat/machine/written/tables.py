@@ -1,49 +1,12 @@
-"""The numbers of a machine written leg by leg: one table for each of its parts, as the plan has them."""
+"""What a file of a machine written leg by leg may hold: the tables of numbers that a plan has, and the JSON Schema."""
 
-from collections.abc import Mapping
 from typing import Any
 
-from kinetostat.algebra.scalar import Scalar, times
-from kinetostat.machine.cross_section import MATERIALS, CrossSection, rectangle, rigidity, tube
-from kinetostat.machine.leg import RIGID
-from kinetostat.machine.link import Rigidity
-from kinetostat.machine.written.plan import SHAPES, JointPlan, Plan
+from kinetostat.machine.cross_section import MATERIALS, SHAPE_KINDS, SHAPES
+from kinetostat.machine.written.joints import JOINT_TYPES
+from kinetostat.machine.written.plan import LINK_MODELS, NAME, SPATIAL_POSE, SUMMARY, JointPlan, Plan
 from kinetostat.spec.fields import Field, Quantity, made_table
-
-AXIS = Quantity("direction", "direction of the joint, of any length, base axes at the home pose", count=3, apart=True)
-POINT = Quantity("length", "a point of the joint, base frame, at the home pose", count=3, apart=True)
-
-
-JOINT_FIELDS: Mapping[str, Mapping[str, Field]] = {
-    "revolute": {"point": Field(POINT), "axis": Field(AXIS)},
-    "prismatic": {"point": Field(POINT), "axis": Field(AXIS)},
-    "cylindrical": {"point": Field(POINT), "axis": Field(AXIS)},
-    "universal": {"point": Field(POINT), "first_axis": Field(AXIS), "second_axis": Field(AXIS)},
-    "spherical": {"point": Field(POINT)},
-    "helical": {"point": Field(POINT), "axis": Field(AXIS), "pitch": Field(Quantity("length", "advance per radian"))},
-    "parallelogram": {
-        "point": Field(POINT),
-        "far": Field(
-            Quantity("length", "middle of the far short side, base frame, at the home pose", count=3, apart=True)
-        ),
-        "axis": Field(AXIS),
-        "width": Field(Quantity("length", "of the short sides", positive=True)),
-        "bar_stiffness": Field(Quantity("linear stiffness", "axial stiffness of each bar"), RIGID),
-    },
-    "fixed": {"point": Field(POINT)},
-}
-
-SHAPE_KINDS = {
-    "diameter": "length",
-    "outer_diameter": "length",
-    "inner_diameter": "length",
-    "width": "length",
-    "height": "length",
-    "area": "area",
-    "second_moment_y": "second moment of area",
-    "second_moment_z": "second moment of area",
-    "torsion_constant": "second moment of area",
-}
+from kinetostat.units import KINDS
 
 POSE_KINDS = {"x": "length", "y": "length", "z": "length", "roll": "angle", "pitch": "angle", "yaw": "angle"}
 
@@ -62,9 +25,9 @@ def tables_of(plan: Plan) -> dict[str, type]:
 
 
 def _joint_fields(joint: JointPlan) -> dict[str, Field]:
-    fields = dict(JOINT_FIELDS[joint.kind])
+    fields = dict(JOINT_TYPES[joint.kind].fields)
     if joint.sprung:
-        kind = "linear stiffness" if joint.kind == "prismatic" else "torsional stiffness"
+        kind = JOINT_TYPES[joint.kind].stiffness or "torsional stiffness"
         what = "its actuator, held by its servo" if joint.actuated else "the joint's own, as of a flexure hinge"
         fields["stiffness"] = Field(Quantity(kind, what))
     return fields
@@ -85,28 +48,71 @@ def _shape_fields(shape: str, material: str) -> dict[str, Field]:
     return fields
 
 
-def rigidity_of(shape: str, data: Any, shear: bool) -> Rigidity:
-    """The rigidity of a bar with a cross-section of the file.
-
-    Args:
-        shape: a key of `SHAPES`.
-        data: an instance of its table.
-        shear: whether it yields in shear (Timoshenko).
-    """
-    return rigidity(data.youngs_modulus, data.shear_modulus, _profile(shape, data), shear)
+QUANTITY = {"type": ["number", "string"]}
+BODIES = {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
+DIRECTION = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+COMPLIANCE = {"type": "array", "minItems": 6, "maxItems": 6, "description": "rx ry rz x y z, rad/(N·m), rad/N, m/N"}
 
 
-def linear_density_of(shape: str, data: Any) -> Scalar:
-    """Mass per length of such a bar, kg/m; arguments as for `rigidity_of`."""
-    return times(data.density, _profile(shape, data).area)
+def written_schema(version: int) -> dict[str, Any]:
+    """The schema; `version` is that of the file format."""
+    point = {"type": "array", "items": QUANTITY, "minItems": 3, "maxItems": 3}
+    return _table(
+        {
+            "schema": {"const": version},
+            "name": {"type": "string", "minLength": 1, "maxLength": 80},
+            "family": {"const": NAME, "description": SUMMARY},
+            "space": {"enum": ["spatial", "planar"], "description": "planar: the x-y plane"},
+            "platform": _table({"point": {**point, "description": "P at the home pose, base frame"}}, ["point"]),
+            "pose": {**_table(dict.fromkeys(SPATIAL_POSE, QUANTITY)), "minProperties": 1},
+            "sections": {"type": "object", "additionalProperties": _cross_section()},
+            "legs": {"type": "array", "minItems": 1, "items": _leg()},
+            "tool": {"type": "object"},
+            "load": {"type": "object"},
+            "limits": {"type": "object"},
+        },
+        ["name", "family", "platform", "pose", "legs"],
+    )
 
 
-def _profile(shape: str, data: Any) -> CrossSection:
-    poisson = 0.5 * data.youngs_modulus / data.shear_modulus - 1.0
-    if shape == "round":
-        return tube(data.diameter, 0.0, poisson)
-    if shape == "tube":
-        return tube(data.outer_diameter, data.inner_diameter, poisson)
-    if shape == "rectangle":
-        return rectangle(data.width, data.height)
-    return CrossSection(data.area, data.second_moment_y, data.second_moment_z, data.torsion_constant, 5.0 / 6.0)
+def _table(properties: dict[str, Any], required: list[str] | None = None) -> dict[str, Any]:
+    return {"type": "object", "properties": properties, "required": required or [], "additionalProperties": False}
+
+
+def _cross_section() -> dict[str, Any]:
+    sizes = {name: {**QUANTITY, "examples": [KINDS[kind].example]} for name, kind in SHAPE_KINDS.items()}
+    known = {"shape": {"enum": list(SHAPES)}, "material": {"enum": list(MATERIALS)}}
+    moduli = dict.fromkeys(("youngs_modulus", "shear_modulus", "density"), QUANTITY)
+    return _table({**known, **sizes, **moduli}, ["shape"])
+
+
+def _leg() -> dict[str, Any]:
+    fields = {name: _field(field) for kind in JOINT_TYPES.values() for name, field in kind.fields.items()}
+    about = "; ".join(f"{name}: {kind.meaning}" for name, kind in JOINT_TYPES.items())
+    joint = {
+        "name": {"type": "string"},
+        "type": {"enum": list(JOINT_TYPES), "description": about},
+        "joins": {**BODIES, "description": "bodies on the base side and on the platform side"},
+        "actuated": {"type": "boolean"},
+        "stiffness": {**QUANTITY, "description": 'of its actuator or flexure; "rigid" is exact'},
+        "compliance": COMPLIANCE,
+    }
+    models = "; ".join(f"{model}: {meaning}" for model, meaning in LINK_MODELS.items())
+    link = {
+        "model": {"enum": list(LINK_MODELS), "description": models},
+        "section": {"type": "string"},
+        "up": DIRECTION,
+        "compliance": COMPLIANCE,
+    }
+    joints = {"type": "array", "minItems": 1, "items": _table({**joint, **fields}, ["name", "type", "joins"])}
+    links = {"type": "object", "additionalProperties": _table(link, ["model"])}
+    return _table({"name": {"type": "string"}, "joints": joints, "links": links}, ["name", "joints"])
+
+
+def _field(field: Field) -> dict[str, Any]:
+    """A field of a joint: one quantity, or a list of them."""
+    count = field.quantity.count
+    if count is None:
+        return {**QUANTITY, "description": field.quantity.meaning}
+    many = {"type": "array", "items": QUANTITY, "minItems": count, "maxItems": count}
+    return {**many, "description": field.quantity.meaning}

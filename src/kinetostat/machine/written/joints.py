@@ -1,0 +1,132 @@
+"""The types of joints that a machine written leg by leg may have: what is written about one, and what it is made of.
+
+A type is one class in `JOINT_TYPES`. Reading, units, schema, messages and `--set` follow from its row; how its joints
+are joined to legs is `family`'s business. Points and axes are in the base frame, at the home pose.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from kinetostat.algebra.scalar import Scalar, reciprocal
+from kinetostat.algebra.vector import AXES, Vector
+from kinetostat.machine.leg import RIGID, Element, Joint, revolutes
+from kinetostat.machine.link import Parallelogram
+from kinetostat.spec.fields import Field, Quantity
+
+AXIS = Field(
+    Quantity("direction", "direction of the joint, of any length, base axes at the home pose", count=3, apart=True)
+)
+POINT = Field(Quantity("length", "a point of the joint, base frame, at the home pose", count=3, apart=True))
+
+
+@dataclass(frozen=True)
+class JointType:
+    """A type of joint.
+
+    Attributes:
+        meaning: what its numbers mean.
+        fields: what is written about it, by name.
+        elements: from the name of a joint and its numbers to what the chain of a leg has for it, base to platform.
+        stiffness: kind of quantity of its stiffness, for a type of one freedom, which may have an actuator or a spring
+            of its own; None for all others.
+        in_plane: where its axis must point in a planar machine, "normal" to the plane or "along" it, "always" if it has
+            none; empty if a planar machine cannot have it.
+    """
+
+    meaning: str
+    fields: Mapping[str, Field]
+    elements: Callable[[str, Any], Sequence[Element]]
+    stiffness: str | None = None
+    in_plane: str = ""
+
+
+def unit(axis: Sequence[Scalar]) -> Vector:
+    """Return the unit vector along an axis as written."""
+    vector = Vector(*axis)
+    return vector * reciprocal(vector.norm())
+
+
+def _revolute(name: str, data: Any) -> Sequence[Element]:
+    return (Joint(unit(data.axis), Vector(*data.point), name),)
+
+
+def _prismatic(name: str, data: Any) -> Sequence[Element]:
+    return (Joint(unit(data.axis), None, name, carriage=Vector(*data.point)),)
+
+
+def _cylindrical(name: str, data: Any) -> Sequence[Element]:
+    axis = unit(data.axis)
+    return Joint(axis, Vector(*data.point), name), Joint(axis, None, name)
+
+
+def _universal(name: str, data: Any) -> Sequence[Element]:
+    return revolutes(Vector(*data.point), [unit(data.first_axis), unit(data.second_axis)], name)
+
+
+def _spherical(name: str, data: Any) -> Sequence[Element]:
+    return revolutes(Vector(*data.point), AXES, name)
+
+
+def _helical(name: str, data: Any) -> Sequence[Element]:
+    return (Joint(unit(data.axis), Vector(*data.point), name, data.pitch),)
+
+
+def _parallelogram(name: str, data: Any) -> Sequence[Element]:
+    ends = Vector(*data.point), Vector(*data.far)
+    return (Parallelogram(name, *ends, unit(data.axis), data.width, data.bar_stiffness),)
+
+
+def _fixed(_name: str, _data: Any) -> Sequence[Element]:
+    return ()
+
+
+JOINT_TYPES = {
+    "revolute": JointType(
+        "turns about `axis` through `point`",
+        {"point": POINT, "axis": AXIS},
+        _revolute,
+        stiffness="torsional stiffness",
+        in_plane="normal",
+    ),
+    "prismatic": JointType(
+        "slides along `axis`",
+        {"point": POINT, "axis": AXIS},
+        _prismatic,
+        stiffness="linear stiffness",
+        in_plane="along",
+    ),
+    "cylindrical": JointType(
+        "turns about and slides along `axis` through `point`", {"point": POINT, "axis": AXIS}, _cylindrical
+    ),
+    "universal": JointType(
+        "turns about `first_axis`, then about `second_axis`, both through `point` (Hooke joint)",
+        {"point": POINT, "first_axis": AXIS, "second_axis": AXIS},
+        _universal,
+    ),
+    "spherical": JointType("turns about `point`", {"point": POINT}, _spherical),
+    "helical": JointType(
+        "turns about `axis` through `point` and advances by `pitch` per radian",
+        {"point": POINT, "axis": AXIS, "pitch": Field(Quantity("length", "advance per radian"))},
+        _helical,
+        stiffness="torsional stiffness",
+    ),
+    "parallelogram": JointType(
+        "two bars from the short side at `point` to the one at `far`, short sides along `axis`",
+        {
+            "point": POINT,
+            "far": Field(
+                Quantity("length", "middle of the far short side, base frame, at the home pose", count=3, apart=True)
+            ),
+            "axis": AXIS,
+            "width": Field(Quantity("length", "of the short sides", positive=True)),
+            "bar_stiffness": Field(Quantity("linear stiffness", "axial stiffness of each bar"), RIGID),
+        },
+        _parallelogram,
+    ),
+    "fixed": JointType("joins two bodies at `point` and does not move", {"point": POINT}, _fixed, in_plane="always"),
+}
+"""Types of joints by the name that machine files give them."""
+
+ONE_FREEDOM = tuple(name for name, kind in JOINT_TYPES.items() if kind.stiffness)
+"""Types that may have an actuator or a spring of their own."""
