@@ -68,3 +68,15 @@ IDLE_COORDINATES = 1e-9
 OPENING = 1e-8
 """Share of an equation's largest rate beyond which it cannot be satisfied when a parameter changes alone: a leg would
 open."""
+
+# Pictures
+
+SAME_TO_THE_EYE = 1e-6
+"""Distance of two points, m, and sine of an angle, below which a picture shows them as one: joints that meet do so up
+to round-off, and nobody sees a micrometre."""
+NO_DIRECTION = 1e-9
+"""Size of a vector, relative to those it is made of, below which its direction is round-off."""
+NO_CIRCLE = 1e-9
+"""Radius, relative to the largest of a solid, below which a circle is drawn as a point: sin(pi) leaves 1e-16."""
+NO_TURN = 1e-12
+"""Angle, rad, below which a body is drawn without turning: the axis of a smaller turn is round-off."""

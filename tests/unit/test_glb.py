@@ -12,10 +12,9 @@ from kinetostat.algebra.vector import IDENTITY, Displacement, Vector
 from kinetostat.machine.loading import load
 from kinetostat.views.scene import shapes
 from kinetostat.views.scene.glb import glb
-from kinetostat.views.scene.looks import LOOKS
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.mesh import placed
-from kinetostat.views.scene.solids import Scene, Solid
+from kinetostat.views.scene.solids import LOOKS, Scene, Solid
 from machines import every_machine
 
 

@@ -8,9 +8,10 @@ import pytest
 from kinetostat.algebra.vector import Displacement, Vector, rotation_along
 from kinetostat.kinetostatics.response import respond
 from kinetostat.views.scene import shapes
-from kinetostat.views.scene.machine_scene import machine_scene, proportions_of
+from kinetostat.views.scene.machine_scene import machine_scene
 from kinetostat.views.scene.mesh import AROUND, ROUNDING, WIRE, mesh_of, placed
-from kinetostat.views.scene.polygon import cut_in_triangles, narrowed
+from kinetostat.views.scene.polygon import cut_in_triangles, narrowed, rounded_hull
+from kinetostat.views.scene.proportions import proportions_of
 from kinetostat.views.scene.solids import Extruded, Solid, Swept, Turned, unit
 from machines import every_machine
 
@@ -21,7 +22,7 @@ EXACT = 1e-9
 BENT = 0.6
 """Least cosine between a face and the normals at its corners: half the corner of a bent wire, and its facets."""
 FORK = Extruded(shapes.fork(0.05, 0.012, 0.055, 0.015), 0.036, 0.003)
-PLATE = Extruded(shapes.rounded_hull([(0.0, 0.0), (0.2, 0.0), (0.1, 0.3)], 0.04), 0.02, 0.004)
+PLATE = Extruded(rounded_hull([(0.0, 0.0), (0.2, 0.0), (0.1, 0.3)], 0.04), 0.02, 0.004)
 CIRCLE = Swept(
     tuple((0.1 * math.cos(a), 0.1 * math.sin(a), 0.0) for a in np.linspace(0.0, math.tau, 48, False)), 0.004, True
 )

@@ -13,17 +13,13 @@ from kinetostat.kinetostatics.loading import deflection
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.changing import changed
 from kinetostat.machine.loading import load
+from kinetostat.views.scene.analysis_overlays import Deflection, compliance_overlays, deflection_overlays
 from kinetostat.views.scene.anatomy import anatomy
-from kinetostat.views.scene.looks import LOOKS
-from kinetostat.views.scene.machine_scene import (
-    Deflection,
-    deflection_overlays,
-    machine_scene,
-    proportions_of,
-    response_overlays,
-)
-from kinetostat.views.scene.shapes import convex_hull, rounded_hull, shaft
-from kinetostat.views.scene.solids import LAYERS, Turned, as_data
+from kinetostat.views.scene.machine_scene import machine_scene
+from kinetostat.views.scene.polygon import convex_hull, rounded_hull
+from kinetostat.views.scene.proportions import proportions_of
+from kinetostat.views.scene.shapes import shaft
+from kinetostat.views.scene.solids import LAYERS, LOOKS, Turned, as_data
 from machines import every_machine
 
 
@@ -168,7 +164,7 @@ def test_ellipsoids_have_the_axes_of_the_compliances():
     configuration = respond(machine).configuration
     sizes = proportions_of(machine, configuration)
     axes = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
-    found = response_overlays(machine, configuration, sizes, {"translation": Principal([1e-9, 2e-9, 4e-9], axes)})
+    found = compliance_overlays(machine, configuration, sizes, {"translation": Principal([1e-9, 2e-9, 4e-9], axes)})
     (body,) = [s for s in found if s.name == "ellipsoid of translation"]
     assert body.scale[0] / body.scale[2] == pytest.approx(0.25)
     assert body.scale[1] / body.scale[2] == pytest.approx(0.5)

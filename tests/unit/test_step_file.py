@@ -6,10 +6,9 @@ import pytest
 from kinetostat.algebra.vector import IDENTITY, Displacement, Vector
 from kinetostat.machine.loading import load
 from kinetostat.views.scene import shapes
-from kinetostat.views.scene.looks import LOOKS, linear
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.mesh import placed
-from kinetostat.views.scene.solids import BASE, Scene, Solid
+from kinetostat.views.scene.solids import BASE, LOOKS, Scene, Solid, linear
 from machines import one_of_each
 
 pytest.importorskip("OCP.STEPCAFControl", reason="Open CASCADE does not start", exc_type=ImportError)

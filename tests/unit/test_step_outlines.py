@@ -6,6 +6,7 @@ from itertools import pairwise
 import pytest
 
 from kinetostat.views.scene import shapes
+from kinetostat.views.scene.polygon import rounded_hull
 
 pytest.importorskip("OCP.STEPCAFControl", reason="Open CASCADE does not start", exc_type=ImportError)
 
@@ -39,7 +40,7 @@ def test_a_circle_is_two_arcs():
 
 
 def test_arcs_stand_between_the_lines_of_a_rounded_outline():
-    outline = shapes.rounded_hull([(0.0, 0.0), (0.4, 0.0), (0.1, 0.3)], 0.05)
+    outline = rounded_hull([(0.0, 0.0), (0.4, 0.0), (0.1, 0.3)], 0.05)
     found = list(pieces(ring(outline)))
     assert [len(piece) for piece in found] == [3, 2, 3, 2, 3, 2]
     assert all(piece[-1] == following[0] for piece, following in zip(found, [*found[1:], found[0]], strict=True))

@@ -6,6 +6,7 @@ import pytest
 
 from kinetostat.views.scene import shapes
 from kinetostat.views.scene.mesh import mesh_of
+from kinetostat.views.scene.polygon import rounded_hull
 from kinetostat.views.scene.solids import Extruded, Swept, Turned
 
 pytest.importorskip("OCP.STEPCAFControl", reason="Open CASCADE does not start", exc_type=ImportError)
@@ -54,7 +55,7 @@ def rounded_disc(outer, height, radius):
         (shapes.block(0.2, 0.1, 0.3), 0.2 * 0.1 * 0.3, ["Plane"] * 6),
         (shapes.block(0.2, 0.1, 0.3, 0.01), rounded_block(0.2, 0.1, 0.3, 0.01), ["Cylinder"] * 8 + ["Plane"] * 6),
         (
-            Extruded(shapes.rounded_hull([(0.3, 0.1)], 0.05), 0.02, 0.004),
+            Extruded(rounded_hull([(0.3, 0.1)], 0.05), 0.02, 0.004),
             rounded_disc(0.05, 0.02, 0.004),
             ["Cylinder"] * 2 + ["Plane"] * 2 + ["Torus"] * 4,
         ),
@@ -116,7 +117,7 @@ def test_a_scaled_ball_is_an_ellipsoid():
     "shape",
     [
         Extruded(shapes.fork(0.02, 0.005, 0.022, 0.006), 0.014, 0.001),
-        Extruded(shapes.rounded_hull([(0.0, 0.0), (0.4, 0.0), (0.1, 0.3)], 0.05), 0.02, 0.0044),
+        Extruded(rounded_hull([(0.0, 0.0), (0.4, 0.0), (0.1, 0.3)], 0.05), 0.02, 0.0044),
         shapes.waist(0.02, 0.005, 0.06),
         shapes.double_arrow(0.3, 0.01),
     ],

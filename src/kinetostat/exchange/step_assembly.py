@@ -19,8 +19,7 @@ from OCP.XCAFDoc import XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.step_solids import point_of, solid_of
-from kinetostat.views.scene.looks import LOOKS, linear
-from kinetostat.views.scene.solids import BASE, Point3, Solid, solid_data
+from kinetostat.views.scene.solids import BASE, LOOKS, Point3, Solid, linear, solid_data
 
 COUNTED = re.compile(r" \d+$")
 """A number at the end of a name: it belongs to the place, not to the part that is built in there."""

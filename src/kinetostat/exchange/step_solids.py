@@ -29,8 +29,7 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_ShapeEnum, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape
 
-from kinetostat.tolerances import EVEN_CHORDS, OPEN_CASCADE_POINT
-from kinetostat.views.scene.mesh import POINT
+from kinetostat.tolerances import EVEN_CHORDS, NO_CIRCLE, OPEN_CASCADE_POINT
 from kinetostat.views.scene.solids import Extruded, Point2, Point3, Shape, Swept, Turned
 
 Piece: TypeAlias = tuple[Point2, Point2] | tuple[Point2, Point2, Point2]
@@ -64,7 +63,7 @@ def point_of(x: float, y: float, z: float) -> gp_Pnt:
 
 
 def _turned(shape: Turned) -> TopoDS_Shape:
-    least = POINT * max(radius for radius, _ in shape.profile)
+    least = NO_CIRCLE * max(radius for radius, _ in shape.profile)
     profile = [(radius if radius > least else 0.0, height) for radius, height in shape.profile]
     return BRepPrimAPI_MakeRevol(_face(profile, lambda x, z: point_of(x, 0.0, z)), gp.OZ_s()).Shape()
 

@@ -20,9 +20,9 @@ from kinetostat.machine.parameters import find, values
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.sensitivity import Sensitivity, sensitivity
 from kinetostat.views.scene import machine_scene as scenes
-from kinetostat.views.scene.overlaid import overlays_of
-from kinetostat.views.scene.overlays import Measure, twist_solids
-from kinetostat.views.scene.profiles import Proportions
+from kinetostat.views.scene.analysis_overlays import overlays_of
+from kinetostat.views.scene.overlays import twist_solids
+from kinetostat.views.scene.proportions import Proportions
 from kinetostat.views.scene.solids import Scene, as_data, solid_data
 
 MAP_POINTS = 41
@@ -76,7 +76,7 @@ def _with_free_twist(scene: Scene, response: Response, sizes: Proportions) -> Sc
     if not all(leg.singularity_margin > SINGULAR for leg in response.legs):
         return scene
     twist = free_twist(response.legs, float(response.configuration.length))
-    arrows = twist_solids([twist], response.reference, Measure(sizes.diagonal, sizes.leg))
+    arrows = twist_solids([twist], response.reference, sizes)
     return Scene((*scene.solids, *arrows), scene.labels, scene.centre, scene.size, scene.floor)
 
 

@@ -13,7 +13,7 @@ from nicegui.element import Element
 
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.views.scene.browser import RENDERER
-from kinetostat.views.scene.looks import looks_data
+from kinetostat.views.scene.solids import looks_data
 
 COMPONENTS = Path(__file__).parent / "components"
 MODULES = {"kinetostat-studio": str(COMPONENTS), "kinetostat-scene": str(RENDERER)}

@@ -26,7 +26,7 @@ from kinetostat.studio.panels.tables import IndicesPanel, LoadsPanel, MatricesPa
 from kinetostat.studio.parameters_panel import ParametersPanel
 from kinetostat.studio.scene_panel import ScenePanel
 from kinetostat.studio.session import Memory, Session
-from kinetostat.views.scene.machine_scene import proportions_of
+from kinetostat.views.scene.proportions import proportions_of
 
 PANELS: tuple[type[Panel], ...] = (
     ContributionsPanel, MatricesPanel, IndicesPanel, SensitivityPanel, LinkPanel, LoadsPanel,

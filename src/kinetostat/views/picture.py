@@ -21,9 +21,8 @@ from kinetostat.views.rendering.camera import VIEWS, Camera, camera_on
 from kinetostat.views.rendering.ground import SIDE, Ground, veil_over
 from kinetostat.views.rendering.light import Light, encoded, light_on, shaded
 from kinetostat.views.rendering.visibility import Body, Hits, hits_of
-from kinetostat.views.scene.looks import LOOKS
 from kinetostat.views.scene.machine_scene import scene_of
-from kinetostat.views.scene.solids import LAYERS, Label, Scene
+from kinetostat.views.scene.solids import LAYERS, LOOKS, Label, Scene
 
 Floats = NDArray[np.float32]
 Theme: TypeAlias = Literal["light", "dark"]

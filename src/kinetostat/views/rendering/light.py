@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from kinetostat.engine.batch import available_cores
 from kinetostat.views.rendering.camera import axes_towards
 from kinetostat.views.rendering.visibility import Body, nearest_triangles
-from kinetostat.views.scene.looks import LOOKS, linear
+from kinetostat.views.scene.solids import LOOKS, linear
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]

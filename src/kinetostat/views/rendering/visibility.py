@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinetostat.views.rendering.camera import Camera
-from kinetostat.views.scene.looks import LOOKS
 from kinetostat.views.scene.mesh import placed
-from kinetostat.views.scene.solids import Solid
+from kinetostat.views.scene.solids import LOOKS, Solid
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]

@@ -21,10 +21,10 @@ from kinetostat.views.figures import as_svg
 from kinetostat.views.picture import picture
 from kinetostat.views.report.content import Figure
 from kinetostat.views.scene import browser
-from kinetostat.views.scene.looks import looks_data
-from kinetostat.views.scene.machine_scene import machine_scene, proportions_of
-from kinetostat.views.scene.overlaid import overlays_of
-from kinetostat.views.scene.solids import Scene, Solid, as_data, solid_data
+from kinetostat.views.scene.analysis_overlays import overlays_of
+from kinetostat.views.scene.machine_scene import machine_scene
+from kinetostat.views.scene.proportions import proportions_of
+from kinetostat.views.scene.solids import Scene, Solid, as_data, looks_data, solid_data
 
 SIZE = (1000, 700)
 """Pixels of a picture of the machine: 190 to an inch on A4."""

@@ -1,1 +1,1 @@
-"""A machine as a scene: solids with places, materials and names, for a page, a report or a CAD file to show."""
+"""A machine as a scene: solids with places, materials and names, which pages, reports and CAD files show."""

@@ -1,4 +1,7 @@
-"""A leg's chain of elements as the parts that one sees: joints by kind, links, rails and springs. Draws nothing."""
+"""Anatomy of a leg: its chain of elements read as visible parts (joints by kind, links, rails and springs).
+
+Nothing is drawn here.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,18 +12,16 @@ from kinetostat.algebra.vector import AXES, ZERO, Vector
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.parts import Arm
+from kinetostat.tolerances import SAME_TO_THE_EYE
 from kinetostat.views.scene.solids import unit
 
 JointKind: TypeAlias = Literal["revolute", "universal", "spherical", "helical", "flexure", "motor"]
 LinkKind: TypeAlias = Literal["bar", "telescope", "bars"]
 
-APART = 1e-6
-"""Distance of two points, m, and sine of an angle, below which they are the same to the eye."""
-
 
 @dataclass(frozen=True)
 class JointPart:
-    """A joint one sees: its kind, centre (base frame, m) and axes (unit vectors)."""
+    """A visible joint: its kind, centre (base frame, m) and axes (unit vectors)."""
 
     name: str
     kind: JointKind
@@ -100,13 +101,23 @@ class Anatomy:
     head: Vector
 
     @property
+    def second_point(self) -> Vector:
+        """Where its first link ends."""
+        return self.links[0].end if self.links else self.head
+
+    @property
+    def last_but_one(self) -> Vector:
+        """Where its last link begins."""
+        return self.links[-1].start if self.links else self.foot
+
+    @property
     def on_rail(self) -> bool:
         """Whether it begins with a slide along the base."""
         return any(together(rail.point, self.foot) for rail in self.rails)
 
 
 def anatomy(leg: Leg) -> Anatomy:
-    """The visible parts of a leg at its pose."""
+    """Read the visible parts of a leg at its pose."""
     reading = _Reading(leg)
     for element in leg.chain:
         reading.take(element)
@@ -125,7 +136,7 @@ def anatomy(leg: Leg) -> Anatomy:
 
 
 class _Reading:
-    """What has been read of a chain so far: parts, the point it has come to, and the slide that led away from there."""
+    """Reader of a chain: the parts so far, the point reached, and the slide that leads on from there."""
 
     def __init__(self, leg: Leg) -> None:
         self.leg = leg
@@ -162,7 +173,7 @@ class _Reading:
                 self.reach(element.end, linked=True)
 
     def reach(self, point: Vector, linked: bool = False) -> None:
-        """Come to a point: what lies before it is a link, unless there is one already, or a slide along a rail."""
+        """Go on to a point. What lies between is a link, unless one was read already, or a slide along a rail."""
         start, slide = self.at, self.slide
         apart = start is not None and not linked and not together(start, point)
         if apart and slide is not None and _along(slide[1], point - (start or point)):
@@ -177,7 +188,7 @@ class _Reading:
         self.first = self.first or point
 
     def finished_rails(self) -> list[RailPart]:
-        """All rails; a slide at the end of the chain runs along the platform."""
+        """Return all rails; a slide at the end of the chain runs along the platform."""
         if self.slide is None or self.at is None:
             return self.rails
         return [*self.rails, RailPart(self.slide[0], self.at, self.slide[1], self.slide[2])]
@@ -211,7 +222,7 @@ def _point(joint: Joint) -> Vector:
 
 
 def _kind_of(joint: JointPart, leg: Leg) -> JointPart:
-    """A joint with one axis more; of a strut's two spherical joints the lower one is a Hooke joint, free of spin."""
+    """A joint with one more axis. Of the two spherical joints of a strut the lower is drawn as a Hooke joint."""
     if len(joint.axes) == 2:
         return replace(joint, kind="universal")
     if len(leg.lines) == 1 and together(joint.point, _lower_end(leg)):
@@ -236,7 +247,7 @@ def _spring_part(spring: Spring, point: Vector) -> SpringPart:
 
 
 def _within_bars(joint: JointPart, links: Sequence[LinkPart]) -> bool:
-    """Whether a joint stands for the balls of a pair of bars."""
+    """Whether a joint is drawn already as the balls of a pair of bars."""
     return any(
         link.kind == "bars"
         and not link.pinned
@@ -245,10 +256,10 @@ def _within_bars(joint: JointPart, links: Sequence[LinkPart]) -> bool:
     )
 
 
-def together(one: Vector, other: Vector) -> bool:
+def together(first: Vector, second: Vector) -> bool:
     """Whether two points are the same to the eye."""
-    return (one - other).norm() < APART
+    return (first - second).norm() < SAME_TO_THE_EYE
 
 
 def _along(axis: Vector, span: Vector) -> bool:
-    return span.cross(axis).norm() < APART * span.norm()
+    return span.cross(axis).norm() < SAME_TO_THE_EYE * span.norm()

@@ -1,4 +1,4 @@
-"""A scene as a glTF 2.0 binary, which viewers, CAD programs and slides open. No file is written here.
+"""A scene as a glTF 2.0 binary for viewers, CAD programs and slides. No file is written here.
 
 Source: Khronos Group, glTF 2.0 specification (2021), sections 3 (JSON) and 4 (GLB).
 """
@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinetostat.views.scene.looks import LOOKS, Look, linear
 from kinetostat.views.scene.mesh import mesh_of
-from kinetostat.views.scene.solids import Scene, Shape, Solid, columns_of
+from kinetostat.views.scene.solids import LOOKS, Look, Scene, Shape, Solid, columns_of, linear
 
 FLOAT, SHORT, INTEGER = 5126, 5123, 5125
 """Component types of glTF: float32, uint16, uint32."""
@@ -23,14 +22,14 @@ POINTS, INDICES = 34962, 34963
 ALIGNED = 4
 """Bytes at whose multiples parts of the file begin."""
 Y_UP = [-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
-"""The quaternion that brings the base frame's z, which is up, to glTF's y."""
+"""Quaternion that turns the base frame's z, which is up, to glTF's y."""
 
 
 def glb(scene: Scene, hidden: Collection[str] = ("frames",)) -> bytes:
-    """A scene in metres with y up, one named node per solid; equal shapes share their triangles.
+    """Write a scene in metres with y up, one named node per solid; equal shapes share their triangles.
 
     Args:
-        scene: what there is to see; labels are left out.
+        scene: solids to write; labels are left out.
         hidden: layers to leave out.
     """
     buffer = _Buffer()
@@ -58,7 +57,7 @@ def glb(scene: Scene, hidden: Collection[str] = ("frames",)) -> bytes:
 
 
 class _Buffer:
-    """Points and triangles as bytes, with what glTF wants to know of them."""
+    """Points and triangles as bytes, with their descriptions for glTF."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -82,7 +81,7 @@ class _Buffer:
         }
 
     def _append(self, array: NDArray[Any], kind: str, component: int, target: int, **more: Any) -> int:
-        """The number of the accessor of some data."""
+        """Append data, and return the number of its accessor."""
         content = array.tobytes()
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(content), "target": target}
         self.views.append(view)
@@ -105,12 +104,12 @@ def _material(name: str, look: Look) -> dict[str, Any]:
         "metallicFactor": look.metalness,
         "roughnessFactor": look.roughness,
     }
-    seen_through = look.opacity < 1.0
+    translucent = look.opacity < 1.0
     return {
         "name": name,
         "pbrMetallicRoughness": surface,
-        "alphaMode": "BLEND" if seen_through else "OPAQUE",
-        "doubleSided": not seen_through,
+        "alphaMode": "BLEND" if translucent else "OPAQUE",
+        "doubleSided": not translucent,
     }
 
 

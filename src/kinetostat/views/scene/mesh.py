@@ -1,7 +1,7 @@
-"""The three shapes of a scene as triangles, for whatever draws or writes them. Knows no material and no format.
+"""Meshes: the three kinds of shape as triangles, to be drawn or written to files. No material and no format is known.
 
-Points are in the shape's own axes, m. A point on a sharp edge is there once for each of its faces, which so have
-normals of their own; points that coincide have equal coordinates, bit by bit.
+Points are in the shape's own axes, m. A point on a sharp edge is listed once for each adjacent face, each with its own
+normal; points that coincide have equal coordinates, bit by bit.
 """
 
 import math
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kinetostat.algebra.vector import Vector
+from kinetostat.tolerances import NO_CIRCLE
 from kinetostat.views.scene.polygon import cut_in_triangles, edge_normals, narrowed
 from kinetostat.views.scene.solids import Extruded, Shape, Solid, Swept, Turned
 
@@ -24,13 +25,11 @@ AROUND = 40
 WIRE = 12
 """Sides of a wire."""
 ROUNDING = 3
-"""Steps in which an edge is broken."""
+"""Steps of a chamfer, which make it look round."""
 SMOOTH = 0.8
 """Cosine between the normals of neighbouring faces above which the edge between them is shaded round."""
-POINT = 1e-9
-"""Radius below which a circle is a point, in units of the largest."""
 KEPT = 1024
-"""Meshes that are kept: a machine has about a hundred, few of which change while it moves."""
+"""Number of meshes that are kept: a machine has about a hundred, few of which change while it moves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,14 +48,14 @@ class Mesh:
 
     @property
     def volume(self) -> float:
-        """What the triangles enclose, m^3, by the divergence theorem."""
+        """Enclosed volume, m^3, by the divergence theorem."""
         a, b, c = (self.points[self.triangles[:, i]] for i in range(3))
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
 
 @lru_cache(KEPT)
 def mesh_of(shape: Shape) -> Mesh:
-    """The triangles of a shape in its own axes; equal shapes share one mesh, whose arrays cannot be changed."""
+    """Cut the surface of a shape into triangles, in its own axes; equal shapes share one mesh, which is read-only."""
     match shape:
         case Turned():
             mesh = _turned(shape)
@@ -70,7 +69,7 @@ def mesh_of(shape: Shape) -> Mesh:
 
 
 def placed(solid: Solid) -> Mesh:
-    """The triangles of a solid in the base frame."""
+    """Return the triangles of a solid in the base frame."""
     mesh, scale = mesh_of(solid.shape), np.array(solid.scale)
     axes = solid.place.rotation
     turn = np.array([_numbers(axis) for axis in (axes.x, axes.y, axes.z)])
@@ -87,7 +86,7 @@ def _numbers(vector: Vector) -> tuple[float, float, float]:
 def _turned(shape: Turned) -> Mesh:
     profile = np.array(shape.profile)
     profile = profile[[True, *(np.linalg.norm(np.diff(profile, axis=0), axis=1) > 0.0)]]
-    profile[profile[:, 0] < POINT * profile[:, 0].max(), 0] = 0.0
+    profile[profile[:, 0] < NO_CIRCLE * profile[:, 0].max(), 0] = 0.0
     ways = np.diff(profile, axis=0)
     outward = np.stack([ways[:, 1], -ways[:, 0]], axis=1) / np.linalg.norm(ways, axis=1, keepdims=True)
     closed = bool(np.all(profile[0] == profile[-1]))
@@ -105,21 +104,21 @@ def _turned(shape: Turned) -> Mesh:
 
 
 def _ends_of_faces(normals: Array, closed: bool) -> tuple[Array, Array]:
-    """Normals at the first and last line of each face of a strip: its own, or shared where the edge is round."""
+    """Normals at the first and last line of each face of a strip: shared with its neighbour where the edge is round."""
     before, after = np.roll(normals, 1, axis=0), np.roll(normals, -1, axis=0)
     if not closed:
         before[0], after[-1] = normals[0], normals[-1]
     return _shared(normals, before), _shared(normals, after)
 
 
-def _shared(own: Array, other: Array) -> Array:
-    smooth = np.einsum("ij,ij->i", own, other) >= SMOOTH
-    both = np.where(smooth[:, None], own + other, own)
+def _shared(normals: Array, others: Array) -> Array:
+    smooth = np.einsum("ij,ij->i", normals, others) >= SMOOTH
+    both = np.where(smooth[:, None], normals + others, normals)
     return both / np.linalg.norm(both, axis=1, keepdims=True)
 
 
 def _bands(points: Array, normals: Array, closed: bool) -> Mesh:
-    """Bands of quadrilaterals, each between two lines of its own.
+    """Bands of quadrilaterals, each between its two lines.
 
     Args:
         points, normals: [bands x 2 x count x 3], along each band's first and second line; to the left of the way along
@@ -139,7 +138,7 @@ def _halved(quads: Indices) -> Indices:
 
 
 def _without_slivers(points: Array, normals: Array, triangles: Indices) -> Mesh:
-    """Without triangles of which two corners coincide, and without points that no triangle has."""
+    """A mesh without triangles of which two corners coincide, and without points that are in no triangle."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     real = np.any(a != b, axis=1) & np.any(b != c, axis=1) & np.any(c != a, axis=1)
     used, numbers = np.unique(triangles[real], return_inverse=True)

@@ -1,4 +1,4 @@
-"""Base and platform as solid plates behind the joints of the legs, with pedestals between."""
+"""Base and platform as plates behind the joints of the legs, with pedestals between. No leg is drawn here."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,16 +7,17 @@ import numpy as np
 
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.views.scene import shapes
+from kinetostat.views.scene.polygon import rounded_hull
 from kinetostat.views.scene.solids import Extruded, Solid, unit, upright
 
 CLEARANCE = 2.3
-"""Distance of a plate from the joint centres, in radii of a leg: what a fork needs."""
+"""Distance of a plate from the joint centres, in radii of a leg: the room that a fork takes."""
 COINCIDENT = 1.0
 """Spread of joints below which a hub takes the place of a plate, in radii of a leg."""
 MARGIN = {"base": 3.6, "platform": 2.9}
 """Width of a plate beyond its joints, in radii of a leg."""
 THICKNESS = {"base": 1.7, "platform": 1.3}
-"""In radii of a leg."""
+"""Thickness of a plate, in radii of a leg."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Plate:
         place: z towards the joints, origin amid them in their mean plane, base frame.
         joints: their centres, base frame, m.
         radius: of a leg, m.
-        hub: whether the joints are so near to each other that it is a block around them.
+        hub: whether it is a block around the joints, because they are close together.
     """
 
     name: str
@@ -53,7 +54,7 @@ class Plate:
         if self.hub:
             return [self._hub()]
         thick = THICKNESS[self.name] * self.radius
-        outline = shapes.rounded_hull(self._flat(), MARGIN[self.name] * self.radius)
+        outline = rounded_hull(self._flat(), MARGIN[self.name] * self.radius)
         origin = self.place.apply(Vector(0.0, 0.0, self.surface - thick))
         plate = Solid(
             f"{self.name}/plate",
@@ -70,7 +71,7 @@ class Plate:
 
     def _flat(self) -> list[tuple[float, float]]:
         axes, origin = self.place.rotation, self.place.translation
-        return [(_cut((j - origin).dot(axes.x)), _cut((j - origin).dot(axes.y))) for j in self.joints]
+        return [(_to_1_nm((j - origin).dot(axes.x)), _to_1_nm((j - origin).dot(axes.y))) for j in self.joints]
 
     def _pedestal(self, number: int, joint: Vector) -> Solid:
         height = (joint - self.place.translation).dot(self.normal) - self.surface
@@ -79,23 +80,23 @@ class Plate:
         return Solid(f"{self.name}/pedestal {number}", shape, "joint", upright(foot, self.normal))
 
 
-def _cut(number: float) -> float:
-    """Without the rounding that would make corners of points that coincide."""
+def _to_1_nm(number: float) -> float:
+    """A length (m) to 1 nm, so that coincident points do not become two corners by round-off."""
     return round(number, 9)
 
 
 def plate_behind(
     name: str, joints: Sequence[Vector], links: Sequence[Vector], radius: float, frame: Displacement, side: Vector
 ) -> Plate:
-    """The plate behind joints, on the side from which their links do not come.
+    """Place a plate behind joints, on the side away from their links.
 
     Args:
         name: base or platform.
         joints: their centres, base frame, m.
-        links: from each joint into its leg, base axes.
+        links: vector from each joint into its leg, base axes.
         radius: of a leg, m.
         frame: of the body, base frame: gives the plane where the joints do not.
-        side: towards the joints where the links lie in their plane.
+        side: direction from the plate to the joints, used where the links lie in the plane of the joints.
     """
     points = np.array([joint.components() for joint in joints], dtype=float)
     centre = Vector(*points.mean(axis=0).tolist())
@@ -105,6 +106,7 @@ def plate_behind(
     normal = Vector(*axes[2].tolist()) if flat else frame.rotation.z
     inward = unit(Vector(*np.sum([unit(link).components() for link in links], axis=0).tolist()))
     lean = inward.dot(normal)
+    # Links in the plane of the joints do not tell which side is free: then `side` decides.
     normal = normal if (lean if abs(lean) > 0.05 else side.dot(normal)) > 0.0 else -normal
     hub = float(sizes[0]) < COINCIDENT * radius and len(points) > 1
     return Plate(name, upright(centre, normal, frame.rotation.x), tuple(joints), radius, hub)

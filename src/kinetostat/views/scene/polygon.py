@@ -1,25 +1,29 @@
-"""Outlines in the plane: narrower by a margin, and cut into triangles. No solid is known here."""
+"""Outlines in the plane: convex hulls, outlines made wider or narrower, and triangles. No solid is known here."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kinetostat.views.scene.shapes import CORNER, ROUND
+from kinetostat.views.scene.solids import Point2
+
 Array = NDArray[np.float64]
 
 SHARPEST = 0.1
-"""Least share of an edge's normal in a corner's bisector: a needle's tip is not drawn back without end."""
+"""Least share of an edge's normal in the bisector of a corner: the tip of a needle is not drawn back without end."""
 
 
 def edge_normals(outline: Array) -> Array:
-    """Unit normals [n x 2], pointing out, of the edges from each corner of a counter-clockwise outline to the next."""
+    """Return the unit normals [n x 2], outwards, of the edges from each corner of a counter-clockwise outline on."""
     edges = np.roll(outline, -1, axis=0) - outline
     normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def narrowed(outline: Array, margin: float) -> Array:
-    """The corners [n x 2] of an outline whose edges have all moved inwards by `margin` (the outline's unit)."""
+    """Move all edges of an outline inwards by `margin` (the outline's unit), and return the corners [n x 2]."""
     after = edge_normals(outline)
     both = after + np.roll(after, 1, axis=0)
     shares = np.einsum("ij,ij->i", both, after)
@@ -27,18 +31,18 @@ def narrowed(outline: Array, margin: float) -> Array:
 
 
 def cut_in_triangles(outline: Array) -> list[tuple[int, int, int]]:
-    """A simple counter-clockwise outline as n - 2 triangles of its corners' numbers (by clipping ears).
+    """Cut a simple counter-clockwise outline into n - 2 triangles of its corners' numbers, by clipping ears.
 
     Source: G. H. Meisters, Polygons have ears, American Mathematical Monthly 82 (1975).
     """
     points = [(float(x), float(y)) for x, y in outline]
     left = list(range(len(points)))
-    found = []
+    triangles = []
     while len(left) > 3:
         at = next((i for i in range(len(left)) if _is_ear(points, left, i)), _widest(points, left))
-        found.append((left[at - 1], left[at], left[(at + 1) % len(left)]))
+        triangles.append((left[at - 1], left[at], left[(at + 1) % len(left)]))
         del left[at]
-    return [*found, (left[0], left[1], left[2])]
+    return [*triangles, (left[0], left[1], left[2])]
 
 
 def _is_ear(points: Sequence[tuple[float, float]], left: Sequence[int], at: int) -> bool:
@@ -52,7 +56,7 @@ def _is_ear(points: Sequence[tuple[float, float]], left: Sequence[int], at: int)
 
 
 def _widest(points: Sequence[tuple[float, float]], left: Sequence[int]) -> int:
-    """The corner that turns most to the left: the next best where rounding has hidden every ear."""
+    """The corner that turns most to the left: the best choice where round-off has hidden every ear."""
     turns = [_turn(points[left[i - 1]], points[left[i]], points[left[(i + 1) % len(left)]]) for i in range(len(left))]
     return max(range(len(left)), key=turns.__getitem__)
 
@@ -60,3 +64,37 @@ def _widest(points: Sequence[tuple[float, float]], left: Sequence[int]) -> int:
 def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
     """Twice the area of a triangle, positive if it is counter-clockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def rounded_hull(points: Sequence[Point2], margin: float) -> tuple[Point2, ...]:
+    """Return the convex hull of points, widened by `margin` with round corners, counter-clockwise."""
+    hull = convex_hull(points)
+    if len(hull) == 1:
+        angles = [math.tau * i / (4 * ROUND) for i in range(4 * ROUND)]
+        return tuple((hull[0][0] + margin * math.cos(a), hull[0][1] + margin * math.sin(a)) for a in angles)
+    corners: list[Point2] = []
+    for i, (x, y) in enumerate(hull):
+        (px, py), (nx, ny) = hull[i - 1], hull[(i + 1) % len(hull)]
+        first = math.atan2(y - py, x - px) - 0.5 * math.pi
+        turn = (math.atan2(ny - y, nx - x) - 0.5 * math.pi - first) % math.tau
+        count = max(2, math.ceil(2 * CORNER * turn / math.pi))
+        angles = [first + turn * k / count for k in range(count + 1)]
+        corners += [(x + margin * math.cos(a), y + margin * math.sin(a)) for a in angles]
+    return tuple(corners)
+
+
+def convex_hull(points: Sequence[Point2]) -> list[Point2]:
+    """Return the corners of the convex hull, counter-clockwise (Andrew's monotone chain)."""
+    ordered = sorted(set(points))
+    if len(ordered) < 3:
+        return ordered
+
+    def half(along: Sequence[Point2]) -> list[Point2]:
+        kept: list[Point2] = []
+        for x, y in along:
+            while len(kept) > 1 and _turn(kept[-2], kept[-1], (x, y)) <= 0.0:
+                kept.pop()
+            kept.append((x, y))
+        return kept[:-1]
+
+    return half(ordered) + half(ordered[::-1])

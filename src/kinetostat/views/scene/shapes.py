@@ -1,7 +1,9 @@
-"""Shapes that machines are made of: shafts, balls, forks, plates, coils, arrows. Each in its own axes, m."""
+"""Shapes that machines are made of: shafts, balls, forks, blocks, coils, arrows. Each in its own axes, m.
+
+Where they stand and what they are made of is decided elsewhere.
+"""
 
 import math
-from collections.abc import Sequence
 from functools import lru_cache
 
 from kinetostat.views.scene.solids import Extruded, Point2, Swept, Turned
@@ -13,11 +15,11 @@ TURN = 18
 CORNER = 8
 """Points of a rounded corner."""
 
-kept = lru_cache(512)
-"""Of a shape that does not change while a machine moves, the same object is used again."""
+shared = lru_cache(512)
+"""Decorator: a shape that does not change while a machine moves is one object, whose mesh is made once."""
 
 
-@kept
+@shared
 def shaft(radius: float, length: float, chamfer: float = 0.0, start: float = 0.0) -> Turned:
     """A cylinder about z from height `start`, its ends chamfered."""
     c = min(chamfer, 0.5 * radius, 0.45 * length)
@@ -27,26 +29,26 @@ def shaft(radius: float, length: float, chamfer: float = 0.0, start: float = 0.0
     )
 
 
-@kept
+@shared
 def pin(radius: float, length: float) -> Turned:
     """A shaft about z through the origin, centred there."""
     return shaft(radius, length, 0.18 * radius, -0.5 * length)
 
 
-@kept
+@shared
 def ball(radius: float) -> Turned:
     """A ball about the origin."""
     angles = [math.pi * (i / ROUND - 0.5) for i in range(ROUND + 1)]
     return Turned(tuple((abs(radius * math.cos(a)), radius * math.sin(a)) for a in angles))
 
 
-@kept
+@shared
 def cone(bottom: float, top: float, length: float) -> Turned:
     """A frustum about z from the origin."""
     return Turned(((0.0, 0.0), (bottom, 0.0), (top, length), (0.0, length)))
 
 
-@kept
+@shared
 def waist(radius: float, neck: float, length: float) -> Turned:
     """A shaft with a thin neck in its middle, centred at the origin: a flexure."""
     half = 0.5 * length
@@ -55,23 +57,23 @@ def waist(radius: float, neck: float, length: float) -> Turned:
     return Turned(((0.0, -half), *sides, (0.0, half)))
 
 
-@kept
+@shared
 def socket(radius: float) -> Turned:
-    """A cup that holds a ball of this radius from below, with its stem towards -z."""
+    """A cup around the lower half of a ball of this radius, with its stem towards -z."""
     angles = [math.radians(a) for a in range(-60, 21, 10)]
     outer = [(1.22 * radius * math.cos(a), 1.22 * radius * math.sin(a)) for a in angles]
     rim = (1.02 * radius * math.cos(angles[-1]), 1.02 * radius * math.sin(angles[-1]))
     return Turned(((0.0, outer[0][1]), *outer, rim, (0.0, rim[1])))
 
 
-@kept
+@shared
 def block(width: float, depth: float, height: float, chamfer: float = 0.0) -> Extruded:
     """A box on the x-y plane, centred on z."""
     w, d = 0.5 * width, 0.5 * depth
     return Extruded(((-w, -d), (w, -d), (w, d), (-w, d)), height, chamfer)
 
 
-@kept
+@shared
 def fork(gap: float, arm: float, reach: float, foot: float) -> tuple[Point2, ...]:
     """Outline of a fork: arms `arm` wide left and right of a `gap` centred at the origin, closed at y = -`reach`.
 
@@ -91,47 +93,9 @@ def fork(gap: float, arm: float, reach: float, foot: float) -> tuple[Point2, ...
     )  # fmt: skip
 
 
-def rounded_hull(points: Sequence[Point2], margin: float) -> tuple[Point2, ...]:
-    """The convex hull of points, widened by `margin` with round corners, counter-clockwise; of one point a disc."""
-    hull = convex_hull(points)
-    if len(hull) == 1:
-        angles = [math.tau * i / (4 * ROUND) for i in range(4 * ROUND)]
-        return tuple((hull[0][0] + margin * math.cos(a), hull[0][1] + margin * math.sin(a)) for a in angles)
-    found: list[Point2] = []
-    for i, (x, y) in enumerate(hull):
-        (px, py), (nx, ny) = hull[i - 1], hull[(i + 1) % len(hull)]
-        first = math.atan2(y - py, x - px) - 0.5 * math.pi
-        turn = (math.atan2(ny - y, nx - x) - 0.5 * math.pi - first) % math.tau
-        count = max(2, math.ceil(2 * CORNER * turn / math.pi))
-        angles = [first + turn * k / count for k in range(count + 1)]
-        found += [(x + margin * math.cos(a), y + margin * math.sin(a)) for a in angles]
-    return tuple(found)
-
-
-def convex_hull(points: Sequence[Point2]) -> list[Point2]:
-    """Corners of the convex hull, counter-clockwise (Andrew's monotone chain)."""
-    ordered = sorted(set(points))
-    if len(ordered) < 3:
-        return ordered
-
-    def half(along: Sequence[Point2]) -> list[Point2]:
-        kept: list[Point2] = []
-        for x, y in along:
-            while len(kept) > 1 and _turns_right(kept[-2], kept[-1], (x, y)):
-                kept.pop()
-            kept.append((x, y))
-        return kept[:-1]
-
-    return half(ordered) + half(ordered[::-1])
-
-
-def _turns_right(a: Point2, b: Point2, c: Point2) -> bool:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) <= 0.0
-
-
-@kept
+@shared
 def spiral(inner: float, outer: float, turns: float, wire: float) -> Swept:
-    """A flat spiral in the x-y plane with a straight end: the sign of a torsional spring about z."""
+    """A flat spiral in the x-y plane with a straight end: the symbol of a torsional spring about z."""
     count = round(TURN * turns)
     steps = [i / count for i in range(count + 1)]
     curve = [((inner + (outer - inner) * t), math.tau * turns * t) for t in steps]
@@ -140,23 +104,23 @@ def spiral(inner: float, outer: float, turns: float, wire: float) -> Swept:
     return Swept((*path, (x * 1.12, y * 1.12, 0.0)), wire)
 
 
-@kept
+@shared
 def helix(radius: float, length: float, turns: float, wire: float) -> Swept:
-    """A coil about z, centred at the origin: the sign of a linear spring."""
+    """A coil about z, centred at the origin: the symbol of a linear spring."""
     count = round(TURN * turns)
     angles = [math.tau * turns * i / count for i in range(count + 1)]
     path = [(radius * math.cos(a), radius * math.sin(a), length * (i / count - 0.5)) for i, a in enumerate(angles)]
     return Swept(tuple(path), wire)
 
 
-@kept
+@shared
 def arc(radius: float, turn: float, wire: float) -> Swept:
     """A wire arc in the x-y plane, from x over the angle `turn` (rad)."""
     angles = [turn * i / (2 * ROUND) for i in range(2 * ROUND + 1)]
     return Swept(tuple((radius * math.cos(a), radius * math.sin(a), 0.0) for a in angles), wire)
 
 
-@kept
+@shared
 def arrow(length: float, radius: float) -> Turned:
     """An arrow along z from the origin."""
     head = min(0.4 * length, 6.0 * radius)
@@ -164,7 +128,7 @@ def arrow(length: float, radius: float) -> Turned:
     return Turned(((0.0, 0.0), (radius, 0.0), (radius, neck), (2.6 * radius, neck), (0.0, length)))
 
 
-@kept
+@shared
 def double_arrow(length: float, radius: float) -> Turned:
     """An arrow along z with a head at either end, centred at the origin."""
     half, head = 0.5 * length, min(0.2 * length, 6.0 * radius)

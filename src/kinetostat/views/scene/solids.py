@@ -1,14 +1,15 @@
-"""Solids of a scene as plain data: shapes, where they stand, what they are of. Knows no machine and no renderer.
+"""Solids of a scene as plain data: shapes, places, and materials with their looks.
 
-Lengths are in m. There are three kinds of shape (`mesh` makes triangles of them); materials are named (`looks`).
+No machine and no renderer is known here. Lengths are in m; `mesh` makes triangles of the three kinds of shape.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Any, TypeAlias
 
 from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Rotation, Vector
+from kinetostat.tolerances import NO_DIRECTION
 
 Point2: TypeAlias = tuple[float, float]
 Point3: TypeAlias = tuple[float, float, float]
@@ -16,11 +17,9 @@ Point3: TypeAlias = tuple[float, float, float]
 DIGITS = 7
 """Significant digits of a number in a scene: a renderer has float32."""
 KEPT = 1024
-"""Shapes whose data is kept: a machine has about a hundred, few of which change while it moves."""
+"""Number of shapes whose data is kept: a machine has about a hundred, few of which change while it moves."""
 DECIMALS = 8
 """Decimals of a place: 10 nm."""
-SHORT = 1e-9
-"""Length of a vector below which it has no direction, in units of the others."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +65,62 @@ class Swept:
 
 Shape: TypeAlias = Turned | Extruded | Swept
 
+
+@dataclass(frozen=True)
+class Look:
+    """A surface as physically based renderers describe it.
+
+    Attributes:
+        color: of diffuse reflection, and of a metal also of its mirror images; sRGB as "#rrggbb".
+        metalness: 0 for plastics and paint, 1 for a bare metal.
+        roughness: 0 for a mirror, 1 for chalk.
+        opacity: 1 unless it is translucent.
+    """
+
+    color: str
+    metalness: float
+    roughness: float
+    opacity: float = 1.0
+
+
+LOOKS = {
+    "base": Look("#8b929c", 0.15, 0.6),
+    "platform": Look("#c3c9d1", 0.3, 0.42),
+    "actuated": Look("#1f6fb4", 0.2, 0.38),
+    "passive": Look("#d9721f", 0.15, 0.42),
+    "removed": Look("#9aa3ad", 0.0, 0.8, 0.25),
+    "steel": Look("#d3d8de", 0.85, 0.24),
+    "joint": Look("#4a525d", 0.55, 0.42),
+    "motor": Look("#2b3440", 0.35, 0.5),
+    "tool": Look("#b9a76a", 0.8, 0.3),
+    "spring": Look("#17a673", 0.3, 0.35),
+    "load": Look("#c81e4a", 0.0, 0.5),
+    "ghost": Look("#d01f50", 0.0, 0.9, 0.4),
+    "translation": Look("#2f9fe0", 0.0, 0.35, 0.38),
+    "rotation": Look("#a855c7", 0.1, 0.4),
+    "soft translation": Look("#0b7fc7", 0.1, 0.4),
+    "soft rotation": Look("#8a2fb0", 0.1, 0.4),
+    "x axis": Look("#d23b3b", 0.0, 0.5),
+    "y axis": Look("#2c9c4a", 0.0, 0.5),
+    "z axis": Look("#2d62d3", 0.0, 0.5),
+}
+"""Materials of solids, and how they look."""
+
+
+def looks_data() -> dict[str, dict[str, Any]]:
+    """Convert all looks to plain data, by the name of the material."""
+    return {name: asdict(look) for name, look in LOOKS.items()}
+
+
+def linear(color: str) -> tuple[float, float, float]:
+    """Convert "#rrggbb" to linear red, green and blue from 0 to 1 (IEC 61966-2-1)."""
+    parts = [int(color[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
+    red, green, blue = (p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
+    return red, green, blue
+
+
 LAYERS = ("machine", "springs", "load", "deflection", "ellipsoids", "directions", "frames", "labels")
-"""What a viewer may show or hide."""
+"""Layers that a viewer may show or hide."""
 
 
 BASE = Displacement(IDENTITY, ZERO)
@@ -81,11 +134,11 @@ class Solid:
     Attributes:
         name: unique within its scene; the same part has the same name at every pose.
         shape: in its own axes.
-        material: one of `looks.LOOKS`.
+        material: one of `LOOKS`.
         place: from its own axes to the base frame.
         scale: along its own axes.
         layer: one of `LAYERS`.
-        leg: of which it is a part; empty if of none.
+        leg: name of the leg that it belongs to; empty if none.
     """
 
     name: str
@@ -112,7 +165,7 @@ class Label:
 
 @dataclass(frozen=True)
 class Scene:
-    """What there is to see.
+    """Solids and labels of a picture.
 
     Attributes:
         solids, labels: in the base frame.
@@ -129,7 +182,7 @@ class Scene:
 
 
 def as_data(scene: Scene) -> dict[str, Any]:
-    """A scene as nested dictionaries and lists."""
+    """Convert a scene to nested dictionaries and lists."""
     return {
         "solids": [solid_data(solid) for solid in scene.solids],
         "labels": [label_data(label) for label in scene.labels],
@@ -140,7 +193,7 @@ def as_data(scene: Scene) -> dict[str, Any]:
 
 
 def solid_data(solid: Solid) -> dict[str, Any]:
-    """A solid as plain data; `place` holds the columns of its 3 x 4 matrix."""
+    """Convert a solid to plain data; `place` holds the columns of its 3 x 4 matrix."""
     return {
         "name": solid.name,
         "layer": solid.layer,
@@ -151,14 +204,14 @@ def solid_data(solid: Solid) -> dict[str, Any]:
 
 
 def columns_of(solid: Solid) -> tuple[Vector, Vector, Vector, Vector]:
-    """The columns of the 3 x 4 matrix from a solid's own axes, scaled, to the base frame (m)."""
+    """Return the columns of the 3 x 4 matrix from a solid's own axes, scaled, to the base frame (m)."""
     axes = solid.place.rotation
     x, y, z = (axis * size for axis, size in zip((axes.x, axes.y, axes.z), solid.scale, strict=True))
     return x, y, z, solid.place.translation
 
 
 def label_data(label: Label) -> dict[str, Any]:
-    """A label as plain data."""
+    """Convert a label to plain data."""
     return {"text": label.text, "layer": label.layer, "point": [round(c, DECIMALS) for c in label.point.components()]}
 
 
@@ -185,15 +238,15 @@ def _round(number: float) -> float:
 
 
 def upright(origin: Vector, z: Vector, x: Vector | None = None) -> Displacement:
-    """The place whose z axis is along `z`, and whose x axis is as near as can be to `x` (any, if not given)."""
+    """Return the place whose z axis is along `z`, and whose x axis is as near as possible to `x` (if that is given)."""
     up = unit(z)
-    hint = x if x is not None and up.cross(x).norm() > SHORT * x.norm() else _far_from(up)
+    hint = x if x is not None and up.cross(x).norm() > NO_DIRECTION * x.norm() else _far_from(up)
     side = unit(up.cross(hint))
     return Displacement(Rotation(side.cross(up), side, up), origin)
 
 
 def unit(vector: Vector) -> Vector:
-    """The vector at length 1; z if it has none."""
+    """Scale a vector to length 1; a zero vector becomes z."""
     size = vector.norm()
     return vector * (1.0 / size) if size > 0.0 else AXES[2]
 

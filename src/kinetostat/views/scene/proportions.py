@@ -1,4 +1,7 @@
-"""How thick the parts of a machine are drawn: from its cross-sections and limits, else in proportion to its size."""
+"""Proportions: how thick the parts of a machine are drawn.
+
+Cross-sections and limits of the file decide; without them the parts are drawn in proportion to the machine.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,14 +11,15 @@ from typing import Any
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.views.scene.anatomy import anatomy
 
 SLENDER = 0.0125
-"""Radius of a leg as a share of the machine's diagonal, where nothing says how thick it is."""
+"""Radius of a leg as a share of the machine's diagonal, where the file does not say how thick it is."""
 
 
 @dataclass(frozen=True)
 class Profile:
-    """A cross-section as one sees it: `depth` is that of a rectangle, `width` along y; None for a round one, m."""
+    """Outer size of a cross-section, m: `width` along y, and the `depth` of a rectangle; None for a round one."""
 
     width: float
     depth: float | None = None
@@ -41,7 +45,7 @@ class Proportions:
 
 
 def diagonal(configuration: Configuration) -> float:
-    """Diagonal of the box around P and all joints that the pose places, m."""
+    """Return the diagonal of the box around P and all joints that the pose places, m."""
     points = [p for leg in configuration.legs for p in leg.path] + [configuration.platform.translation]
     placed = [p for p in points if all(math.isfinite(c) for c in p.components())]
     low, high = bounds(placed) if placed else (ZERO, ZERO)
@@ -49,21 +53,21 @@ def diagonal(configuration: Configuration) -> float:
 
 
 def leg_radius(machine: Machine, size: float) -> float:
-    """Radius of the legs, m."""
+    """Return the radius of the legs, m: half their diameter in [limits], if it is there."""
     given = machine.tables["limits"].leg_diameter
     return 0.5 * given if is_set(given) else SLENDER * size
 
 
 def cross_sections_of(machine: Machine) -> dict[str, Profile]:
-    """The cross-sections of a machine written leg by leg, by the name of the link."""
-    found = {}
-    for table, said in machine.family.literals.items():
+    """Return the cross-sections of a machine written leg by leg, by the name of the link."""
+    profiles = {}
+    for table, entries in machine.family.literals.items():
         parts = table.split(".", 2)
-        section = said.get("section")
+        section = entries.get("section")
         if parts[0] == "legs" and section:
             shape = machine.family.literals[f"sections.{section}"]["shape"]
-            found[f"{parts[1]} {parts[2]}"] = _profile(str(shape), machine.tables[f"sections.{section}"])
-    return found
+            profiles[f"{parts[1]} {parts[2]}"] = _profile(str(shape), machine.tables[f"sections.{section}"])
+    return profiles
 
 
 def _profile(shape: str, data: Any) -> Profile:
@@ -78,6 +82,19 @@ def _profile(shape: str, data: Any) -> Profile:
 
 
 def bounds(points: Sequence[Vector]) -> tuple[Vector, Vector]:
-    """The lowest and highest corner of the box around some points."""
+    """Return the lowest and the highest corner of the box around some points."""
     columns = list(zip(*(p.components() for p in points), strict=True))
     return Vector(*(min(c) for c in columns)), Vector(*(max(c) for c in columns))
+
+
+def proportions_of(machine: Machine, configuration: Configuration) -> Proportions:
+    """Return the sizes to draw a machine with, from its pose when it is loaded; they stay while it moves."""
+    legs = [anatomy(leg) for leg in configuration.legs]
+    size = diagonal(configuration)
+    return Proportions(
+        leg_radius(machine, size),
+        cross_sections_of(machine),
+        {link.name: link.span.norm() for leg in legs for link in leg.links},
+        {rail.name: rail.point for leg in legs for rail in leg.rails},
+        size,
+    )
