@@ -31,7 +31,7 @@ CURVE_POINTS = 61
 
 
 @dataclass(frozen=True)
-class PictureWish:
+class PictureRequest:
     """The machine to draw.
 
     Attributes:
@@ -53,16 +53,16 @@ class Picture:
     scene: dict[str, Any] | None
 
 
-def picture(wish: PictureWish) -> Picture:
+def picture(request: PictureRequest) -> Picture:
     """Draw the machine at its pose; at a singular pose, together with the motion that stays free."""
-    response = respond(wish.machine)
+    response = respond(request.machine)
     status = Status(int(response.status))
     if status is not Status.OK and not _drawable(status, response):
         return Picture(status, None)
-    scene = scenes.machine_scene(wish.machine, response.configuration, wish.sizes)
+    scene = scenes.machine_scene(request.machine, response.configuration, request.sizes)
     if status is Status.SINGULAR:
-        scene = _with_free_twist(scene, response, wish.sizes)
-    return Picture(status, {**as_data(scene), "fit": wish.fit})
+        scene = _with_free_twist(scene, response, request.sizes)
+    return Picture(status, {**as_data(scene), "fit": request.fit})
 
 
 def _drawable(status: Status, response: Response) -> bool:
@@ -81,7 +81,7 @@ def _with_free_twist(scene: Scene, response: Response, sizes: Proportions) -> Sc
 
 
 @dataclass(frozen=True)
-class ReportWish:
+class ReportRequest:
     """The machine to analyse, and the factor by which its deflections are drawn larger; None to choose one."""
 
     machine: Machine
@@ -98,10 +98,10 @@ class Report:
     exaggeration: float | None
 
 
-def report(wish: ReportWish) -> Report:
+def report(request: ReportRequest) -> Report:
     """Analyse the machine at its pose and make the solids that are drawn over it."""
-    analysis = analyze(wish.machine)
-    solids, factor = overlays_of(analysis, wish.sizes, wish.exaggeration)
+    analysis = analyze(request.machine)
+    solids, factor = overlays_of(analysis, request.sizes, request.exaggeration)
     return Report(analysis, [solid_data(solid) for solid in solids], factor)
 
 
@@ -115,7 +115,7 @@ class Ends:
 
 
 @dataclass(frozen=True)
-class MapWish:
+class MapRequest:
     """A map over two fields of a machine; `since` is the time at which the designer changed something, s."""
 
     machine: Machine
@@ -124,7 +124,7 @@ class MapWish:
     since: float
 
 
-def compliance_map(wish: MapWish) -> dict[str, Array]:
+def compliance_map(request: MapRequest) -> dict[str, Array]:
     """Evaluate every quantity of `map_quantities` at 41 x 41 points.
 
     A program is compiled once and must then serve while the designer moves the machine. Therefore all coordinates of
@@ -133,11 +133,11 @@ def compliance_map(wish: MapWish) -> dict[str, Array]:
     Returns:
         Values by quantity, the second field running fastest; NaN where there is no answer.
     """
-    machine = _unloaded(wish.machine)
+    machine = _unloaded(request.machine)
     present, family = values(machine), machine.family
     axes = [
         Axis(find(family, ends.path).leaves, np.linspace(ends.low, ends.high, MAP_POINTS))
-        for ends in (wish.across, wish.up)
+        for ends in (request.across, request.up)
     ]
     varied = {leaf for axis in axes for leaf in axis.paths}
     fixed = [path for path in present if path.startswith("pose.") and path not in varied]
@@ -154,7 +154,7 @@ def _unloaded(machine: Machine) -> Machine:
 
 
 @dataclass(frozen=True)
-class CurveWish:
+class CurveRequest:
     """Several quantities over one field of a machine."""
 
     machine: Machine
@@ -170,12 +170,12 @@ class Curves:
     values: dict[str, list[float | None]]
 
 
-def curves(wish: CurveWish) -> Curves:
+def curves(request: CurveRequest) -> Curves:
     """Evaluate the quantities along the field, at a constant factor from point to point."""
-    across = np.geomspace(wish.field.low, wish.field.high, CURVE_POINTS)
-    grid = Grid([Axis(find(wish.machine.family, wish.field.path).leaves, across)])
-    lines = evaluate(wish.machine, grid, wish.quantities).values
-    return Curves(across.tolist(), {name: finite(lines[name]) for name in wish.quantities})
+    across = np.geomspace(request.field.low, request.field.high, CURVE_POINTS)
+    grid = Grid([Axis(find(request.machine.family, request.field.path).leaves, across)])
+    lines = evaluate(request.machine, grid, request.quantities).values
+    return Curves(across.tolist(), {name: finite(lines[name]) for name in request.quantities})
 
 
 def finite(values: Array) -> list[float | None]:
@@ -184,16 +184,16 @@ def finite(values: Array) -> list[float | None]:
 
 
 @dataclass(frozen=True)
-class RankingWish:
+class RankingRequest:
     """A machine and the quantity whose sensitivities to all parameters are wanted."""
 
     machine: Machine
     quantity: str
 
 
-def ranking(wish: RankingWish) -> Sensitivity:
+def ranking(request: RankingRequest) -> Sensitivity:
     """Rank the parameters by their influence on the quantity."""
-    return sensitivity(wish.machine, [wish.quantity])
+    return sensitivity(request.machine, [request.quantity])
 
 
 def map_quantities(machine: Machine) -> dict[str, str]:

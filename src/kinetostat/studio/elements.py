@@ -126,3 +126,23 @@ def upload_field(on_upload: Callable[[Any], Any], refuse: Callable[[str], None],
         max_file_size=LARGEST_FILE, max_files=1,
     )  # fmt: skip
     return field.props('accept=".toml" aria-hidden="true"').classes("unseen").mark(mark)
+
+
+def refuse(message: str) -> None:
+    """Show why something could not be done, until the message is closed."""
+    ui.notify(message, type="negative", multi_line=True, close_button="close", timeout=0, position="top")
+
+
+def confirm(question: str, action: Callable[[], None]) -> None:
+    """Ask before something is deleted, and do it if the designer agrees."""
+
+    def agree() -> None:
+        action()
+        window.close()
+
+    with ui.dialog(value=True) as window, ui.element("div").classes("confirm-window"):
+        ui.label(question)
+        with ui.element("div").classes("confirm-buttons"):
+            ui.button("Cancel", on_click=window.close).props("flat no-caps").mark("confirm-no")
+            ui.button("Delete", on_click=agree).props("unelevated no-caps color=negative").mark("confirm-yes")
+    window.on_value_change(lambda change: None if change.value else window.delete())

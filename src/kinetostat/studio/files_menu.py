@@ -7,14 +7,14 @@ import asyncio
 import io
 import sys
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from nicegui import background_tasks, ui
 
 from kinetostat.exchange.formats import KNOWN
-from kinetostat.studio.elements import icon_button
+from kinetostat.studio.elements import icon_button, refuse
 from kinetostat.studio.session import Session
 
 REPORTS = (
@@ -28,14 +28,9 @@ BUSY = "Another file is being written; wait until it is done."
 class FilesMenu:
     """A button with a menu; a file that is chosen is written and sent to the browser."""
 
-    def __init__(self, session: Session, refuse: Callable[[str], None]) -> None:
-        """Build the button.
-
-        Args:
-            session: whose machine is written, as it is when a file is chosen.
-            refuse: shows why there is no file.
-        """
-        self._session, self._refuse = session, refuse
+    def __init__(self, session: Session) -> None:
+        """Build the button; the machine is written as it is when a file is chosen."""
+        self._session = session
         self._process: asyncio.subprocess.Process | None = None
         self._busy = False
         self._button = icon_button("ios_share", "Export: reports, and formats of other programs", lambda: None, "files")
@@ -54,7 +49,7 @@ class FilesMenu:
 
     def _choose(self, words: Sequence[str], suffix: str) -> None:
         if self._busy:
-            self._refuse(BUSY)
+            refuse(BUSY)
             return
         self._busy = True
         background_tasks.create(self._send(words, suffix), name="studio file")
@@ -75,7 +70,7 @@ class FilesMenu:
             waiting.dismiss()
         with self._button:
             if not data:
-                self._refuse(reason)
+                refuse(reason)
             elif len(data) == 1:
                 ui.download(data[0][1], data[0][0])
             else:

@@ -12,7 +12,7 @@ from typing import Generic, TypeVar
 
 from nicegui import background_tasks
 
-Wish = TypeVar("Wish")
+Request = TypeVar("Request")
 Result = TypeVar("Result")
 
 WORKERS = 2
@@ -21,10 +21,10 @@ WORKERS = 2
 log = logging.getLogger("kinetostat")
 
 
-class Lane(Generic[Wish, Result]):
+class Lane(Generic[Request, Result]):
     """One kind of work of one page: at most one request in progress, at most one waiting."""
 
-    def __init__(self, work: Callable[[Wish], Result], deliver: Callable[[Wish, Result], None]) -> None:
+    def __init__(self, work: Callable[[Request], Result], deliver: Callable[[Request, Result], None]) -> None:
         """Create an idle lane.
 
         Args:
@@ -32,13 +32,13 @@ class Lane(Generic[Wish, Result]):
             deliver: shows the result, on the event loop.
         """
         self._work, self._deliver = work, deliver
-        self._waiting: list[Wish] = []
+        self._waiting: list[Request] = []
         self.busy = False
         self._open = True
 
-    def ask(self, wish: Wish) -> None:
+    def ask(self, request: Request) -> None:
         """Compute this next, in place of the request that is waiting."""
-        self._waiting = [wish]
+        self._waiting = [request]
         if not self.busy and self._open:
             self.busy = True
             background_tasks.create(self._run(), name="studio lane")
@@ -51,10 +51,10 @@ class Lane(Generic[Wish, Result]):
     async def _run(self) -> None:
         try:
             while self._waiting:
-                wish = self._waiting.pop()
-                result = await asyncio.get_running_loop().run_in_executor(_workers(), self._work, wish)
+                request = self._waiting.pop()
+                result = await asyncio.get_running_loop().run_in_executor(_workers(), self._work, request)
                 if self._open and result is not None:
-                    self._deliver(wish, result)
+                    self._deliver(request, result)
         except Exception:
             log.exception("the studio could not compute or show something")
             raise

@@ -13,9 +13,9 @@ from nicegui.events import GenericEventArguments
 from kinetostat.engine.points import Array
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.errors import InputError
-from kinetostat.studio.answers import MAP_POINTS, Ends, MapWish, compliance_map, finite, map_quantities
+from kinetostat.studio.answers import MAP_POINTS, Ends, MapRequest, compliance_map, finite, map_quantities
 from kinetostat.studio.controls import Control
-from kinetostat.studio.elements import MapView, choice
+from kinetostat.studio.elements import MapView, choice, refuse
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import full_label
@@ -29,15 +29,14 @@ THROTTLE = 0.03
 class MapPanel:
     """Choices of two coordinates and a quantity, the map, and how long it took."""
 
-    def __init__(self, session: Session, on_change: Callable[[], None], on_problem: Callable[[str], None]) -> None:
+    def __init__(self, session: Session, on_change: Callable[[], None]) -> None:
         """Build the panel.
 
         Args:
             session: whose machine it shows and moves.
             on_change: called after the map has moved the machine.
-            on_problem: called with the reason where the machine cannot be moved.
         """
-        self._session, self._on_change, self._on_problem = session, on_change, on_problem
+        self._session, self._on_change = session, on_change
         self._lane = Lane(compliance_map, self._deliver)
         with ui.row().classes("panel-tools"):
             self.quantity = choice({}, "map of", self._chosen, "map-quantity")
@@ -76,7 +75,7 @@ class MapPanel:
             self.time.set_text("Choose two different axes.")
             return
         start = time.perf_counter() if since is None else since
-        self._lane.ask(MapWish(self._session.machine, across, up, start))
+        self._lane.ask(MapRequest(self._session.machine, across, up, start))
 
     def close(self) -> None:
         self._lane.close()
@@ -90,11 +89,11 @@ class MapPanel:
         kind = KINDS[control.parameter.quantity.kind]
         return control, coordinate_scale(kind.name, kind.unit, np.array([control.low, control.high]))
 
-    def _deliver(self, wish: MapWish, maps: dict[str, Array]) -> None:
+    def _deliver(self, request: MapRequest, maps: dict[str, Array]) -> None:
         quantity = str(self.quantity.value)
-        if (wish.across, wish.up) != self._ends() or quantity not in maps:
+        if (request.across, request.up) != self._ends() or quantity not in maps:
             return  # the designer has chosen other axes meanwhile, and that map is on its way
-        (across, x), (up, y) = self._scale(wish.across.path), self._scale(wish.up.path)
+        (across, x), (up, y) = self._scale(request.across.path), self._scale(request.up.path)
         self.view.run_method(
             "show",
             {
@@ -107,7 +106,7 @@ class MapPanel:
                 "here": [self._session.value(across.path) * x.factor, self._session.value(up.path) * y.factor],
             },
         )
-        took = 1e3 * (time.perf_counter() - wish.since)
+        took = 1e3 * (time.perf_counter() - request.since)
         self.time.set_text(f"{MAP_POINTS} × {MAP_POINTS} poses in {took:.0f} ms, {QUANTITIES[quantity].unit}")
 
     def _chosen(self) -> None:
@@ -120,7 +119,7 @@ class MapPanel:
             where = {across.path: float(event.args["x"]) / x.factor, up.path: float(event.args["y"]) / y.factor}
             self._session.move(where)
         except InputError as error:
-            self._on_problem(str(error))
+            refuse(str(error))
             return
         self._on_change()
 
@@ -128,5 +127,5 @@ class MapPanel:
         try:
             self._session.settle()
         except InputError as error:
-            self._on_problem(str(error))
+            refuse(str(error))
         self._on_change()

@@ -13,9 +13,9 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studio.answers import Picture, PictureWish, Report, ReportWish, picture, report
+from kinetostat.studio.answers import Picture, PictureRequest, Report, ReportRequest, picture, report
 from kinetostat.studio.design.design_tab import DesignTab, Workshop
-from kinetostat.studio.elements import icon_button, toggle, upload_field
+from kinetostat.studio.elements import icon_button, refuse, toggle, upload_field
 from kinetostat.studio.files_menu import FilesMenu
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.map_panel import MapPanel
@@ -65,10 +65,10 @@ class StudioPage:
                 self.scene = ScenePanel(self._exaggerate)
             with ui.element("section").classes("right").props('aria-label="linked views"'):
                 with ui.element("div").classes("card map-card"):
-                    self.map = MapPanel(self.session, self.changed, self._refuse)
+                    self.map = MapPanel(self.session, self.changed)
                 with ui.element("div").classes("card views-card"):
                     self._views()
-            self.design = DesignTab(self.session, workshop, self._take, self._refuse)
+            self.design = DesignTab(self.session, workshop, self._take)
         ui.context.client.on_delete(self._close)
         ui.keyboard(on_key=self._key, ignore=["input", "select", "textarea"])
         self._loaded()
@@ -83,10 +83,10 @@ class StudioPage:
             self.reset = icon_button("restart_alt", "Back to the machine as it was loaded", self._reset, "restart_alt")
             self.mode = toggle(MODES, MODES[0], self._to_front, "mode").classes("mode")
             ui.space()
-            self.upload = upload_field(self._open_upload, self._refuse, "upload")
+            self.upload = upload_field(self._open_upload, refuse, "upload")
             icon_button("folder_open", "Open a machine file", lambda: self.upload.run_method("pickFiles"), "open")
             icon_button("download", "Save the machine as a file", self._save, "save")
-            self.files = FilesMenu(self.session, self._refuse)
+            self.files = FilesMenu(self.session)
             icon_button("contrast", "Light or dark", self.dark.toggle, "theme")
 
     def _views(self) -> None:
@@ -104,7 +104,7 @@ class StudioPage:
     def changed(self) -> None:
         """Request map and picture for new numbers of the machine; the report follows the picture."""
         self.map.refresh(time.perf_counter())
-        self._pictures.ask(PictureWish(self.session.machine, self._sizes))
+        self._pictures.ask(PictureRequest(self.session.machine, self._sizes))
         self.parameters.refresh()
         self._offer_history()
 
@@ -123,7 +123,7 @@ class StudioPage:
         self.design.renew()
         self._offer_history()
         self.map.refresh()
-        self._pictures.ask(PictureWish(machine, self._sizes, fit=True))
+        self._pictures.ask(PictureRequest(machine, self._sizes, fit=True))
 
     def _offer_history(self) -> None:
         self.undo.set_enabled(self.session.can_undo)
@@ -131,14 +131,14 @@ class StudioPage:
         self.reset.set_enabled(self.session.machine is not self.session.origin)
         self._remember(self.session.memory)
 
-    def _show_picture(self, _wish: PictureWish, drawn: Picture) -> None:
+    def _show_picture(self, _request: PictureRequest, drawn: Picture) -> None:
         """Draw, then let a waiting slider go on, then request the figures: the eye follows the picture first."""
         self.scene.draw(drawn)
         self.parameters.go_on()
         self._report()
 
     def _report(self) -> None:
-        self._reports.ask(ReportWish(self.session.machine, self._sizes, self.session.exaggeration))
+        self._reports.ask(ReportRequest(self.session.machine, self._sizes, self.session.exaggeration))
 
     def _exaggerate(self, factor: float | None) -> None:
         """Draw the deflected shape with another factor; None to choose one."""
@@ -146,8 +146,8 @@ class StudioPage:
         self._remember(self.session.memory)
         self._report()
 
-    def _show_report(self, wish: ReportWish, new: Report) -> None:
-        self.scene.explain(new, wish.exaggeration is None)
+    def _show_report(self, request: ReportRequest, new: Report) -> None:
+        self.scene.explain(new, request.exaggeration is None)
         if new.analysis.status is Status.OK:
             self._latest = new
             self._show_front()
@@ -171,7 +171,7 @@ class StudioPage:
         try:
             opening()
         except InputError as error:
-            self._refuse(str(error))
+            refuse(str(error))
             return
         self._loaded()
 
@@ -209,10 +209,6 @@ class StudioPage:
                 self._undo()
             elif event.key.name.lower() in ("y", "z"):
                 self._redo()
-
-    @staticmethod
-    def _refuse(message: str) -> None:
-        ui.notify(message, type="negative", multi_line=True, close_button="close", timeout=0, position="top")
 
     def _close(self) -> None:
         for part in (self._pictures, self._reports, self.map, self.files, self.design):

@@ -39,23 +39,20 @@ class Workshop:
 class DesignTab:
     """The panels of the tab on one page."""
 
-    def __init__(
-        self, session: Session, workshop: Workshop, load: Callable[[Machine], None], refuse: Callable[[str], None]
-    ) -> None:
+    def __init__(self, session: Session, workshop: Workshop, load: Callable[[Machine], None]) -> None:
         """Build the panels to the left and to the right of the machine.
 
         Args:
             session: whose machine is designed.
             workshop: searches and favourites of the server.
             load: takes a machine into the session.
-            refuse: shows a message about something that could not be done.
         """
         self._session, self._workshop = session, workshop
         with ui.element("section").classes("design left").props('aria-label="study"'):
             self.form = StudyForm(session, self._start)
         with ui.element("section").classes("design right").props('aria-label="search and result"'):
             with ui.element("div").classes("card run-card"):
-                self.runs = RunPanel(workshop.runs, load, refuse, _confirm)
+                self.runs = RunPanel(workshop.runs, load)
             with ui.element("div").classes("card answer-card"):
                 with ui.tabs().classes("panel-tabs").props("dense no-caps") as self.tabs:
                     for name in (RESULT, FRONT, FAVOURITES):
@@ -67,7 +64,7 @@ class DesignTab:
                     with ui.tab_panel(RESULT):
                         self.runs.answer()
                     with ui.tab_panel(FAVOURITES):
-                        self.favourites = FavouritesPanel(session, workshop.favourites, load, refuse, _confirm)
+                        self.favourites = FavouritesPanel(session, workshop.favourites, load)
 
     def front(self, on: bool) -> None:
         """Note whether the tab is in front: only then the page follows its searches."""
@@ -89,18 +86,3 @@ class DesignTab:
         run = self._workshop.runs.start(draft.problem(self._session.machine))
         self.tabs.set_value(RESULT)
         self.runs.follow(run)
-
-
-def _confirm(question: str, action: Callable[[], None]) -> None:
-    """Ask before something is deleted."""
-    with ui.dialog(value=True) as window, ui.element("div").classes("confirm-window"):
-        ui.label(question)
-        with ui.element("div").classes("confirm-buttons"):
-            ui.button("Cancel", on_click=window.close).props("flat no-caps").mark("confirm-no")
-
-            def agreed() -> None:
-                action()
-                window.close()
-
-            ui.button("Delete", on_click=agreed).props("unelevated no-caps color=negative").mark("confirm-yes")
-    window.on_value_change(lambda change: None if change.value else window.delete())

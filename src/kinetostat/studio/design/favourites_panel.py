@@ -14,7 +14,7 @@ from kinetostat.studies.analysis import analyze
 from kinetostat.studies.comparison.designs import Comparison, Design, compare
 from kinetostat.studio.design.comparison_text import comparison_text
 from kinetostat.studio.design.state_folder import LONGEST_NAME, LONGEST_NOTE, Favourite, Favourites
-from kinetostat.studio.elements import MAIN_BUTTON, icon_button, in_quotes
+from kinetostat.studio.elements import MAIN_BUTTON, confirm, icon_button, in_quotes, refuse
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.session import Session
 
@@ -30,25 +30,15 @@ Named = list[tuple[str, Machine]]
 class FavouritesPanel:
     """The list of favourites, a form to keep another one, and a window for the comparison."""
 
-    def __init__(
-        self,
-        session: Session,
-        favourites: Favourites,
-        load: Callable[[Machine], None],
-        refuse: Callable[[str], None],
-        confirm: Callable[[str, Callable[[], None]], None],
-    ) -> None:
+    def __init__(self, session: Session, favourites: Favourites, load: Callable[[Machine], None]) -> None:
         """Build the panel.
 
         Args:
             session: whose machine may be kept.
             favourites: of the server.
             load: takes a machine into the session.
-            refuse: shows a message about something that could not be done.
-            confirm: asks a question, then does something.
         """
-        self._session, self._favourites = session, favourites
-        self._load, self._refuse, self._confirm = load, refuse, confirm
+        self._session, self._favourites, self._load = session, favourites, load
         self._lane = Lane(_compared, self._show)
         self._chosen: set[int] = set()
         with ui.element("div").classes("keep-row"):
@@ -111,7 +101,7 @@ class FavouritesPanel:
         try:
             self._favourites.keep(self._session.machine, self.name.value or self._session.machine.name, self.note.value)
         except InputError as error:
-            self._refuse(str(error))
+            refuse(str(error))
             return
         self.name.value = self.note.value = ""
         self.fill()
@@ -120,21 +110,21 @@ class FavouritesPanel:
         try:
             self._load(favourite.machine())
         except InputError as error:
-            self._refuse(str(error))
+            refuse(str(error))
 
     def _delete(self, favourite: Favourite) -> None:
         def delete() -> None:
             self._favourites.delete(favourite.number)
             self.fill()
 
-        self._confirm(f"Delete the favourite {favourite.name}?", delete)
+        confirm(f"Delete the favourite {favourite.name}?", delete)
 
     def _ask(self) -> None:
         try:
             chosen = [kept for kept in reversed(self._favourites.every()) if kept.number in self._chosen]
             machines = [(kept.name, kept.machine()) for kept in chosen]
         except InputError as error:
-            self._refuse(str(error))
+            refuse(str(error))
             return
         if PRESENT in self._chosen:
             machines.insert(0, (PRESENT_NAME, self._session.machine))

@@ -14,18 +14,18 @@ from kinetostat.studio.design.front_panel import FrontPanel, axis_label
 from kinetostat.studio.design.progress import Follower, Progress, failure
 from kinetostat.studio.design.result_text import result_text
 from kinetostat.studio.design.runs import Run, Runs, Stage
-from kinetostat.studio.elements import MAIN_BUTTON, CurveView, choice, icon_button
+from kinetostat.studio.elements import MAIN_BUTTON, CurveView, choice, confirm, icon_button, refuse
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.wording import paragraph
 
 NOTHING = "There is no search yet. Choose variables and objectives on the left, then start one."
-GLANCE = 0.5
+INTERVAL = 0.5
 """Seconds between two looks at a search."""
 
 
 @dataclass(frozen=True)
-class Look:
-    """A request for the list of searches and the progress of one of them.
+class ProgressRequest:
+    """The list of searches and the progress of one of them are wanted.
 
     Attributes:
         number: of the search; 0 for the latest.
@@ -37,7 +37,7 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Seen:
+class Searches:
     """All searches, and the progress of one or the reason why it cannot be shown."""
 
     runs: list[Run]
@@ -49,22 +49,14 @@ class Seen:
 class RunPanel:
     """The list of searches, and one of them in front with its progress, plot and result."""
 
-    def __init__(
-        self,
-        runs: Runs,
-        load: Callable[[Machine], None],
-        refuse: Callable[[str], None],
-        confirm: Callable[[str, Callable[[], None]], None],
-    ) -> None:
+    def __init__(self, runs: Runs, load: Callable[[Machine], None]) -> None:
         """Build the panel without the result, for which `answer` makes a place.
 
         Args:
             runs: searches of the server.
             load: takes a machine into the session.
-            refuse: shows a message about something that could not be done.
-            confirm: asks a question, then does something.
         """
-        self._runs, self._load, self._refuse, self._confirm = runs, load, refuse, confirm
+        self._runs, self._load = runs, load
         self._lane = Lane(self._look, self._deliver)
         self._follower: Follower | None = None
         self._progress: Progress | None = None
@@ -79,7 +71,7 @@ class RunPanel:
         self.line = ui.label("").classes("run-line").props('role="status"').mark("run-line")
         self.curve = CurveView("objective of the best design and mean of all, over the steps").mark("run-curve")
         self.front = FrontPanel(self._take)
-        self.timer = ui.timer(GLANCE, self.refresh, active=False)
+        self.timer = ui.timer(INTERVAL, self.refresh, active=False)
 
     def answer(self) -> None:
         """Make the place of the result; the table of the front must have its place already."""
@@ -91,7 +83,7 @@ class RunPanel:
 
     def refresh(self) -> None:
         """Request the progress of the search in front."""
-        self._lane.ask(Look(int(self.choice.value or 0), self._follower))
+        self._lane.ask(ProgressRequest(int(self.choice.value or 0), self._follower))
 
     def follow(self, run: Run) -> None:
         """Bring a search that has just been started to the front."""
@@ -103,42 +95,42 @@ class RunPanel:
         self.timer.deactivate()
         self._lane.close()
 
-    def _look(self, wish: Look) -> Seen:
+    def _look(self, request: ProgressRequest) -> Searches:
         runs = self._runs.every()
-        number = wish.number or (runs[0].number if runs else 0)
+        number = request.number or (runs[0].number if runs else 0)
         run = next((listed for listed in runs if listed.number == number), None)
         if run is None:
-            return Seen(runs)
+            return Searches(runs)
         try:
-            known = wish.follower
+            known = request.follower
             follower = known if known is not None and known.number == number else Follower(run)
-            return Seen(runs, follower, follower.progress(run), failure(run))
+            return Searches(runs, follower, follower.progress(run), failure(run))
         except InputError as error:
-            return Seen(runs, problem=str(error))
+            return Searches(runs, problem=str(error))
         except OSError:
-            return Seen(runs)  # deleted while it was read
+            return Searches(runs)  # deleted while it was read
 
-    def _deliver(self, wish: Look, seen: Seen) -> None:
-        if wish.number != int(self.choice.value or 0):
+    def _deliver(self, request: ProgressRequest, searches: Searches) -> None:
+        if request.number != int(self.choice.value or 0):
             self.refresh()
             return
-        progress = seen.progress
-        self._list(seen.runs, progress.run.number if progress else wish.number)
-        self._follower, self._progress = seen.follower, progress
-        key = progress and (progress.run, progress.steps, progress.result is None, seen.problem)
+        progress = searches.progress
+        self._list(searches.runs, progress.run.number if progress else request.number)
+        self._follower, self._progress = searches.follower, progress
+        key = progress and (progress.run, progress.steps, progress.result is None, searches.problem)
         if key == self._shown and key is not None:
             return
         self._shown = key
         self._offer(progress)
         if progress is None:
-            self.line.set_text(seen.problem)
+            self.line.set_text(searches.problem)
             self.bar.set_value(0.0)
-            self.text.set_content(paragraph(seen.problem or NOTHING))
+            self.text.set_content(paragraph(searches.problem or NOTHING))
             return
         self.bar.set_value(progress.steps / progress.total if progress.total else 0.0)
         self.line.set_text(_line(progress))
         self._draw(progress)
-        self.text.set_content(paragraph(seen.problem, "lead") if seen.problem else result_text(progress))
+        self.text.set_content(paragraph(searches.problem, "lead") if searches.problem else result_text(progress))
 
     def _list(self, runs: list[Run], number: int) -> None:
         options = {run.number: f"{run.number} · {run.name} · {run.stage}" for run in runs}
@@ -187,7 +179,7 @@ class RunPanel:
         self._attempt(self._runs.go_on)
 
     def _delete(self) -> None:
-        self._confirm(f"Delete search {self.choice.value} and all its designs?", lambda: self._attempt(self._forget))
+        confirm(f"Delete search {self.choice.value} and all its designs?", lambda: self._attempt(self._forget))
 
     def _forget(self, number: int) -> None:
         self._runs.delete(number)
@@ -198,7 +190,7 @@ class RunPanel:
         try:
             action(int(self.choice.value or 0))
         except InputError as error:
-            self._refuse(str(error))
+            refuse(str(error))
         self.refresh()
 
 

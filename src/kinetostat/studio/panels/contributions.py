@@ -9,7 +9,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.sensitivity import Sensitivity
-from kinetostat.studio.answers import RankingWish, Report, map_quantities, ranking
+from kinetostat.studio.answers import RankingRequest, Report, map_quantities, ranking
 from kinetostat.studio.elements import choice, toggle
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.panels import Panel
@@ -95,9 +95,9 @@ class SensitivityPanel(Panel):
 
     def _ask(self) -> None:
         if self._session is not None and self.quantity.value:
-            self._lane.ask(RankingWish(self._session.machine, str(self.quantity.value)))
+            self._lane.ask(RankingRequest(self._session.machine, str(self.quantity.value)))
 
-    def _draw(self, _wish: RankingWish, answer: Sensitivity) -> None:
+    def _draw(self, _request: RankingRequest, answer: Sensitivity) -> None:
         self.bars.set_content(ranking_text(answer))
 
 

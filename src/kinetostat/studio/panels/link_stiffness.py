@@ -7,7 +7,7 @@ import math
 
 from nicegui import ui
 
-from kinetostat.studio.answers import Curves, CurveWish, Ends, Report, curves
+from kinetostat.studio.answers import CurveRequest, Curves, Ends, Report, curves
 from kinetostat.studio.controls import USUAL_STIFFNESS
 from kinetostat.studio.elements import CurveView, choice
 from kinetostat.studio.lanes import Lane
@@ -57,15 +57,15 @@ class LinkPanel(Panel):
         names = [n for n in self._session.machine.family.component_names if (n[0] == "r") == (letters == "r")]
         quantities = tuple(f"{matrix}_{name}" for name in names)
         ends = Ends(path, middle / DECADES, middle * DECADES)
-        self._lane.ask(CurveWish(self._session.machine, ends, quantities))
+        self._lane.ask(CurveRequest(self._session.machine, ends, quantities))
 
-    def _draw(self, wish: CurveWish, answer: Curves) -> None:
-        if self._session is None or wish.field.path not in self._session.controls:
+    def _draw(self, request: CurveRequest, answer: Curves) -> None:
+        if self._session is None or request.field.path not in self._session.controls:
             return
-        control = self._session.controls[wish.field.path]
+        control = self._session.controls[request.field.path]
         unit, (matrix, letters) = KINDS[control.parameter.quantity.kind].unit, BLOCKS[str(self.block.value)]
         units = {"compliance": ("rad/(N·m)", "m/N"), "stiffness": ("N·m/rad", "N/m")}[matrix]
-        present = self._session.value(wish.field.path)
+        present = self._session.value(request.field.path)
         data = {
             "x": answer.across,
             "lines": [{"name": name.split("_")[1], "values": line} for name, line in answer.values.items()],
