@@ -27,7 +27,7 @@ _HOMES = {
     "reproduce": "kinetostat.studies.paper.reproduction",
     "machine_picture": "kinetostat.views.picture",
     "plot": "kinetostat.views.answers",
-    "save": "kinetostat.views.saving",
+    "save": "kinetostat.views.answers",
     "report": "kinetostat.views.report.writing",
     "export": "kinetostat.exchange.formats",
     "Machine": "kinetostat.machine.machine",

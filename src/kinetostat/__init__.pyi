@@ -21,8 +21,8 @@ from kinetostat.studies.sensitivity import sensitivity as sensitivity
 from kinetostat.studies.workspace.workspace import workspace as workspace
 from kinetostat.validation.comparison import validate as validate
 from kinetostat.views.answers import plot as plot
+from kinetostat.views.answers import save as save
 from kinetostat.views.picture import machine_picture as machine_picture
 from kinetostat.views.report.writing import report as report
-from kinetostat.views.saving import save as save
 
 def load_ipython_extension(shell: Any) -> None: ...

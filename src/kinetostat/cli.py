@@ -12,9 +12,9 @@ from pathlib import Path
 from kinetostat.commands.common import (
     BAD_INPUT,
     DONE,
-    NO_ANSWER,
     Parser,
     add_command,
+    give,
     load_machine,
     no_answer,
     print_json,
@@ -22,16 +22,13 @@ from kinetostat.commands.common import (
     takes_json,
     takes_machine,
 )
-from kinetostat.commands.compare import add_compare_command
+from kinetostat.commands.compare import add_compare_commands
 from kinetostat.commands.doctor import add_doctor_command
-from kinetostat.commands.export import add_export_command
 from kinetostat.commands.grid import add_grid_commands
-from kinetostat.commands.guidelines import add_guidelines_command
+from kinetostat.commands.influence import add_influence_commands
 from kinetostat.commands.optimize import add_optimize_commands
-from kinetostat.commands.report import add_report_command
-from kinetostat.commands.sensitivity import add_sensitivity_command
+from kinetostat.commands.report import add_report_commands
 from kinetostat.commands.studio import add_studio_command
-from kinetostat.commands.workspace import add_workspace_command
 
 EXAMPLES = """examples:
   kinetostat list
@@ -128,32 +125,12 @@ def _parser() -> Parser:
     )  # fmt: skip
     analyze.add_argument("--full", action="store_true", help="also show eigenscrews and every single spring")
     takes_json(analyze)
-    validate = add_command(
-        commands, "validate", _validate, "compare the machine with an independent engine",
-        'kinetostat validate tripteron --pose x="0.4 m" y="0.6 m" --pose z="0.3 m"',
-    )  # fmt: skip
-    takes_machine(validate)
-    validate.add_argument(
-        "--pose", metavar="NAME=VALUE", nargs="+", action="append", default=[], dest="poses",
-        help="coordinates of the pose to change from those of the file; repeat for several poses",
-    )  # fmt: skip
-    validate.add_argument("--engine", help="exudyn or pynite (default: the first that is installed)")
-    takes_json(validate)
     add_grid_commands(commands)
-    add_workspace_command(commands)
-    add_sensitivity_command(commands)
-    add_guidelines_command(commands)
-    add_compare_command(commands)
+    add_influence_commands(commands)
+    add_compare_commands(commands)
     add_optimize_commands(commands)
-    add_export_command(commands)
-    add_report_command(commands)
+    add_report_commands(commands)
     add_studio_command(commands)
-    reproduce = add_command(
-        commands, "reproduce", _reproduce, "recompute every table, equation and figure of the paper and compare",
-        "kinetostat reproduce -o reproduce",
-    )  # fmt: skip
-    reproduce.add_argument("-o", "--output", type=Path, default=Path("reproduce"), help="folder (default: reproduce)")
-    takes_json(reproduce)
     add_doctor_command(commands)
     return parser
 
@@ -218,13 +195,13 @@ def _check(options: argparse.Namespace) -> int:
         return _check_study(options)
     machine = load_machine(options)
     print_machine(terminal(), machine)
-    found = analyze(machine)
-    return no_answer(found.message) if found.status is not Status.OK else DONE
+    analysis = analyze(machine)
+    return no_answer(analysis.message) if analysis.status is not Status.OK else DONE
 
 
 def _check_study(options: argparse.Namespace) -> int:
     from kinetostat.studies.optimisation.problem import load_problem
-    from kinetostat.views.study_tables import print_study
+    from kinetostat.views.optimisation_tables import print_study
     from kinetostat.views.tables import terminal
 
     print_study(terminal(), load_problem(options.machine, options.settings))
@@ -234,54 +211,15 @@ def _check_study(options: argparse.Namespace) -> int:
 def _analyze(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
     from kinetostat.studies.analysis import analyze, as_json
-
-    found = analyze(load_machine(options), options.axes)
-    answered = found.status is Status.OK
-    along = [found.along(direction) for direction in options.along] if answered else []
-    if options.json:
-        print_json(as_json(found, along))
-        return DONE if found.status is Status.OK else NO_ANSWER
-    if found.status is not Status.OK:
-        return no_answer(found.message)
     from kinetostat.views.analysis_tables import print_analysis
-    from kinetostat.views.tables import terminal
 
-    print_analysis(terminal(), found, along, options.full)
-    return DONE
-
-
-def _validate(options: argparse.Namespace) -> int:
-    from kinetostat.kinematics.status import Status
-    from kinetostat.studies.analysis import analyze
-    from kinetostat.validation.comparison import AGREED, as_json, validate
-    from kinetostat.views.tables import terminal
-    from kinetostat.views.validation_tables import print_validation
-
-    poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]
-    machines = [load_machine(options, pose) for pose in poses]
-    for machine in machines:
-        answer = analyze(machine)
-        if answer.status is not Status.OK:
-            return no_answer(answer.message)
-    found = [validate(machine, options.engine) for machine in machines]
-    if options.json:
-        print_json([as_json(validation) for validation in found])
-    else:
-        for validation in found:
-            print_validation(terminal(), validation, AGREED)
-    return DONE if all(validation.difference <= AGREED for validation in found) else NO_ANSWER
-
-
-def _reproduce(options: argparse.Namespace) -> int:
-    from kinetostat.studies.paper.reproduction import reproduce
-    from kinetostat.views.paper import print_summary, write_all
-    from kinetostat.views.progress import progress_bar
-
-    with progress_bar("reproducing") as progress:
-        found = reproduce(progress)
-        written = write_all(found, options.output)
-    if options.json:
-        print_json(found.as_json())
-    else:
-        print_summary(found, written)
-    return DONE if found.explained else NO_ANSWER
+    analysis = analyze(load_machine(options), options.axes)
+    answered = analysis.status is Status.OK
+    along = [analysis.along(direction) for direction in options.along] if answered else []
+    return give(
+        options,
+        answered,
+        lambda: as_json(analysis, along),
+        lambda console: print_analysis(console, analysis, along, options.full),
+        message=analysis.message,
+    )

@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
-from kinetostat.commands.common import STOPPED
+from kinetostat.cli import main
+from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER, STOPPED
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studies import analysis

@@ -10,7 +10,8 @@ from io import StringIO
 import numpy as np
 from rich.console import Console
 
-from kinetostat.cli import DONE, NO_ANSWER, main
+from kinetostat.cli import main
+from kinetostat.commands.common import DONE, NO_ANSWER
 from kinetostat.studies.diagnosis import diagnosis, self_test, software
 from kinetostat.studies.diagnosis.diagnosis import Check, State
 from kinetostat.studies.paper import printed

@@ -6,8 +6,9 @@ from xml.etree import ElementTree
 import pytest
 
 from cad import needs_cad
-from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
-from kinetostat.commands.export import FORMATS
+from kinetostat.cli import main
+from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
+from kinetostat.commands.report import FORMATS
 from kinetostat.exchange import solids
 from kinetostat.exchange.formats import KNOWN
 from kinetostat.machine.loading import bundled

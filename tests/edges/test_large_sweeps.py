@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from kinetostat.cli import BAD_INPUT, DONE, main
-from kinetostat.commands.common import STOPPED
+from kinetostat.cli import main
+from kinetostat.commands.common import BAD_INPUT, DONE, STOPPED
 from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
 from kinetostat.machine.loading import load

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
+from kinetostat.cli import main
+from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
 from kinetostat.machine.loading import load
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze

@@ -43,7 +43,8 @@ from kinetostat import (
     validate,
     workspace,
 )
-from kinetostat.cli import DONE, main
+from kinetostat.cli import main
+from kinetostat.commands.common import DONE
 from kinetostat.studies.report.answers import PARTS
 
 LEAST = [word for part in PARTS for word in ("--without", part)]
@@ -203,9 +204,9 @@ def test_a_figure_that_there_is_not_is_refused_with_those_that_there_are(found):
         plot(found["guidelines"], "spider web")
     with pytest.raises(InputError, match="no figure for a result of type Analysis"):
         plot(found["analysis"])
-    with pytest.raises(InputError, match="int is not an answer"):
+    with pytest.raises(InputError, match="type int is not a result"):
         plot(42)
-    with pytest.raises(InputError, match="no answer"):
+    with pytest.raises(InputError, match="not a result"):
         plot(xr.Dataset())
 
 

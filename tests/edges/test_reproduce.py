@@ -7,7 +7,8 @@ from collections import Counter
 
 import pytest
 
-from kinetostat.cli import DONE, NO_ANSWER, main
+from kinetostat.cli import main
+from kinetostat.commands.common import DONE, NO_ANSWER
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.claims import Finding
 from kinetostat.studies.paper.comparison import Verdict, compare, rounds_to

@@ -6,7 +6,8 @@ import json
 import pytest
 from studio_page import on_page
 
-from kinetostat.cli import DONE, main
+from kinetostat.cli import main
+from kinetostat.commands.common import DONE
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.spec.document import parse
 from kinetostat.spec.study import read_study

@@ -7,7 +7,8 @@ import sys
 
 import pytest
 
-from kinetostat.cli import DONE, main
+from kinetostat.cli import main
+from kinetostat.commands.common import DONE
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError

@@ -7,7 +7,8 @@ import pytest
 from browser import browser, needs_chromium, served
 from matplotlib import image
 
-from kinetostat.cli import DONE, main
+from kinetostat.cli import main
+from kinetostat.commands.common import DONE
 from studies import SMALL
 
 pytestmark = needs_chromium

@@ -5,7 +5,8 @@ import json
 import jsonschema
 import pytest
 
-from kinetostat.cli import BAD_INPUT, main
+from kinetostat.cli import main
+from kinetostat.commands.common import BAD_INPUT
 from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.bundled import bundled_studies, study_template

@@ -8,7 +8,8 @@ from operator import attrgetter
 import numpy as np
 import pytest
 
-from kinetostat.cli import BAD_INPUT, DONE, main
+from kinetostat.cli import main
+from kinetostat.commands.common import BAD_INPUT, DONE
 from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
 from kinetostat.engine.chunks import Crew, hired, in_chunks

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from kinetostat.cli import BAD_INPUT, DONE, NO_ANSWER, main
+from kinetostat.cli import main
+from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
 
 PLANE = ["workspace", "planar-3rpr", "--over", "x=-30 cm:30 cm:13", "--over", "y=-30 cm:30 cm:11"]
 SPACE = ["workspace", "hexapod", "--over", "x=-8 cm:8 cm:9", "--over", "y=-8 cm:8 cm:7", "--over", "z=6 cm:25 cm:8"]

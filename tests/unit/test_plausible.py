@@ -2,7 +2,8 @@
 
 import pytest
 
-from kinetostat.cli import DONE, main
+from kinetostat.cli import main
+from kinetostat.commands.common import DONE
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import doubts
 

@@ -1,15 +1,22 @@
-"""What commands share: exit codes, common options, how machines are read and answers printed. Knows no command."""
+"""Parts that commands share: exit codes, options, reading of machines, progress, output of results.
+
+No command is known here. What is not needed for `--help` is imported late, so that the help appears at once.
+"""
 
 import argparse
 import json
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from typing import TypeAlias
 
+    from rich.console import Console
+
+    from kinetostat.engine.batch import Progress
     from kinetostat.machine.machine import Machine
 
     Commands: TypeAlias = argparse._SubParsersAction["Parser"]
@@ -25,15 +32,18 @@ QUANTITIES = (
     "aspect (1 or -1; the sign changes at singularities), shortest_leg, longest_leg, actuator_force, "
     "actuator_moment (the greatest under [load]), mass (of all moving parts); repeatable"
 )
-"""Of what sweeps, maps and sensitivities are."""
+"""Help on the quantities of sweeps, maps and sensitivities."""
 MACHINE = "a machine file, or the name of a bundled machine (see `kinetostat list`)"
+
+MEMORY = 600.0
+"""Seconds of progress from which the remaining time is estimated: several chunks, even where each takes minutes."""
 
 
 class Parser(argparse.ArgumentParser):
     """An argument parser that reports mistakes in one readable paragraph."""
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong and where help is, exit code 2."""
+        """Print what is wrong and where the help is; exit with code 2."""
         self.exit(BAD_INPUT, f"{self.prog}: {message}. Help: {self.prog} --help\n")
 
 
@@ -53,9 +63,19 @@ def add_command(commands: "Commands", name: str, run: object, text: str, example
 def takes_machine(command: Parser, what: str = MACHINE) -> None:
     """Give a command the machine and `--set`."""
     command.add_argument("machine", metavar="MACHINE", help=what)
+    takes_settings(command, 'override a field, e.g. --set geometry.base_radius="26 cm"; repeatable')
+
+
+def takes_settings(command: Parser, meaning: str) -> None:
+    """Give a command `--set`."""
+    command.add_argument("--set", metavar="PATH=VALUE", action="append", default=[], dest="settings", help=meaning)
+
+
+def takes_ranges(command: Parser, meaning: str, required: bool = False) -> None:
+    """Give a command `--over`: coordinates of the pose and their ranges."""
     command.add_argument(
-        "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",
-        help='override a field, e.g. --set geometry.base_radius="26 cm"; repeatable',
+        "--over", metavar="FIELD=from:to:count", action="append", default=[], dest="ranges", required=required,
+        help=meaning,
     )  # fmt: skip
 
 
@@ -66,16 +86,21 @@ def takes_quantities(command: Parser, default: str) -> None:
     )
 
 
+def takes_output(command: Parser, what: str) -> None:
+    """Give a command `--output`, a folder."""
+    command.add_argument("-o", "--output", type=Path, help=f"folder for {what}")
+
+
 def takes_json(command: Parser) -> None:
     """Give a command `--json`."""
     command.add_argument("--json", action="store_true", help="print the result as JSON and nothing else")
 
 
 def load_machine(options: argparse.Namespace, more: "Sequence[str]" = ()) -> "Machine":
-    """The machine that the options name, with their overrides and then more of them.
+    """Load the machine that the options name, with their overrides and then with more of them.
 
     Raises:
-        InputError: no such machine, or a mistake in the file or an override.
+        InputError: there is no such machine, or the file or an override has a mistake.
     """
     from kinetostat.machine.loading import STUDY, bundled, load
     from kinetostat.spec.document import exists
@@ -90,34 +115,75 @@ def load_machine(options: argparse.Namespace, more: "Sequence[str]" = ()) -> "Ma
 
 
 def print_json(data: object) -> None:
-    """Print plain data."""
+    """Print plain data as JSON."""
     print(json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1))
 
 
 def give(
     options: argparse.Namespace,
     answered: bool,
-    message: str,
     as_data: "Callable[[], object]",
-    show: "Callable[[], None]",
+    show: "Callable[[Console], None]",
+    written: "Sequence[Path]" = (),
+    message: str = "",
 ) -> int:
-    """Give an answer, as data with `--json`, else as `show` prints it, or why there is none; returns the exit code."""
+    """Print a result and the files that were written.
+
+    Args:
+        options: of the command; with `--json` the result is printed as data.
+        answered: whether there is a result.
+        as_data: gives the result as plain data.
+        show: prints the result on a terminal.
+        written: files to name after the result.
+        message: printed instead of the result where there is none; if empty, the result is printed all the same.
+
+    Returns:
+        The exit code.
+    """
     if options.json:
         print_json(as_data())
-        return DONE if answered else NO_ANSWER
-    if not answered:
+    elif message and not answered:
         return no_answer(message)
-    show()
-    return DONE
+    else:
+        from kinetostat.views.tables import print_written, terminal
+
+        console = terminal()
+        show(console)
+        print_written(console, written)
+    return DONE if answered else NO_ANSWER
+
+
+@contextmanager
+def progress_bar(what: str) -> "Iterator[Progress]":
+    """Show a bar on stderr with the remaining time; show nothing where stderr is not a terminal."""
+    with search_bar(what) as update:
+        yield lambda done, total: update(done, total, "")
+
+
+@contextmanager
+def search_bar(what: str) -> "Iterator[Callable[[int, int, str], None]]":
+    """Show a bar that also has a few words on the state of the work: (done, total, words)."""
+    if not sys.stderr.isatty():
+        yield lambda *_: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True, speed_estimate_period=MEMORY) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total, words: bar.update(
+            task, completed=done, total=total, description=f"{what} {words}".rstrip()
+        )
 
 
 def no_answer(message: str) -> int:
-    """Say why there is no answer; returns the exit code."""
+    """Print why there is no result; return the exit code."""
     print(f"kinetostat: {message}", file=sys.stderr)
     return NO_ANSWER
 
 
 def stopped(message: str) -> int:
-    """Say what remains of a command that was stopped; returns the exit code."""
+    """Print what remains of a command that was stopped; return the exit code."""
     print(f"\nkinetostat: stopped; {message}", file=sys.stderr)
     return STOPPED

@@ -1,71 +1,103 @@
-"""`compare`: designs side by side. No formula lives here."""
+"""The commands `compare` and `validate`: designs side by side, and a machine in an independent engine.
+
+No formula lives here.
+"""
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinetostat.commands.common import DONE, NO_ANSWER, add_command, print_json, takes_json
+from kinetostat.commands.common import (
+    add_command,
+    give,
+    load_machine,
+    no_answer,
+    progress_bar,
+    takes_json,
+    takes_machine,
+    takes_output,
+    takes_ranges,
+    takes_settings,
+)
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from kinetostat.commands.common import Commands
     from kinetostat.studies.comparison.designs import Comparison
 
-STEM = "compare"
 
-
-def add_compare_command(commands: "Commands") -> None:
-    """Add `compare`."""
-    command = add_command(
+def add_compare_commands(commands: "Commands") -> None:
+    """Add `compare` and `validate`."""
+    compare = add_command(
         commands, "compare", _compare, "compare designs side by side: differences, stiffness, gains",
         'kinetostat compare zhang-gosselin-4dof "zhang-gosselin-4dof:geometry.base_radius=26 cm;pose.z=66 cm"',
     )  # fmt: skip
-    command.add_argument(
+    compare.add_argument(
         "designs", metavar="DESIGN", nargs="+",
         help='a machine file or a bundled machine, optionally with overrides: "NAME:path=value;path=value"; '
         "all designs are compared with the first",
     )  # fmt: skip
-    command.add_argument(
-        "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",
-        help="override a field in all designs; repeatable",
+    takes_settings(compare, "override a field in all designs; repeatable")
+    takes_ranges(
+        compare,
+        "a coordinate of the pose and its range: compare worst, 95 percent and mean over it as well; repeatable",
+    )
+    takes_output(compare, "the figure (PNG, SVG, PDF) and JSON")
+    takes_json(compare)
+    validate = add_command(
+        commands, "validate", _validate, "compare the machine with an independent engine",
+        'kinetostat validate tripteron --pose x="0.4 m" y="0.6 m" --pose z="0.3 m"',
     )  # fmt: skip
-    command.add_argument(
-        "--over", metavar="FIELD=from:to:count", action="append", default=[], dest="ranges",
-        help="a coordinate of the pose and its range: compare worst, 95 percent and mean over it as well; repeatable",
+    takes_machine(validate)
+    validate.add_argument(
+        "--pose", metavar="NAME=VALUE", nargs="+", action="append", default=[], dest="poses",
+        help="coordinates of the pose to change from those of the file; repeat for several poses",
     )  # fmt: skip
-    command.add_argument("-o", "--output", type=Path, help="folder for the figure (PNG, SVG, PDF) and JSON")
-    takes_json(command)
+    validate.add_argument("--engine", help="exudyn or pynite (default: the first that is installed)")
+    takes_json(validate)
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from kinetostat.studies.comparison.designs import compare, read_design
-    from kinetostat.views.progress import progress_bar
+    from kinetostat.studies.comparison.designs import as_json, compare, read_design
+    from kinetostat.views.comparison_tables import print_comparison
 
     designs = [read_design(text, options.settings) for text in options.designs]
     with progress_bar("computing") as progress:
-        found = compare(designs, options.ranges, progress)
-    written = _write(found, options.output) if options.output else []
-    if options.json:
-        from kinetostat.studies.comparison.designs import as_json
-
-        print_json(as_json(found))
-    else:
-        from kinetostat.views.design_tables import print_comparison
-        from kinetostat.views.grid_tables import print_written
-        from kinetostat.views.tables import terminal
-
-        console = terminal()
-        print_comparison(console, found)
-        print_written(console, written)
-    return DONE if all(design.answered for design in designs) else NO_ANSWER
+        result = compare(designs, options.ranges, progress)
+    written = _write(result, options.output) if options.output else []
+    answered = all(design.answered for design in designs)
+    return give(options, answered, lambda: as_json(result), lambda console: print_comparison(console, result), written)
 
 
-def _write(found: "Comparison", folder: Path) -> list[Path]:
+def _write(result: "Comparison", folder: Path) -> list[Path]:
     from kinetostat.studies.comparison.designs import as_json
-    from kinetostat.studies.storage import write_text
-    from kinetostat.views.design_figure import comparison_figure
+    from kinetostat.studies.storage import write_json
+    from kinetostat.views.comparison_figure import comparison_figure
     from kinetostat.views.figures import save
 
-    written = [folder / f"{STEM}.json"]
-    write_text(written[0], json.dumps(as_json(found), ensure_ascii=False, allow_nan=False, indent=1) + "\n")
-    return written + save(comparison_figure(found), folder / STEM)
+    written = [folder / "compare.json"]
+    write_json(written[0], as_json(result))
+    return written + save(comparison_figure(result), folder / "compare")
+
+
+def _validate(options: argparse.Namespace) -> int:
+    from kinetostat.kinematics.status import Status
+    from kinetostat.studies.analysis import analyze
+    from kinetostat.validation.comparison import AGREED, as_json, validate
+    from kinetostat.views.comparison_tables import print_validation
+
+    poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]
+    machines = [load_machine(options, pose) for pose in poses]
+    for machine in machines:
+        analysis = analyze(machine)
+        if analysis.status is not Status.OK:
+            return no_answer(analysis.message)
+    validations = [validate(machine, options.engine) for machine in machines]
+
+    def show(console: "Console") -> None:
+        for validation in validations:
+            print_validation(console, validation, AGREED)
+
+    agreed = all(validation.difference <= AGREED for validation in validations)
+    return give(options, agreed, lambda: [as_json(validation) for validation in validations], show)

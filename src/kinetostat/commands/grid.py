@@ -1,20 +1,23 @@
-"""`sweep` and `map`: quantities over a grid, in memory or into a study folder. No formula lives here."""
+"""The commands `sweep`, `map` and `workspace`: grids of poses or parameters, in memory or in a study folder.
+
+No formula lives here.
+"""
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import (
-    DONE,
-    NO_ANSWER,
     add_command,
+    give,
     load_machine,
-    print_json,
+    progress_bar,
     stopped,
     takes_json,
     takes_machine,
+    takes_output,
     takes_quantities,
+    takes_ranges,
 )
 
 if TYPE_CHECKING:
@@ -23,13 +26,14 @@ if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
     from kinetostat.engine.chunks import Crew
     from kinetostat.studies.grid.grid import GridQuestion
+    from kinetostat.studies.workspace.workspace import Workspace
 
 VARY = "FIELD=from:to:count[:log]"
 MOST_WORKERS = 1024
 
 
 def add_grid_commands(commands: "Commands") -> None:
-    """Add `sweep` and `map`."""
+    """Add `sweep`, `map` and `workspace`."""
     sweep = add_command(
         commands, "sweep", _sweep, "compute quantities along one parameter: table, curves and NetCDF",
         'kinetostat sweep zhang-gosselin-4dof --vary "stiffness.passive_links=1e3:1e10:8:log" --quantity compliance',
@@ -47,7 +51,7 @@ def add_grid_commands(commands: "Commands") -> None:
     for command in (sweep, mapping):
         takes_machine(command)
         takes_quantities(command, command.get_default("default_quantity"))
-        command.add_argument("-o", "--output", type=Path, help="folder for NetCDF and figures (PNG, SVG, PDF)")
+        takes_output(command, "NetCDF and figures (PNG, SVG, PDF)")
         command.add_argument(
             "--resume", action="store_true",
             help="continue the grid in the folder, and refuse if there is none; without this option, the same command "
@@ -57,6 +61,24 @@ def add_grid_commands(commands: "Commands") -> None:
         who.add_argument("--workers", metavar="N", type=_workers, help="compute in N processes on this machine")
         who.add_argument("--cluster", metavar="ADDRESS", help="compute on a Dask cluster, e.g. tcp://10.0.0.1:8786")
         takes_json(command)
+    _add_workspace_command(commands)
+
+
+def _add_workspace_command(commands: "Commands") -> None:
+    command = add_command(
+        commands, "workspace", _workspace, "compute where the machine can work: volume, limits, pictures",
+        'kinetostat workspace hexapod --set "limits.longest_leg=20 cm" --over "x=-8 cm:8 cm:41" '
+        '--over "y=-8 cm:8 cm:41" --over "z=10 cm:25 cm:41" --where "free_stiffness_z > 20 N/um" -o out',
+    )  # fmt: skip
+    takes_machine(command)
+    takes_ranges(command, "a coordinate of the pose and its range; give two to six", required=True)
+    command.add_argument(
+        "--where", metavar="CONDITION", action="append", default=[], dest="conditions",
+        help='a condition that a pose must meet, e.g. "free_stiffness_z > 20 N/um"; repeatable, all must be met',
+    )  # fmt: skip
+    command.add_argument("--seed", type=_seed, default=0, help="seed of the random points for the volume (default: 0)")
+    takes_output(command, "NetCDF and pictures (PNG, SVG, PDF)")
+    takes_json(command)
 
 
 def _workers(text: str) -> int:
@@ -99,19 +121,29 @@ def _crew(options: argparse.Namespace) -> "Crew":
 def _in_memory(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
     from kinetostat.engine.chunks import hired
     from kinetostat.studies.grid.grid import answer
-    from kinetostat.views.progress import progress_bar
 
     if options.output:
         _check_folder(options.output, options.resume)
     with hired(_crew(options)) as compute, progress_bar("computing") as progress:
         dataset = answer(question, progress, compute)
     written = _write(dataset, options.output, stem) if options.output else []
-    _show(dataset, options.json, written)
-    return DONE if bool((dataset["status"] == 0).any()) else NO_ANSWER
+
+    from kinetostat.studies.grid.grid import as_json
+    from kinetostat.views.grid_tables import print_dataset
+
+    names = [str(name) for name in dataset.data_vars if name != "status"]
+    answered = bool((dataset["status"] == 0).any())
+    return give(
+        options,
+        answered,
+        lambda: as_json(dataset),
+        lambda console: print_dataset(console, dataset, names),
+        written,
+    )
 
 
 def _check_folder(folder: Path, resume: bool) -> None:
-    """See that a small grid does not take the place of a long study."""
+    """Refuse to write a small grid over a long study."""
     from kinetostat.spec.errors import InputError
     from kinetostat.studies.study_folder import holds_study
 
@@ -130,7 +162,7 @@ def _write(dataset: "xr.Dataset", folder: Path, stem: str) -> list[Path]:
 
 
 def _draw(dataset: "xr.Dataset", stem: Path, title: str) -> list[Path]:
-    """Figures of what has one dimension or two."""
+    """Draw a grid of one or two dimensions; return the files."""
     dims = len(dataset["status"].dims)
     if dims > 2:
         return []
@@ -140,47 +172,65 @@ def _draw(dataset: "xr.Dataset", stem: Path, title: str) -> list[Path]:
     return save(draw(dataset, [str(name) for name in dataset.data_vars if name != "status"], title), stem)
 
 
-def _show(dataset: "xr.Dataset", as_json: bool, written: Sequence[Path]) -> None:
-    if as_json:
-        from kinetostat.studies.grid.grid import as_json
-
-        print_json(as_json(dataset))
-        return
-    from kinetostat.views.grid_tables import print_dataset, print_written
-    from kinetostat.views.tables import terminal
-
-    console = terminal()
-    print_dataset(console, dataset, [str(name) for name in dataset.data_vars if name != "status"])
-    print_written(console, written)
-
-
 def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
     from kinetostat.engine.chunks import hired
     from kinetostat.studies.grid.stored_grid import answer_into
-    from kinetostat.views.progress import progress_bar
 
     try:
         with hired(_crew(options)) as compute, progress_bar("computing") as progress:
             found = answer_into(question, options.output, stem, progress, compute, options.resume)
     except KeyboardInterrupt:
         return stopped(f"the results so far are in {options.output}; the same command continues from there.")
-    if options.json:
-        from kinetostat.studies.grid.stored_grid import summary_json
+    from kinetostat.studies.grid.stored_grid import summary_json
+    from kinetostat.views.grid_tables import print_stored
 
-        print_json(summary_json(found))
-    else:
-        from kinetostat.views.grid_tables import print_stored, print_written
-        from kinetostat.views.tables import terminal
-
-        console = terminal()
-        print_stored(console, found)
-        print_written(console, [found.path, *(_draw_thinned(found.path) if len(question.dims) <= 2 else [])])
-    return DONE if found.tally.answered else NO_ANSWER
+    drawn = [] if options.json or len(question.dims) > 2 else _draw_thinned(found.path)
+    return give(
+        options,
+        bool(found.tally.answered),
+        lambda: summary_json(found),
+        lambda console: print_stored(console, found),
+        [found.path, *drawn],
+    )
 
 
 def _draw_thinned(path: Path) -> list[Path]:
-    """Figures of a large grid of one dimension or two, of as many points as paper can show."""
+    """Draw a large grid of one or two dimensions, thinned to as many points as paper can show."""
     from kinetostat.studies.result_file import thinned
 
     dataset = thinned(path)
     return _draw(dataset, path.with_suffix(""), f"{dataset.attrs['machine']} (thinned)")
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal() or len(text) > 9:
+        raise argparse.ArgumentTypeError(f"{text} is not a seed; give a whole number of at most nine digits")
+    return int(text)
+
+
+def _workspace(options: argparse.Namespace) -> int:
+    from kinetostat.studies.workspace.workspace import as_json, workspace
+    from kinetostat.views.grid_tables import print_workspace
+
+    machine = load_machine(options)
+    with progress_bar("computing") as progress:
+        result = workspace(machine, options.ranges, options.conditions, progress, options.seed)
+    written = _write_workspace(result, options.output) if options.output else []
+    return give(
+        options,
+        bool(result.found),
+        lambda: as_json(result),
+        lambda console: print_workspace(console, result),
+        written,
+    )
+
+
+def _write_workspace(result: "Workspace", folder: Path) -> list[Path]:
+    from kinetostat.studies.storage import write_dataset
+    from kinetostat.views.figures import save
+    from kinetostat.views.workspace_figures import pictures
+
+    written = [folder / "workspace.nc"]
+    write_dataset(written[0], result.dataset)
+    drawn = pictures(result.dataset, result.verdicts, result.conditions, result.dataset.attrs["machine"])
+    return written + [path for name, figure in drawn.items() for path in save(figure, folder / f"workspace{name}")]

@@ -1,10 +1,20 @@
-"""`optimize` and `pareto`: better designs of a machine, and what they give up for each other. No formula lives here."""
+"""The commands `optimize` and `pareto`: better designs of a machine. No formula lives here."""
 
 import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinetostat.commands.common import DONE, NO_ANSWER, add_command, no_answer, print_json, takes_json
+from kinetostat.commands.common import (
+    DONE,
+    NO_ANSWER,
+    add_command,
+    no_answer,
+    print_json,
+    search_bar,
+    takes_json,
+    takes_output,
+    takes_settings,
+)
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
@@ -25,14 +35,11 @@ def add_optimize_commands(commands: "Commands") -> None:
     )  # fmt: skip
     for command in (optimize, pareto):
         command.add_argument("study", metavar="STUDY", help=STUDY)
-        command.add_argument(
-            "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",
-            help='override a field of the study, e.g. --set optimizer.seed=3, --set variables.0.to="15 cm"; repeatable',
-        )  # fmt: skip
-        command.add_argument(
-            "-o", "--output", type=Path,
-            help="folder for the result, its figures and all designs; a stopped search continues there",
-        )  # fmt: skip
+        takes_settings(
+            command,
+            'override a field of the study, e.g. --set optimizer.seed=3, --set variables.0.to="15 cm"; repeatable',
+        )
+        takes_output(command, "the result, its figures and all designs; a stopped search continues there")
         command.add_argument(
             "--resume", action="store_true", help="continue the search in the folder, and refuse if there is none"
         )
@@ -40,72 +47,70 @@ def add_optimize_commands(commands: "Commands") -> None:
 
 
 def _optimize(options: argparse.Namespace) -> int:
-    found = _found(options)
+    result = _search(options)
     if options.json:
         from kinetostat.studies.optimisation.result_data import as_json
 
-        print_json(as_json(found))
-    return _told(options, found)
+        print_json(as_json(result))
+    return _report(options, result)
 
 
 def _pareto(options: argparse.Namespace) -> int:
-    found = _found(options, least=2)
+    result = _search(options, least=2)
     if options.json:
         from kinetostat.studies.optimisation.result_data import as_json
 
-        told = as_json(found)
-        print_json({key: told.get(key) for key in ("name", "status", "message", "evaluations", "front")})
-    return _told(options, found)
+        data = as_json(result)
+        print_json({key: data.get(key) for key in ("name", "status", "message", "evaluations", "front")})
+    return _report(options, result)
 
 
-def _found(options: argparse.Namespace, least: int = 1) -> "Result":
-    """Search, with a bar, into the folder if there is one."""
+def _search(options: argparse.Namespace, least: int = 1) -> "Result":
+    """Search with a progress bar; into the folder if there is one."""
     from kinetostat.spec.document import exists
     from kinetostat.spec.errors import InputError
     from kinetostat.studies.optimisation.problem import load_problem
     from kinetostat.studies.optimisation.result import optimize
     from kinetostat.studies.optimisation.search import stored_problem
     from kinetostat.studies.study_folder import holds_study
-    from kinetostat.views.progress import telling_bar
 
-    given = Path(options.study)
-    if exists(given) and holds_study(given):
+    folder = Path(options.study)
+    if exists(folder) and holds_study(folder):
         if options.settings or options.output:
-            raise InputError(f'"{given}" holds a study together with its settings; leave out --set and -o.')
-        problem, options.output = stored_problem(given), given
+            raise InputError(f'"{folder}" holds a study together with its settings; leave out --set and -o.')
+        problem, options.output = stored_problem(folder), folder
     else:
         problem = load_problem(options.study, options.settings)
     if options.resume and options.output is None:
         raise InputError("--resume continues the search in a folder; name the folder with -o.")
     if len(problem.objectives) < least:
         raise InputError("a Pareto front needs two objectives or more; for one, use `kinetostat optimize`.")
-    with telling_bar("searching") as tell:
+    with search_bar("searching") as update:
         return optimize(
             problem,
             options.output,
-            lambda done, total, best: tell(done, total, "" if best is None else f"(best {best:.8g})"),
+            lambda done, total, best: update(done, total, "" if best is None else f"(best {best:.8g})"),
             options.resume,
         )
 
 
-def _told(options: argparse.Namespace, found: "Result") -> int:
-    """Write files, and print what is not JSON."""
+def _report(options: argparse.Namespace, result: "Result") -> int:
+    """Write the files of a result, and print it unless JSON was printed."""
     from kinetostat.studies.optimisation.result_data import message, write_result
 
-    written = write_result(found, options.output) if options.output else []
-    if found.solved and options.output:
+    written = write_result(result, options.output) if options.output else []
+    if result.solved and options.output:
         from kinetostat.views.figures import save
         from kinetostat.views.optimisation_figures import pictures
 
-        for name, figure in pictures(found).items():
+        for name, figure in pictures(result).items():
             written += save(figure, options.output / name)
-    if not found.solved:
-        return NO_ANSWER if options.json else no_answer(message(found))
+    if not result.solved:
+        return NO_ANSWER if options.json else no_answer(message(result))
     if not options.json:
-        from kinetostat.views.grid_tables import print_written
         from kinetostat.views.optimisation_tables import print_result
-        from kinetostat.views.tables import terminal
+        from kinetostat.views.tables import print_written, terminal
 
-        print_result(terminal(), found)
+        print_result(terminal(), result)
         print_written(terminal(), written)
     return DONE

@@ -1,21 +1,58 @@
-"""`report`: everything about a machine or a study in one file for a design review. No formula lives here."""
+"""The commands `report`, `export` and `reproduce`: documents and files for others. No formula lives here."""
 
 import argparse
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinetostat.commands.common import DONE, add_command, no_answer
+from kinetostat.commands.common import (
+    DONE,
+    add_command,
+    give,
+    load_machine,
+    no_answer,
+    progress_bar,
+    search_bar,
+    takes_json,
+    takes_machine,
+    takes_ranges,
+    takes_settings,
+)
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
     from kinetostat.studies.optimisation.problem import Problem
     from kinetostat.studies.optimisation.result import Result
 
+FORMATS = "mjcf, urdf, glb, step, csv, netcdf, mat, nastran, abaqus or ansys"
 WITHOUT = ("maps", "guidelines", "sensitivity", "validation")
 
 
-def add_report_command(commands: "Commands") -> None:
-    """Add `report`."""
+def add_report_commands(commands: "Commands") -> None:
+    """Add `report`, `export` and `reproduce`."""
+    _add_report_command(commands)
+    _add_export_command(commands)
+    reproduce = add_command(
+        commands, "reproduce", _reproduce, "recompute every table, equation and figure of the paper and compare",
+        "kinetostat reproduce -o reproduce",
+    )  # fmt: skip
+    reproduce.add_argument("-o", "--output", type=Path, default=Path("reproduce"), help="folder (default: reproduce)")
+    takes_json(reproduce)
+
+
+def _add_export_command(commands: "Commands") -> None:
+    command = add_command(
+        commands, "export", _export, "write the machine or its results for other programs",
+        "kinetostat export tripteron --to mjcf -o tripteron.xml",
+    )  # fmt: skip
+    takes_machine(command)
+    command.add_argument("--to", metavar="FORMAT", help=f"{FORMATS} (default: given by the suffix of the file)")
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="the file (default: the name of the machine)"
+    )
+
+
+def _add_report_command(commands: "Commands") -> None:
     command = add_command(
         commands, "report", _report, "write one document about a machine or a study for a design review",
         'kinetostat report tripteron --set \'load.force=["0 N","0 N","-500 N"]\' -o tripteron.pdf',
@@ -24,14 +61,8 @@ def add_report_command(commands: "Commands") -> None:
         "subject", metavar="MACHINE|STUDY",
         help="a machine or study file, the name of a bundled one (see `kinetostat list`), or the folder of a study",
     )  # fmt: skip
-    command.add_argument(
-        "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",
-        help="override a field of the machine or of the study; repeatable",
-    )  # fmt: skip
-    command.add_argument(
-        "--over", metavar="FIELD=from:to:count", action="append", default=[], dest="ranges",
-        help="an axis of the maps (one or two); default: two coordinates of the pose, over their reach",
-    )  # fmt: skip
+    takes_settings(command, "override a field of the machine or of the study; repeatable")
+    takes_ranges(command, "an axis of the maps (one or two); default: two coordinates of the pose, over their reach")
     command.add_argument(
         "--without", metavar="PART", action="append", default=[], choices=WITHOUT,
         help=f"omit a part that takes time: {', '.join(WITHOUT)}; repeatable",
@@ -58,15 +89,13 @@ def _report(options: argparse.Namespace) -> int:
     from kinetostat.studies.optimisation.result_data import message
     from kinetostat.studies.report.answers import gather
     from kinetostat.studies.report.subject import subject_of
-    from kinetostat.views.grid_tables import print_written
-    from kinetostat.views.progress import progress_bar
     from kinetostat.views.report.writing import Wanted, report_path, write_report
-    from kinetostat.views.tables import terminal
+    from kinetostat.views.tables import print_written, terminal
 
     path = report_path(options.output)
     wanted = Wanted(options.ranges, options.without, options.engine, options.author, options.date)
     subject = subject_of(options.subject, options.settings)
-    result = _searched(subject.problem, subject.folder) if subject.problem else None
+    result = _search(subject.problem, subject.folder) if subject.problem else None
     if result is not None and not result.solved:
         return no_answer(message(result))
     machine = subject.machine if result is None else result.machine
@@ -81,14 +110,44 @@ def _report(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _searched(problem: "Problem", folder: Path | None) -> "Result":
-    """The result of a study, which goes on in its folder if it has one."""
+def _search(problem: "Problem", folder: Path | None) -> "Result":
+    """Search the best design of a study; continue in its folder if it has one."""
     from kinetostat.studies.optimisation.result import optimize
-    from kinetostat.views.progress import telling_bar
 
-    with telling_bar("searching") as tell:
+    with search_bar("searching") as update:
         return optimize(
             problem,
             folder,
-            lambda done, total, best: tell(done, total, "" if best is None else f"(best {best:.8g})"),
+            lambda done, total, best: update(done, total, "" if best is None else f"(best {best:.8g})"),
         )
+
+
+def _export(options: argparse.Namespace) -> int:
+    from kinetostat.exchange.formats import choose
+    from kinetostat.kinematics.status import Status
+    from kinetostat.studies.analysis import analyze
+    from kinetostat.views.tables import print_written, terminal
+
+    chosen = choose(options.to, options.output)
+    analysis = analyze(load_machine(options))
+    if analysis.status is not Status.OK:
+        return no_answer(analysis.message)
+    stem = re.sub(r"[^\w.-]+", "-", Path(options.machine).stem if options.output is None else "").strip("-")
+    written = chosen.write(analysis, options.output or Path(f"{stem}{chosen.suffix}"))
+    print_written(terminal(), written)
+    return DONE
+
+
+def _reproduce(options: argparse.Namespace) -> int:
+    from kinetostat.studies.paper.reproduction import reproduce
+    from kinetostat.views.paper import print_summary, write_all
+
+    with progress_bar("reproducing") as progress:
+        reproduction = reproduce(progress)
+        written = write_all(reproduction, options.output)
+    return give(
+        options,
+        reproduction.explained,
+        reproduction.as_json,
+        lambda console: print_summary(console, reproduction, written),
+    )

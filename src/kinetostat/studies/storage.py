@@ -1,5 +1,6 @@
 """Files written whole or not at all: into a temporary neighbour first, then renamed. Nothing is computed here."""
 
+import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -37,6 +38,11 @@ def write_text(path: Path, text: str) -> None:
     """Write a UTF-8 text file."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, data: object) -> None:
+    """Write plain data as a JSON file."""
+    write_text(path, f"{json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1)}\n")
 
 
 def write_dataset(path: Path, dataset: xr.Dataset) -> None:

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from kinetostat.kinematics.mobility import Mobility
+from kinetostat.kinematics.mobility import Kind, Mobility
 from kinetostat.kinetostatics.eigenscrews import Eigenscrew
 from kinetostat.kinetostatics.indices import PrincipalStiffness
 from kinetostat.studies.analysis import Analysis, Rows
@@ -182,10 +182,8 @@ def remarks(analysis: Analysis) -> list[str]:
     if analysis.mobility:
         found = analysis.mobility
         extra = f", {found.here.redundant} redundant constraints" if found.here.redundant else ""
-        lines.append(
-            f"Mobility: {found.full_cycle} freedoms, {found.actuators} actuators{extra}. "
-            f"{found.kind.capitalize()} pose. {margins(found)}"
-        )
+        lines.append(f"Mobility: {found.full_cycle} freedoms, {found.actuators} actuators{extra}.")
+        lines.append(f"{_sort_of_pose(found.kind)}. {margins(found)}")
     if analysis.internal_loads and analysis.internal_loads.degree:
         legs = ", ".join(analysis.internal_loads.legs)
         lines.append(
@@ -211,6 +209,10 @@ def margins(mobility: Mobility) -> str:
     """Return a sentence with the singularity margins of a pose, to two digits."""
     legs, platform = mobility.leg_distance, mobility.platform_distance
     return f"Singularity margin (0 to 1): legs {legs:.2g}, platform {platform:.2g}."
+
+
+def _sort_of_pose(kind: Kind) -> str:
+    return "Regular pose" if kind is Kind.REGULAR else f"Singular pose ({kind})"
 
 
 def _decided(undecided: int) -> str:

@@ -1,7 +1,11 @@
-"""What there is to see of each kind of answer: tables, figures, plain data. One row a kind; nothing is drawn here."""
+"""Tables, figures, data and files of each kind of result: one row a kind. Nothing is drawn here.
+
+`plot`, `save` and notebooks look up here what they can show.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import xarray as xr
@@ -9,6 +13,7 @@ from matplotlib.figure import Figure
 from rich.console import Console
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.studies import analysis, sensitivity
@@ -21,25 +26,25 @@ from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.optimisation import result_data
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.sensitivity import Sensitivity
+from kinetostat.studies.storage import replacing, write_dataset, write_json, write_text
 from kinetostat.studies.workspace import workspace
 from kinetostat.studies.workspace.workspace import Workspace
 from kinetostat.validation import comparison as validation
 from kinetostat.validation.comparison import Validation
 from kinetostat.views import optimisation_figures, workspace_figures
 from kinetostat.views.analysis_tables import print_analysis
-from kinetostat.views.design_figure import comparison_figure
-from kinetostat.views.design_tables import print_comparison
+from kinetostat.views.comparison_figure import comparison_figure
+from kinetostat.views.comparison_tables import print_comparison, print_validation
 from kinetostat.views.drawing import three_views
-from kinetostat.views.figures import contour_maps, curves
-from kinetostat.views.grid_tables import print_dataset
-from kinetostat.views.guideline_figures import guideline_figures
-from kinetostat.views.guideline_tables import print_guidelines
+from kinetostat.views.figures import FORMATS, contour_maps, curves, save_figure
+from kinetostat.views.grid_tables import print_dataset, print_workspace
+from kinetostat.views.influence_figures import guideline_figures, sensitivity_figure
+from kinetostat.views.influence_tables import print_guidelines, print_sensitivity
 from kinetostat.views.optimisation_tables import print_result
-from kinetostat.views.sensitivity_figure import sensitivity_figure
-from kinetostat.views.sensitivity_tables import print_sensitivity
+from kinetostat.views.picture import Picture, machine_picture
+from kinetostat.views.scene.glb import glb
+from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.tables import print_machine
-from kinetostat.views.validation_tables import print_validation
-from kinetostat.views.workspace_tables import print_workspace
 
 
 @dataclass(frozen=True)
@@ -114,12 +119,14 @@ def kind_of(answer: object) -> Kind:
     """How an answer is shown.
 
     Raises:
-        InputError: it is no answer of ours.
+        InputError: it is not a result of kinetostat.
     """
     found = next((kind for kind in KINDS if isinstance(answer, kind.type)), None)
     if found is None or (isinstance(answer, xr.Dataset) and "status" not in answer):
         known = ", ".join(kind.type.__name__ for kind in KINDS)
-        raise InputError(f"A {type(answer).__name__} is not an answer of kinetostat; give one of: {known}.")
+        raise InputError(
+            f"An object of type {type(answer).__name__} is not a result of kinetostat; give one of: {known}."
+        )
     return found
 
 
@@ -140,3 +147,56 @@ def plot(answer: object, which: str | None = None) -> Figure:
             f"There is no figure for a result of type {type(answer).__name__}; use its tables and its data instead."
         )
     return figures[next(iter(figures)) if which is None else choice(which, figures, "which")]
+
+
+Writer = Callable[[Path], None]
+
+
+def save(what: object, path: str | Path) -> Path:
+    """Write something to a file, whole or not at all; the suffix says as what.
+
+    Args:
+        what: a machine (.toml; .png, a picture; .glb, its solids), an answer (.json), a grid or a workspace (.json,
+            .nc), a figure (.png, .svg, .pdf), a picture (.png).
+        path: of the file; one that is there is replaced.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: there is no such way to keep it, or the place cannot be written.
+    """
+    place = Path(path)
+    writers = _writers(what)
+    writers[choice(place.suffix.lower(), writers, f'the suffix of "{place}"')](place)
+    return place
+
+
+def _writers(what: object) -> dict[str, Writer]:
+    """How something can be written, by suffix."""
+    match what:
+        case Figure():
+            return dict.fromkeys((f".{name}" for name in FORMATS), lambda path: save_figure(what, path))
+        case Picture():
+            return {".png": lambda path: _write_bytes(path, what)}
+        case Machine():
+            return {
+                ".toml": lambda path: write_text(path, as_toml(what)),
+                ".png": lambda path: _write_bytes(path, machine_picture(what)),
+                ".glb": lambda path: _write_bytes(path, glb(scene_of(what))),
+            }
+    data = kind_of(what).data
+    if data is None:
+        raise InputError(f"A {type(what).__name__} cannot be saved.")
+    written: dict[str, Writer] = {".json": lambda path: write_json(path, data(what))}
+    match what:
+        case xr.Dataset():
+            written[".nc"] = lambda path: write_dataset(path, what)
+        case Workspace():
+            written[".nc"] = lambda path: write_dataset(path, what.dataset)
+    return written
+
+
+def _write_bytes(path: Path, data: bytes) -> None:
+    with replacing(path) as temporary:
+        temporary.write_bytes(data)

@@ -5,22 +5,21 @@ Colours are the page's own, so that light and dark pages read alike; nothing is 
 
 import base64
 import io
-from collections.abc import Iterator
 from html import escape
 from typing import Any
 
 from matplotlib.figure import Figure
-from rich.cells import cell_len
 from rich.console import Console
 from rich.padding import Padding
 from rich.style import Style
-from rich.table import Column, Table
+from rich.table import Table
 from rich.text import Text
 
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.views.answers import kind_of
+from kinetostat.views.page import Markup, table
 from kinetostat.views.picture import machine_picture
 
 WIDTH = 200
@@ -34,12 +33,13 @@ CSS = """
 .kinetostat p{margin:.2em 0}
 .kinetostat .dim{opacity:.65}
 .kinetostat .good{color:#1a9a50}.kinetostat .bad{color:#e0506a}.kinetostat .warn{color:#c98a1b}
+.kinetostat .scroll{overflow-x:auto}
 .kinetostat table{font-size:inherit;border-collapse:collapse;border:0;margin:.9em 0 .6em}
 .kinetostat table{font-variant-numeric:tabular-nums}
 .kinetostat caption{caption-side:top;text-align:left;font-weight:600;padding:0 0 .3em;color:inherit;white-space:nowrap}
 .kinetostat tr,.kinetostat tbody tr:nth-child(odd),.kinetostat tbody tr:hover{background:none}
 .kinetostat th,.kinetostat td{padding:.16em .9em .16em 0;text-align:left;border:0;color:inherit;vertical-align:top}
-.kinetostat .num{text-align:right;white-space:nowrap;padding-left:.6em}
+.kinetostat .n{text-align:right;white-space:nowrap;padding-left:.6em}
 .kinetostat th{font-weight:600;opacity:.75;border-bottom:1px solid rgba(128,128,128,.45)}
 .kinetostat td{border-bottom:1px solid rgba(128,128,128,.14)}
 .kinetostat img{display:block;max-width:100%;height:auto;margin:.4em 0}
@@ -134,21 +134,14 @@ def _within(content: str, style: Style | None) -> str:
     return f'<span class="{classes}">{content}</span>' if classes else content
 
 
-def _table(table: Table) -> str:
-    """A table of the terminal as one of HTML."""
-    caption = f"<caption>{_styled(_text(table.title))}</caption>" if table.title else ""
-    heads = "".join(_cell("th", column, column.header) for column in table.columns)
-    rows = "".join(f"<tr>{row}</tr>" for row in _rows(table))
-    shown = any(cell_len(str(column.header)) for column in table.columns)
-    return f"<table>{caption}{f'<thead><tr>{heads}</tr></thead>' if shown else ''}<tbody>{rows}</tbody></table>"
+def _table(shown: Table) -> str:
+    """Return a table of the terminal as one of HTML."""
+    rows = zip(*(column.cells for column in shown.columns), strict=True)
+    cells = [[_markup(cell, row.style) for cell in content] for row, content in zip(shown.rows, rows, strict=True)]
+    caption = _markup(shown.title) if shown.title else ""
+    heads = [_markup(column.header) for column in shown.columns]
+    return table(caption, heads, cells, [column.justify == "right" for column in shown.columns])
 
 
-def _rows(table: Table) -> Iterator[str]:
-    cells = zip(*(column.cells for column in table.columns), strict=True)
-    for row, held in zip(table.rows, cells, strict=True):
-        yield "".join(_cell("td", column, cell, row.style) for column, cell in zip(table.columns, held, strict=True))
-
-
-def _cell(tag: str, column: Column, content: object, style: str | Style | None = None) -> str:
-    numeric = ' class="num"' if column.justify == "right" else ""
-    return f"<{tag}{numeric}>{_styled(_text(content), style)}</{tag}>".replace("\n", "<br>")
+def _markup(content: object, style: str | Style | None = None) -> Markup:
+    return Markup(_styled(_text(content), style).replace("\n", "<br>"))

@@ -32,15 +32,23 @@ def whole_page(title: str, style: str, body: Iterable[str]) -> str:
 
 
 def table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[str]], numeric: Sequence[bool]) -> str:
-    """A table that scrolls by itself where it is too wide; `numeric` says which columns hold numbers."""
-    kinds = [' class="n"' if number else "" for number in numeric]
-    top = "".join(f"<th{kind}>{marked(head)}</th>" for head, kind in zip(heads, kinds, strict=True))
-    lines = ("".join(f"<td{kind}>{marked(cell)}</td>" for cell, kind in zip(row, kinds, strict=True)) for row in rows)
-    body = "".join(f"<tr>{line}</tr>" for line in lines)
-    return (
-        f'<div class="scroll"><table><caption>{marked(caption)}</caption><thead><tr>{top}</tr></thead>'
-        f"<tbody>{body}</tbody></table></div>"
-    )
+    """Write a table, in a box that scrolls where the table is too wide.
+
+    Args:
+        caption: above the table; none if empty.
+        heads: of the columns; if all are empty, there is no row of heads.
+        rows: cells as text, or as HTML where they are a `Markup`.
+        numeric: for each column, whether it holds numbers (aligned to the right).
+    """
+    above = f"<caption>{marked(caption)}</caption>" if caption else ""
+    top = f"<thead>{_row('th', heads, numeric)}</thead>" if any(heads) else ""
+    body = "".join(_row("td", row, numeric) for row in rows)
+    return f'<div class="scroll"><table>{above}{top}<tbody>{body}</tbody></table></div>'
+
+
+def _row(tag: str, cells: Sequence[str], numeric: Sequence[bool]) -> str:
+    kinds = (' class="n"' if number else "" for number in numeric)
+    return f"<tr>{''.join(f'<{tag}{kind}>{marked(c)}</{tag}>' for c, kind in zip(cells, kinds, strict=True))}</tr>"
 
 
 def figure(picture: str, caption: str) -> str:

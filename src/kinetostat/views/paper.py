@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import astuple, fields
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
+from rich.console import Console
 from rich.text import Text
 
 from kinetostat.kinetostatics.quantities import GROUPS
@@ -18,12 +18,12 @@ from kinetostat.studies.paper.claims import Claim
 from kinetostat.studies.paper.comparison import Comparison, Verdict
 from kinetostat.studies.paper.derivation import Check
 from kinetostat.studies.paper.reproduction import Reproduction
-from kinetostat.studies.storage import write_dataset, write_text
+from kinetostat.studies.storage import write_dataset, write_json, write_text
 from kinetostat.views.drawing import three_views
 from kinetostat.views.figures import contour_maps, curves, save
 from kinetostat.views.optimisation_figures import convergence
 from kinetostat.views.paper_page import page
-from kinetostat.views.tables import terminal, text_table
+from kinetostat.views.tables import text_table
 
 FIGURE_4 = "Fig. 4: stiffness against the stiffness of the passive links"
 FIGURE_5 = "Fig. 5: compliance at z = 68 cm, theta5 = -60 deg, theta6 = 120 deg"
@@ -41,7 +41,7 @@ def write_all(found: Reproduction, folder: Path) -> list[Path]:
     written = [folder / "index.html"]
     write_text(written[0], page(found, drawn))
     written.append(folder / "reproduction.json")
-    write_text(written[-1], json.dumps(found.as_json(), ensure_ascii=False, allow_nan=False, indent=1) + "\n")
+    write_json(written[-1], found.as_json())
     for name, rows in (
         ("numbers", found.comparisons),
         ("equations", found.checks),
@@ -71,9 +71,8 @@ def figures(found: Reproduction) -> dict[str, Figure]:
     }
 
 
-def print_summary(found: Reproduction, written: Sequence[Path]) -> None:
+def print_summary(console: Console, found: Reproduction, written: Sequence[Path]) -> None:
     """Every number beside the printed one, then equations, statements and the verdict."""
-    console = terminal()
     console.print(_numbers_table(found.comparisons))
     equations = text_table(
         "Equations 1-32: matrices of the paper against those of kinetostat", "eq.", "statement", "residual", ""

@@ -2,7 +2,8 @@
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich import box
@@ -14,7 +15,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import doubts, parameters, values
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.study import StudyFile
-from kinetostat.units import KINDS
+from kinetostat.units import KINDS, show
 
 Number = float | None
 
@@ -80,13 +81,13 @@ def readable(values: Sequence[float], quantity: Quantity) -> str:
 
 def _readable(value: float, quantity: Quantity) -> str:
     """A value for a table: ten digits, a power of ten where it is large, angles in degrees."""
-    if quantity.kind == "angle" and value != quantity.unset:
-        return f"{math.degrees(value):.10g} deg"
+    unit = KINDS[quantity.kind].unit
     if math.isinf(value):
         return quantity.show(value)
+    if abs(value) < LARGE:
+        return show(value, unit, 10)
     digits, _, power = f"{value:.9e}".partition("e")
-    large = f"{digits.rstrip('0').rstrip('.')}e{int(power)}"
-    return f"{large if abs(value) >= LARGE else f'{value:.10g}'} {KINDS[quantity.kind].unit}".rstrip()
+    return f"{digits.rstrip('0').rstrip('.')}e{int(power)} {unit}".rstrip()
 
 
 class Piped(Console):
@@ -119,11 +120,10 @@ def number(value: Number, endless: str = "∞") -> str:
     return f"{value:.6g}" if value == 0.0 or 1e-2 <= abs(value) < 1e6 else f"{value:.4g}"
 
 
-def measured(value: float, kind: str) -> str:
-    """A value with its unit for a table: angles in degrees, all else in SI."""
-    if kind == "angle":
-        return f"{number(math.degrees(value) + 0.0)} deg"
-    return f"{number(value + 0.0)} {KINDS[kind].unit}".rstrip()
+def print_written(console: Console, paths: Iterable[Path]) -> None:
+    """Name the files that were written."""
+    for path in paths:
+        console.print(f"wrote {path}", highlight=False)
 
 
 def omitted(count: int) -> str:

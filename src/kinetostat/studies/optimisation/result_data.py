@@ -1,6 +1,5 @@
 """The answer to a study as plain data, as a table of all designs, and as files. Nothing is computed here."""
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.ridges import told
 from kinetostat.studies.optimisation.robustness import Robustness
-from kinetostat.studies.storage import write_dataset, write_text
+from kinetostat.studies.storage import write_dataset, write_json, write_text
 
 INFEASIBLE = "No feasible design was found: {}. Widen the bounds, ease the constraints, or change [poses]."
 
@@ -171,7 +170,7 @@ def as_dataset(found: Result) -> xr.Dataset:
 def write_result(found: Result, folder: Path) -> list[Path]:
     """Write the result, the table of all designs and the best design as a machine file; returns the paths."""
     written = [folder / "result.json", folder / "designs.nc"]
-    write_text(written[0], json.dumps(as_json(found), ensure_ascii=False, allow_nan=False, indent=1) + "\n")
+    write_json(written[0], as_json(found))
     write_dataset(written[1], as_dataset(found))
     if found.solved:
         written.append(folder / "best.toml")

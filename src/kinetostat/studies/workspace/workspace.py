@@ -1,6 +1,6 @@
 """Where a machine can work: what it reaches of pose space without a singularity, within limits and conditions.
 
-What is drawn or printed of it is elsewhere (`views.workspace_figures`, `views.workspace_tables`).
+What is drawn or printed of it is elsewhere (`views.workspace_figures`, `views.grid_tables`).
 """
 
 from collections.abc import Sequence

@@ -8,14 +8,15 @@ from kinetostat.studies.guidelines.roles import Roles
 from kinetostat.studies.guidelines.sentences import statements
 from kinetostat.studies.report.answers import Answers
 from kinetostat.studies.sensitivity import Sensitivity, notes
-from kinetostat.views.guideline_figures import limit_figure
-from kinetostat.views.guideline_tables import (
+from kinetostat.views.influence_figures import limit_figure
+from kinetostat.views.influence_tables import (
     ALIKE,
     LEGEND,
     MOST_ROWS,
     TOPICS,
     element_table,
     equations,
+    influence_table,
     left_out,
     limit_table,
     move_table,
@@ -24,7 +25,6 @@ from kinetostat.views.guideline_tables import (
 from kinetostat.views.report.content import Block, Listing, Paragraph, Points, Section
 from kinetostat.views.report.pictures import drawn
 from kinetostat.views.report.typesetting import printed, typeset
-from kinetostat.views.sensitivity_tables import influence_table
 
 MOST_INFLUENCES = 24
 """Number of parameters in the ranking."""

@@ -11,9 +11,12 @@ from kinetostat.studies.optimisation.result_data import message
 from kinetostat.views.display import spoken
 from kinetostat.views.optimisation_figures import pictures
 from kinetostat.views.optimisation_tables import (
+    aims,
+    bounds_table,
     direction_table,
     failing,
     front_table,
+    not_searched,
     remarks,
     scatter_table,
     variable_table,
@@ -22,7 +25,6 @@ from kinetostat.views.optimisation_tables import (
 from kinetostat.views.report.content import Block, Paragraph, Points, Section
 from kinetostat.views.report.pictures import drawn
 from kinetostat.views.report.typesetting import printed, typeset
-from kinetostat.views.study_tables import aims, bounds_table, not_searched
 from kinetostat.views.tables import number
 
 METHODS = {

@@ -1,4 +1,7 @@
-"""Guidelines on a terminal: sentences, and the tables behind them. Nothing is computed but rounding."""
+"""Tables of what parameters do to the stiffness: sensitivities and design guidelines.
+
+Only rounding is computed here.
+"""
 
 import math
 from collections.abc import Iterator
@@ -13,7 +16,45 @@ from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.guidelines.moves import Move
 from kinetostat.studies.guidelines.roles import Roles
 from kinetostat.studies.guidelines.sentences import LEAST, MATTERS, statements
+from kinetostat.studies.sensitivity import PER, Sensitivity, notes
+from kinetostat.units import KINDS, show
+from kinetostat.views.display import family_of_names, spoken
 from kinetostat.views.tables import number, numeric_table, omitted
+
+MOST_INFLUENCES = 40
+"""Parameters that are printed; `--json` has all."""
+NEGLIGIBLE = 0.0005
+"""Percent per percent below which a 0 is printed."""
+
+
+def print_sensitivity(console: Console, answer: Sensitivity) -> None:
+    """The parameters that matter most, and what the numbers mean."""
+    console.print(influence_table(answer, MOST_INFLUENCES))
+    hidden = len(answer.influences) - MOST_INFLUENCES
+    if hidden > 0:
+        console.print(f"{omitted(hidden)} (--json has all).")
+    for note in notes(answer):
+        console.print(note, highlight=False)
+
+
+def influence_table(answer: Sensitivity, count: int) -> Table:
+    """The first parameters by rank, with their values and what they do to each index."""
+    group = family_of_names(answer.quantities)
+    heads = [spoken(name.removeprefix(f"{group}_")) for name in answer.quantities]
+    title = f"{answer.machine.name}: {spoken(group)}, {PER}" if group else f"{answer.machine.name}: {PER}"
+    table = numeric_table(title, "parameter", ["value", *heads])
+    for one in answer.influences[:count]:
+        name = with_leg(answer.machine, one.path)
+        table.add_row(name, show(one.value, KINDS[one.kind].unit, 6), *(_percent(percent) for percent in one.percents))
+    return table
+
+
+def _percent(value: float | None) -> str:
+    """Three digits after the point, a dash where there is none."""
+    if value is None:
+        return "–"
+    return "0" if abs(value) < NEGLIGIBLE else f"{value:.3f}"
+
 
 TOPICS = {
     "yields": "What each direction depends on",

@@ -1,0 +1,109 @@
+"""The commands `sensitivity` and `guidelines`: which parameters decide the stiffness. No formula lives here."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kinetostat.commands.common import (
+    add_command,
+    give,
+    load_machine,
+    progress_bar,
+    takes_json,
+    takes_machine,
+    takes_output,
+    takes_quantities,
+    takes_ranges,
+)
+
+if TYPE_CHECKING:
+    from kinetostat.commands.common import Commands
+    from kinetostat.studies.guidelines.guidelines import Guidelines
+    from kinetostat.studies.sensitivity import Sensitivity
+
+
+def add_influence_commands(commands: "Commands") -> None:
+    """Add `sensitivity` and `guidelines`."""
+    command = add_command(
+        commands, "sensitivity", _sensitivity, "rank the parameters by their effect on the stiffness at a pose",
+        "kinetostat sensitivity zhang-gosselin-4dof --quantity compliance_z -o sensitivity",
+    )  # fmt: skip
+    takes_machine(command)
+    takes_quantities(command, "compliance")
+    takes_output(command, "the figure (PNG, SVG, PDF) and JSON")
+    takes_json(command)
+    command = add_command(
+        commands, "guidelines", _guidelines, "show what stiffness depends on, what counts as rigid, what to change",
+        'kinetostat guidelines zhang-gosselin-4dof --over "x=-2 cm:2 cm:11" --over "z=66 cm:70 cm:11" -o out',
+    )  # fmt: skip
+    takes_machine(command)
+    takes_ranges(
+        command, "a coordinate of the pose and its range: count at how many poses the guidelines hold; repeatable"
+    )
+    command.add_argument(
+        "--full", action="store_true", help="show every parameter, and sentences about the most important ones"
+    )
+    takes_output(command, "the figures (PNG, SVG, PDF) and JSON")
+    takes_json(command)
+
+
+def _sensitivity(options: argparse.Namespace) -> int:
+    from kinetostat.kinematics.status import Status
+    from kinetostat.studies.sensitivity import as_json, sensitivity
+    from kinetostat.views.influence_tables import print_sensitivity
+
+    result = sensitivity(load_machine(options), options.quantities or ["compliance"])
+    answered = result.status is Status.OK
+    written = _write_sensitivity(result, options.output) if options.output and answered else []
+    return give(
+        options,
+        answered,
+        lambda: as_json(result),
+        lambda console: print_sensitivity(console, result),
+        written,
+        result.message,
+    )
+
+
+def _write_sensitivity(result: "Sensitivity", folder: Path) -> list[Path]:
+    from kinetostat.studies.sensitivity import as_json
+    from kinetostat.studies.storage import write_json
+    from kinetostat.views.figures import save
+    from kinetostat.views.influence_figures import sensitivity_figure
+
+    written = [folder / "sensitivity.json"]
+    write_json(written[0], as_json(result))
+    return written + (save(sensitivity_figure(result), folder / "sensitivity") if result.influences else [])
+
+
+def _guidelines(options: argparse.Namespace) -> int:
+    from kinetostat.kinematics.status import Status
+    from kinetostat.studies.guidelines.guidelines import guidelines
+    from kinetostat.studies.guidelines.sentences import as_json
+    from kinetostat.views.influence_tables import print_guidelines
+
+    machine = load_machine(options)
+    with progress_bar("computing") as progress:
+        result = guidelines(machine, options.ranges, progress)
+    answered = result.status is Status.OK
+    written = _write_guidelines(result, options.output) if options.output and answered else []
+    return give(
+        options,
+        answered,
+        lambda: as_json(result),
+        lambda console: print_guidelines(console, result, options.full),
+        written,
+        result.message,
+    )
+
+
+def _write_guidelines(result: "Guidelines", folder: Path) -> list[Path]:
+    from kinetostat.studies.guidelines.sentences import as_json
+    from kinetostat.studies.storage import write_json
+    from kinetostat.views.figures import save
+    from kinetostat.views.influence_figures import guideline_figures
+
+    written = [folder / "guidelines.json"]
+    write_json(written[0], as_json(result))
+    drawn = guideline_figures(result)
+    return written + [path for name, figure in drawn.items() for path in save(figure, folder / f"guidelines-{name}")]
