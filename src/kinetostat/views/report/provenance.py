@@ -10,9 +10,9 @@ from importlib.metadata import version
 
 from kinetostat.studies.paper.printed import CITATION
 from kinetostat.validation.comparison import AGREED, Validation
+from kinetostat.views.comparison_tables import diagonal_table, difference_table, trial_table
 from kinetostat.views.report.content import Block, Formula, Listing, Paragraph, Section, Table
 from kinetostat.views.report.typesetting import printed, typeset
-from kinetostat.views.validation_tables import diagonal_table, difference_table, trial_table
 
 LIBRARIES = ("kinetostat", "numpy", "scipy", "llvmlite", "pymoo", "matplotlib")
 THEORY = (
