@@ -1,10 +1,22 @@
-"""Hypothesis profiles for the whole suite.
+"""What holds for the whole suite: profiles of Hypothesis, the markers of slow files, and the option that rewrites pages.
 
 The default profile draws the same examples on every run, so that a failure is never a matter of luck, and reports the
-first one it meets; run `pytest --hypothesis-profile=explore` to look for new counter-examples and the least of them.
+first one it meets. CI runs the property tests with `--hypothesis-profile=fresh` as well, whose examples are new every
+time; `--hypothesis-profile=explore` looks long for new counter-examples, and for the least of them.
 """
 
+import pytest
 from hypothesis import HealthCheck, Phase, settings
+
+MARKERS = {
+    "documents": ("test_documents", "test_recipes"),
+    "notebooks": ("test_notebooks",),
+    "browser": ("test_studio_browser", "test_report_browser"),
+    "workers": ("test_workers", "test_large_sweeps"),
+    "packaging": ("test_packaging",),
+    "step": ("test_step_file", "test_step_outlines", "test_step_solids"),
+}
+"""Files of tests that plain `pytest` leaves out, because they take long and seldom fail alone; CI runs them with `-m`."""
 
 QUIET = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large]
 """Poses are filtered by singularity margin and each costs a statics solve; neither is a fault of a test."""
@@ -17,6 +29,7 @@ settings.register_profile(
     phases=[Phase.explicit, Phase.generate],
     suppress_health_check=QUIET,
 )
+settings.register_profile("fresh", max_examples=8, deadline=None, print_blob=True, suppress_health_check=QUIET)
 settings.register_profile("explore", max_examples=1000, deadline=None, suppress_health_check=QUIET)
 settings.load_profile("steady")
 
@@ -26,3 +39,12 @@ def pytest_addoption(parser):
     parser.addoption(
         "--rewrite-pages", action="store_true", help="bring quoted answers of the documentation up to date"
     )
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Mark the tests of each slow file, before `-m` chooses among them."""
+    by_file = {stem: marker for marker, stems in MARKERS.items() for stem in stems}
+    for item in items:
+        if item.path.stem in by_file:
+            item.add_marker(by_file[item.path.stem])
