@@ -1,4 +1,4 @@
-"""What holds for the whole suite: profiles of Hypothesis, the markers of slow files, and the option that rewrites pages.
+"""What holds for the whole suite: profiles of Hypothesis, markers of slow files, the option that rewrites pages.
 
 The default profile draws the same examples on every run, so that a failure is never a matter of luck, and reports the
 first one it meets. CI runs the property tests with `--hypothesis-profile=fresh` as well, whose examples are new every
@@ -16,7 +16,7 @@ MARKERS = {
     "packaging": ("test_packaging",),
     "step": ("test_step_file", "test_step_outlines", "test_step_solids"),
 }
-"""Files of tests that plain `pytest` leaves out, because they take long and seldom fail alone; CI runs them with `-m`."""
+"""Files of tests that plain `pytest` leaves out, because they take long; CI runs them with `-m`."""
 
 QUIET = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large]
 """Poses are filtered by singularity margin and each costs a statics solve; neither is a fault of a test."""
