@@ -80,3 +80,20 @@ NO_CIRCLE = 1e-9
 """Radius, relative to the largest of a solid, below which a circle is drawn as a point: sin(pi) leaves 1e-16."""
 NO_TURN = 1e-12
 """Angle, rad, below which a body is drawn without turning: the axis of a smaller turn is round-off."""
+
+# Studies
+
+NO_ROLE = 1e-9
+"""Share of an entry of C or K below which an element has no part in it: its contribution is then round-off."""
+NO_INFLUENCE = 1e-9
+"""Percent per percent below which a parameter has no influence: exact derivatives of zero come out at 1e-13 or less."""
+ZERO_LENGTH = 1e-9
+"""Share of the characteristic length below which a length counts as zero, and no percent of it means anything."""
+ROUND_OFF_OF_ENTRY = 1e-12
+"""Share of what an entry of a screw, of K or of C is compared with below which it is only round-off."""
+DEPENDENT_MOTIONS = 1e-9
+"""Relative singular value below which the motions of springs are dependent, where the rank of C or K is counted."""
+EQUAL_DESIGNS = 1e-9
+"""Relative difference up to which a number is the same for two designs, so that neither is the better one."""
+EQUAL_ROUTES = 1e-9
+"""Relative difference up to which machine code, NumPy and a single pose agree in the self-test."""

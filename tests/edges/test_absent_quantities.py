@@ -38,7 +38,7 @@ def test_what_the_file_or_the_range_says_is_answered():
     pushed = evaluate_grid(load("hexapod"), ["load.force.2=0 N:200 N:3"], ["actuator_force"])["actuator_force"].values
     assert pushed[0] == 0.0
     assert pushed[2] == pytest.approx(2 * pushed[1])
-    assert sensitivity(load("hexapod", ["load.force=[0, 0, 5]"]), ["actuator_force"]).found[0] > 0.0
+    assert sensitivity(load("hexapod", ["load.force=[0, 0, 5]"]), ["actuator_force"]).indices[0] > 0.0
 
 
 def test_a_part_that_is_missing_is_told_before_a_load():

@@ -73,7 +73,7 @@ def _write_sensitivity(result: "Sensitivity", folder: Path) -> list[Path]:
 
     written = [folder / "sensitivity.json"]
     write_json(written[0], as_json(result))
-    return written + (save(sensitivity_figure(result), folder / "sensitivity") if result.influences else [])
+    return written + (save(sensitivity_figure(result), folder / "sensitivity") if result.parameters else [])
 
 
 def _guidelines(options: argparse.Namespace) -> int:

@@ -1,6 +1,6 @@
-"""Which parameters decide how stiff a machine is: derivatives of its indices at its pose, compared and ranked.
+"""Sensitivity of a machine's stiffness at one pose to its parameters: exact derivatives, made comparable and ranked.
 
-Derivatives are exact; the joints of a machine written leg by leg follow. What is printed or drawn of it is elsewhere.
+Tables and bars of it are in `views`; the derivatives come from `engine.derivatives`.
 """
 
 import math
@@ -12,40 +12,68 @@ import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import Array, Table
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import Parameter, parameters, values
+from kinetostat.spec.renamed import renamed_property
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
 from kinetostat.studies.plain_data import as_answer
-from kinetostat.units import KINDS
+from kinetostat.tolerances import NO_INFLUENCE, ROUND_OFF_OF_ENTRY, ZERO_LENGTH
+from kinetostat.units import KINDS, show
 
 WITHOUT_INFLUENCE = ("load", "limits")
-"""Sections on which no index depends."""
-ZERO = 1e-9
-"""Share of what a number is compared with below which it counts as zero: it is then the rounding of one."""
-NEGLIGIBLE = 1e-9
-"""Percent per percent below which a parameter has no influence: the rounding of zero."""
-ROUNDING = 1e-12
-"""Share of what its rows yield or hold beside others below which an entry of C or K is the rounding of zero."""
-
+"""Tables of a machine file on which no index depends."""
 MOST_NAMED = 12
 """Parameters without influence that are named."""
 
 PER = "percent per percent, of an angle per 0.01 rad"
-"""What the numbers are. An angle counts from an axis of choice, and with 360 deg more it is the same."""
+"""What the numbers are. No percent of an angle is taken: where it is zero, and how often it winds, is a convention."""
 
 RIGID = "because rigid (a relative change is undefined)"
 FREE = "because free (C is infinite, or does not depend on it)"
-OPENS = "as the legs would no longer close if one of them changed alone"
+OPENS = "because the legs would no longer close if one of them changed alone"
 
 
 def greatest_of(percents: Sequence[float | None]) -> float:
-    """Size of the greatest; 0 if there is none."""
+    """Return the size of the greatest percentage; 0 if there is none."""
     return max((abs(percent) for percent in percents if percent is not None), default=0.0)
+
+
+def relative_sensitivity(slope: Array | float, size: Array | float, index: Array | float) -> Array:
+    """Return the relative change of an index per relative change of a parameter: size * slope / index.
+
+    All studies compare sensitivities by this rule. It is undefined (NaN) where the index is zero or infinite, and where
+    the size is zero: a percent of zero is no change.
+
+    Args:
+        slope: derivative of the index by the parameter, SI.
+        size: what one percent of a change of the parameter is of, SI; see `measure_of`.
+        index: SI.
+    """
+    with np.errstate(all="ignore"):
+        ratio = np.multiply(size, slope) / index
+        known = np.isfinite(index) & (np.abs(index) > 0.0) & (np.abs(size) > 0.0)
+    return np.where(known, ratio, math.nan)
+
+
+def measure_of(kind: str, value: float, length: float) -> tuple[float, str]:
+    """Return what one percent of a change of a parameter is of, SI, and the name of that measure.
+
+    It is the parameter itself, except for a length of zero, where it is the characteristic length of the machine, and
+    for an angle, where it is 1 rad.
+
+    Args:
+        kind: of the parameter, a key of `units.KINDS`; the entries of a direction are measured by its length instead.
+        value: of the parameter, SI.
+        length: characteristic length, m.
+    """
+    if kind == "length" and abs(value) <= ZERO_LENGTH * length:
+        return length, "length"
+    return (1.0, "radian") if kind == "angle" else (abs(value), "itself")
 
 
 @dataclass(frozen=True)
@@ -80,36 +108,44 @@ class Influence:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """The answer at one pose.
+    """Sensitivities at one pose, ranked.
 
     Attributes:
-        machine: what was asked about.
+        machine: the machine.
         status: of the pose; all that follows is empty unless it is OK.
         message: one readable paragraph.
         quantities: names of the indices.
-        found: their values, SI; infinite where rigid or free, 0 where they are but rounding.
-        length: characteristic length, m.
-        influences: the parameters that have one, the greatest first.
-        none: paths of those that have none.
-        skipped: paths of those without a derivative, and why.
+        indices: their values, SI; infinite where rigid or free, 0 where they are only round-off.
+        characteristic_length: of the machine, m.
+        parameters: those that have an influence, the greatest first.
+        without_influence: paths of those that have none.
+        without_derivative: paths of those without a derivative, and why.
     """
 
     machine: Machine
     status: Status
     message: str
     quantities: tuple[str, ...] = ()
-    found: tuple[float, ...] = ()
-    length: float = math.nan
-    influences: tuple[Influence, ...] = ()
-    none: tuple[str, ...] = ()
-    skipped: tuple[tuple[str, str], ...] = ()
+    indices: tuple[float, ...] = ()
+    characteristic_length: float = math.nan
+    parameters: tuple[Influence, ...] = ()
+    without_influence: tuple[str, ...] = ()
+    without_derivative: tuple[tuple[str, str], ...] = ()
+
+    found = renamed_property("indices")
+    length = renamed_property("characteristic_length")
+    influences = renamed_property("parameters")
+    none = renamed_property("without_influence")
+    skipped = renamed_property("without_derivative")
 
     def __repr__(self) -> str:
-        return f"<Sensitivity of {self.machine.name!r}: {self.status.word}, {len(self.influences)} parameters>"
+        return f"<Sensitivity of {self.machine.name!r}: {self.status.word}, {len(self.parameters)} parameters>"
 
 
 def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -> Sensitivity:
-    """How indices of a machine at its pose depend on each of its design parameters and pose coordinates.
+    """Compute how indices of a machine at its pose depend on each design parameter and pose coordinate.
+
+    Derivatives are exact. In a machine written leg by leg, the joints follow each change so that the legs stay closed.
 
     Args:
         machine: with its pose.
@@ -121,29 +157,33 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     need_machine(machine)
     names = tuple(resolve_quantities(quantities, machine.family.component_names))
     refuse_absent(machine, names)
-    asked = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(p, names)]
-    held = values(machine)
-    by = [p.path for p in asked if not math.isinf(held[p.path])]
-    anywhere = next(path for path in held if path.startswith("pose."))
-    answer = evaluate_gradient(machine, Table({anywhere: np.array([held[anywhere]])}), names, by)
+    candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(p, names)]
+    here = values(machine)
+    by = [p.path for p in candidates if not math.isinf(here[p.path])]
+    # One point with the pose as it is: any coordinate of it can be the column that a batch must have.
+    column = next(path for path in here if path.startswith("pose."))
+    answer = evaluate_gradient(machine, Table({column: np.array([here[column]])}), names, by)
     status = Status(int(answer.status[0]))
     if status is not Status.OK:
         return Sensitivity(machine, status, analyze(machine).message)
     response = respond(machine)
     length = float(response.configuration.length)
-    found = tuple(_felt(name, value, response) for name, value in zip(names, answer.values[:, 0].tolist(), strict=True))
-    slopes = dict(zip(by, answer.gradients[:, :, 0].T.tolist(), strict=True))
-    skipped = {path: reason for path, reason in ((p.path, _why_not(p, held, slopes)) for p in asked) if reason}
-    every = [_influence(p, held, found, slopes[p.path], length) for p in asked if p.path not in skipped]
-    ranked = sorted((one for one in every if one.greatest > NEGLIGIBLE), key=lambda one: -one.greatest)
-    none = tuple(one.path for one in every if one.greatest <= NEGLIGIBLE)
-    return Sensitivity(
-        machine, status, status.sentence, names, found, length, tuple(ranked), none, tuple(skipped.items())
+    indices = tuple(
+        _without_round_off(name, value, response)
+        for name, value in zip(names, answer.values[:, 0].tolist(), strict=True)
     )
+    slopes = dict(zip(by, answer.gradients[:, :, 0].T.tolist(), strict=True))
+    reasons = {p.path: _no_derivative(p, here, slopes) for p in candidates}
+    known = [p for p in candidates if not reasons[p.path]]
+    influences = [_influence(p, here, indices, slopes[p.path], length) for p in known]
+    ranked = sorted((one for one in influences if one.greatest > NO_INFLUENCE), key=lambda one: -one.greatest)
+    quiet = tuple(one.path for one in influences if one.greatest <= NO_INFLUENCE)
+    skipped = tuple((path, reason) for path, reason in reasons.items() if reason)
+    return Sensitivity(machine, status, status.sentence, names, indices, length, tuple(ranked), quiet, skipped)
 
 
-def _felt(name: str, value: float, response: Response) -> float:
-    """An index, 0 where it is an entry of C or K that is but the rounding of zero: a rigid or a free direction."""
+def _without_round_off(name: str, value: float, response: Response) -> float:
+    """An index, set to zero where it is an entry of C or K that is only round-off: of a rigid or a free direction."""
     about = QUANTITIES[name].components
     if not about or not math.isfinite(value):
         return value
@@ -153,9 +193,9 @@ def _felt(name: str, value: float, response: Response) -> float:
     diagonal = [abs(float(entry)) * arm * arm for entry, arm in zip(matrix.diagonal(), arms, strict=True)]
     largest = max((size for size in diagonal if math.isfinite(size)), default=0.0)
     first, last = (COMPONENTS.index(about[k]) for k in (0, -1))
-    seen = min(diagonal[first], diagonal[last]) > ROUNDING * ROUNDING * largest
+    present = min(diagonal[first], diagonal[last]) > ROUND_OFF_OF_ENTRY * ROUND_OFF_OF_ENTRY * largest
     compared = math.sqrt(diagonal[first]) * math.sqrt(diagonal[last])
-    return value if seen and abs(value) * arms[first] * arms[last] > ROUNDING * compared else 0.0
+    return value if present and abs(value) * arms[first] * arms[last] > ROUND_OFF_OF_ENTRY * compared else 0.0
 
 
 def _decides(parameter: Parameter, names: Sequence[str]) -> bool:
@@ -164,9 +204,9 @@ def _decides(parameter: Parameter, names: Sequence[str]) -> bool:
     return parameter.path.split(".")[0] not in WITHOUT_INFLUENCE
 
 
-def _why_not(parameter: Parameter, held: dict[str, float], slopes: dict[str, list[float]]) -> str:
+def _no_derivative(parameter: Parameter, here: dict[str, float], slopes: dict[str, list[float]]) -> str:
     """Why there is no derivative by a parameter; empty if there is one."""
-    value = held[parameter.path]
+    value = here[parameter.path]
     if math.isinf(value):
         return RIGID
     if parameter.quantity.stiff and value == 0.0:
@@ -175,34 +215,24 @@ def _why_not(parameter: Parameter, held: dict[str, float], slopes: dict[str, lis
 
 
 def _influence(
-    parameter: Parameter, held: dict[str, float], found: Sequence[float], slopes: Sequence[float], length: float
+    parameter: Parameter, here: dict[str, float], indices: Sequence[float], slopes: Sequence[float], length: float
 ) -> Influence:
-    value, kind = held[parameter.path], parameter.quantity.kind
-    percent_of, measure = _one_percent_of(parameter, held, length)
-    pairs = list(zip(slopes, found, strict=True))
-    return Influence(
-        parameter.path,
-        kind,
-        value,
-        percent_of,
-        measure,
-        tuple(None if math.isnan(slope) else slope for slope, _ in pairs),
-        tuple(percent_of * slope / index if 0.0 < abs(index) < math.inf else None for slope, index in pairs),
-    )
-
-
-def _one_percent_of(parameter: Parameter, held: dict[str, float], length: float) -> tuple[float, str]:
-    """What a change of a parameter is compared with, SI, and what that is."""
     path, kind = parameter.path, parameter.quantity.kind
-    value = abs(held[path])
     if kind == "direction":
         field = path.rpartition(".")[0]
-        return math.hypot(*(held[f"{field}.{i}"] for i in range(3))), "axis"
-    if kind == "length" and value <= ZERO * length:
-        return length, "length"
-    if kind == "angle":
-        return 1.0, "radian"
-    return value, "itself"
+        size, measure = math.hypot(*(here[f"{field}.{i}"] for i in range(3))), "axis"
+    else:
+        size, measure = measure_of(kind, here[path], length)
+    percents = relative_sensitivity(np.array(slopes), size, np.array(indices)).tolist()
+    return Influence(
+        path,
+        kind,
+        here[path],
+        size,
+        measure,
+        tuple(None if math.isnan(slope) else slope for slope in slopes),
+        tuple(None if math.isnan(percent) else percent for percent in percents),
+    )
 
 
 def as_json(answer: Sensitivity) -> dict[str, Any]:
@@ -213,10 +243,10 @@ def as_json(answer: Sensitivity) -> dict[str, Any]:
             "name": answer.machine.name,
             "status": answer.status.word,
             "message": answer.message,
-            "characteristic_length": answer.length if answer.influences else None,
+            "characteristic_length": answer.characteristic_length if answer.parameters else None,
             "indices": {
                 name: {"value": value, "units": QUANTITIES[name].unit}
-                for name, value in zip(names, answer.found, strict=True)
+                for name, value in zip(names, answer.indices, strict=True)
             },
             "parameters": [
                 {
@@ -227,27 +257,29 @@ def as_json(answer: Sensitivity) -> dict[str, Any]:
                     "derivatives": dict(zip(names, one.derivatives, strict=True)),
                     "percent_per_percent": dict(zip(names, one.percents, strict=True)),
                 }
-                for one in answer.influences
+                for one in answer.parameters
             ],
-            "without_influence": answer.none,
-            "without_derivative": dict(answer.skipped),
+            "without_influence": answer.without_influence,
+            "without_derivative": dict(answer.without_derivative),
         }
     )
 
 
 def notes(answer: Sensitivity) -> Iterator[str]:
-    """What a reader of the percentages must know, in sentences."""
-    used = {one.measure for one in answer.influences}
+    """Explain the percentages: what a percent is of, and which parameters are omitted, in sentences."""
+    used = {one.measure for one in answer.parameters}
+    length = show(answer.characteristic_length, "m")
     meanings = {
-        "length": f"where a length is 0, a percent is one of the characteristic length, {answer.length:.4g} m",
+        "length": f"where a length is 0, a percent is one of the characteristic length, {length}",
         "radian": "of an angle, a percent is 0.01 rad (0.57 deg), whatever its value",
         "axis": "of a direction, a percent is one of its length",
     }
-    said = [meaning for measure, meaning in meanings.items() if measure in used]
-    yield "; ".join(["Percent of the result per percent of the parameter", *said]) + "."
-    for reason in dict.fromkeys(reason for _, reason in answer.skipped):
-        yield f"Omitted {reason}: {', '.join(path for path, why in answer.skipped if why == reason)}."
-    if answer.none:
-        shown = answer.none[:MOST_NAMED]
-        more = f" and {len(answer.none) - len(shown)} more" if len(answer.none) > len(shown) else ""
+    explained = [meaning for measure, meaning in meanings.items() if measure in used]
+    yield "; ".join(["Percent of the result per percent of the parameter", *explained]) + "."
+    for reason in dict.fromkeys(reason for _, reason in answer.without_derivative):
+        yield f"Omitted {reason}: {', '.join(path for path, why in answer.without_derivative if why == reason)}."
+    if answer.without_influence:
+        shown = answer.without_influence[:MOST_NAMED]
+        rest = len(answer.without_influence) - len(shown)
+        more = f" and {rest} more" if rest else ""
         yield f"Without influence: {', '.join(shown)}{more}."

@@ -84,7 +84,7 @@ def _workspace_figures(found: Workspace) -> dict[str, Figure]:
 
 
 def _sensitivity_figures(found: Sensitivity) -> dict[str, Figure]:
-    return {"influences": sensitivity_figure(found)} if found.influences else {}
+    return {"influences": sensitivity_figure(found)} if found.parameters else {}
 
 
 KINDS = (

@@ -35,7 +35,7 @@ DARK = 0.6
 
 def sensitivity_figure(answer: Sensitivity) -> Figure:
     """A table of coloured cells: red where the index grows with the parameter, blue where it falls."""
-    rows = {with_leg(answer.machine, one.path): one.percents for one in answer.influences}
+    rows = {with_leg(answer.machine, one.path): one.percents for one in answer.parameters}
     heads = [QUANTITIES[name].symbol for name in answer.quantities]
     return coloured_table((answer.machine.name, setting_of(answer.machine)), rows, heads, "RdBu_r", PER)
 
@@ -95,7 +95,7 @@ def guideline_figures(found: Guidelines) -> dict[str, Figure]:
     """Figures by name: "design", and "rigid" where there are elements with a limit of rigidity."""
     if found.here is None:
         return {}
-    drawn = {"design": design_figure(found)} if found.moves else {}
+    drawn = {"design": design_figure(found)} if found.parameters else {}
     rigid = limit_figure(found)
     return {**drawn, "rigid": rigid} if rigid else drawn
 
@@ -104,14 +104,14 @@ def limit_figure(found: Guidelines) -> Figure | None:
     """Stiffness of each direction against that of elements; None where no element has a limit of rigidity."""
     if found.here is None:
         return None
-    limits = [(one, found.here.rigid[k, :, 0]) for k, one in enumerate(found.found) if not one.actuated]
+    limits = [(one, found.here.rigid[k, :, 0]) for k, one in enumerate(found.elements) if not one.actuated]
     shown = [(one, row) for one, row in limits if (np.isfinite(row) & (row > 0.0)).any()]
     return rigid_figure(found, shown[-MOST_PANELS:]) if shown else None
 
 
 def design_figure(found: Guidelines) -> Figure:
     """Parameters against directions: blue where one percent more makes a direction stiffer, red where softer."""
-    rows = {with_leg(found.machine, move.path): move.percents for move in found.moves}
+    rows = {with_leg(found.machine, move.path): move.percents for move in found.parameters}
     titles = f"{found.machine.name}: effect of each parameter", setting_of(found.machine)
     label = "percent stiffer per 1 % more (angle: per 0.01 rad)"
     return coloured_table(titles, rows, found.components, "RdBu", label)

@@ -30,7 +30,7 @@ NEGLIGIBLE = 0.0005
 def print_sensitivity(console: Console, answer: Sensitivity) -> None:
     """The parameters that matter most, and what the numbers mean."""
     console.print(influence_table(answer, MOST_INFLUENCES))
-    hidden = len(answer.influences) - MOST_INFLUENCES
+    hidden = len(answer.parameters) - MOST_INFLUENCES
     if hidden > 0:
         console.print(f"{omitted(hidden)} (--json has all).")
     for note in notes(answer):
@@ -43,7 +43,7 @@ def influence_table(answer: Sensitivity, count: int) -> Table:
     heads = [spoken(name.removeprefix(f"{group}_")) for name in answer.quantities]
     title = f"{answer.machine.name}: {spoken(group)}, {PER}" if group else f"{answer.machine.name}: {PER}"
     table = numeric_table(title, "parameter", ["value", *heads])
-    for one in answer.influences[:count]:
+    for one in answer.parameters[:count]:
         name = with_leg(answer.machine, one.path)
         table.add_row(name, show(one.value, KINDS[one.kind].unit, 6), *(_percent(percent) for percent in one.percents))
     return table
@@ -57,7 +57,7 @@ def _percent(value: float | None) -> str:
 
 
 TOPICS = {
-    "yields": "What each direction depends on",
+    "compliance": "What each direction depends on",
     "weakest": "Where more stiffness helps most",
     "rigid": "What counts as rigid, within 1 %",
     "design": "What each parameter does",
@@ -110,7 +110,7 @@ def over_poses(share: float) -> str:
 
 def _print_equations(console: Console, found: Guidelines) -> None:
     """K as sums over elements, as the paper's equations 33-38."""
-    if found.equations is None:
+    if found.stiffness_equations is None:
         return
     console.print(
         Text.assemble(
@@ -124,7 +124,7 @@ def _print_equations(console: Console, found: Guidelines) -> None:
 
 def equations(found: Guidelines) -> list[str]:
     """The diagonal of K as sums over elements, a line each; none where K is no such sum."""
-    rows = (found.equations or {}).items()
+    rows = (found.stiffness_equations or {}).items()
     sums = [
         " + ".join(f"{number(row[i])} k({element})" for element, row in rows if row[i] != 0.0)
         for i in range(len(found.components))
@@ -135,7 +135,7 @@ def equations(found: Guidelines) -> list[str]:
 def element_table(found: Guidelines, here: Roles) -> Table:
     """What each element contributes to each direction."""
     table = numeric_table("Attribution: share of each element in the diagonal of C", "element", found.components)
-    for element, row in zip(found.found, here.shares[:, :, 0].tolist(), strict=True):
+    for element, row in zip(found.elements, here.shares[:, :, 0].tolist(), strict=True):
         table.add_row(element.name, *(_share(part) for part in row))
     return table
 
@@ -151,7 +151,7 @@ def limit_table(found: Guidelines, here: Roles) -> Table:
     table = numeric_table(
         "Stiffness from which an element counts as rigid (within 1 %)", "element", ["now", *found.components]
     )
-    for k, element in enumerate(found.found):
+    for k, element in enumerate(found.elements):
         row = here.rigid[k, :, 0].tolist()
         if element.stiffness is None:
             table.add_row(element.name, "1 × now", *(_limit(factor) for factor in row))
@@ -174,7 +174,7 @@ def _limit(value: float) -> str:
 
 
 def _print_moves(console: Console, found: Guidelines, full: bool) -> None:
-    shown = found.moves if full else found.moves[:MOST_ROWS]
+    shown = found.parameters if full else found.parameters[:MOST_ROWS]
     console.print(move_table(found, len(shown)))
     if found.poses[0]:
         console.print(ALIKE, style="dim")
@@ -189,7 +189,7 @@ def move_table(found: Guidelines, count: int) -> Table:
     heads = ["parameter", *found.components, *(["poses"] if grid else [])]
     title = "Effect of 1 % more (of an angle: 0.01 rad more), percent stiffer ▲ or softer ▼"
     table = numeric_table(title, heads[0], heads[1:])
-    for move in found.moves[:count]:
+    for move in found.parameters[:count]:
         table.add_row(
             with_leg(found.machine, move.path), *(_arrow(p) for p in move.percents), *([_alike(move)] if grid else [])
         )
@@ -198,13 +198,13 @@ def move_table(found: Guidelines, count: int) -> Table:
 
 def left_out(found: Guidelines, count: int) -> Iterator[str]:
     """What the table of the first parameters does not show, in sentences."""
-    hidden = len(found.moves) - count
+    hidden = len(found.parameters) - count
     if hidden:
         yield f"{omitted(hidden)} (--full shows them)."
-    if found.idle:
-        yield f"No direction depends on {_few(found.idle)}."
-    for reason in dict.fromkeys(why for _, why in found.skipped):
-        paths = [path for path, why in found.skipped if why == reason]
+    if found.without_influence:
+        yield f"No direction depends on {_few(found.without_influence)}."
+    for reason in dict.fromkeys(why for _, why in found.left_out):
+        paths = [path for path, why in found.left_out if why == reason]
         yield f"Omitted {reason}: {_few(paths)}."
 
 

@@ -1,7 +1,7 @@
-"""Design guidelines of a machine, derived: what each direction depends on, what counts as rigid, what to change.
+"""Design guidelines of a machine: what each direction depends on, what counts as rigid, what to change.
 
-What section 4.2 of the paper says of its machine, for any machine, at its pose and over a grid of poses. Sentences are
-in `guideline_sentences`, what is printed or drawn is in `views`.
+They are derived as section 4.2 of the paper does it for its machine, here for any machine, at its pose and over a grid
+of poses. Sentences and plain data are in `sentences`; what is printed or drawn is in `views`.
 """
 
 import math
@@ -21,6 +21,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.renamed import renamed_property
 from kinetostat.studies.grid.grid import grid_question
 from kinetostat.studies.guidelines.moves import Move, axes_left_out, designed, moves_at, with_signs
 from kinetostat.studies.guidelines.roles import Roles, equations_of_k, roles_at, roles_over
@@ -32,23 +33,23 @@ MOST_POSES = 10_000
 
 @dataclass(frozen=True)
 class Guidelines:
-    """The answer.
+    """Design guidelines.
 
     Attributes:
-        machine: what was asked about.
+        machine: the machine.
         status: of its pose; all that follows is empty unless it is OK.
         message: one readable paragraph.
         components: names of the directions.
-        compliance: the diagonal of C.
-        found: the elastic elements, actuators first.
+        compliance_diagonal: the diagonal of C.
+        elements: the elastic elements, actuators first.
         here: their roles at the pose of the file.
-        equations: per element, its coefficients in the diagonal of K; None where K is no such sum.
-        meaning: of the percentages in `moves`, one sentence.
-        moves: what the parameters of the design do, the greatest first.
-        idle: paths of parameters that do nothing to any direction, here or anywhere on the grid.
-        skipped: paths of parameters without a derivative, and why.
+        stiffness_equations: per element, its coefficients in the diagonal of K; None where K is no such sum.
+        meaning: of the percentages in `parameters`, one sentence.
+        parameters: what the parameters of the design do, those with the largest effect first.
+        without_influence: paths of parameters that change no direction, here or anywhere on the grid.
+        left_out: paths of parameters without a derivative, and why.
         ranges: of the grid, as written.
-        poses: how many of the grid have an answer, and how many there are.
+        poses: how many poses of the grid have an answer, and how many there are.
         everywhere: roles at those that have one; None without a grid.
     """
 
@@ -56,68 +57,76 @@ class Guidelines:
     status: Status
     message: str
     components: tuple[str, ...]
-    compliance: tuple[float, ...] = ()
-    found: tuple[Element, ...] = ()
+    compliance_diagonal: tuple[float, ...] = ()
+    elements: tuple[Element, ...] = ()
     here: Roles | None = None
-    equations: dict[str, tuple[float, ...]] | None = None
+    stiffness_equations: dict[str, tuple[float, ...]] | None = None
     meaning: str = ""
-    moves: tuple[Move, ...] = ()
-    idle: tuple[str, ...] = ()
-    skipped: tuple[tuple[str, str], ...] = ()
+    parameters: tuple[Move, ...] = ()
+    without_influence: tuple[str, ...] = ()
+    left_out: tuple[tuple[str, str], ...] = ()
     ranges: tuple[str, ...] = ()
     poses: tuple[int, int] = (0, 0)
     everywhere: Roles | None = None
 
+    compliance = renamed_property("compliance_diagonal")
+    found = renamed_property("elements")
+    equations = renamed_property("stiffness_equations")
+    moves = renamed_property("parameters")
+    idle = renamed_property("without_influence")
+    skipped = renamed_property("left_out")
+
     def __repr__(self) -> str:
-        return f"<Guidelines for {self.machine.name!r}: {self.status.word}, {len(self.moves)} parameters that matter>"
+        count = len(self.parameters)
+        return f"<Guidelines for {self.machine.name!r}: {self.status.word}, {count} parameters that matter>"
 
     @property
     def actuator(self) -> Element | None:
-        """Actuators that all have one finite stiffness, to compare others with."""
-        alike = (one for one in self.found if one.actuated and one.stiffness and one.stiffness < math.inf)
+        """The first group of actuators that all have one finite stiffness, to compare others with."""
+        alike = (part for part in self.elements if part.actuated and part.stiffness and part.stiffness < math.inf)
         return next(alike, None)
 
 
 def guidelines(machine: Machine, ranges: Sequence[str] = (), progress: Progress = silent) -> Guidelines:
-    """What the stiffness of a machine depends on, at its pose and over a grid.
+    """Derive what the stiffness of a machine depends on, at its pose and over a grid.
 
     Args:
         machine: with its pose.
         ranges: of the grid, "FIELD=from:to:count", coordinates of the pose; none for the file's pose alone.
-        progress: told how far the work is.
+        progress: receives how far the work is.
 
     Raises:
         InputError: a bad range, one that is no coordinate of the pose, or too many poses.
     """
     ranges = several(ranges)
     grid = _grid(machine, ranges) if ranges else None
-    answer = sensitivity(machine)
+    sensitivities = sensitivity(machine)
     names = machine.family.component_names
-    if answer.status is not Status.OK:
-        return Guidelines(machine, answer.status, answer.message, names)
+    if sensitivities.status is not Status.OK:
+        return Guidelines(machine, sensitivities.status, sensitivities.message, names)
     kept, response = list(machine.family.components), respond(machine)
     single = elements(response.configuration)
-    found = with_links_together(single)
+    every = with_links_together(single)
     whole = without_rounding(response.compliance.diagonal(), response)[kept, 0]
-    moves = moves_at(answer, whole > 0.0)
+    moves = moves_at(sensitivities, whole > 0.0)
     everywhere, poses = None, (0, 0)
     if grid is not None:
-        everywhere, poses = roles_over(machine, grid, found, kept, progress)
+        everywhere, poses = roles_over(machine, grid, every, kept, progress)
         moves = with_signs(machine, grid, moves)
-    moving = tuple(move for move in moves if move.felt)
+    without_derivative = [pair for pair in sensitivities.without_derivative if designed(machine, pair[0])]
     return Guidelines(
         machine,
-        answer.status,
-        answer.message,
+        sensitivities.status,
+        sensitivities.message,
         names,
         tuple(whole.tolist()),
-        tuple(found),
-        roles_at(response, found, kept),
+        tuple(every),
+        roles_at(response, every, kept),
         equations_of_k(response, single, kept),
-        next(notes(answer)),
-        moving,
-        tuple(move.path for move in moves if not move.felt),
-        (*((path, why) for path, why in answer.skipped if designed(machine, path)), *axes_left_out(answer)),
+        next(notes(sensitivities)),
+        tuple(move for move in moves if move.matters),
+        tuple(move.path for move in moves if not move.matters),
+        (*without_derivative, *axes_left_out(sensitivities)),
         tuple(ranges),
         poses,
         everywhere,
@@ -129,7 +138,7 @@ def _grid(machine: Machine, ranges: Sequence[str]) -> Points:
     for path in question.dims:
         if not path.startswith("pose."):
             known = ", ".join(path for path in values(machine) if path.startswith("pose."))
-            raise InputError(f"{path} is no coordinate of the pose; --over takes {known}.")
+            raise InputError(f"{path} is not a coordinate of the pose; --over takes {known}.")
     if question.grid.size > MOST_POSES:
         raise InputError(
             f"the grid has {question.grid.size:,} poses; at most {MOST_POSES:,} are allowed: lower a count."

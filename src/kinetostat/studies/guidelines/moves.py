@@ -1,4 +1,4 @@
-"""What the parameters of a design do to the stiffness of each direction, at a pose and over a grid of poses."""
+"""Effect of the parameters of a design on the stiffness of each direction, at a pose and over a grid of poses."""
 
 import math
 from collections.abc import Sequence
@@ -10,16 +10,17 @@ import numpy.typing as npt
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Array, Points
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
-from kinetostat.studies.sensitivity import Sensitivity, greatest_of
+from kinetostat.studies.sensitivity import Sensitivity, greatest_of, measure_of, relative_sensitivity
 
 FELT = 1e-3
-"""Percent per percent below which a parameter counts as doing nothing to a direction."""
-AXES = "as axes of joints, which are rather a matter of tolerances: `kinetostat sensitivity` has them"
+"""Percent per percent below which a parameter counts as without effect on a direction."""
+AXES = "as axes of joints, whose errors are a matter of tolerances: `kinetostat sensitivity` shows them"
 """Why directions are no parameters of the design."""
 NOT_DESIGN = ("pose", "tool", "load", "limits", "linear_density")
-"""Sections whose values are no matter of the machine's design."""
+"""Tables of a machine file whose values are not part of the design."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,8 @@ class Move:
     turning: bool = False
 
     @property
-    def felt(self) -> bool:
-        """Whether it does anything, here or anywhere on the grid."""
+    def matters(self) -> bool:
+        """Whether it changes any direction, here or anywhere on the grid."""
         return self.greatest > FELT or any(self.stiffer) or any(self.softer)
 
     @property
@@ -51,28 +52,29 @@ class Move:
         return greatest_of(self.percents)
 
 
-def moves_at(answer: Sensitivity, yielding: npt.NDArray[np.bool_]) -> list[Move]:
-    """What the parameters of the design do, the greatest first; entries of one actuator stiffness move together.
+def moves_at(sensitivities: Sensitivity, compliant: npt.NDArray[np.bool_]) -> list[Move]:
+    """List what the parameters of the design do, the largest effect first; entries of one stiffness move together.
 
     Args:
-        answer: sensitivities of the diagonal of C.
-        yielding: which directions yield at all.
+        sensitivities: of the diagonal of C.
+        compliant: which directions are neither rigid nor free.
     """
-    percents: dict[str, list[Array]] = {}
-    for one in answer.influences:
-        if designed(answer.machine, one.path):
-            row = np.where(yielding, [math.nan if p is None else -p for p in one.percents], math.nan)
-            percents.setdefault(_together(answer.machine, one.path), []).append(row)
-    rows = {path: np.sum(own, axis=0) for path, own in percents.items()}
-    quiet = [_together(answer.machine, path) for path in answer.none if designed(answer.machine, path)]
-    zero = np.where(yielding, 0.0, math.nan)
+    machine = sensitivities.machine
+    entries: dict[str, list[Array]] = {}
+    for parameter in sensitivities.parameters:
+        if designed(machine, parameter.path):
+            row = np.where(compliant, [math.nan if p is None else -p for p in parameter.percents], math.nan)
+            entries.setdefault(_together(machine, parameter.path), []).append(row)
+    rows = {path: np.sum(parts, axis=0) for path, parts in entries.items()}
+    quiet = [_together(machine, path) for path in sensitivities.without_influence if designed(machine, path)]
+    zero = np.where(compliant, 0.0, math.nan)
     rows |= {path: zero for path in quiet if path not in rows}
-    kinds = _kinds(answer.machine)
-    found = [
+    kinds = _kinds(machine)
+    moves = [
         Move(path, tuple(None if math.isnan(p) else float(p) for p in row), turning=kinds[path] == "angle")
         for path, row in rows.items()
     ]
-    return sorted(found, key=lambda move: -move.greatest)
+    return sorted(moves, key=lambda move: -move.greatest)
 
 
 def designed(machine: Machine, path: str) -> bool:
@@ -80,10 +82,10 @@ def designed(machine: Machine, path: str) -> bool:
     return path.split(".")[0] not in NOT_DESIGN and _kinds(machine)[path] != "direction"
 
 
-def axes_left_out(answer: Sensitivity) -> list[tuple[str, str]]:
+def axes_left_out(sensitivities: Sensitivity) -> list[tuple[str, str]]:
     """The axes of joints that have an influence, and why they are left out."""
-    fields = (one.path.rpartition(".")[0] for one in answer.influences if one.kind == "direction")
-    return [(path, AXES) for path in dict.fromkeys(fields)]
+    axes = (p.path.rpartition(".")[0] for p in sensitivities.parameters if p.kind == "direction")
+    return [(path, AXES) for path in dict.fromkeys(axes)]
 
 
 def _kinds(machine: Machine) -> dict[str, str]:
@@ -94,13 +96,13 @@ def _together(machine: Machine, path: str) -> str:
     """The path of a whole field where its entries are stiffnesses of springs that are one element; else the path."""
     field = path.rpartition(".")[0]
     whole = {p.path: p for p in parameters(machine.family)}.get(field)
-    held = values(machine)
-    alike = whole is not None and whole.quantity.stiff and len({held[leaf] for leaf in whole.leaves}) == 1
+    here = values(machine)
+    alike = whole is not None and whole.quantity.stiff and len({here[leaf] for leaf in whole.leaves}) == 1
     return field if alike and field.endswith("actuator") else path
 
 
 def with_signs(machine: Machine, grid: Points, moves: Sequence[Move]) -> list[Move]:
-    """The moves, with the shares of the poses of a grid at which they stiffen and soften."""
+    """Add to each move at which share of the poses of a grid it stiffens and softens each direction."""
     leaves = {p.path: p.leaves for p in parameters(machine.family)}
     paths = [leaf for move in moves for leaf in leaves[move.path]]
     names = [f"compliance_{name}" for name in machine.family.component_names]
@@ -108,13 +110,14 @@ def with_signs(machine: Machine, grid: Points, moves: Sequence[Move]) -> list[Mo
     good = answer.status == Status.OK
     if not good.any():
         return list(moves)
-    held, found = values(machine), []
+    length, here, kinds = float(respond(machine).configuration.length), values(machine), _kinds(machine)
+    signed = []
     for move in moves:
         rows = [paths.index(leaf) for leaf in leaves[move.path]]
-        sizes = np.array([1.0 if move.turning else abs(held[path]) or 1.0 for path in leaves[move.path]])
-        with np.errstate(all="ignore"):
-            change = -np.einsum("cpn,p->cn", answer.gradients[:, rows], sizes) / answer.values
-        felt = np.where(np.abs(change) > FELT, np.sign(change), 0.0)[:, good]
-        stiffer, softer = (tuple((felt == sign).mean(axis=1).tolist()) for sign in (1.0, -1.0))
-        found.append(replace(move, stiffer=stiffer, softer=softer))
-    return found
+        sizes = np.array([measure_of(kinds[leaf], here[leaf], length)[0] for leaf in leaves[move.path]])
+        percents = relative_sensitivity(answer.gradients[:, rows], sizes[:, None], answer.values[:, None])
+        change = -np.nansum(percents, axis=1)
+        sign = np.where(np.abs(change) > FELT, np.sign(change), 0.0)[:, good]
+        stiffer, softer = (tuple((sign == wanted).mean(axis=1).tolist()) for wanted in (1.0, -1.0))
+        signed.append(replace(move, stiffer=stiffer, softer=softer))
+    return signed

@@ -1,4 +1,4 @@
-"""What each elastic element does to each direction of a machine: shares, limits of rigidity and gains, pose by pose."""
+"""Roles of the elastic elements in each direction of a machine: shares, limits of rigidity and gains, pose by pose."""
 
 import math
 from collections.abc import Sequence
@@ -20,11 +20,10 @@ from kinetostat.kinetostatics.elements import (
 )
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
+from kinetostat.tolerances import NO_ROLE
 
 EXCESS = 0.01
 """An element counts as rigid where its compliance adds less than this share to that of the machine with it rigid."""
-ROUNDING = 1e-9
-"""Share of an entry of C or K below which an element does nothing to it: what it adds is then rounding."""
 
 Array = npt.NDArray[np.float64]
 
@@ -36,8 +35,9 @@ class Roles:
     Attributes:
         shares: of each entry of the diagonal of C, 0 to 1 [elements x components x poses].
         rigid: by which factor the stiffness of an element may be multiplied until it only just counts as rigid: from
-            there on it does; infinite where nothing else yields, 0 where no softness of it matters [likewise].
-        gains: by which share an entry of C falls once the element is twice as stiff [likewise].
+            there on it does; infinite where nothing else is compliant, 0 where no compliance of it
+            matters [same shape].
+        gains: by which share an entry of C falls once the element is twice as stiff [same shape].
     """
 
     shares: Array
@@ -45,47 +45,47 @@ class Roles:
     gains: Array
 
 
-def roles_at(response: Response, found: Sequence[Element], kept: Sequence[int]) -> Roles:
-    """The roles of elements.
+def roles_at(response: Response, elements: Sequence[Element], kept: Sequence[int]) -> Roles:
+    """Compute the roles of elements.
 
     Args:
         response: at one pose, or at many as arrays.
-        found: the elements.
+        elements: the elements.
         kept: which of rx ry rz x y z = 0 ... 5 the machine has.
     """
     with np.errstate(all="ignore"):
         whole = without_rounding(response.compliance.diagonal(), response)[kept]
-        held = np.isfinite(whole)
-        whole = np.where((whole > 0.0) & held, whole, math.nan)
+        bounded = np.isfinite(whole)
+        whole = np.where((whole > 0.0) & bounded, whole, math.nan)
         shares, rigid, gains = [], [], []
-        for element in found:
+        for element in elements:
             part = without_rounding(element_share(response, element), response)[kept]
-            ever = part / np.where(np.isfinite(whole), whole, 1.0) > ROUNDING
+            ever = part / np.where(np.isfinite(whole), whole, 1.0) > NO_ROLE
             factor = 1.0 / rigid_from(response, element, EXCESS)[kept]
-            rigid.append(np.where(held, np.where(ever, factor, 0.0), math.nan))
+            rigid.append(np.where(bounded, np.where(ever, factor, 0.0), math.nan))
             here = 0.0 if element.stiffness == math.inf else part / whole
-            shares.append(np.where(here > ROUNDING, here, whole * 0.0))
+            shares.append(np.where(here > NO_ROLE, here, whole * 0.0))
             gains.append(1.0 - without_rounding(diagonal_with(response, element, 0.5), response)[kept] / whole)
     return Roles(*(np.stack(np.broadcast_arrays(*rows)) for rows in (shares, rigid, gains)))
 
 
 def roles_over(
-    machine: Machine, grid: Points, found: Sequence[Element], kept: Sequence[int], progress: Progress
+    machine: Machine, grid: Points, elements: Sequence[Element], kept: Sequence[int], progress: Progress
 ) -> tuple[Roles, tuple[int, int]]:
-    """Roles at the poses of a grid that have an answer, how many these are, and how many there are.
+    """Compute roles at the poses of a grid that have an answer; also how many these are, and how many there are.
 
     Args:
         machine: gives what does not vary.
         grid: poses.
-        found, kept: as for `roles_at`.
-        progress: told how far the work is.
+        elements, kept: as for `roles_at`.
+        progress: receives how far the work is.
     """
     response = responses(machine, grid)
     progress(1, 2)
     good = np.broadcast_to(np.asarray(response.status) == Status.OK, (grid.size,))
-    every = roles_at(response, found, kept)
+    every = roles_at(response, elements, kept)
     progress(2, 2)
-    shape = (len(found), len(kept), grid.size)
+    shape = (len(elements), len(kept), grid.size)
     part = [np.broadcast_to(rows, shape)[:, :, good] for rows in (every.shares, every.rigid, every.gains)]
     return Roles(*part), (int(good.sum()), grid.size)
 
@@ -99,7 +99,7 @@ def stiffening(machine: Machine, element: Element, factors: Array) -> Array:
         factors: on its stiffness; of an element that is rigid, its stiffness itself (SI) [points].
 
     Returns:
-        1 / C_ii over its limit [components x points]; 0 where nothing else yields.
+        1 / C_ii over its limit [components x points]; 0 where nothing else is compliant.
     """
     kept, response = list(machine.family.components), respond(machine)
     with np.errstate(all="ignore"):
@@ -108,18 +108,18 @@ def stiffening(machine: Machine, element: Element, factors: Array) -> Array:
 
 
 def equations_of_k(
-    response: Response, found: Sequence[Element], kept: Sequence[int]
+    response: Response, elements: Sequence[Element], kept: Sequence[int]
 ) -> dict[str, tuple[float, ...]] | None:
-    """Coefficients in the diagonal of K by element (eqs. 33-38), without rounding; None where K is no such sum.
+    """Coefficients in the diagonal of K by element (eqs. 33-38), without round-off; None where K is no such sum.
 
     Arguments as for `roles_at`, at one pose.
     """
-    by_element = stiffness_equations(response, found)
+    by_element = stiffness_equations(response, elements)
     if by_element is None:
         return None
     rows = {name: [float(matrix.entry(i, i)) for i in kept] for name, matrix in by_element.items()}
     most = [max(column) for column in zip(*rows.values(), strict=True)]
     return {
-        name: tuple(c if c > ROUNDING * top else 0.0 for c, top in zip(row, most, strict=True))
+        name: tuple(c if c > NO_ROLE * top else 0.0 for c, top in zip(row, most, strict=True))
         for name, row in rows.items()
     }

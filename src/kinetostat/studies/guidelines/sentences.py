@@ -1,6 +1,6 @@
-"""Guidelines in plain sentences, each with the share of the poses of a grid at which it holds. Nothing is derived here.
+"""Guidelines in plain sentences, each with the share of the poses of a grid at which it holds, and as plain data.
 
-One kind of statement is one function, in the order of the paper's section 4.2.
+One kind of statement is one function, in the order of the paper's section 4.2. Nothing is derived here.
 """
 
 import math
@@ -16,17 +16,20 @@ from kinetostat.kinetostatics.elements import LINKS_TOGETHER, Element
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.guidelines.moves import Move
-from kinetostat.studies.guidelines.roles import EXCESS, ROUNDING, Array, Roles
+from kinetostat.studies.guidelines.roles import EXCESS, Array, Roles
 from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
+from kinetostat.tolerances import NO_ROLE
 
 MATTERS = 0.01
 """Share of an entry of C from which an element is named as one that decides it."""
 APART = 10.0
-"""Ratio of limits of rigidity from which directions are told apart."""
+"""Ratio of limits of rigidity from which directions get a limit each."""
 LEAST = 0.005
-"""Percent per percent below which a sentence says that nothing happens."""
+"""Percent per percent below which a sentence says that a parameter has no effect."""
 MOST_MOVES = 8
 """Parameters of which a sentence is made."""
+WITHOUT_NOUN = ("proximal", "distal", "upper", "lower", "inner", "outer")
+"""Labels of links that need the word "links" in a sentence."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +37,8 @@ class Statement:
     """A guideline.
 
     Attributes:
-        topic: "yields", "weakest", "rigid" or "design".
-        text: one sentence.
+        topic: "compliance", "weakest", "rigid" or "design".
+        text: one sentence or two.
         holds: share of the poses of the grid at which it is true, 0 to 1; None without a grid.
     """
 
@@ -44,81 +47,77 @@ class Statement:
     holds: float | None
 
 
-def statements(found: Guidelines) -> list[Statement]:
-    """All guidelines, at the pose of the file and, where there is a grid, with how far they hold over it."""
-    if found.here is None:
+def statements(answer: Guidelines) -> list[Statement]:
+    """Write all guidelines, at the pose of the file and, where there is a grid, with how far they hold over it."""
+    if answer.here is None:
         return []
     return [
-        *_what_yields(found, found.here),
-        *_weakest(found, found.here),
-        *_counts_as_rigid(found, found.here),
-        *_design(found),
+        *_sources_of_compliance(answer, answer.here),
+        *_weakest(answer, answer.here),
+        *_counts_as_rigid(answer, answer.here),
+        *_design(answer),
     ]
 
 
-def _what_yields(found: Guidelines, here: Roles) -> Iterator[Statement]:
-    """Which directions depend on which elements: directions of which the same is true together."""
-    single, over = _single(found), _over(found)
+def _sources_of_compliance(answer: Guidelines, here: Roles) -> Iterator[Statement]:
+    """Which elements each direction depends on; directions of which the same is true share a sentence."""
+    single, over = _single(answer), _over(answer)
     groups: dict[tuple[bytes, float | None], list[int]] = {}
-    for i in _yielding(here):
+    for i in _compliant(here):
         mask = here.shares[single, i] >= MATTERS
-        true = None if over is None else _share_of((over.shares[single, i] >= MATTERS) == mask)
-        groups.setdefault((mask.tobytes(), true), []).append(i)
-    for (_, true), directions in groups.items():
+        holds = None if over is None else _share_of((over.shares[single, i] >= MATTERS) == mask)
+        groups.setdefault((mask.tobytes(), holds), []).append(i)
+    for (_, holds), directions in groups.items():
         shares = here.shares[single][:, directions, 0]
         deciding = [
-            f"{found.found[k].name} ({_percents(own.min(), own.max())})"
-            for k, own in zip(single, shares, strict=True)
-            if own.max() >= MATTERS
+            f"{_the(answer, k)} ({_percents(row.min(), row.max())})"
+            for k, row in zip(single, shares, strict=True)
+            if row.max() >= MATTERS
         ]
-        silent = [found.found[k].name for k, own in zip(single, shares, strict=True) if own.max() <= ROUNDING]
-        aside = f", not by {_listed(silent, 'or')}" if silent else ""
-        verb = "yields" if len(directions) == 1 else "yield"
-        yield Statement("yields", f"{_named(found, directions)} {verb} by {_listed(deciding)}{aside}.", true)
-    rigid = [i for i, c in enumerate(found.compliance) if c == 0.0]
-    if rigid:
-        yield Statement("yields", f"Nothing yields in {_named(found, rigid)}.", None)
-    free = [i for i, c in enumerate(found.compliance) if c == math.inf]
-    if free:
-        yield Statement("yields", f"Nothing holds the platform in {_named(found, free)}.", None)
+        silent = [_the(answer, k) for k, row in zip(single, shares, strict=True) if row.max() <= NO_ROLE]
+        aside = f", not from {_listed(silent, 'or')}" if silent else ""
+        text = f"{_where(answer, directions)} the compliance comes from {_listed(deciding)}{aside}."
+        yield Statement("compliance", _capital(text), holds)
+    for word, extreme in (("rigid", 0.0), ("free", math.inf)):
+        directions = [i for i, c in enumerate(answer.compliance_diagonal) if c == extreme]
+        if directions:
+            yield Statement("compliance", f"The platform is {word} {_where(answer, directions)}.", None)
 
 
-def _weakest(found: Guidelines, here: Roles) -> Iterator[Statement]:
+def _weakest(answer: Guidelines, here: Roles) -> Iterator[Statement]:
     """The element whose doubling gains most, direction by direction."""
-    single, over = _single(found), _over(found)
+    single, over = _single(answer), _over(answer)
     best, gains = _first(here.gains[single])[:, 0], here.gains[single, :, 0]
-    for k in dict.fromkeys(best[_yielding(here)].tolist()):
-        directions = [i for i in _yielding(here) if best[i] == k]
-        own = gains[k, directions]
+    for k in dict.fromkeys(best[_compliant(here)].tolist()):
+        directions = [i for i in _compliant(here) if best[i] == k]
+        row, many = gains[k, directions], _many(answer.elements[single[k]])
         text = (
-            f"Weakest {_where(found, directions)} is {found.found[single[k]].name}: twice as stiff, it lowers the "
-            f"compliance by {_percents(own.min(), own.max())}."
+            f"{_where(answer, directions)} {_the(answer, single[k])} {'are' if many else 'is'} weakest: doubling "
+            f"{'their' if many else 'its'} stiffness would cut the compliance by {_percents(row.min(), row.max())}."
         )
-        true = None if over is None else _share_of(_first(over.gains[single])[directions] == k)
-        yield Statement("weakest", text, true)
+        holds = None if over is None else _share_of(_first(over.gains[single])[directions] == k)
+        yield Statement("weakest", _capital(text), holds)
 
 
-def _counts_as_rigid(found: Guidelines, here: Roles) -> Iterator[Statement]:
-    """From which stiffness on an element may be taken as rigid: directions that ask for much the same together."""
-    for k, element in enumerate(found.found):
-        factors = {i: float(here.rigid[k, i, 0]) for i in _yielding(here) if here.rigid[k, i, 0] > 0.0}
+def _counts_as_rigid(answer: Guidelines, here: Roles) -> Iterator[Statement]:
+    """From which stiffness on an element may be taken as rigid; directions with similar limits share one."""
+    for k, element in enumerate(answer.elements):
+        factors = {i: float(here.rigid[k, i, 0]) for i in _compliant(here) if here.rigid[k, i, 0] > 0.0}
         if element.actuated or not factors:
             continue
-        said = []
+        clauses = []
         for directions in _clusters(factors):
             most = max(factors[i] for i in directions)
-            where = _where(found, directions)
-            said.append(
+            where = _where(answer, directions)
+            clauses.append(
                 f"{where} from {_stiffness(element, most)} on"
                 if most < math.inf
-                else f"never {where}, where nothing else yields"
+                else f"never {where}, where nothing else is compliant"
             )
         finite = [factor for factor in factors.values() if factor < math.inf]
-        against = _against_actuators(found, element, max(finite)) if finite else ""
-        counts = (
-            f"{element.name[0].upper()}{element.name[1:]} {'count' if element.name == LINKS_TOGETHER else 'counts'}"
-        )
-        text = f"{counts} as rigid {'; '.join(said)}.{against}{_at_worst(found, k, list(factors))}"
+        against = _against_actuators(answer, element, max(finite)) if finite else ""
+        counts = f"{_capital(_the(answer, k))} {'count' if _many(element) else 'counts'}"
+        text = f"{counts} as rigid {'; '.join(clauses)}.{against}{_at_worst(answer, k, list(factors))}"
         yield Statement("rigid", text, None)
 
 
@@ -133,39 +132,40 @@ def _clusters(factors: Mapping[int, float]) -> list[list[int]]:
     return [sorted(group) for group in groups]
 
 
-def _at_worst(found: Guidelines, k: int, directions: Sequence[int]) -> str:
+def _at_worst(answer: Guidelines, k: int, directions: Sequence[int]) -> str:
     """The limit that is enough at every pose of the grid, in those directions in which there is one."""
-    over = _over(found)
+    over = _over(answer)
     if over is None:
         return ""
     most = {i: float(over.rigid[k, i].max()) for i in directions}
     finite = [i for i in directions if most[i] < math.inf]
     if not finite:
         return ""
-    limit = _stiffness(found.found[k], max(most[i] for i in finite))
-    return f" At every pose of the grid {_where(found, finite)} from {limit} on."
+    limit = _stiffness(answer.elements[k], max(most[i] for i in finite))
+    return f" At every pose of the grid {_where(answer, finite)} from {limit} on."
 
 
-def _design(found: Guidelines) -> Iterator[Statement]:
-    """Which parameter moves which direction which way."""
-    for move in found.moves[:MOST_MOVES]:
+def _design(answer: Guidelines) -> Iterator[Statement]:
+    """Which parameter stiffens or softens which direction."""
+    for move in answer.parameters[:MOST_MOVES]:
         directions = [(i, p) for i, p in enumerate(move.percents) if p is not None]
         rising = sorted(((i, p) for i, p in directions if p > LEAST), key=lambda pair: -pair[1])
         falling = sorted(((i, p) for i, p in directions if p < -LEAST), key=lambda pair: pair[1])
-        none = [found.components[i] for i, p in directions if abs(p) <= LEAST]
-        said = [
-            f"{word} in {', '.join(f'{found.components[i]} {p:+.2g}' for i, p in pairs)}"
+        none = [answer.components[i] for i, p in directions if abs(p) <= LEAST]
+        clauses = [
+            f"{word} in {', '.join(f'{answer.components[i]} {p:+.2g}' for i, p in pairs)}"
             for word, pairs in (("stiffer", rising), ("softer", falling))
             if pairs
         ]
-        aside = f"; nothing in {', '.join(none)}" if none else ""
-        more = f"{'0.01 rad more' if move.turning else 'More'} {with_leg(found.machine, move.path)}"
-        yield Statement("design", f"{more}: {'; '.join(said)}{aside}.", _same_signs(found, move))
+        aside = f"; no effect in {', '.join(none)}" if none else ""
+        name = with_leg(answer.machine, move.path)
+        change = f"Turning {name} by 0.01 rad" if move.turning else f"Increasing {name}"
+        yield Statement("design", f"{change}: {'; '.join(clauses)}{aside}.", _same_signs(answer, move))
 
 
-def _same_signs(found: Guidelines, move: Move) -> float | None:
-    """The least share of the poses at which the signs of the file's pose hold, over the directions that are felt."""
-    if found.everywhere is None or not move.stiffer:
+def _same_signs(answer: Guidelines, move: Move) -> float | None:
+    """The least share of the poses at which the signs of the file's pose hold, over the directions with an effect."""
+    if answer.everywhere is None or not move.stiffer:
         return None
     shares = [
         move.stiffer[i] if p > 0.0 else move.softer[i]
@@ -175,25 +175,25 @@ def _same_signs(found: Guidelines, move: Move) -> float | None:
     return min(shares, default=None)
 
 
-def _single(found: Guidelines) -> list[int]:
+def _single(answer: Guidelines) -> list[int]:
     """Places of the elements that are no sums of others."""
     taken: set[int] = set()
     single = []
-    for k, element in enumerate(found.found):
+    for k, element in enumerate(answer.elements):
         if not taken.issuperset(element.springs):
             single.append(k)
         taken.update(element.springs)
     return single
 
 
-def _yielding(roles: Roles) -> list[int]:
-    """Places of the directions that yield and are held."""
+def _compliant(roles: Roles) -> list[int]:
+    """Places of the directions that are neither rigid nor free."""
     return [i for i in range(roles.shares.shape[1]) if np.isfinite(roles.shares[:, i, 0]).all()]
 
 
-def _over(found: Guidelines) -> Roles | None:
+def _over(answer: Guidelines) -> Roles | None:
     """Roles over the grid, if there is one with any answer."""
-    return found.everywhere if found.everywhere is not None and found.poses[0] else None
+    return answer.everywhere if answer.everywhere is not None and answer.poses[0] else None
 
 
 def _share_of(true: npt.NDArray[np.bool_]) -> float:
@@ -207,26 +207,26 @@ def _first(gains: Array) -> npt.NDArray[np.int64]:
 
 
 def _percents(least: float, most: float) -> str:
-    low, high = f"{100 * least:.3g}", f"{100 * most:.3g}"
+    low, high = (f"{100 * x:.0f}" if 100 * x >= 9.5 else f"{100 * x:.2g}" for x in (least, most))
     return f"{high}\N{NO-BREAK SPACE}%" if low == high else f"{low} to {high}\N{NO-BREAK SPACE}%"
 
 
 def _stiffness(element: Element, factor: float) -> str:
     """A limit as a stiffness with its unit, and as a multiple of the present one."""
     if element.stiffness is None:
-        return f"{factor:.3g} times its present stiffness"
+        return f"{factor:.3g} times {'their' if _many(element) else 'its'} present stiffness"
     now = "" if element.stiffness == math.inf else f" ({factor:.3g} times now)"
     return f"{limit_of(element.stiffness, factor):.4g} {element.unit}{now}"
 
 
-def _against_actuators(found: Guidelines, element: Element, factor: float) -> str:
+def _against_actuators(answer: Guidelines, element: Element, factor: float) -> str:
     """The limit as a ratio to the stiffness of an actuator, with the unit of that ratio."""
-    servo = found.actuator
-    if servo is None or servo.stiffness is None or element.stiffness is None:
+    actuator = answer.actuator
+    if actuator is None or actuator.stiffness is None or element.stiffness is None:
         return ""
-    ratio = limit_of(element.stiffness, factor) / servo.stiffness
-    unit = "times" if servo.unit == element.unit else f"{element.unit} per {servo.unit} of"
-    return f" The greatest is {ratio:.3g} {unit} an actuator."
+    ratio = limit_of(element.stiffness, factor) / actuator.stiffness
+    unit = "times" if actuator.unit == element.unit else f"{element.unit} per {actuator.unit} of"
+    return f" The largest of these is {ratio:.3g} {unit} an actuator."
 
 
 def limit_of(stiffness: float, factor: float) -> float:
@@ -234,39 +234,62 @@ def limit_of(stiffness: float, factor: float) -> float:
     return factor if stiffness == math.inf else stiffness * factor
 
 
-def _named(found: Guidelines, directions: Sequence[int]) -> str:
-    return ", ".join(found.components[i] for i in directions)
+def _many(element: Element) -> bool:
+    """Whether an element is several parts, and a sentence about it in the plural."""
+    return len(element.parts) > 1
 
 
-def _where(found: Guidelines, directions: Sequence[int]) -> str:
-    return "in every direction" if len(directions) == len(found.components) else f"in {_named(found, directions)}"
+def _the(answer: Guidelines, k: int) -> str:
+    """An element as a sentence names it: "the actuators", "passive link 1", "all links together"."""
+    element = answer.elements[k]
+    if element.name == LINKS_TOGETHER:
+        return "all links together"
+    if not _many(element):
+        return element.name
+    label = element.name.partition(" ×")[0]
+    noun = f"{label} links" if label in WITHOUT_NOUN else label if label.endswith("s") else f"{label}s"
+    alike = [other for other in answer.elements if other.name.partition(" ×")[0] == label]
+    return f"the {noun}" if len(alike) == 1 else f"the {len(element.parts)} {noun}"
+
+
+def _where(answer: Guidelines, directions: Sequence[int]) -> str:
+    """Directions as a sentence names them: "about x and z", "along y", "in every direction"."""
+    if len(directions) == len(answer.components) > 1:
+        return "in every direction"
+    names = [answer.components[i] for i in directions]
+    about, along = [name[1:] for name in names if len(name) == 2], [name for name in names if len(name) == 1]
+    return " and ".join([f"{word} {_listed(axes)}" for word, axes in (("about", about), ("along", along)) if axes])
 
 
 def _listed(words: Sequence[str], last: str = "and") -> str:
     return f" {last} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def as_json(found: Guidelines) -> dict[str, Any]:
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
+
+
+def as_json(answer: Guidelines) -> dict[str, Any]:
     """Guidelines as plain data, their sentences among them; directions by name."""
-    names, here = found.components, found.here
+    names, here = answer.components, answer.here
     by_direction = partial(_by_direction, names)
     return as_answer(
         {
-            "name": found.machine.name,
-            "status": found.status.word,
-            "message": found.message,
+            "name": answer.machine.name,
+            "status": answer.status.word,
+            "message": answer.message,
             "components": names,
             "rigid_within": EXCESS,
-            "compliance_diagonal": found.compliance or None,
-            "elements": [_element_json(found, here, k) for k in range(len(found.found))] if here else [],
-            "stiffness_equations": found.equations
-            and {name: by_direction(row) for name, row in found.equations.items()},
-            "parameters": [_move_json(move, names) for move in found.moves],
-            "without_influence": found.idle,
-            "left_out": dict(found.skipped),
-            "statements": statements(found),
-            "grid": {"over": found.ranges, "poses": found.poses[1], "answered": found.poses[0]}
-            if found.ranges
+            "compliance_diagonal": answer.compliance_diagonal or None,
+            "elements": [_element_json(answer, here, k) for k in range(len(answer.elements))] if here else [],
+            "stiffness_equations": answer.stiffness_equations
+            and {name: by_direction(row) for name, row in answer.stiffness_equations.items()},
+            "parameters": [_move_json(move, names) for move in answer.parameters],
+            "without_influence": answer.without_influence,
+            "left_out": dict(answer.left_out),
+            "statements": statements(answer),
+            "grid": {"over": answer.ranges, "poses": answer.poses[1], "answered": answer.poses[0]}
+            if answer.ranges
             else None,
         }
     )
@@ -276,9 +299,9 @@ def _by_direction(names: Sequence[str], row: Any) -> dict[str, Any]:
     return dict(zip(names, row, strict=True))
 
 
-def _element_json(found: Guidelines, here: Roles, k: int) -> dict[str, Any]:
-    element, over, actuator = found.found[k], _over(found), found.actuator
-    by_direction = partial(_by_direction, found.components)
+def _element_json(answer: Guidelines, here: Roles, k: int) -> dict[str, Any]:
+    element, over, actuator = answer.elements[k], _over(answer), answer.actuator
+    by_direction = partial(_by_direction, answer.components)
     limits = [None if element.stiffness is None else limit_of(element.stiffness, f) for f in here.rigid[k, :, 0]]
     ratio = actuator.stiffness if actuator else None
     data: dict[str, Any] = {

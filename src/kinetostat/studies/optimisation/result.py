@@ -23,6 +23,7 @@ from kinetostat.studies.optimisation.ridges import Ridge, at_bounds, find_ridges
 from kinetostat.studies.optimisation.robustness import Robustness, robustness_of
 from kinetostat.studies.optimisation.search import Stop, Watch, never, search, search_into, unwatched
 from kinetostat.studies.optimisation.slopes import Surveyor
+from kinetostat.studies.sensitivity import relative_sensitivity
 
 LONGEST_NAME = 80
 
@@ -217,9 +218,7 @@ def _influences(problem: Problem, survey: Surveyor, genes: Array) -> list[Influe
         variable = problem.space.searched[k]
         slopes = tuple(float(slope[place]) / (variable.high - variable.low) for _, slope in numbers)
         size = 1.0 if variable.quantity.kind == "angle" else float(held[k])
-        percents = tuple(
-            slope * size / value if value and size else float("nan")
-            for slope, (value, _) in zip(slopes, numbers, strict=True)
-        )
+        levels = [value for value, _ in numbers]
+        percents = tuple(relative_sensitivity(np.array(slopes), size, np.array(levels)).tolist())
         found.append(Influence(variable.name, slopes, percents, bounds[k]))
     return found

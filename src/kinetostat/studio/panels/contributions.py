@@ -103,7 +103,7 @@ class SensitivityPanel(Panel):
 
 def ranking_text(answer: Sensitivity) -> str:
     """Bars of the parameters that influence the first quantity of a sensitivity study."""
-    percents = [(with_leg(answer.machine, p.path), p.percents[0]) for p in answer.influences if p.percents]
+    percents = [(with_leg(answer.machine, p.path), p.percents[0]) for p in answer.parameters if p.percents]
     known = [(path, percent) for path, percent in percents if percent is not None]
     largest = max((abs(percent) for _, percent in known), default=1.0)
     rows = [(path, percent / largest, f"{percent:+.3f}") for path, percent in known[:MOST]]

@@ -52,7 +52,7 @@ def _about(advice: Guidelines) -> str:
 
 
 def _tables(advice: Guidelines, here: Roles) -> tuple[Block, ...]:
-    count = min(MOST_ROWS, len(advice.moves))
+    count = min(MOST_ROWS, len(advice.parameters))
     blocks: list[Block] = [printed(element_table(advice, here), "Shares of the elements in the diagonal of C.")]
     sums = equations(advice)
     if sums:
@@ -78,10 +78,10 @@ def sensitivity_section(ranking: Sensitivity | None) -> Section:
     title = "Sensitivity"
     if ranking is None:
         return Section(title, (Paragraph("Sensitivities were left out."),))
-    if not ranking.influences:
+    if not ranking.parameters:
         return Section(title, (Paragraph("No parameter has an influence on the compliance here."),))
-    count = min(MOST_INFLUENCES, len(ranking.influences))
-    rest = len(ranking.influences) - count
+    count = min(MOST_INFLUENCES, len(ranking.parameters))
+    rest = len(ranking.parameters) - count
     more = f" {rest} parameters with less influence are omitted." if rest else ""
     caption = (
         "Percent by which each entry of the diagonal of C changes per percent of a parameter, of an angle per 0.01 rad."
