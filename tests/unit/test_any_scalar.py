@@ -6,6 +6,7 @@ import jax
 import numpy as np
 import pytest
 
+from kinetostat.algebra.column import column
 from kinetostat.algebra.solve import complement, conjugate, dual_basis
 from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import Vector, rotation_x, rotation_y
@@ -87,13 +88,13 @@ def together(results):
 @every_formula
 def test_numpy_arrays_give_the_same_bits_as_floats(formula, count):
     batch = inputs(count)
-    assert np.array_equal(together(formula(*batch)), one_by_one(formula, batch))
+    assert np.array_equal(together(formula(*map(column, batch))), one_by_one(formula, batch))
 
 
 @every_formula
 def test_longer_floats_give_the_same_numbers_with_more_digits(formula, count):
     batch = inputs(count)
-    longer = together(formula(*batch.astype(np.longdouble)))
+    longer = together(formula(*map(column, batch.astype(np.longdouble))))
     assert longer.dtype == np.longdouble
     assert np.allclose(longer.astype(float), one_by_one(formula, batch), rtol=AMPLIFIED, atol=AMPLIFIED)
     assert not np.array_equal(longer, longer.astype(float).astype(np.longdouble)), "digits beyond float64 were lost"

@@ -2,29 +2,28 @@
 
 import math
 
-import jax
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from kinetostat.algebra.column import Column, column
 from kinetostat.algebra.scalar import (
     cos,
     is_one,
     is_zero,
-    minus,
-    plus,
     reciprocal,
     sin,
     smaller,
     sqrt,
-    times,
     total,
+    weighted,
     where,
 )
 from kinetostat.algebra.vector import Vector
+from kinetostat.engine.trace import Graph
 
-A = np.array([1.5, -2.0, 0.0])
+A = column(np.array([1.5, -2.0, 0.0]))
 
 
 def test_only_the_python_floats_are_structural():
@@ -36,33 +35,49 @@ def test_only_the_python_floats_are_structural():
         assert not is_one(impostor)
 
 
-def test_a_structural_zero_drops_out():
-    assert is_zero(times(0.0, A))
-    assert is_zero(times(A, 0.0))
-    assert plus(0.0, A) is A
-    assert plus(A, 0.0) is A
-    assert minus(A, 0.0) is A
-    assert np.array_equal(minus(0.0, A), -A)
-    assert times(1.0, A) is A
-    assert times(A, 1.0) is A
+def test_a_structural_zero_drops_out_of_a_column():
+    assert is_zero(0.0 * A)
+    assert is_zero(A * 0.0)
+    assert 0.0 + A is A
+    assert A + 0.0 is A
+    assert A - 0.0 is A
+    assert np.array_equal(0.0 - A, -A)
+    assert 1.0 * A is A
+    assert A * 1.0 is A
     assert is_zero(total([]))
     assert total([0.0, A, 0.0]) is A
 
 
-def test_a_structural_zero_leaves_no_operation_in_a_traced_formula():
-    def sparse(a):
-        return a * 2.0, Vector(a, 0.0, 0.0).dot(Vector(0.0, a, a)), Vector(a, 0.0, 0.0).cross(Vector(a, 0.0, 0.0)).x
-
-    traced = jax.make_jaxpr(sparse)(1.0)
-    assert len(traced.eqns) == 1, "only the product that is asked for may remain"
+def test_what_is_computed_from_columns_is_a_column():
+    results = (A + A, A * 2.0, 2.0 - A, abs(A), A / 3.0, sqrt(A * A), sin(A), where(A > 0.0, A, 1.0), smaller(A, 0.5))
+    assert all(type(result) is Column for result in results)
+    assert type(column(np.ones(2))) is Column
+    assert column(2.5) == 2.5
 
 
 @given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
-def test_structural_operators_are_the_plain_ones(a, b):
-    assert times(a, b) == a * b
-    assert plus(a, b) == a + b
-    assert minus(a, b) == a - b
+def test_columns_and_floats_follow_the_same_arithmetic(a, b):
+    many = column(np.full(2, a))
+    for result, expected in ((many * b, a * b), (many + b, a + b), (many - b, a - b), (b - many, b - a)):
+        assert np.array_equal(np.broadcast_to(result, 2), [expected, expected])
     assert smaller(a, b) == min(a, b)
+
+
+def test_a_structural_zero_leaves_no_operation_in_a_traced_formula():
+    graph = Graph()
+    a = graph.input()
+    assert is_zero(Vector(a, 0.0, 0.0).dot(Vector(0.0, a, a)))
+    assert is_zero(Vector(a, 0.0, 0.0).cross(Vector(a, 0.0, 0.0)).x)
+    assert len(graph.nodes) == 1, "nothing but the input may be there"
+    assert len({id(a * 2.0), id(graph.nodes[-1])}) == 1, "a product that is asked for remains"
+
+
+def test_an_infinite_weight_counts_only_where_it_is_felt():
+    assert weighted(math.inf, 0.0) == 0.0
+    assert weighted(0.0, math.inf) == 0.0
+    assert weighted(math.inf, 2.0) == math.inf
+    assert weighted(3.0, 2.0) == 6.0
+    assert is_zero(weighted(column(np.array([math.inf, 1.0])), 0.0))
 
 
 def test_square_root_of_a_negative_number_is_nan():

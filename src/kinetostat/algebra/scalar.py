@@ -23,42 +23,22 @@ def is_one(a: Scalar) -> bool:
     return type(a) is float and a == 1.0
 
 
-def times(a: Scalar, b: Scalar) -> Scalar:
-    """a * b, without a multiplication where either is a structural zero or one."""
-    # Most of the time of one pose is spent here and in the next two: they call nothing.
-    if type(a) is float:
-        if a == 0.0:
-            return 0.0
-        if type(b) is float:
-            return 0.0 if b == 0.0 else a * b
-        return b if a == 1.0 else a * b
-    if type(b) is float:
-        if b == 0.0:
-            return 0.0
-        if b == 1.0:
-            return a
-    return a * b
+def weighted(weight: Scalar, amount: Scalar) -> Scalar:
+    """weight * amount, and exactly 0 where the amount is exactly 0, even if the weight is infinite.
 
-
-def plus(a: Scalar, b: Scalar) -> Scalar:
-    """a + b, without an operation where either is a structural zero."""
-    if type(a) is float and a == 0.0:
-        return b
-    return a if type(b) is float and b == 0.0 else a + b
-
-
-def minus(a: Scalar, b: Scalar) -> Scalar:
-    """a - b, without a subtraction where either is a structural zero."""
-    if type(b) is float and b == 0.0:
-        return a
-    return -b if type(a) is float and a == 0.0 else a - b
+    For weights that may be infinite: the compliance of a free spring, the reciprocal of an exact zero. A load that a
+    free spring does not feel does not deform it, so that 0 times infinity is 0 there, not NaN.
+    """
+    if (type(amount) is float and amount == 0.0) or (type(weight) is float and weight == 0.0):
+        return 0.0
+    return weight * amount
 
 
 def total(terms: list[Scalar]) -> Scalar:
     """Sum of `terms`, left to right; 0.0 when there are none."""
     result: Scalar = 0.0
     for term in terms:
-        result = plus(result, term)
+        result = result + term
     return result
 
 

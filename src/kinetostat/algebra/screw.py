@@ -9,7 +9,7 @@ and 2.5. Axes are whatever the caller's are; every function names the point at w
 from dataclasses import dataclass
 from typing import Self
 
-from kinetostat.algebra.scalar import Scalar, plus
+from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import ZERO, Rotation, Vector
 
 COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")
@@ -60,7 +60,7 @@ class Wrench(Screw):
 
     def work(self, twist: Twist) -> Scalar:
         """Reciprocal product: the power (W) of this wrench on that twist, both at one point in the same axes."""
-        return plus(self.rotational.dot(twist.rotational), self.translational.dot(twist.translational))
+        return self.rotational.dot(twist.rotational) + self.translational.dot(twist.translational)
 
 
 def rotation_about(axis: Vector, arm: Vector) -> Twist:

@@ -3,7 +3,7 @@
 Points are in axes that the caller chooses.
 """
 
-from kinetostat.algebra.scalar import Scalar, minus, plus, reciprocal, smaller, times, where
+from kinetostat.algebra.scalar import Scalar, reciprocal, smaller, where
 from kinetostat.algebra.vector import Vector
 
 PARALLEL = 1e-14
@@ -18,11 +18,11 @@ def squared_distance(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -
     along, across, between = one[1] - one[0], other[1] - other[0], one[0] - other[0]
     a, b, c = along.dot(along), along.dot(across), across.dot(across)
     d, e = along.dot(between), across.dot(between)
-    crossed = minus(times(a, c), times(b, b))
-    apart = crossed > PARALLEL * times(a, c)
-    s = where(apart, _clamped(minus(times(b, e), times(c, d)) * reciprocal(where(apart, crossed, 1.0))), 0.0)
-    t = plus(times(b, s), e) * reciprocal(c)
-    begin, end = _clamped(-d * reciprocal(a)), _clamped(minus(b, d) * reciprocal(a))
+    crossed = a * c - b * b
+    apart = crossed > PARALLEL * (a * c)
+    s = where(apart, _clamped((b * e - c * d) * reciprocal(where(apart, crossed, 1.0))), 0.0)
+    t = (b * s + e) * reciprocal(c)
+    begin, end = _clamped(-d * reciprocal(a)), _clamped((b - d) * reciprocal(a))
     s = where(t < 0.0, begin, where(t > 1.0, end, s))
     gap = between + along * s - across * _clamped(t)
     return gap.dot(gap)

@@ -10,18 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import (
-    Scalar,
-    is_zero,
-    minus,
-    plus,
-    reciprocal,
-    smaller,
-    sqrt,
-    times,
-    total,
-    where,
-)
+from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller, sqrt, total, weighted, where
 
 Row = list[Scalar]
 
@@ -57,8 +46,8 @@ class _Triangular:
             shrink = reciprocal(self.vectors[here][pivot])
             above = [(self.vectors[here][self.pivots[i]], steps[i]) for i in range(k)]
             for j in size:
-                known = total([times(factor, step[j]) for factor, step in above])
-                steps[k].append(times(minus(1.0 if j == here else 0.0, known), shrink))
+                known = total([factor * step[j] for factor, step in above])
+                steps[k].append(weighted(shrink, (1.0 if j == here else 0.0) - known))
         return steps
 
 
@@ -82,8 +71,8 @@ def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
         later = solved.order[k + 1 :]
         inverse = reciprocal(solved.vectors[here][row])
         for column, turned in enumerate(solved.turned):
-            known = total([times(solved.vectors[j][row], dual[j][column]) for j in later])
-            dual[here].append(times(minus(turned[row], known), inverse))
+            known = total([solved.vectors[j][row] * dual[j][column] for j in later])
+            dual[here].append(weighted(inverse, turned[row] - known))
     return dual, _singularity_margin(basis, dual, solved.least)
 
 
@@ -97,7 +86,7 @@ def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row
     solved = _triangularise(rows)
     size, wide, steps = len(rows), len(rows[0]), solved.inverse()
     solution = [
-        [total([times(column[p], steps[k][j]) for k, p in enumerate(solved.pivots)]) for j in range(size)]
+        [total([column[p] * steps[k][j] for k, p in enumerate(solved.pivots)]) for j in range(size)]
         for column in solved.turned
     ]
     null = [[solved.turned[i][row] for i in range(wide)] for row in solved.free]
@@ -119,8 +108,8 @@ def _singularity_margin(
     vectors: Sequence[Sequence[Scalar]], inverse: Sequence[Sequence[Scalar]], least: Scalar
 ) -> Scalar:
     """n / (|V| |V+|) for n vectors and anything of the size of their inverse, at most 1; 0 where they are dependent."""
-    squares = [total([times(c, c) for row in rows for c in row]) for rows in (vectors, inverse)]
-    found = times(float(len(vectors)), reciprocal(sqrt(times(*squares))))
+    squares = [total([c * c for row in rows for c in row]) for rows in (vectors, inverse)]
+    found = float(len(vectors)) * reciprocal(sqrt(squares[0] * squares[1]))
     return where(least > SMALLEST, smaller(1.0, found), 0.0)
 
 
@@ -167,14 +156,14 @@ def _reflect(column: Row, others: list[Row], rows: list[int]) -> None:
     """Reflect all in place such that of `rows` the `column` keeps only the first."""
     if len(rows) == 1:
         return
-    pivot = sqrt(total([times(column[i], column[i]) for i in rows]))
+    pivot = sqrt(total([column[i] * column[i] for i in rows]))
     pivot = where(column[rows[0]] < 0.0, pivot, -pivot)
-    normal = [minus(column[rows[0]], pivot), *(column[i] for i in rows[1:])]
-    weight = reciprocal(times(pivot, -normal[0]))
+    normal = [column[rows[0]] - pivot, *(column[i] for i in rows[1:])]
+    weight = reciprocal(pivot * -normal[0])
     for other in others:
-        share = times(weight, total([times(a, other[i]) for a, i in zip(normal, rows, strict=True)]))
+        share = weighted(weight, total([a * other[i] for a, i in zip(normal, rows, strict=True)]))
         for a, i in zip(normal, rows, strict=True):
-            other[i] = minus(other[i], times(share, a))
+            other[i] = other[i] - share * a
     for i in rows:
         column[i] = 0.0
     column[rows[0]] = pivot
@@ -198,17 +187,17 @@ def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar]) ->
     pivots: Row = []
     taken: Row = [0.0] * len(left)  # of a^T S a, what lies in the columns before
     for k, column in enumerate(left):
-        weighted = [times(w, c) for w, c in zip(weights, column, strict=False)]
-        pivot = _product(weighted, column)
-        alive = pivot > times(DEPENDENT, taken[k])
+        felt = [weighted(w, c) for w, c in zip(weights, column, strict=False)]
+        pivot = _product(felt, column)
+        alive = pivot > DEPENDENT * taken[k]
         pivots.append(where(alive, pivot, 0.0))
         inverse = where(alive, reciprocal(where(alive, pivot, 1.0)), 0.0)
         for i in range(k + 1, len(left)):
-            shared = _product(weighted, left[i])
-            share = times(shared, inverse)
+            shared = _product(felt, left[i])
+            share = weighted(shared, inverse)
             shares[i].append(share)
             left[i] = _less(left[i], share, column)
-            taken[i] = plus(taken[i], times(share, shared))
+            taken[i] = taken[i] + weighted(shared, share)
     return left, shares, pivots
 
 
@@ -223,14 +212,14 @@ def least_energy(
     left = [list(column) for column in columns]
     for mode, pivot in zip(modes, pivots, strict=True):
         inverse = where(pivot > 0.0, reciprocal(where(pivot > 0.0, pivot, 1.0)), 0.0)
-        weighted = [times(w, c) for w, c in zip(weights, mode, strict=True)]
-        left = [_less(column, times(_product(weighted, column), inverse), mode) for column in left]
+        felt = [weighted(w, c) for w, c in zip(weights, mode, strict=True)]
+        left = [_less(column, weighted(_product(felt, column), inverse), mode) for column in left]
     return left
 
 
-def _product(weighted: Sequence[Scalar], column: Sequence[Scalar]) -> Scalar:
-    return total([times(a, b) for a, b in zip(weighted, column, strict=False)])
+def _product(felt: Sequence[Scalar], column: Sequence[Scalar]) -> Scalar:
+    return total([weighted(a, b) for a, b in zip(felt, column, strict=False)])
 
 
 def _less(column: Sequence[Scalar], share: Scalar, other: Sequence[Scalar]) -> Row:
-    return [minus(a, times(share, b)) for a, b in zip(column, other, strict=True)]
+    return [a - share * b for a, b in zip(column, other, strict=True)]

@@ -8,7 +8,7 @@ Source: theory (10), whose dyads they are sums of. In the axes and at the point 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, plus, times, total
+from kinetostat.algebra.scalar import Scalar, total, weighted
 from kinetostat.algebra.screw import Screw
 
 SIZE = 6
@@ -28,8 +28,8 @@ class Symmetric6:
         """The symmetric part of the dyad a b^T; for b = a, a a^T itself."""
         p, q = a.components(), b.components()
         if a is b:
-            return cls(tuple(times(p[i], p[j]) for i, j in POSITIONS))
-        return cls(tuple(times(0.5, plus(times(p[i], q[j]), times(p[j], q[i]))) for i, j in POSITIONS))
+            return cls(tuple(p[i] * p[j] for i, j in POSITIONS))
+        return cls(tuple(0.5 * (p[i] * q[j] + p[j] * q[i]) for i, j in POSITIONS))
 
     @classmethod
     def total(cls, terms: Sequence["Symmetric6"]) -> "Symmetric6":
@@ -37,7 +37,7 @@ class Symmetric6:
         return cls(tuple(total([term.upper[k] for term in terms]) for k in range(len(POSITIONS))))
 
     def __mul__(self, factor: Scalar) -> "Symmetric6":
-        return Symmetric6(tuple(times(entry, factor) for entry in self.upper))
+        return Symmetric6(tuple(weighted(factor, entry) for entry in self.upper))
 
     def entry(self, i: int, j: int) -> Scalar:
         """Entry in row i, column j (0-based)."""

@@ -3,7 +3,7 @@
 Source: theory (13), (14) and (23). All points are in axes that the caller chooses.
 """
 
-from kinetostat.algebra.scalar import Scalar, minus, plus, reciprocal, sqrt, times
+from kinetostat.algebra.scalar import Scalar, reciprocal, sqrt
 from kinetostat.algebra.vector import Vector
 
 
@@ -46,7 +46,7 @@ def crank_end(start: Vector, end: Vector, axis: Vector, crank: Scalar, rod: Scal
     off = span.dot(axis)
     flat = span - axis * off
     shrink = reciprocal(flat.dot(flat))
-    flat_rod = minus(times(rod, rod), times(off, off))
+    flat_rod = rod * rod - off * off
     along = 0.5 * (1.0 + (crank * crank - flat_rod) * shrink)
     across = sqrt(crank * crank * shrink - along * along)
     return start + flat * along + axis.cross(flat) * across
@@ -57,8 +57,8 @@ def crank_range(start: Vector, end: Vector, axis: Vector, crank: Scalar) -> tupl
     span = end - start
     off = span.dot(axis)
     size = (span - axis * off).norm()
-    near, far = minus(size, crank), plus(size, crank)
-    return sqrt(plus(near * near, times(off, off))), sqrt(plus(far * far, times(off, off)))
+    near, far = size - crank, size + crank
+    return sqrt(near * near + off * off), sqrt(far * far + off * off)
 
 
 def slide_travel(start: Vector, end: Vector, direction: Vector, rod: Scalar) -> tuple[Scalar, Scalar]:
@@ -79,4 +79,4 @@ def slide_travel(start: Vector, end: Vector, direction: Vector, rod: Scalar) -> 
     ahead = span.dot(direction)
     aside = span - direction * ahead
     square = aside.dot(aside)
-    return minus(ahead, sqrt(minus(times(rod, rod), square))), sqrt(square)
+    return ahead - sqrt(rod * rod - square), sqrt(square)

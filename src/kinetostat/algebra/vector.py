@@ -8,7 +8,7 @@ Source: R. M. Murray, Z. Li and S. S. Sastry, A Mathematical Introduction to Rob
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, cos, is_one, minus, plus, sin, sqrt, times
+from kinetostat.algebra.scalar import Scalar, cos, is_one, sin, sqrt
 
 
 @dataclass(frozen=True)
@@ -24,27 +24,27 @@ class Vector:
         return self.x, self.y, self.z
 
     def __add__(self, other: "Vector") -> "Vector":
-        return Vector(plus(self.x, other.x), plus(self.y, other.y), plus(self.z, other.z))
+        return Vector(self.x + other.x, self.y + other.y, self.z + other.z)
 
     def __sub__(self, other: "Vector") -> "Vector":
-        return Vector(minus(self.x, other.x), minus(self.y, other.y), minus(self.z, other.z))
+        return Vector(self.x - other.x, self.y - other.y, self.z - other.z)
 
     def __mul__(self, factor: Scalar) -> "Vector":
-        return Vector(times(self.x, factor), times(self.y, factor), times(self.z, factor))
+        return Vector(self.x * factor, self.y * factor, self.z * factor)
 
     def __neg__(self) -> "Vector":
         return ZERO - self
 
     def dot(self, other: "Vector") -> Scalar:
         """Inner product."""
-        return plus(plus(times(self.x, other.x), times(self.y, other.y)), times(self.z, other.z))
+        return self.x * other.x + self.y * other.y + self.z * other.z
 
     def cross(self, other: "Vector") -> "Vector":
         """Vector product self x other."""
         return Vector(
-            minus(times(self.y, other.z), times(self.z, other.y)),
-            minus(times(self.z, other.x), times(self.x, other.z)),
-            minus(times(self.x, other.y), times(self.y, other.x)),
+            self.y * other.z - self.z * other.y,
+            self.z * other.x - self.x * other.z,
+            self.x * other.y - self.y * other.x,
         )
 
     def norm(self) -> Scalar:
@@ -103,11 +103,11 @@ def rotation_along(axis: Vector, c: Scalar, s: Scalar) -> Rotation:
 
     What is 1 by form on the diagonal stays so: about a base axis, it is as sparse as `rotation_x` and the like.
     """
-    rest = minus(1.0, c)
+    rest = 1.0 - c
     columns = []
     for i, (unit, part) in enumerate(zip(AXES, axis.components(), strict=True)):
-        column = list((unit * c + axis * times(rest, part) + axis.cross(unit) * s).components())
-        if is_one(times(part, part)):
+        column = list((unit * c + axis * (rest * part) + axis.cross(unit) * s).components())
+        if is_one(part * part):
             column[i] = 1.0
         columns.append(Vector(*column))
     return Rotation(*columns)
@@ -115,7 +115,7 @@ def rotation_along(axis: Vector, c: Scalar, s: Scalar) -> Rotation:
 
 def polar(radius: Scalar, angle: Scalar) -> Vector:
     """The point of the x-y plane at `radius` (m) from the origin and `angle` (rad) from x."""
-    return Vector(times(radius, cos(angle)), times(radius, sin(angle)), 0.0)
+    return Vector(radius * cos(angle), radius * sin(angle), 0.0)
 
 
 def ring(radius: Scalar, angles: Sequence[Scalar], height: Scalar = 0.0) -> list[Vector]:

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar, plus, times, where
+from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.engine.trace import Array, Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.kinematics.closing import closing_equations
@@ -214,7 +214,7 @@ def joint_columns(machine: Machine, columns: Mapping[str, Array], count: int) ->
 def _weighted(response: Response, weights: Weights) -> Scalar:
     value: Scalar = 0.0
     for name, weight in weights:
-        value = plus(value, times(float(weight), QUANTITIES[name].value(response)))
+        value = value + float(weight) * QUANTITIES[name].value(response)
     return value
 
 

@@ -13,7 +13,7 @@ Source: Griewank and Walther 2008, Evaluating Derivatives, section 3.2.
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from kinetostat.algebra.scalar import Scalar, is_zero, plus, times, where
+from kinetostat.algebra.scalar import Scalar, is_zero, where
 from kinetostat.engine.trace import Body, Condition, Node, Operand, Traced
 
 TURN = "turn"
@@ -49,7 +49,7 @@ def gradient(result: Operand, inputs: Sequence[Traced]) -> list[Operand]:
         for place, operand in parents(node):
             if operand in members:
                 share = share_of(operation, operands, node, place, slope)
-                slopes[operand] = plus(slopes.get(operand, 0.0), share)
+                slopes[operand] = slopes.get(operand, 0.0) + share
     return [slopes.get(given, 0.0) for given in inputs]
 
 
@@ -101,16 +101,16 @@ def share_of(operation: str, operands: Sequence[Any], value: Scalar, place: int,
         case "neg":
             return -slope
         case "mul":
-            return times(slope, operands[1 - place])
+            return slope * operands[1 - place]
         case "div":
-            share = times(slope, 1.0 / operands[1])
-            return share if place == 0 else -times(share, value)
+            share = slope * (1.0 / operands[1])
+            return share if place == 0 else -(share * value)
         case "sqrt":
-            return times(slope, 0.5 * (1.0 / value))
+            return slope * (0.5 * (1.0 / value))
         case "abs":
             return where(operands[0] < 0.0, -slope, slope)
         case "where":
             return where(operands[0], slope, 0.0) if place == 1 else where(operands[0], 0.0, slope)
         case "turn":
-            return times(slope, operands[1])
+            return slope * operands[1]
     raise ValueError(f"no derivative of {operation}")

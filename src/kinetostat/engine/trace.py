@@ -332,7 +332,7 @@ def _mul(a: Any, b: Any) -> Any:
         a, b = b, a
     if _is(b, 1.0):
         return a
-    if _is(b, 0.0) and isinstance(a, Node) and a.bounds:
+    if _is(b, 0.0):  # zero by form, at every point: it drops out even where `a` is infinite
         return 0.0
     if isinstance(b, float) and math.copysign(1.0, b) < 0.0:
         return -_mul(a, -b)

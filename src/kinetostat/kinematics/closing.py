@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.scalar import Scalar, cos, minus, plus, sin, smaller, sqrt, times
+from kinetostat.algebra.scalar import Scalar, cos, sin, smaller, sqrt
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector, rotation_x, rotation_y, rotation_z
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.machine import Chains, Closure, Configuration
@@ -124,18 +124,18 @@ def _turned(start: Rotation, end: Rotation, length: Scalar) -> list[Scalar]:
     turn = ZERO
     for a, b in ((start.x, end.x), (start.y, end.y), (start.z, end.z)):
         turn = turn + a.cross(b)
-    return list((turn * times(0.5, length)).components())
+    return list((turn * (0.5 * length)).components())
 
 
 def _off_pose(chains: Chains, end: Displacement) -> list[Scalar]:
     """What is left from a placement to the pose, for each coordinate that is given."""
     given = chains.pose
-    gaps = [minus(given[name], getattr(end.translation, name)) for name in POINT if name in given]
+    gaps = [given[name] - getattr(end.translation, name) for name in POINT if name in given]
     if all(name in given for name in ANGLES):
         return gaps + _turned(end.rotation, platform_placement(chains).rotation, chains.length)
     sides = _sides(end.rotation)
     return gaps + [
-        times(chains.length, minus(times(sin(given[name]), sides[name][0]), times(cos(given[name]), sides[name][1])))
+        chains.length * (sin(given[name]) * sides[name][0] - cos(given[name]) * sides[name][1])
         for name in ANGLES
         if name in given
     ]
@@ -143,7 +143,7 @@ def _off_pose(chains: Chains, end: Displacement) -> list[Scalar]:
 
 def _sides(turn: Rotation) -> dict[str, tuple[Scalar, Scalar]]:
     """Cosine and sine of roll, pitch and yaw of Q = Rz(yaw) Ry(pitch) Rx(roll), each up to a common factor."""
-    flat = sqrt(times(turn.x.x, turn.x.x) + times(turn.x.y, turn.x.y))
+    flat = sqrt(turn.x.x * turn.x.x + turn.x.y * turn.x.y)
     return {"roll": (turn.z.z, turn.y.z), "pitch": (flat, -turn.x.z), "yaw": (turn.x.x, turn.x.y)}
 
 
@@ -153,7 +153,7 @@ def squared_distance(start: Displacement, end: Displacement, length: Scalar) -> 
     turns = ((start.rotation.x, end.rotation.x), (start.rotation.y, end.rotation.y), (start.rotation.z, end.rotation.z))
     square: Scalar = shift.dot(shift)
     for column in [a - b for a, b in turns]:
-        square = plus(square, times(0.5, column.dot(column)))
+        square = square + 0.5 * column.dot(column)
     return square
 
 

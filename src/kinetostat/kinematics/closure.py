@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.algebra.column import column
 from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.kinematics.closing import (
     ANGLES,
@@ -162,7 +163,7 @@ def _angle(amount: Scalar | Turn) -> Scalar:
 def _as_joints(coordinates: Array, status: Codes, single: bool) -> Joints:
     if single:
         return Joints(tuple(float(q) for q in coordinates[0]), int(status[0]))
-    return Joints(tuple(coordinates.T), status)
+    return Joints(tuple(map(column, coordinates.T)), status)
 
 
 def _goal(machine: Machine, chains: Chains) -> tuple[Array, bool]:

@@ -5,7 +5,7 @@ Two poses of different aspect can be joined only through a singularity. Nothing 
 Source: theory (30).
 """
 
-from kinetostat.algebra.scalar import Scalar, reciprocal, times
+from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.solve import handedness
 from kinetostat.algebra.symmetric import SIZE
@@ -29,5 +29,5 @@ def aspect(response: Response) -> Scalar:
     for leg, screws in zip(response.configuration.legs, response.legs, strict=True):
         if not leg.lines:
             needed = [twist for i, twist in enumerate(screws.passive) if i not in leg.idle]
-            sign = times(sign, handedness([comparable(twist, shrink) for twist in needed]))
+            sign = sign * handedness([comparable(twist, shrink) for twist in needed])
     return sign

@@ -8,7 +8,7 @@ Source: theory (4)-(6) and (8)-(10). All screws, K and C are at one reference po
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, reciprocal, times, total, where
+from kinetostat.algebra.scalar import Scalar, reciprocal, total, where
 from kinetostat.algebra.screw import Screw, Twist, Wrench
 from kinetostat.algebra.solve import dual_basis, least_energy, right_inverse
 from kinetostat.algebra.symmetric import POSITIONS, SIZE, Symmetric6
@@ -190,7 +190,7 @@ def least_energy_rows(
     every, null = (in_modes(modes, rows) for rows in (balance, [*zip(*internal, strict=True)]))
     weights = compliance + [0.0] * (len(wrenches) - len(compliance))
     shared = least_energy([*zip(*every, strict=True)], [*zip(*null, strict=True)], weights)
-    return [(*(times(c, shrink) for c in row[:3]), *row[3:]) for row in zip(*shared, strict=True)], singularity_margin
+    return [(*(c * shrink for c in row[:3]), *row[3:]) for row in zip(*shared, strict=True)], singularity_margin
 
 
 def weighted_sum(shares: Sequence[tuple[Screw, Scalar]], length: Scalar) -> Symmetric6:
@@ -204,14 +204,14 @@ def weighted_sum(shares: Sequence[tuple[Screw, Scalar]], length: Scalar) -> Symm
     reached = [_endless(w, screw, length) for screw, w in shares]
     entries = []
     for k, (i, j) in enumerate(POSITIONS):
-        together = total([times(flags[i], flags[j]) for flags in reached])
+        together = total([flags[i] * flags[j] for flags in reached])
         entries.append(where(together > 0.5, INFINITE, finite.upper[k]))
     return Symmetric6(tuple(entries))
 
 
 def _endless(weight: Scalar, screw: Screw, length: Scalar) -> list[Scalar]:
     """1 for each component of the screw that an infinite weight reaches beyond rounding, else 0."""
-    sizes = [times(times(c, c), scale) for c, scale in zip(screw.components(), _squares(length), strict=True)]
+    sizes = [c * c * scale for c, scale in zip(screw.components(), _squares(length), strict=True)]
     limit = ROUNDING * total(sizes)
     return [where(weight < INFINITE, 0.0, where(size > limit, 1.0, 0.0)) for size in sizes]
 

@@ -9,7 +9,6 @@ from math import isinf
 
 import numpy as np
 
-from kinetostat.algebra.scalar import times
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.kinetostatics.loading import deflection, spring_loads
@@ -60,7 +59,7 @@ def deflected_links(response: Response, load: Wrench) -> list[DeflectedLink]:
     found: list[DeflectedLink] = []
     for leg, screws in zip(response.configuration.legs, response.legs, strict=True):
         pairs = [(twist, soft, next(loads)) for twist, soft in zip(screws.elastic, screws.compliance, strict=True)]
-        elastic = [None if isinf(soft) else twist * times(load, soft) for twist, soft, load in pairs]
+        elastic = [None if isinf(soft) else twist * (load * soft) for twist, soft, load in pairs]
         free = [twist for twist, soft, _ in pairs if isinf(soft)]
         passive = [joint.twist(response.reference) for joint in leg.passive]
         left = platform - _sum([twist for twist in elastic if twist is not None])

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.scalar import Scalar, reciprocal, times
+from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.symmetric import SIZE, Symmetric6
 from kinetostat.kinetostatics.assembly import compliance_matrix, solve_statics, weighted_sum
 from kinetostat.kinetostatics.attribution import stiffness_coefficients
@@ -125,7 +125,7 @@ def diagonal_with(response: Response, element: Element, factor: Scalar) -> list[
     chosen, number, legs = _weights(response, element), 0, []
     for leg in response.legs:
         places = range(number, number + len(leg.compliance))
-        own = [times(chosen[i], factor) if i in chosen else s for i, s in zip(places, leg.compliance, strict=True)]
+        own = [chosen[i] * factor if i in chosen else s for i, s in zip(places, leg.compliance, strict=True)]
         legs.append(replace(leg, compliance=tuple(own)))
         number += len(leg.compliance)
     return list(compliance_matrix(solve_statics(legs, response.statics.length, response.guide)).diagonal())

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 
 from kinetostat.algebra.eigenvalues import greatest_eigenvalue
-from kinetostat.algebra.scalar import Scalar, plus, reciprocal, smaller, sqrt, times, total, where
+from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller, sqrt, total, where
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
 from kinetostat.kinetostatics.overload import actuator_loads
@@ -41,9 +41,9 @@ def free_stiffness(response: Response, row: int) -> Scalar:
     soft, length = response.compliance.entry(row, row), response.configuration.length
     turns = total([response.compliance.entry(i, i) for i in ROTATIONS])
     moves = total([response.compliance.entry(i, i) for i in TRANSLATIONS])
-    area = times(length, length)
-    size = plus(turns, times(reciprocal(area), moves)) if row in ROTATIONS else plus(moves, times(area, turns))
-    least = where(size < math.inf, times(ROUNDED, size), 0.0)
+    area = length * length
+    size = turns + reciprocal(area) * moves if row in ROTATIONS else moves + area * turns
+    least = where(size < math.inf, ROUNDED * size, 0.0)
     return where(soft > least, reciprocal(soft), math.inf)
 
 
@@ -76,25 +76,28 @@ def frobenius_condition(response: Response) -> Scalar:
     """Condition of K in the Frobenius norm: |D K D| |D^-1 C D^-1| / n, D = diag(1/L for rotations, 1 for translations).
 
     It is 1 where K is the same in all directions, else greater, and unlike the ratio of eigenvalues it is smooth. L is
-    the machine's characteristic length. Infinite where something is rigid or free while other things yield.
+    the machine's characteristic length. Infinite where something is rigid or free
+    while other parts deflect, NaN where everything is rigid, or everything free.
 
     Source: Angeles, Fundamentals of Robotic Mechanical Systems, section 5.8 (there of a Jacobian).
     """
     length, there = response.configuration.length, components(response)
     stiff = _squares(response.stiffness, reciprocal(length), there)
     soft = _squares(response.compliance, length, there)
+    if is_zero(stiff) or is_zero(soft):  # all is rigid, or all free: infinity times zero
+        return math.nan
     return sqrt(stiff) * sqrt(soft) * (1.0 / len(there))
 
 
 def _squares(matrix: Symmetric6, arm: Scalar, there: Sequence[int]) -> Scalar:
     """Sum of the squares of a matrix whose rotational rows and columns are multiplied by a length or its reciprocal."""
     scaled = [[_scaled(matrix.entry(i, j), arm, (i < 3) + (j < 3)) for j in there] for i in there]
-    return total([times(one, one) for row in scaled for one in row])
+    return total([one * one for row in scaled for one in row])
 
 
 def _scaled(value: Scalar, arm: Scalar, power: int) -> Scalar:
     for _ in range(power):
-        value = times(value, arm)
+        value = value * arm
     return value
 
 

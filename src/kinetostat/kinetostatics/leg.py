@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from kinetostat.algebra.scalar import Scalar, is_one, plus, reciprocal, smaller, sqrt, times, total, where
+from kinetostat.algebra.scalar import Scalar, is_one, reciprocal, smaller, sqrt, total, weighted, where
 from kinetostat.algebra.screw import Screw, Wrench
 from kinetostat.algebra.solve import complement, conjugate, dual_basis
 from kinetostat.algebra.vector import ZERO, Vector
@@ -33,7 +33,7 @@ def leg_compliance(leg: LegScrews) -> list[list[Scalar]]:
     Source: theory (3). Zero for a rigid leg; infinite where a free spring is loaded.
     """
     size, springs = range(len(leg.wrenches)), list(zip(leg.compliance, leg.loads, strict=True))
-    return [[total([times(s, times(row[a], row[b])) for s, row in springs]) for b in size] for a in size]
+    return [[total([weighted(s, row[a] * row[b]) for s, row in springs]) for b in size] for a in size]
 
 
 def relaxed(leg: LegScrews) -> LegScrews:
@@ -52,9 +52,7 @@ def relaxed(leg: LegScrews) -> LegScrews:
         singularity_margin = smaller(singularity_margin, apart)
     weights = [0.0 if type(s) is float and s == INFINITE else s for s in leg.compliance]
     rows = [
-        tuple(
-            0.0 if row in free else total([times(c, b) for c, b in zip(row, column, strict=True)]) for column in basis
-        )
+        tuple(0.0 if row in free else total([c * b for c, b in zip(row, column, strict=True)]) for column in basis)
         for row in leg.loads
     ]
     wrenches = tuple(combine(leg.wrenches, column) for column in basis)
@@ -90,8 +88,8 @@ def _rank(rows: Sequence[Sequence[float]]) -> int:
 
 
 def _unit(row: Sequence[Scalar]) -> list[Scalar]:
-    size = reciprocal(sqrt(total([times(c, c) for c in row])))
-    return [times(c, size) for c in row]
+    size = reciprocal(sqrt(total([c * c for c in row])))
+    return [weighted(size, c) for c in row]
 
 
 def _identity(size: int) -> list[list[Scalar]]:
@@ -117,7 +115,7 @@ class Modes:
     def amounts(self, amounts: Sequence[Scalar]) -> list[Scalar]:
         """Of the modes, in a load that is given by amounts of the leg's own wrenches: L^T times these."""
         size = range(len(amounts))
-        return [plus(amounts[k], total([times(self.shares[j][k], amounts[j]) for j in size if j > k])) for k in size]
+        return [amounts[k] + total([self.shares[j][k] * amounts[j] for j in size if j > k]) for k in size]
 
 
 def modes_of(leg: LegScrews) -> Modes:
@@ -175,14 +173,14 @@ def leg_resistance(leg: LegScrews) -> Resistance:
     modes = modes_of(leg)
     yielding = [reciprocal(where(d > 0.0, d, INFINITE)) for d in modes.compliance]
     in_modes = [
-        (combine(modes.wrenches, [times(f, y) for f, y in zip(row, yielding, strict=True)]), s)
+        (combine(modes.wrenches, [f * y for f, y in zip(row, yielding, strict=True)]), s)
         for row, s in zip(modes.loads, leg.compliance, strict=True)
     ]
     pairs = list(zip(modes.wrenches, modes.compliance, strict=True))
     if len(leg.loads) != len(leg.wrenches):
         return Resistance(in_modes, [(wrench, reciprocal(d)) for wrench, d in pairs])
     held = [(wrench, where(d > 0.0, 0.0, INFINITE)) for wrench, d in pairs]
-    sizes = [reciprocal(sqrt(total([times(c, c) for c in row]))) for row in leg.loads]
+    sizes = [reciprocal(sqrt(total([c * c for c in row]))) for row in leg.loads]
     unload, sine = dual_basis([_unit(row) for row in leg.loads])
     apart = sine > UNSEEN
     springwise = [combine(leg.wrenches, row) * size for row, size in zip(unload, sizes, strict=True)]

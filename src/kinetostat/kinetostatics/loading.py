@@ -6,7 +6,7 @@ Source: theory (28) and (29). Wrenches and twists are in base axes, at the point
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, times, total
+from kinetostat.algebra.scalar import Scalar, total, weighted
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.symmetric import SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
@@ -33,7 +33,7 @@ class JointReaction:
 def deflection(compliance: Symmetric6, load: Wrench) -> Twist:
     """t = C w: small rotation (rad) and displacement (m) of the tool point under a wrench there, base axes."""
     w = load.components()
-    rows = [total([times(compliance.entry(i, j), w[j]) for j in range(SIZE)]) for i in range(SIZE)]
+    rows = [total([weighted(compliance.entry(i, j), w[j]) for j in range(SIZE)]) for i in range(SIZE)]
     return Twist(Vector(*rows[:3]), Vector(*rows[3:]))
 
 

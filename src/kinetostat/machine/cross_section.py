@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from kinetostat.algebra.scalar import Scalar, minus, plus, reciprocal, smaller, times
+from kinetostat.algebra.scalar import Scalar, reciprocal, smaller
 from kinetostat.machine.leg import RIGID
 from kinetostat.machine.link import Rigidity
 
@@ -72,12 +72,12 @@ def tube(outer: Scalar, inner: Scalar = 0.0, poisson: Scalar = 0.3) -> CrossSect
 
     Source of the shear factor: Cowper 1966, J. Appl. Mech. 33, 335.
     """
-    big, small = outer * outer, times(inner, inner)
-    area = (math.pi / 4.0) * minus(big, small)
-    second = (math.pi / 64.0) * minus(big * big, times(small, small))
-    ratio = times(small, reciprocal(big))
-    thick = plus(1.0, ratio) * plus(1.0, ratio)
-    below = plus((7.0 + 6.0 * poisson) * thick, times(20.0 + 12.0 * poisson, ratio))
+    big, small = outer * outer, inner * inner
+    area = (math.pi / 4.0) * (big - small)
+    second = (math.pi / 64.0) * (big * big - small * small)
+    ratio = small * reciprocal(big)
+    thick = (1.0 + ratio) * (1.0 + ratio)
+    below = (7.0 + 6.0 * poisson) * thick + (20.0 + 12.0 * poisson) * ratio
     return CrossSection(area, second, second, 2.0 * second, 6.0 * (1.0 + poisson) * thick / below)
 
 
@@ -154,7 +154,7 @@ def rigidity_of(shape: str, data: Any, shear: bool) -> Rigidity:
 
 def linear_density_of(shape: str, data: Any) -> Scalar:
     """Mass per length of such a bar, kg/m; arguments as for `rigidity_of`."""
-    return times(data.density, _profile(shape, data).area)
+    return data.density * _profile(shape, data).area
 
 
 def _profile(shape: str, data: Any) -> CrossSection:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from kinetostat.algebra.scalar import Scalar, cos, is_zero, plus, reciprocal, sin, times, where
+from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin, where
 from kinetostat.algebra.screw import Twist, Wrench, force_along, pure_moment, rotation_about, translation_along
 from kinetostat.algebra.solve import complement
 from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector, rotation_along
@@ -91,7 +91,7 @@ class Joint:
         turn = rotation_along(self.axis, angle.cosine, angle.sine)
         shift = self.point - turn.apply(self.point)
         if not is_zero(self.pitch):
-            shift = shift + self.axis * times(self.pitch, amount)
+            shift = shift + self.axis * (self.pitch * amount)
         return self, Displacement(turn, shift)
 
 
@@ -309,7 +309,7 @@ def two_force_leg(
     along = span * reciprocal(size)
     yielding = [Spring(f"{name} actuator", Joint(along), stiffness, actuated=True)]
     if not (type(axial) is float and axial == RIGID):
-        yielding.append(Spring(f"{name} rod", Joint(along), times(axial, reciprocal(size))))
+        yielding.append(Spring(f"{name} rod", Joint(along), axial * reciprocal(size)))
     chain: tuple[Element, ...] = (
         *revolutes(base_joint, AXES, f"{name} base joint"),
         *yielding,
@@ -358,4 +358,4 @@ def series(stiffness: Scalar, other: Scalar) -> Scalar:
     """Stiffness of two springs in a row: 1 / (1/k + 1/k'); exact for rigid ones."""
     if is_zero(stiffness) or is_zero(other):
         return 0.0
-    return reciprocal(plus(reciprocal(stiffness), reciprocal(other)))
+    return reciprocal(reciprocal(stiffness) + reciprocal(other))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.scalar import Scalar, cos, is_zero, plus, reciprocal, sin, times
+from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin
 from kinetostat.algebra.vector import IDENTITY, Displacement, Rotation, Vector, rotation_along
 from kinetostat.machine.leg import RIGID, Joint, Spring
 
@@ -91,7 +91,7 @@ class Beam:
         shear = [
             0.0
             if is_zero(bending) or is_zero(sliding)
-            else reciprocal(plus(times(cubed, reciprocal(bending)), times(length, reciprocal(sliding))))
+            else reciprocal(cubed * reciprocal(bending) + length * reciprocal(sliding))
             for bending, sliding in ((own.bending_z, own.shear_y), (own.bending_y, own.shear_z))
         ]
         turning = zip(("torsion", "bending y", "bending z"), (axes.x, axes.y, axes.z), strict=True)
@@ -100,9 +100,9 @@ class Beam:
             *_springs(
                 self.name,
                 [(what, Joint(axis, middle)) for what, axis in turning],
-                [times(k, shrink) for k in (own.torsion, own.bending_y, own.bending_z)],
+                [k * shrink for k in (own.torsion, own.bending_y, own.bending_z)],
             ),
-            *_springs(self.name, [(what, Joint(a)) for what, a in sliding_along], [times(own.axial, shrink), *shear]),
+            *_springs(self.name, [(what, Joint(a)) for what, a in sliding_along], [own.axial * shrink, *shear]),
         )
 
     @property
@@ -133,8 +133,8 @@ def lumped_springs(name: str, start: Vector, end: Vector, up: Vector, rigidity: 
         ("bending z", Joint(axes.z, start)),
         ("tension", Joint(axes.x)),
     ]
-    bending = (times(rigidity.bending_y, 3.0 * shrink), times(rigidity.bending_z, 3.0 * shrink))
-    return _springs(name, joints, (times(rigidity.torsion, shrink), *bending, times(rigidity.axial, shrink)))
+    bending = (rigidity.bending_y * (3.0 * shrink), rigidity.bending_z * (3.0 * shrink))
+    return _springs(name, joints, (rigidity.torsion * shrink, *bending, rigidity.axial * shrink))
 
 
 def _springs(name: str, joints: Sequence[tuple[str, Joint]], stiffness: Sequence[Scalar]) -> tuple[Spring, ...]:
@@ -195,7 +195,7 @@ class Parallelogram:
         along, normal = self.along, self.normal
         arm = self.width * normal.cross(self.side).dot(along)
         joints = [("tension", Joint(along)), ("turning", Joint(normal, (self.near + self.far) * 0.5))]
-        return _springs(self.name, joints, (2.0 * self.bar, times(0.5 * self.bar, arm * arm)))
+        return _springs(self.name, joints, (2.0 * self.bar, 0.5 * self.bar * (arm * arm)))
 
     @property
     def path(self) -> tuple[Vector, ...]:

@@ -5,7 +5,7 @@ A mass is a plain sum, over any scalar: how it is distributed, and what it does 
 
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, is_zero, plus, times, total
+from kinetostat.algebra.scalar import Scalar, is_zero, total
 from kinetostat.machine.machine import Configuration, Machine, Member
 
 PLATFORM = "platform and tool"
@@ -44,7 +44,7 @@ def moving_mass(machine: Machine, configuration: Configuration) -> Scalar:
 
 
 def _weighed(link: Member) -> Scalar | None:
-    return None if is_zero(link.linear_density) else plus(0.0, times(link.linear_density, link.length))
+    return None if is_zero(link.linear_density) else link.linear_density * link.length
 
 
 def _members(machine: Machine, configuration: Configuration) -> list[Member]:

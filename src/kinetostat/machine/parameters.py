@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from kinetostat.algebra.column import column
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.machine.machine import Family, Machine
 from kinetostat.spec.errors import InputError
@@ -92,8 +93,8 @@ def values(machine: Machine) -> dict[str, Scalar]:
 
 
 def with_values(machine: Machine, changes: Mapping[str, Any]) -> Machine:
-    """The machine with some scalars replaced, by leaf path; the values may be floats or traced scalars."""
-    new = {**values(machine), **changes}
+    """The machine with some scalars replaced, by leaf path: by floats, traced scalars or arrays (as columns)."""
+    new = {**values(machine), **{path: column(value) for path, value in changes.items()}}
     tables = {}
     for table, fields in machine.family.every_table.items():
         made = {}

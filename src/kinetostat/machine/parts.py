@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
-from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, times
+from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.vector import Z_AXIS, Displacement, Vector
 from kinetostat.machine.leg import RIGID, Element, Joint, Line, Spring, series
 from kinetostat.machine.link import Parallelogram, link_axes
@@ -38,7 +38,7 @@ def if_elastic(*springs: Spring) -> tuple[Spring, ...]:
 
 def per_length(rigidity: Scalar, length: Scalar, factor: float = 1.0) -> Scalar:
     """Stiffness of a whole link: factor x rigidity / length (SI), rigid by form where the rigidity is."""
-    return rigidity if is_rigid(rigidity) else times(times(factor, rigidity), reciprocal(length))
+    return rigidity if is_rigid(rigidity) else factor * rigidity * reciprocal(length)
 
 
 def in_series(stiffness: Scalar, rigidity: Scalar, length: Scalar, factor: float = 1.0) -> Scalar:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar, minus, plus, reciprocal, sqrt, times
+from kinetostat.algebra.scalar import Scalar, reciprocal, sqrt
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.machine import Closure, Step
@@ -57,9 +57,9 @@ class ParallelAxes:
         found: list[Scalar | Turn] = [0.0] * len(movers)
         turns = (one, _between(one, both), _between(both, whole))
         for i, turn in zip(self.revolutes, turns, strict=True):
-            found[i] = Turn(turn.cosine, times(self.signs[i], turn.sine))
+            found[i] = Turn(turn.cosine, self.signs[i] * turn.sine)
         if self.slide is not None:
-            found[self.slide] = times(self.signs[self.slide], axis.dot(goal - last))
+            found[self.slide] = self.signs[self.slide] * axis.dot(goal - last)
         return found, closure
 
     def _triangle(self, axis: Vector, lower: Vector, upper: Vector, span: Vector) -> tuple[Vector, Closure]:
@@ -70,7 +70,7 @@ class ParallelAxes:
         across = sqrt(near * shrink - along * along)
         sizes = sqrt(near), sqrt(far)
         closure = Closure(self.leg, sqrt(square), abs(sizes[0] - sizes[1]), sizes[0] + sizes[1])
-        return span * along + axis.cross(span) * times(self.bend, across), closure
+        return span * along + axis.cross(span) * (self.bend * across), closure
 
 
 def _point(joint: Joint) -> Vector:
@@ -87,14 +87,14 @@ def _across(vector: Vector, axis: Vector) -> Vector:
 def _turn(axis: Vector, old: Vector, new: Vector) -> Turn:
     """The turn about an axis that takes one vector at right angles to it to another of the same length."""
     size = reciprocal(old.dot(old))
-    return Turn(times(old.dot(new), size), times(axis.dot(old.cross(new)), size))
+    return Turn(old.dot(new) * size, axis.dot(old.cross(new)) * size)
 
 
 def _between(first: Turn, whole: Turn) -> Turn:
     """What is left of a turn after the first part of it."""
     return Turn(
-        plus(times(whole.cosine, first.cosine), times(whole.sine, first.sine)),
-        minus(times(whole.sine, first.cosine), times(whole.cosine, first.sine)),
+        whole.cosine * first.cosine + whole.sine * first.sine,
+        whole.sine * first.cosine - whole.cosine * first.sine,
     )
 
 

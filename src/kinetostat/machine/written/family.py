@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any
 
-from kinetostat.algebra.scalar import Scalar, is_zero, plus, sqrt, times, total, where
+from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.algebra.vector import AXES, IDENTITY, X_AXIS, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector
 from kinetostat.machine.cross_section import linear_density_of, rigidity_of
 from kinetostat.machine.leg import Element, Leg, Spring, Turn
@@ -134,7 +134,7 @@ def members(plan: Plan, **tables: Any) -> list[Member]:
 
 def _any_up(ends: tuple[Vector, Vector]) -> Vector:
     """The base axis that is furthest from a link's direction: for cross-sections that look alike from all sides."""
-    sizes = [times(c, c) for c in (ends[1] - ends[0]).components()]
+    sizes = [c * c for c in (ends[1] - ends[0]).components()]
     across = [axis for axis, size in zip(AXES, sizes, strict=True) if is_zero(size)]
     if across:
         return across[0]
@@ -153,4 +153,4 @@ def _length(plan: Plan, tables: Mapping[str, Any]) -> Scalar:
         Vector(*tables[f"legs.{leg.name}.{joint.name}"].point) - centre for leg in plan.legs for joint in leg.joints
     ]
     squares = total([arm.dot(arm) for arm in arms])
-    return sqrt(plus(squares, 0.0) * (1.0 / len(arms)))
+    return sqrt(squares * (1.0 / len(arms)))
