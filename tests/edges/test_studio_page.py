@@ -185,7 +185,7 @@ def test_every_view_follows():
         for tab, mark, words in (
             ("Indices", "indices", "condition number of W"),
             ("Sensitivity", "sensitivity-bars", "stiffness.actuator"),
-            ("Loads", "under-load", "no load on the tool"),
+            ("Loads", "under-load", "carries no load"),
         ):
             await page.front(tab)
             assert words in page.one(mark).content

@@ -1,1 +1,1 @@
-"""The studio: a page on which a designer moves a machine and sees where it is stiff. A thin edge; no formula here."""
+"""The studio: a page on which a designer moves a machine and sees where it is stiff. It computes nothing itself."""

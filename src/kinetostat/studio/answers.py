@@ -131,7 +131,7 @@ def compliance_map(request: MapRequest) -> dict[str, Array]:
     the pose are its inputs, also those that do not vary over the map, and the load is left out where it has no effect.
 
     Returns:
-        Values by quantity, the second field running fastest; NaN where there is no answer.
+        Values by quantity, the second field running fastest; NaN at a pose without an answer.
     """
     machine = _unloaded(request.machine)
     present, family = values(machine), machine.family
@@ -164,7 +164,7 @@ class CurveRequest:
 
 @dataclass(frozen=True)
 class Curves:
-    """Values of the field and of each quantity; None where there is no finite answer."""
+    """Values of the field and of each quantity; None where the answer is not finite."""
 
     across: list[float]
     values: dict[str, list[float | None]]

@@ -15,15 +15,12 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import MAP_POINTS, Ends, MapRequest, compliance_map, finite, map_quantities
 from kinetostat.studio.controls import Control
-from kinetostat.studio.elements import MapView, choice, refuse
+from kinetostat.studio.elements import THROTTLE, MapView, choice, refuse
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import full_label
 from kinetostat.units import KINDS
 from kinetostat.views.display import Scale, coordinate_scale
-
-THROTTLE = 0.03
-"""Seconds between two positions that a browser sends during a drag over the map."""
 
 
 class MapPanel:

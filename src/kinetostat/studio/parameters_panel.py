@@ -13,12 +13,10 @@ from nicegui.events import GenericEventArguments
 
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.controls import PANELS, STEPS, Control
-from kinetostat.studio.elements import QuantityRow
+from kinetostat.studio.elements import THROTTLE, QuantityRow
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import shown
 
-THROTTLE = 0.03
-"""Seconds between two positions of a slider that a browser sends; the last one is always sent."""
 OPEN = 12
 """Controls of a group up to which it is open from the start."""
 

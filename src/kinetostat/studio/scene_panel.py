@@ -13,7 +13,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, Report
 from kinetostat.studio.controls import FACTOR_STEPS, factor_at, factor_position, factor_text, read_factor
-from kinetostat.studio.elements import MachineView, QuantityRow
+from kinetostat.studio.elements import THROTTLE, MachineView, QuantityRow
 from kinetostat.studio.wording import engineering
 
 LAYERS = {
@@ -27,8 +27,6 @@ LAYERS = {
 """Layers of the picture that can be hidden, and their names on the page."""
 EXAGGERATION = "factor by which the deflected shape is drawn larger than it is: a number, or auto"
 VIEWS = {"iso": "view from the corner", "front": "front view", "side": "side view", "top": "view from above"}
-THROTTLE = 0.03
-"""Seconds between two positions of a slider that a browser sends."""
 
 
 class ScenePanel:

@@ -73,7 +73,7 @@ class Session:
         """Open a bundled machine.
 
         Raises:
-            InputError: there is no such machine; the session stays as it was.
+            InputError: no bundled machine has this name; the session stays as it was.
         """
         if name not in bundled():
             raise InputError(f"{shorten(name)} is not a bundled machine; choose one of {', '.join(bundled())}.")

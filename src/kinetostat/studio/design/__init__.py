@@ -1,1 +1,1 @@
-"""The studio's design tab: studies, searches in processes of their own, their results, favourites. No formula here."""
+"""The design tab of the studio: studies, searches in other processes, their results, favourites. No formulas."""

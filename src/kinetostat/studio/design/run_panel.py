@@ -18,14 +18,14 @@ from kinetostat.studio.elements import MAIN_BUTTON, CurveView, choice, confirm, 
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.wording import paragraph
 
-NOTHING = "There is no search yet. Choose variables and objectives on the left, then start one."
+NOTHING = "No search has been started yet. Choose variables and objectives on the left, then start one."
 INTERVAL = 0.5
 """Seconds between two looks at a search."""
 
 
 @dataclass(frozen=True)
 class ProgressRequest:
-    """The list of searches and the progress of one of them are wanted.
+    """A request for the list of searches and for the progress of one of them.
 
     Attributes:
         number: of the search; 0 for the latest.

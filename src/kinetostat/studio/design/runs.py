@@ -70,14 +70,14 @@ class Runs:
 
     def __init__(self, state: Path) -> None:
         """Searches below `state`; nothing is written before the first one."""
-        self._place = state / "runs"
+        self._folder = state / "runs"
         self._processes: dict[Path, subprocess.Popen[bytes]] = {}
         self._names: dict[Path, str] = {}
-        self._turn = threading.Lock()
+        self._lock = threading.Lock()
 
     def every(self) -> list[Run]:
         """All searches, the latest first."""
-        folders = numbered(self._place).items()
+        folders = numbered(self._folder).items()
         return [Run(n, path, self._name(path), self._stage(path)) for n, path in folders if (path / QUESTION).exists()]
 
     def of(self, number: int) -> Run:
@@ -86,7 +86,7 @@ class Runs:
         Raises:
             InputError: it has been deleted.
         """
-        path = numbered(self._place).get(number)
+        path = numbered(self._folder).get(number)
         if path is None or not (path / QUESTION).exists():
             raise InputError(f"search {number} has been deleted; choose another one.")
         return Run(number, path, self._name(path), self._stage(path))
@@ -97,13 +97,13 @@ class Runs:
         Raises:
             InputError: too many searches run or are kept, or the folder cannot be written.
         """
-        with self._turn:
+        with self._lock:
             self._check_free()
-            present = numbered(self._place)
+            present = numbered(self._folder)
             if len(present) >= MOST_RUNS:
                 raise InputError(f"{MOST_RUNS} searches are kept, the most there may be; delete one of them.")
             number = max(present, default=0) + 1
-            folder = self._place / f"{number:04d}-{slug(problem.study.name, 'study')}"
+            folder = self._folder / f"{number:04d}-{slug(problem.study.name, 'study')}"
             begin_search(problem, folder)
             self._work(folder)
         return self.of(number)
@@ -114,7 +114,7 @@ class Runs:
         Raises:
             InputError: too many searches run, or this one runs already or is done.
         """
-        with self._turn:
+        with self._lock:
             run = self.of(number)
             if run.stage not in (Stage.STOPPED, Stage.FAILED):
                 raise InputError(f"search {number} is {run.stage}; only a search that was stopped can be resumed.")
@@ -140,7 +140,7 @@ class Runs:
         Raises:
             InputError: it is running.
         """
-        with self._turn:
+        with self._lock:
             run = self.of(number)
             if run.stage.active:
                 raise InputError(f"search {number} is {run.stage}; stop it before it is deleted.")
@@ -201,7 +201,7 @@ def _complete(folder: Path) -> bool:
 
 
 def work(folder: Path) -> None:
-    """Search on from where the folder stands, and write the answer so far; this is what the process of a search does.
+    """Search on from the records in the folder and write the result so far: what the process of a search does.
 
     Args:
         folder: of a search that has been begun.

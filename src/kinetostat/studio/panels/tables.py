@@ -3,6 +3,8 @@
 The tables are HTML made of an `Analysis`; nothing is computed but the rounding of its numbers.
 """
 
+from collections.abc import Sequence
+
 from nicegui import ui
 
 from kinetostat.studies.analysis import Analysis
@@ -51,7 +53,7 @@ def _rows(analysis: Analysis, kind: str) -> list[list[float]] | None:
     return analysis.compliance if kind == "C" else analysis.stiffness
 
 
-def _diagonal(analysis: Analysis, kind: str) -> list[float]:
+def _diagonal(analysis: Analysis, kind: str) -> Sequence[float]:
     return analysis.compliance_diagonal if kind == "C" else analysis.stiffness_diagonal
 
 
@@ -154,7 +156,7 @@ def load_text(analysis: Analysis) -> str:
     """Deflection and spring loads as tables; without a load, how to set one."""
     load = analysis.load
     if load is None:
-        return paragraph("There is no load on the tool. Set a force or a moment under Load on the left.")
+        return paragraph("The tool carries no load. Set a force or a moment under Load on the left.")
     tool = [
         [name, *_loaded(wrench, motion, name.startswith("r"))]
         for name, wrench, motion in zip(COMPONENTS, load.wrench, load.deflection, strict=True)
