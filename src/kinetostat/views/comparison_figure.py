@@ -1,4 +1,4 @@
-"""Designs side by side as grouped bars for print; every axis has its unit."""
+"""Figure of a comparison of designs: grouped bars, a panel for each unit. Nothing is computed here but scales."""
 
 import math
 import string
@@ -19,54 +19,58 @@ from kinetostat.views.figures import COLOURS, STYLE, fix_layout
 WIDE = 30.0
 """Ratio of the largest to the least bar from which an axis is logarithmic."""
 LONGEST = 100
-"""Characters of a design's name in the legend."""
+"""Characters of a design's name in the legend, at most."""
 
 
-def comparison_figure(found: Comparison) -> Figure:
-    """Compliance about and along the axes, singularity margin and mass of each design; over a grid mean and worst.
+def comparison_figure(comparison: Comparison) -> Figure:
+    """Draw compliance, singularity margin and mass of each design; over a grid bars are means and dots the worst.
 
-    Bars start at 0. Where the numbers of a panel are too far apart for that, its axis is logarithmic and has marks, as
-    the length of a bar would mean nothing.
+    Bars start at 0. Where the numbers of a panel are too far apart for that, its axis is logarithmic, and marks take
+    the place of bars, whose length would have no meaning.
     """
-    grid = bool(found.ranges)
-    rows = found.over if grid else found.rows
-    panels = [panel for panel in (*_compliance(rows, grid), *_scalars(found, rows, grid)) if panel[1]]
+    grid = bool(comparison.ranges)
+    rows = comparison.over if grid else comparison.rows
+    panels = [panel for panel in (*_compliance(rows, grid), *_scalars(comparison, rows, grid)) if panel[1]]
     widths = [0.9 + 0.55 * len(bars) for _, bars in panels]
     with mpl.rc_context(STYLE):
-        height = 2.9 + 0.17 * len(found.designs)
+        height = 2.9 + 0.17 * len(comparison.designs)
         figure = Figure(figsize=(sum(widths) + 0.6 * len(panels) + 0.6, height), layout="constrained")
         axes = figure.subplots(1, len(panels), squeeze=False, width_ratios=widths).flat
         for panel, (title, bars) in zip(axes, panels, strict=True):
-            _bars(panel, title, bars, len(found.designs))
-        styles = zip(string.ascii_uppercase, found.designs, strict=False)
+            _bars(panel, title, bars, len(comparison.designs))
+        styles = zip(string.ascii_uppercase, comparison.designs, strict=False)
         handles = [
             Patch(color=_colour(i), label=f"{letter}  {_short(design.label)}")
             for i, (letter, design) in enumerate(styles)
         ]
-        frames = dict.fromkeys(frame_of(design.machine) for design in found.designs)
+        frames = dict.fromkeys(frame_of(design.machine) for design in comparison.designs)
         title = f"compliance in {' or '.join(frames)}"
         figure.legend(handles=handles, loc="outside lower left", title=title, title_fontsize=6.5, alignment="left")
-        what = f"mean (bars) and worst (dots) over {', '.join(found.ranges)}" if grid else "at the pose of each design"
-        figure.suptitle(f"Designs compared, {what}", fontsize=10)
+        over = (
+            f"mean (bars) and worst (dots) over {', '.join(comparison.ranges)}"
+            if grid
+            else "at the pose of each design"
+        )
+        figure.suptitle(f"Designs compared, {over}", fontsize=10)
         fix_layout(figure)
     return figure
 
 
 Bars = list[tuple[str, Row, Row | None]]
-"""Label, heights, and where dots stand."""
+"""Label, heights of the bars, and of the dots if there are any."""
 
 
 def _compliance(rows: Sequence[Row], grid: bool) -> list[tuple[str, Bars]]:
-    own = [row for row in rows if (row.group.startswith("C_") if grid else row.group == "compliance")]
+    diagonal = [row for row in rows if (row.group.startswith("C_") if grid else row.group == "compliance")]
     panels: dict[str, Bars] = {"compliance about axes": [], "compliance along axes": []}
-    for label, bar, dot in _pairs(own, grid):
+    for label, bar, dot in _pairs(diagonal, grid):
         panels[f"compliance {'about' if label.startswith('r') else 'along'} axes"].append((label, bar, dot))
     return list(panels.items())
 
 
-def _scalars(found: Comparison, rows: Sequence[Row], grid: bool) -> list[tuple[str, Bars]]:
+def _scalars(comparison: Comparison, rows: Sequence[Row], grid: bool) -> list[tuple[str, Bars]]:
     regular = [row for row in rows if (row.group if grid else row.name) == "singularity margin"]
-    mass = [row for row in found.rows if row.name == "moving mass"]
+    mass = [row for row in comparison.rows if row.name == "moving mass"]
     return [("singularity margin", _pairs(regular, grid)), ("moving mass", [("", row, None) for row in mass])]
 
 
@@ -76,7 +80,7 @@ def _pairs(rows: Sequence[Row], grid: bool) -> Bars:
     groups: dict[str, dict[str, Row]] = {}
     for row in rows:
         groups.setdefault(row.group.removeprefix("C_").replace("singularity margin", ""), {})[row.name] = row
-    return [(label, own["mean"], own["worst"]) for label, own in groups.items()]
+    return [(label, group["mean"], group["worst"]) for label, group in groups.items()]
 
 
 def _bars(panel: Axes, title: str, bars: Bars, count: int) -> None:
@@ -109,7 +113,7 @@ def _bars(panel: Axes, title: str, bars: Bars, count: int) -> None:
 
 
 def _say_missing(panel: Axes, place: float, row: Row, i: int) -> None:
-    """Where a design has no bar, why: nothing says its mass, it lacks the direction, or it is free there."""
+    """Write why a design has no bar: its mass is not known, it lacks the direction, or it is free there."""
     value = row.values[i]
     if value is None or not math.isfinite(value):
         none = "not known" if row.unit == "kg" else "none"

@@ -1,4 +1,4 @@
-"""A machine at its pose in three views: front, side and plan. Geometry is the configuration's, styles are here."""
+"""Drawing of a machine at its pose: front, side and plan. Geometry comes from the configuration, style is set here."""
 
 import math
 
@@ -11,26 +11,24 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.tolerances import SAME_TO_THE_EYE
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout
 
 VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
 MILLIMETRES = 1e3
 LEG, CONSTRAINT, PLATE = COLOURS[0], COLOURS[1], "#555555"
 OFFSETS = {"P": (4, 4), "T": (4, -10)}
-"""Of the letters of reference points from these, in points: both can be read where one is behind the other."""
-
-SAME = 1e-6
-"""Distance in mm below which two points of a view are one."""
+"""Shift of the letters of reference points, in points: both can be read where the points coincide in a view."""
 
 Loop = list[Vector]
 
 
 def three_views(machine: Machine, title: str) -> Figure:
-    """Front, side and plan of a machine, of a planar one the plan alone, to scale, in mm; actuated legs blue.
+    """Draw front, side and plan of a machine to scale, in mm; of a planar machine only the plan. Actuated legs are blue.
 
     Args:
         machine: at its pose; P is marked, and T where the machine has a tool.
-        title: over the whole figure.
+        title: above the figure.
     """
     response = respond(machine)
     configuration, tool = response.configuration, response.reference
@@ -74,25 +72,27 @@ def _draw_leg(panel: Axes, leg: Leg, across: str, up: str, actuated: bool) -> No
 
 
 def _number(panel: Axes, leg: Leg, x: float, y: float, colour: str) -> None:
-    """The leg's name beside its base joint: away from where the leg goes, or if it goes up, from the origin."""
+    """Write the name of a leg beside its base joint: away from the leg, or from the origin where the leg goes up."""
     ends = list(zip(*_flat(list(leg.path), "x", "y"), strict=True))
     ways = [*((x - end[0], y - end[1]) for end in ends[1:]), (x, y), (-1.0, 0.0)]
-    across, up = next((dx / far, dy / far) for dx, dy in ways if (far := math.hypot(dx, dy)) > SAME)
+    across, up = next(
+        (dx / far, dy / far) for dx, dy in ways if (far := math.hypot(dx, dy)) > MILLIMETRES * SAME_TO_THE_EYE
+    )
     text = leg.name.removeprefix("leg ")
     panel.annotate(
         text, (x, y), textcoords="offset points", xytext=(6 * across, 6 * up), color=colour, zorder=5,
-        ha=_side(across, "right", "left"), va=_side(up, "top", "bottom"),
+        ha=_alignment(across, "right", "left"), va=_alignment(up, "top", "bottom"),
         path_effects=[withStroke(linewidth=2.0, foreground="white")],
     )  # fmt: skip
 
 
-def _side(part: float, low: str, high: str) -> str:
-    """On which side of a text its point is, so that none of it lies over the point."""
+def _alignment(part: float, low: str, high: str) -> str:
+    """Alignment of a text along one axis, so that it does not cover its point."""
     return "center" if abs(part) < 0.38 else high if part > 0.0 else low
 
 
 def _loop(points: Loop) -> Loop:
-    """Points in the order of their angle about their centre in the x-y plane."""
+    """Points sorted by their angle about their centre in the x-y plane."""
     cx, cy = sum(p.x for p in points) / len(points), sum(p.y for p in points) / len(points)
     return sorted(points, key=lambda p: math.atan2(p.y - cy, p.x - cx))
 

@@ -71,7 +71,7 @@ def camera_on(points: Array, direction: Sequence[float], width: int, height: int
     or farther until it fits, which converges in a few steps.
 
     Args:
-        points: what is to be seen.
+        points: of all that has to be visible.
         direction: from there to the camera, base axes.
         width, height: of the picture, pixels.
     """

@@ -50,7 +50,7 @@ class Ground:
 
 
 def veil_over(ground: Ground, light: Light, camera: Camera) -> tuple[Floats, Floats]:
-    """Compute what the ground does to a background [height x width]: shares of shadow and of the grid's ink.
+    """Compute how the ground covers a background [height x width]: shares of shadow and of the grid's ink.
 
     Args:
         ground: where it is.

@@ -52,7 +52,7 @@ BOXES = (
 )
 """Soft boxes that metals mirror: direction, cosine of their half width, brightness."""
 GLINT = (tuple(SUN.tolist()), 0.96, 6.0)
-"""The main light, as far as surfaces mirror it; likewise."""
+"""The main light as surfaces mirror it, in the same form."""
 WALL, GROUND = 0.3, 0.42
 """Brightness of the room above and below the horizon."""
 
@@ -72,12 +72,12 @@ class Light:
 
 
 def light_on(points: Array, normals: Array, casters: Body, detail: int) -> Light:
-    """Compute the light on points of surfaces from many distant lamps, each with a map of what is in its way.
+    """Compute the light on points of surfaces from many distant lamps, each with a map of the solids in its way.
 
     Args:
         points: base frame, m [n x 3].
         normals: of the surfaces, unit vectors [n x 3].
-        casters: what casts shadows.
+        casters: solids that cast shadows.
         detail: pixels across a picture of all of it: shadows need not be finer.
     """
     box = casters.points if len(casters.points) else np.zeros((1, 3))
@@ -150,7 +150,7 @@ def _sky_directions() -> Array:
 def shaded(look: Indices, normals: Floats, to_eye: Floats, light: Light) -> Floats:
     """Compute the colours [n x 3] (linear, 0 to 1) of points: paint and metal in a studio with soft boxes.
 
-    Diffuse paint takes light from sun, sky and ground; what shines mirrors the room and the main light. At the end
+    Diffuse paint takes light from sun, sky and ground; shiny surfaces mirror the room and the main light. At the end
     bright light is compressed as film does.
 
     Source: C. Schlick, An inexpensive BRDF model for physically-based rendering (1994), for the reflectance;

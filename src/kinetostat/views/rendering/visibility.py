@@ -69,7 +69,7 @@ class Hits:
 
 
 def hits_of(body: Body, camera: Camera, finer: int) -> Hits:
-    """Find what a camera sees of a body in `finer` times as many pixels across and down.
+    """Find the points of a body that a camera sees, in `finer` times as many pixels across and down.
 
     The finer pixels smooth the edges. Light is costly, so those that lie within one pixel of the picture, on the same
     solid and with like normals, share one sample.

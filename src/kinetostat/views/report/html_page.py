@@ -1,6 +1,6 @@
-"""A report as one self-contained HTML page: pictures, data and the renderer are inside it, and no server is asked.
+"""A report as one self-contained HTML page: pictures, data and the renderer are inside it, and it needs no server.
 
-The content comes from `content.Report`; nothing is said here that is not in it.
+The content comes from `content.Report`; only its form is decided here.
 """
 
 import json

@@ -8,6 +8,7 @@ from dataclasses import replace
 from kinetostat.kinematics.mobility import Kind, Mobility
 from kinetostat.spec.fields import NO_LIMIT
 from kinetostat.studies.analysis import Analysis
+from kinetostat.views.analysis_tables import margins
 from kinetostat.views.drawing import three_views
 from kinetostat.views.report.content import Block, Figure, Paragraph, Section
 from kinetostat.views.report.pictures import SHARE, WITHOUT, Shown, can_be_live, drawn
@@ -49,9 +50,8 @@ def _drawing(analysis: Analysis) -> Figure:
 
 def pose_kind(mobility: Mobility) -> str:
     """Say in a sentence or two what kind of pose it is, and how far it is from a singularity."""
-    legs, platform = mobility.leg_distance, mobility.platform_distance
     kind = f"{mobility.kind} pose" if mobility.kind is Kind.REGULAR else mobility.kind
-    return f"{_first_upper(kind)} Singularity margin (0 to 1): legs {legs:.2g}, platform {platform:.2g}."
+    return f"{_first_upper(kind)} {margins(mobility)}"
 
 
 def _mobility(mobility: Mobility | None) -> tuple[Block, ...]:

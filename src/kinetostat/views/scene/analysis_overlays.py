@@ -50,7 +50,7 @@ class Deflection:
 def overlays_of(
     analysis: Analysis, sizes: Proportions, factor: float | None = None
 ) -> tuple[list[Solid], float | None]:
-    """Draw what an analysis says, and return the factor by which the deflected shape is exaggerated.
+    """Draw the results of an analysis, and return the factor by which the deflected shape is exaggerated.
 
     Args:
         analysis: in base axes; for a pose without an answer nothing is drawn.

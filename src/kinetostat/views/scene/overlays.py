@@ -1,6 +1,6 @@
 """Symbols over a machine: load, compliance ellipsoids, soft and free directions, and frames.
 
-Sizes of the machine decide how large they are; what they show is decided in `analysis_overlays`.
+Sizes of the machine decide how large they are; their directions and values come from `analysis_overlays`.
 """
 
 import math

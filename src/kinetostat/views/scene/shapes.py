@@ -1,6 +1,6 @@
-"""Shapes that machines are made of: shafts, balls, forks, blocks, coils, arrows. Each in its own axes, m.
+"""Shapes of the parts of machines: shafts, balls, forks, blocks, coils, arrows. Each in its own axes, m.
 
-Where they stand and what they are made of is decided elsewhere.
+Their places and materials are decided elsewhere.
 """
 
 import math

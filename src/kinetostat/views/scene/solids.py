@@ -124,7 +124,7 @@ LAYERS = ("machine", "springs", "load", "deflection", "ellipsoids", "directions"
 
 
 BASE = Displacement(IDENTITY, ZERO)
-"""The place of what stands in the base frame."""
+"""The place of a solid whose axes are those of the base frame."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class Scene:
 
     Attributes:
         solids, labels: in the base frame.
-        centre: of what is shown, m.
+        centre: of all solids, m.
         size: its diagonal, m.
         floor: height of the ground below it, m.
     """
