@@ -24,7 +24,7 @@ Loop = list[Vector]
 
 
 def three_views(machine: Machine, title: str) -> Figure:
-    """Draw front, side and plan of a machine to scale, in mm; of a planar machine only the plan. Actuated legs are blue.
+    """Draw front, side and plan of a machine to scale, in mm; of a planar machine only the plan. Actuated legs: blue.
 
     Args:
         machine: at its pose; P is marked, and T where the machine has a tool.
