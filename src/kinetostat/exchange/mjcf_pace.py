@@ -96,5 +96,5 @@ def _masses(model: Model, known: Sequence[Mass]) -> dict[str, float]:
 
 
 def _share(body: Body, bodies: Sequence[Body], known: Sequence[Mass]) -> float:
-    masses = [float(p.mass) for p in known if p.mass is not None and f"{p.name} ".startswith(f"{body.leg} ")]
+    masses = [float(p.mass) for p in known if p.mass is not None and p.leg == body.leg]
     return sum(masses) / sum(other.leg == body.leg for other in bodies)

@@ -66,13 +66,13 @@ def elements(configuration: Configuration) -> list[Element]:
         parts: dict[str, list[tuple[int, Spring]]] = {}
         for spring in leg.springs:
             if spring.stiffness != 0.0:
-                parts.setdefault(spring.part or spring.name, []).append((number, spring))
+                parts.setdefault(spring.of, []).append((number, spring))
             number += 1
-        alike = tuple((part.removeprefix(f"{leg.name} "), len(own)) for part, own in parts.items())
+        alike = tuple((own[0][1].kind, len(own)) for own in parts.values())
         for part, own in parts.items():
             if len(own) > 1 and all(spring.stiffness == math.inf for _, spring in own):
                 continue
-            label = part.removeprefix(f"{leg.name} ")
+            label = own[0][1].kind
             kind = (label, tuple(_unit(spring) for _, spring in own), own[0][1].actuated, alike)
             groups.setdefault(kind, {})[part] = own
     found = [_element(str(kind[0]), parts) for kind, parts in groups.items()]

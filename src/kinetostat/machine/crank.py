@@ -10,7 +10,7 @@ from typing import Annotated
 from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin
 from kinetostat.algebra.triangle import crank_end, crank_range
 from kinetostat.algebra.vector import AXES, Z_AXIS, Vector, rotation_z
-from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, Spring, revolutes
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, PartName, Spring, numbered, revolutes
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure
 from kinetostat.machine.parts import Arm, if_elastic, per_length
@@ -91,16 +91,16 @@ def crank_leg(
     """
     elbow, limits = place(name, base, tip, axis, links)
     along, crank = (tip - elbow) * reciprocal(links.rod), (elbow - base) * reciprocal(links.crank)
-    bending, part = per_length(links.bending, links.crank, 3.0), f"{name} crank"
+    bending, part = per_length(links.bending, links.crank, 3.0), PartName(name, "crank")
     chain: tuple[Element, ...] = (
-        Spring(f"{name} actuator", Joint(axis, base), stiffness, actuated=True),
+        Spring(PartName(name, "actuator"), Joint(axis, base), stiffness, actuated=True),
         *if_elastic(
             Spring(f"{part} in plane", Joint(axis, base), bending, part),
             Spring(f"{part} across", Joint(axis.cross(crank), base), bending, part),
         ),
         Arm(base, elbow),
         *revolutes(elbow, AXES, f"{name} elbow"),
-        *if_elastic(Spring(f"{name} rod", Joint(along), per_length(links.axial, links.rod))),
+        *if_elastic(Spring(PartName(name, "rod"), Joint(along), per_length(links.axial, links.rod))),
         *revolutes(tip, AXES, f"{name} platform joint"),
     )
     return Leg(name, chain, (Line(tip, along),)), limits
@@ -126,4 +126,4 @@ def crank_legs(
         crank_leg(f"leg {i}", base, tip, Z_AXIS.cross(side), k, links)
         for i, (base, tip, side, k) in enumerate(zip(*ends, sides, stiffness, strict=True), 1)
     ]
-    return [leg for leg, _ in placed], [limit for _, limits in placed for limit in limits]
+    return numbered(leg for leg, _ in placed), [limit for _, limits in placed for limit in limits]

@@ -6,7 +6,7 @@ business (`catalogue`), what the screws do to the platform is that of `kinetosta
 Source: theory (1) and (2), eqs. 1-4. In the base frame.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -20,6 +20,26 @@ UNSEEN = 1e-12
 
 RIGID = float("inf")
 """Stiffness of what does not yield: exact, not large."""
+
+
+class PartName(str):
+    """Name of a joint or link, e.g. "leg 1 actuator", that knows which leg it is in and what it is there.
+
+    Attributes:
+        leg: name of the leg, "leg 1".
+        kind: what the part is in it, "actuator": alike in legs that are alike.
+    """
+
+    leg: str
+    kind: str
+
+    def __new__(cls, leg: str, kind: str) -> "PartName":
+        name = super().__new__(cls, f"{leg} {kind}")
+        name.leg, name.kind = leg, kind
+        return name
+
+    def __getnewargs__(self) -> tuple[str, str]:  # type: ignore[override]
+        return self.leg, self.kind
 
 
 @dataclass(frozen=True)
@@ -121,6 +141,16 @@ class Spring:
     hinge: bool = False
 
     @property
+    def of(self) -> str:
+        """The part that it stands for."""
+        return self.part or self.name
+
+    @property
+    def kind(self) -> str:
+        """What that part is in its leg; its whole name where no leg is known."""
+        return self.of.kind if isinstance(self.of, PartName) else self.of
+
+    @property
     def freedoms(self) -> tuple[Joint, ...]:
         """None: it is held."""
         return ()
@@ -216,12 +246,22 @@ class Leg:
         lines: where it is known in closed form that the leg carries forces along these lines and nothing else.
         idle: which of its passive freedoms, counted from the base, depend on the others: the spin of a strut between
             two spherical joints, for instance. Irrelevant where `lines` are given.
+        number: of the actuated legs of a family, from 1, in the order of its fields; None for a leg that is not one of
+            them, and in machines written leg by leg.
+        short: what a drawing writes beside it; its name if empty.
     """
 
     name: str
     chain: tuple[Element, ...]
     lines: tuple[Line, ...] = ()
     idle: tuple[int, ...] = ()
+    number: int | None = None
+    short: str = ""
+
+    @property
+    def label(self) -> str:
+        """What a drawing writes beside it."""
+        return self.short or self.name
 
     @property
     def passive(self) -> tuple[Joint, ...]:
@@ -307,9 +347,9 @@ def two_force_leg(
     span = platform_joint - base_joint
     size = span.norm()
     along = span * reciprocal(size)
-    yielding = [Spring(f"{name} actuator", Joint(along), stiffness, actuated=True)]
+    yielding = [Spring(PartName(name, "actuator"), Joint(along), stiffness, actuated=True)]
     if not (type(axial) is float and axial == RIGID):
-        yielding.append(Spring(f"{name} rod", Joint(along), axial * reciprocal(size)))
+        yielding.append(Spring(PartName(name, "rod"), Joint(along), axial * reciprocal(size)))
     chain: tuple[Element, ...] = (
         *revolutes(base_joint, AXES, f"{name} base joint"),
         *yielding,
@@ -326,7 +366,12 @@ def two_force_legs(
 ) -> list[Leg]:
     """Actuated U-P-S legs "leg 1", "leg 2", ... between joint centres (base frame, m) with their actuators (N/m)."""
     pairs = zip(base_joints, platform_joints, stiffness, strict=True)
-    return [two_force_leg(f"leg {i}", base, top, k, axial) for i, (base, top, k) in enumerate(pairs, 1)]
+    return numbered(two_force_leg(f"leg {i}", base, top, k, axial) for i, (base, top, k) in enumerate(pairs, 1))
+
+
+def numbered(legs: Iterable[Leg]) -> list[Leg]:
+    """Return the actuated legs of a family with their numbers, which drawings write beside them."""
+    return [replace(leg, number=i, short=leg.short or str(i)) for i, leg in enumerate(legs, 1)]
 
 
 def reciprocal_wrenches(passive: Sequence[Twist], length: Scalar) -> tuple[tuple[Wrench, ...], Scalar]:

@@ -14,8 +14,9 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.machine.leg import Leg
 from kinetostat.spec.fields import Field, Quantity, made_table
 
-Lengths = Callable[[Sequence[Leg], Vector, Any], list[tuple[str, Scalar]]]
-"""From the legs at a pose, P (base frame, m) and the table `geometry` to names and lengths (m) of links."""
+Lengths = Callable[[Sequence[Leg], Vector, Any], list[tuple[str, str, Scalar]]]
+"""From the legs at a pose, P (base frame, m) and the table `geometry` to each link: its leg, or nothing if it
+belongs to none, its name and its length (m)."""
 
 
 @dataclass(frozen=True)
@@ -45,18 +46,19 @@ def density_table(kinds: Sequence[LinkKind]) -> type:
     return made_table("LinearDensity", found)
 
 
-def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[tuple[str, Scalar]]:
+def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[tuple[str, str, Scalar]]:
     """Legs from the first to the last of their passive joints, as long as the pose makes them."""
     ends = [(leg.name, leg.passive[0].point, leg.passive[-1].point) for leg in actuated_legs(legs)]
-    return [(name, (end - start).norm()) for name, start, end in ends if start is not None and end is not None]
+    return [(name, name, (end - start).norm()) for name, start, end in ends if start is not None and end is not None]
 
 
 def in_each_leg(what: str, field: str, bars: int = 1) -> Lengths:
     """Links of the actuated legs, all as long as a field of [geometry] says; in pairs where `bars` is 2."""
 
-    def lengths(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[tuple[str, Scalar]]:
+    def lengths(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[tuple[str, str, Scalar]]:
         names = [what] if bars == 1 else [f"{what} {i}" for i in range(1, bars + 1)]
-        return [(f"{leg.name} {name}", getattr(geometry, field)) for leg in actuated_legs(legs) for name in names]
+        length = getattr(geometry, field)
+        return [(leg.name, f"{leg.name} {name}", length) for leg in actuated_legs(legs) for name in names]
 
     return lengths
 
@@ -64,18 +66,18 @@ def in_each_leg(what: str, field: str, bars: int = 1) -> Lengths:
 def listed(what: str, field: str) -> Lengths:
     """Links whose lengths are the entries of a field of [geometry]."""
 
-    def lengths(_legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[tuple[str, Scalar]]:
-        return [(f"{what} {i}", length) for i, length in enumerate(getattr(geometry, field), 1)]
+    def lengths(_legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[tuple[str, str, Scalar]]:
+        return [("", f"{what} {i}", length) for i, length in enumerate(getattr(geometry, field), 1)]
 
     return lengths
 
 
 def from_origin(what: str) -> Lengths:
     """One link from the origin of the base frame to P."""
-    return lambda _legs, tip, _geometry: [(what, tip.norm())]
+    return lambda _legs, tip, _geometry: [(what, what, tip.norm())]
 
 
 def actuated_legs(legs: Sequence[Leg]) -> list[Leg]:
-    """The legs "leg ..." that are there: one whose actuator has no stiffness by form has been removed."""
-    named = [leg for leg in legs if leg.name.startswith("leg ")]
-    return [leg for leg in named if not any(s.actuated and is_zero(s.stiffness) for s in leg.springs)]
+    """Return the numbered legs that are there: one whose actuator has no stiffness by form has been removed."""
+    counted = [leg for leg in legs if leg.number is not None]
+    return [leg for leg in counted if not any(s.actuated and is_zero(s.stiffness) for s in leg.springs)]

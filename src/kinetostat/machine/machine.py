@@ -96,11 +96,13 @@ class Member:
     """A link that can move.
 
     Attributes:
+        leg: that it belongs to, or empty.
         name: unique within the machine.
         length: from joint to joint, m.
         linear_density: kg/m; 0 where nothing says it.
     """
 
+    leg: str
     name: str
     length: Scalar
     linear_density: Scalar

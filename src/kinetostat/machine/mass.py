@@ -18,10 +18,12 @@ class Mass:
     Attributes:
         name: of the link, or `PLATFORM`.
         mass: kg; None where nothing says it.
+        leg: that it belongs to; empty for the platform and for a link that is not counted to a leg.
     """
 
     name: str
     mass: Scalar | None
+    leg: str = ""
 
 
 def moving_masses(machine: Machine, configuration: Configuration) -> list[Mass]:
@@ -34,7 +36,7 @@ def moving_masses(machine: Machine, configuration: Configuration) -> list[Mass]:
         configuration: of it, at its pose.
     """
     platform = machine.tables["tool"].mass
-    links = [Mass(one.name, _weighed(one)) for one in _members(machine, configuration)]
+    links = [Mass(link.name, _weighed(link), link.leg) for link in _members(machine, configuration)]
     return [*links, Mass(PLATFORM, None if is_zero(platform) else platform)]
 
 
@@ -55,6 +57,6 @@ def _members(machine: Machine, configuration: Configuration) -> list[Member]:
     for kind in family.links:
         density = getattr(machine.tables["linear_density"], kind.name)
         placed = configuration.legs, configuration.platform.translation, machine.tables["geometry"]
-        for i, (name, length) in enumerate(kind.lengths(*placed)):
-            found.append(Member(name, length, density if kind.count is None else density[i]))
+        for i, (leg, name, length) in enumerate(kind.lengths(*placed)):
+            found.append(Member(leg, name, length, density if kind.count is None else density[i]))
     return found

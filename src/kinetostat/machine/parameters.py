@@ -15,10 +15,6 @@ from kinetostat.machine.machine import Family, Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Quantity, leaves, quantities
 
-LEG_BY_LEG = ("_angles", "crank_turn", "stiffness.actuator")
-"""Ends of the fields of families that have an entry for each leg."""
-
-
 FULL_TURN = 2.0 * math.pi
 BEYOND = 100.0
 """How many times the longest of all other lengths a length may be."""
@@ -106,13 +102,13 @@ def with_values(machine: Machine, changes: Mapping[str, Any]) -> Machine:
 
 
 def with_leg(machine: Machine, path: str) -> str:
-    """A path for people: "geometry.base_angles.5 (leg 6)", as entries count from 0 and legs have names."""
+    """Return a path for people: "geometry.base_angles.5 (leg 6)", as entries count from 0 and legs have names."""
     field, _, entry = path.rpartition(".")
-    if not entry.isdigit() or not field.endswith(LEG_BY_LEG):
+    whole = next((p for p in parameters(machine.family) if p.path == field and p.quantity.per_leg), None)
+    if whole is None:
         return path
-    legs = [leg.name for leg in machine.configure().legs if leg.name.startswith("leg ")]
-    count = next(len(p.leaves) for p in parameters(machine.family) if p.path == field)
-    return f"{path} ({legs[int(entry)] if len(legs) == count else f'leg {int(entry) + 1}'})"
+    names = {leg.number: leg.name for leg in machine.configure().legs}
+    return f"{path} ({names.get(int(entry) + 1, f'leg {int(entry) + 1}')})"
 
 
 def doubts(machine: Machine) -> Iterator[str]:

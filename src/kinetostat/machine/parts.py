@@ -12,7 +12,7 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.vector import Z_AXIS, Displacement, Vector
-from kinetostat.machine.leg import RIGID, Element, Joint, Line, Spring, series
+from kinetostat.machine.leg import RIGID, Element, Joint, Line, PartName, Spring, series
 from kinetostat.machine.link import Parallelogram, link_axes
 from kinetostat.spec.fields import Quantity, table
 
@@ -141,7 +141,7 @@ class BarPair:
         return (
             Joint(self.side, self.near, f"{self.name} elbow"),
             Joint(self.along, self.near, f"{self.name} bars"),
-            Parallelogram(f"{self.name} bars", self.near, self.far, self.side, self.spacing, bar),
+            Parallelogram(PartName(self.name, "bars"), self.near, self.far, self.side, self.spacing, bar),
             Joint(self.side, self.far, f"{self.name} platform joint"),
         )
 

@@ -37,10 +37,10 @@ class ThreeLegs(Rings):
     """Part of a table [geometry]: rings of three legs."""
 
     base_angles: Annotated[
-        Three, Quantity("angle", "angles of the base joints from x, leg by leg", count=3, apart=True)
+        Three, Quantity("angle", "angles of the base joints from x, leg by leg", count=3, apart=True, per_leg=True)
     ]
     platform_angles: Annotated[
-        Three, Quantity("angle", "angles of the platform joints from x, leg by leg", count=3, apart=True)
+        Three, Quantity("angle", "angles of the platform joints from x, leg by leg", count=3, apart=True, per_leg=True)
     ]
 
 
@@ -138,9 +138,11 @@ def with_cranks(
 
 def _crank_tables(geometry: type, stiffness: type) -> dict[str, type]:
     count = quantities(stiffness)["actuator"].count
-    turn = Quantity("angle", "turn of each crank's plane about z, from the radial direction", count=count)
+    turn = Quantity("angle", "turn of each crank's plane about z, from the radial direction", count=count, per_leg=True)
     changed = {
-        "actuator": Field(Quantity("torsional stiffness", "stiffness of the actuated revolutes", count=count)),
+        "actuator": Field(
+            Quantity("torsional stiffness", "stiffness of the actuated revolutes", count=count, per_leg=True)
+        ),
         "leg_axial": Field(Quantity("axial rigidity", "axial rigidity of the rods, EA"), RIGID),
         "crank_bending": Field(Quantity("bending rigidity", "bending rigidity of the cranks, EI"), RIGID),
     }

@@ -45,6 +45,7 @@ class Quantity:
         meaning: one phrase for people, also the comment in templates.
         positive: zero and negative values are refused; stiffness may be zero (free) but never negative.
         count: how many values.
+        per_leg: whether there is a value for each actuated leg, in their order.
         apart: whether each of them must be written, as components and angles; otherwise one may stand for all.
         most: the largest value that is allowed, SI.
         unset: of a limit, the infinity that stands for "none"; None for what is no limit.
@@ -57,6 +58,7 @@ class Quantity:
     apart: bool = False
     most: float = math.inf
     unset: float | None = None
+    per_leg: bool = False
 
     @property
     def stiff(self) -> bool:

@@ -78,7 +78,7 @@ def _number(panel: Axes, leg: Leg, x: float, y: float, colour: str) -> None:
     across, up = next(
         (dx / far, dy / far) for dx, dy in ways if (far := math.hypot(dx, dy)) > MILLIMETRES * SAME_TO_THE_EYE
     )
-    text = leg.name.removeprefix("leg ")
+    text = leg.label
     panel.annotate(
         text, (x, y), textcoords="offset points", xytext=(6 * across, 6 * up), color=colour, zorder=5,
         ha=_alignment(across, "right", "left"), va=_alignment(up, "top", "bottom"),

@@ -9,7 +9,7 @@ from typing import Annotated
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import IDENTITY, Z_AXIS, Displacement, Vector, polar, ring
 from kinetostat.machine.crank import CrankLinks, place
-from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring, numbered
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm, BarPair, Translations
@@ -24,7 +24,8 @@ class Geometry(Rings):
     """Table [geometry]; the base frame has its origin at the base centre, the platform's axes stay parallel to it."""
 
     leg_angles: Annotated[
-        Three, Quantity("angle", "angles of the legs from x, in base and platform", count=LEGS, apart=True)
+        Three,
+        Quantity("angle", "angles of the legs from x, in base and platform", count=LEGS, per_leg=True, apart=True),
     ]
     arm_length: Annotated[
         float, Quantity("length", "from the actuated revolute to the middle of the elbow", positive=True)
@@ -37,7 +38,9 @@ class Geometry(Rings):
 class Stiffness:
     """Table [stiffness]."""
 
-    actuator: Annotated[Three, Quantity("torsional stiffness", "stiffness of the actuated revolutes", count=LEGS)]
+    actuator: Annotated[
+        Three, Quantity("torsional stiffness", "stiffness of the actuated revolutes", count=LEGS, per_leg=True)
+    ]
     bar_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of each bar, EA")] = RIGID
     arm_bending: Annotated[float, Quantity("bending rigidity", "bending rigidity of the arms, EI")] = RIGID
     arm_torsion: Annotated[float, Quantity("torsional rigidity", "torsional rigidity of the arms, GJ")] = RIGID
@@ -57,7 +60,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Translations) -> C
         for i, (low, high, outward, k) in enumerate(zip(base, top, radial, stiffness.actuator, strict=True), 1)
     ]
     limits = tuple(limit for _, own in found for limit in own)
-    return Configuration(Displacement(IDENTITY, tip), tuple(leg for leg, _ in found), limits, geometry.size)
+    return Configuration(Displacement(IDENTITY, tip), tuple(numbered(leg for leg, _ in found)), limits, geometry.size)
 
 
 def _leg(
@@ -67,8 +70,8 @@ def _leg(
     elbow, limits = place(name, base, tip, axis, CrankLinks(geometry.arm_length, geometry.bar_length))
     bars = BarPair(name, elbow, tip, axis, geometry.bar_length, geometry.bar_spacing, stiffness.bar_axial)
     chain: tuple[Element, ...] = (
-        Spring(f"{name} actuator", Joint(axis, base), actuator, actuated=True),
-        Arm(base, elbow, f"{name} arm", axis, stiffness.arm_bending, stiffness.arm_torsion),
+        Spring(PartName(name, "actuator"), Joint(axis, base), actuator, actuated=True),
+        Arm(base, elbow, PartName(name, "arm"), axis, stiffness.arm_bending, stiffness.arm_torsion),
         *bars.chain,
     )
     return Leg(name, chain, bars.lines), limits

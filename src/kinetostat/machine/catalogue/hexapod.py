@@ -20,10 +20,10 @@ class Geometry(Rings):
     """Table [geometry]; the base frame has its origin at the base centre, the platform frame at P."""
 
     base_angles: Annotated[
-        Six, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS, apart=True)
+        Six, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS, per_leg=True, apart=True)
     ]
     platform_angles: Annotated[
-        Six, Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS, apart=True)
+        Six, Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS, per_leg=True, apart=True)
     ]
     base_height: Annotated[float, Quantity("length", "z of the base joints, base frame")] = 0.0
     platform_height: Annotated[float, Quantity("length", "z of the platform joints, platform frame (from P)")] = 0.0
@@ -34,7 +34,8 @@ class Stiffness:
     """Table [stiffness]."""
 
     actuator: Annotated[
-        Six, Quantity("linear stiffness", "stiffness of the six legs with their actuators held", count=LEGS)
+        Six,
+        Quantity("linear stiffness", "stiffness of the six legs with their actuators held", count=LEGS, per_leg=True),
     ]
     leg_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of the legs, EA")] = RIGID
 

@@ -5,12 +5,13 @@ applications, the Orthoglide" (2003), for the architecture; bars on spherical jo
 section 4). At the origin all bars point along their slides: there the machine is isotropic.
 """
 
+from dataclasses import replace
 from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.triangle import slide_travel
 from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector
-from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring, numbered
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm, BarPair, Translations
@@ -38,7 +39,9 @@ class Geometry:
 class Stiffness:
     """Table [stiffness]."""
 
-    actuator: Annotated[Three, Quantity("linear stiffness", "stiffness of the slides along x, y, z", count=LEGS)]
+    actuator: Annotated[
+        Three, Quantity("linear stiffness", "stiffness of the slides along x, y, z", count=LEGS, per_leg=True)
+    ]
     bar_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of each bar, EA")] = RIGID
     foot_bending: Annotated[float, Quantity("bending rigidity", "bending rigidity of the feet, EI")] = RIGID
     foot_torsion: Annotated[float, Quantity("torsional rigidity", "torsional rigidity of the feet, GJ")] = RIGID
@@ -55,7 +58,10 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Translations) -> C
         _leg(f"leg {name}", tip, (AXES[i], AXES[(i + 1) % LEGS]), k, geometry, stiffness)
         for i, (name, k) in enumerate(zip("xyz", stiffness.actuator, strict=True))
     ]
-    legs, limits = tuple(leg for leg, _ in found), tuple(limit for _, limit in found)
+    legs, limits = (
+        tuple(numbered(replace(leg, short=axis) for axis, (leg, _) in zip("xyz", found, strict=True))),
+        tuple(limit for _, limit in found),
+    )
     return Configuration(Displacement(IDENTITY, tip), legs, limits, geometry.bar_length)
 
 
@@ -70,8 +76,8 @@ def _leg(
     bars = BarPair(name, slide, joint, side, geometry.bar_length, geometry.bar_spacing, stiffness.bar_axial)
     rail = slide + side.cross(forward) * geometry.foot_length
     chain: tuple[Element, ...] = (
-        Spring(f"{name} actuator", Joint(forward), actuator, actuated=True),
-        Arm(rail, slide, f"{name} foot", forward, stiffness.foot_bending, stiffness.foot_torsion),
+        Spring(PartName(name, "actuator"), Joint(forward), actuator, actuated=True),
+        Arm(rail, slide, PartName(name, "foot"), forward, stiffness.foot_bending, stiffness.foot_torsion),
         *bars.chain,
     )
     return Leg(name, chain, bars.lines), Closure(f"pair of bars of {name}", aside, 0.0, geometry.bar_length)

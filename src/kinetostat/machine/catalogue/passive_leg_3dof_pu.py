@@ -25,7 +25,9 @@ class Geometry(ThreeLegs):
 class Stiffness:
     """Table [stiffness]."""
 
-    actuator: Annotated[Three, Quantity("linear stiffness", "stiffness of the three actuators, Ka", count=LEGS)]
+    actuator: Annotated[
+        Three, Quantity("linear stiffness", "stiffness of the three actuators, Ka", count=LEGS, per_leg=True)
+    ]
     ram: Annotated[
         Three, Quantity("torsional stiffness", "ram at its base end: bending about x and y, torsion about z", count=3)
     ]

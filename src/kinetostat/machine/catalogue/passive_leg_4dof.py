@@ -62,7 +62,10 @@ class Stiffness(PassiveLegStiffness):
     """Table [stiffness]."""
 
     actuator: Annotated[
-        Four, Quantity("linear stiffness", "stiffness of the four actuators held by their servos, Ka", count=LEGS)
+        Four,
+        Quantity(
+            "linear stiffness", "stiffness of the four actuators held by their servos, Ka", count=LEGS, per_leg=True
+        ),
     ]
     passive_actuator: Annotated[
         float, Quantity("torsional stiffness", "actuator of the passive leg's first revolute; 0 leaves it passive")

@@ -30,10 +30,11 @@ class Geometry(PassiveLinks):
     """Table [geometry]; the base frame has its origin O at the foot of the passive leg, z up."""
 
     base_angles: Annotated[
-        Five, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS, apart=True)
+        Five, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS, per_leg=True, apart=True)
     ]
     platform_angles: Annotated[
-        Five, Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS, apart=True)
+        Five,
+        Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS, per_leg=True, apart=True),
     ]
 
 
@@ -41,7 +42,9 @@ class Geometry(PassiveLinks):
 class Stiffness(PassiveLegStiffness):
     """Table [stiffness]."""
 
-    actuator: Annotated[Five, Quantity("linear stiffness", "stiffness of the five actuators, Ka", count=LEGS)]
+    actuator: Annotated[
+        Five, Quantity("linear stiffness", "stiffness of the five actuators, Ka", count=LEGS, per_leg=True)
+    ]
     passive_actuator: Annotated[
         float, Quantity("torsional stiffness", "actuator of the passive leg's first foot axis; 0 leaves it passive")
     ] = 0.0

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin
 from kinetostat.algebra.vector import Z_AXIS, Displacement, Vector, rotation_z
-from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, Spring
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, PartName, Spring, numbered
 from kinetostat.machine.links import LinkKind, straight_legs
 from kinetostat.machine.machine import Configuration, Family, Plane
 from kinetostat.machine.parts import if_elastic, per_length
@@ -26,7 +26,9 @@ class Geometry(ThreeLegs):
 class Stiffness:
     """Table [stiffness]."""
 
-    actuator: Annotated[Three, Quantity("linear stiffness", "stiffness of the three actuated slides", count=LEGS)]
+    actuator: Annotated[
+        Three, Quantity("linear stiffness", "stiffness of the three actuated slides", count=LEGS, per_leg=True)
+    ]
     leg_axial: Annotated[float, Quantity("axial rigidity", "axial rigidity of the legs, EA")] = RIGID
 
 
@@ -56,7 +58,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
         _leg(f"leg {i}", base, tip, k, stiffness.leg_axial)
         for i, (base, tip, k) in enumerate(zip(*joints, stiffness.actuator, strict=True), 1)
     ]
-    return Configuration(platform, tuple(legs), (), geometry.size, Plane())
+    return Configuration(platform, tuple(numbered(legs)), (), geometry.size, Plane())
 
 
 def _leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, axial: Scalar) -> Leg:
@@ -66,8 +68,8 @@ def _leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, axial: Scalar)
     along = span * reciprocal(size)
     chain: tuple[Element, ...] = (
         Joint(Z_AXIS, base, f"{name} base joint"),
-        Spring(f"{name} actuator", Joint(along), stiffness, actuated=True),
-        *if_elastic(Spring(f"{name} rod", Joint(along), per_length(axial, size))),
+        Spring(PartName(name, "actuator"), Joint(along), stiffness, actuated=True),
+        *if_elastic(Spring(PartName(name, "rod"), Joint(along), per_length(axial, size))),
         Joint(Z_AXIS, tip, f"{name} platform joint"),
     )
     return Leg(name, chain, (Line(tip, along),))

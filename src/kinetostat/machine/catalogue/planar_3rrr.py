@@ -11,7 +11,7 @@ from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.vector import Z_AXIS, Vector
 from kinetostat.machine.catalogue.planar_3rpr import LEGS, Pose, placed
 from kinetostat.machine.crank import CrankLinks, place
-from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, Spring
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, PartName, Spring, numbered
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family, Plane
 from kinetostat.machine.parts import Arm, if_elastic, per_length
@@ -31,7 +31,9 @@ class Geometry(ThreeLegs):
 class Stiffness:
     """Table [stiffness]."""
 
-    actuator: Annotated[Three, Quantity("torsional stiffness", "stiffness of the actuated revolutes", count=LEGS)]
+    actuator: Annotated[
+        Three, Quantity("torsional stiffness", "stiffness of the actuated revolutes", count=LEGS, per_leg=True)
+    ]
     proximal_bending: Annotated[
         float, Quantity("bending rigidity", "bending rigidity of the proximal links in the plane, EI")
     ] = RIGID
@@ -51,7 +53,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
         for i, (base, tip, k) in enumerate(zip(*joints, stiffness.actuator, strict=True), 1)
     ]
     limits = tuple(limit for _, own in found for limit in own)
-    return Configuration(platform, tuple(leg for leg, _ in found), limits, geometry.size, Plane())
+    return Configuration(platform, tuple(numbered(leg for leg, _ in found)), limits, geometry.size, Plane())
 
 
 def _leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, links: CrankLinks) -> tuple[Leg, tuple[Closure, ...]]:
@@ -59,11 +61,11 @@ def _leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, links: CrankLi
     elbow, limits = place(name, base, tip, Z_AXIS, links)
     along, pivot = (tip - elbow) * reciprocal(links.rod), Joint(Z_AXIS, base)
     chain: tuple[Element, ...] = (
-        Spring(f"{name} actuator", pivot, stiffness, actuated=True),
-        *if_elastic(Spring(f"{name} proximal link", pivot, per_length(links.bending, links.crank, 3.0))),
+        Spring(PartName(name, "actuator"), pivot, stiffness, actuated=True),
+        *if_elastic(Spring(PartName(name, "proximal link"), pivot, per_length(links.bending, links.crank, 3.0))),
         Arm(base, elbow),
         Joint(Z_AXIS, elbow, f"{name} elbow"),
-        *if_elastic(Spring(f"{name} distal link", Joint(along), per_length(links.axial, links.rod))),
+        *if_elastic(Spring(PartName(name, "distal link"), Joint(along), per_length(links.axial, links.rod))),
         Joint(Z_AXIS, tip, f"{name} platform joint"),
     )
     return Leg(name, chain, (Line(tip, along),)), limits

@@ -25,7 +25,9 @@ class Geometry(ThreeLegs):
 class Stiffness:
     """Table [stiffness]."""
 
-    actuator: Annotated[Three, Quantity("linear stiffness", "stiffness of the three actuators, Ka", count=LEGS)]
+    actuator: Annotated[
+        Three, Quantity("linear stiffness", "stiffness of the three actuators, Ka", count=LEGS, per_leg=True)
+    ]
     tube: Annotated[
         Three,
         Quantity("torsional stiffness", "tube at its platform end: bending about its x and y, torsion", count=3),

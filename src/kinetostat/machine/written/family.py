@@ -10,7 +10,7 @@ from typing import Any
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.algebra.vector import AXES, IDENTITY, X_AXIS, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector
 from kinetostat.machine.cross_section import linear_density_of, rigidity_of
-from kinetostat.machine.leg import Element, Leg, Spring, Turn
+from kinetostat.machine.leg import Element, Leg, PartName, Spring, Turn
 from kinetostat.machine.link import Beam, lumped_springs, matrix_springs
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
 from kinetostat.machine.written.joints import JOINT_TYPES
@@ -77,15 +77,21 @@ def chain_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[S
     data = [tables[f"legs.{leg.name}.{joint.name}"] for joint in leg.joints]
     steps: list[Step] = []
     for i, joint in enumerate(leg.joints):
-        title = f"{leg.name} {joint.name}"
-        own = matrix_springs(f"{title} play", joint.compliance, Vector(*data[i].point)) if joint.compliance else ()
+        title = PartName(leg.name, joint.name)
+        own = (
+            matrix_springs(
+                PartName(leg.name, f"{joint.name} bearing compliance"), joint.compliance, Vector(*data[i].point)
+            )
+            if joint.compliance
+            else ()
+        )
         steps += [Step(spring, False) for spring in own]
         steps += [Step(element, True) for element in _elements(title, joint, data[i])]
         link = leg.links.get(joint.joins[1])
         if link is not None:
             ends = Vector(*data[i].point), Vector(*data[i + 1].point)
             steps += [
-                Step(element, False) for element in _yielding(f"{leg.name} {link.name}", link, ends, plan, tables)
+                Step(element, False) for element in _yielding(PartName(leg.name, link.name), link, ends, plan, tables)
             ]
     return steps
 
@@ -128,7 +134,7 @@ def members(plan: Plan, **tables: Any) -> list[Member]:
                 section = leg.links[joint.joins[1]].cross_section if joint.joins[1] in leg.links else ""
                 held = tables[f"sections.{section}"] if section else None
                 density = linear_density_of(plan.shapes[section], held) if section else 0.0
-                found.append(Member(f"{leg.name} {joint.joins[1]}", (end - start).norm(), density))
+                found.append(Member(leg.name, f"{leg.name} {joint.joins[1]}", (end - start).norm(), density))
     return found
 
 

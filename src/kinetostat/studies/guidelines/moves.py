@@ -98,7 +98,7 @@ def _together(machine: Machine, path: str) -> str:
     whole = {p.path: p for p in parameters(machine.family)}.get(field)
     here = values(machine)
     alike = whole is not None and whole.quantity.stiff and len({here[leaf] for leaf in whole.leaves}) == 1
-    return field if alike and field.endswith("actuator") else path
+    return field if alike and whole.quantity.per_leg else path
 
 
 def with_signs(machine: Machine, grid: Points, moves: Sequence[Move]) -> list[Move]:

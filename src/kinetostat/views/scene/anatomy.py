@@ -85,12 +85,14 @@ class Anatomy:
 
     Attributes:
         leg: name.
+        label: what a drawing writes beside it.
         actuated: whether it has an actuator; `removed` if all of those are without stiffness.
         joints, links, rails, springs: in order.
         foot, head: where it stands on the base and holds the platform, base frame, m.
     """
 
     leg: str
+    label: str
     actuated: bool
     removed: bool
     joints: tuple[JointPart, ...]
@@ -124,6 +126,7 @@ def anatomy(leg: Leg) -> Anatomy:
     drives = [spring for spring in leg.springs if spring.actuated]
     return Anatomy(
         leg.name,
+        leg.label,
         bool(drives),
         bool(drives) and all(is_zero(spring.stiffness) for spring in drives),
         tuple(joint for joint in reading.joints if not _within_bars(joint, reading.links)),

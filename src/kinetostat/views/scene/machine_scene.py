@@ -57,7 +57,7 @@ def machine_scene(machine: Machine, configuration: Configuration, sizes: Proport
     if not together(tool, configuration.platform.translation):
         frames.append(("T", Displacement(configuration.platform.rotation, tool)))
     length = FRAME * sizes.diagonal
-    labels = [Label(leg.leg.removeprefix("leg "), _label_point(leg, sizes)) for leg in legs if leg.actuated]
+    labels = [Label(leg.label, _label_point(leg, sizes)) for leg in legs if leg.actuated]
     for name, place in frames:
         solids += overlays.frame_solids(name, place, length)
         labels += overlays.frame_labels(name, place, length)
