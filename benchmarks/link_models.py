@@ -12,7 +12,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.link import Beam
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
-from kinetostat.validation.cantilever import end_compliance, section_axes
+from kinetostat.validation.pieces import end_compliance, section_axes
 
 Array = npt.NDArray[np.float64]
 

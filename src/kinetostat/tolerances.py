@@ -97,3 +97,24 @@ EQUAL_DESIGNS = 1e-9
 """Relative difference up to which a number is the same for two designs, so that neither is the better one."""
 EQUAL_ROUTES = 1e-9
 """Relative difference up to which machine code, NumPy and a single pose agree in the self-test."""
+
+# Validation with independent engines
+
+AGREED = 1e-6
+"""Relative difference up to which two compliances agree: engines with their own tolerances reach about 1e-8."""
+RIGID_BLOCK_OF_ENGINE = 1e-10
+"""Share of the other diagonal block of C, in one unit, below which it counts as zero: the machine is rigid there."""
+BLOCK_BEING_EXTRAPOLATED = 1e-4
+"""The same while a block of a rigid machine is still on its way to zero, so that its relative error means nothing."""
+COINCIDENT = 1e-9
+"""Share of a leg's extent, or sine of an angle, below which points coincide and directions are parallel."""
+UNBALANCED_LOAD = 1e-6
+"""Share of a load that may remain where a singular system is solved by least squares; more means a free motion."""
+IDLE_MOTION = 1e-15
+"""Relative stiffness below which a motion counts as idle: the round-off of the largest stiffness."""
+UNMOVED = 1e-9
+"""Share of the largest motion below which a wrench moves nothing."""
+NEWTON_STATICS = 1e-9
+"""Relative tolerance of Newton's method in the engine's nonlinear statics."""
+SAME_NODE = 1e-6
+"""Share of the machine's length below which two points of a frame are one node."""

@@ -84,7 +84,8 @@ def _write(result: "Comparison", folder: Path) -> list[Path]:
 def _validate(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
     from kinetostat.studies.analysis import analyze
-    from kinetostat.validation.comparison import AGREED, as_json, validate
+    from kinetostat.tolerances import AGREED
+    from kinetostat.validation.comparison import as_json, validate
     from kinetostat.views.comparison_tables import print_validation
 
     poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]

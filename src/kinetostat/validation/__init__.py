@@ -1,1 +1,1 @@
-"""The same machine in an engine that is not ours: built from its geometry, loaded, and compared with our C."""
+"""Validation: the machine rebuilt from its geometry in an independent engine, loaded, and compared with C."""

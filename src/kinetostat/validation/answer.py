@@ -1,23 +1,23 @@
-"""What an independent engine answers about a machine, and how two compliances compare. Knows no engine."""
+"""The compliance that an independent engine returns, and the difference of two compliances. Knows no engine."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.tolerances import RIGID_BLOCK_OF_ENGINE
+
 Array = npt.NDArray[np.float64]
 
 ROTATIONS, TRANSLATIONS = slice(0, 3), slice(3, 6)
-VANISHING = 1e-10
-"""Share of the other diagonal block, in one unit, below which a block counts as zero: the machine is rigid there."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One of the answers from which an engine's final one follows.
+    """One of the results from which an engine's final one follows.
 
     Attributes:
-        scale: what was varied, see `Answer.varied`.
+        scale: the quantity that was varied, see `Answer.varied`.
         compliance: C at the reference point, base axes, rx ry rz x y z [6 x 6].
     """
 
@@ -32,26 +32,26 @@ class Answer:
     Attributes:
         compliance: C at the reference point, base axes, rx ry rz x y z [6 x 6]; rows that a planar machine does not
             have are 0.
-        rival: the same by the engine's next best way, if it found one: how far it may be trusted.
-        varied: what the trials vary, for people.
+        second_best: C by the engine's next best way, if there is one; their difference is the uncertainty.
+        varied: the quantity that the trials vary, in words.
         trials: in the order of their scale.
     """
 
     compliance: Array
-    rival: Array | None
+    second_best: Array | None
     varied: str
     trials: tuple[Trial, ...]
 
 
 def block_differences(
-    actual: Array, expected: Array, length: float, vanishing: float = VANISHING, scale: Array | None = None
+    actual: Array, expected: Array, length: float, vanishing: float = RIGID_BLOCK_OF_ENGINE, scale: Array | None = None
 ) -> dict[str, float]:
-    """Relative difference of two compliances in their blocks: rotation, coupling, translation.
+    """Return the relative difference of two compliances in their blocks: rotation, coupling, translation.
 
     A block of `expected`, or of `scale` if given, is measured by its Frobenius norm, the coupling by the geometric mean
     of the two diagonal blocks: for a positive semi-definite matrix it is at most that, and no unit is mixed. Where the
-    machine is rigid in one diagonal block, so that nothing is there to compare with, the other one serves, through
-    `length` (m): that is, where it is below the share `vanishing` of the other.
+    machine is rigid in one diagonal block (it is below the share `vanishing` of the other), there is nothing to compare
+    with; then the other block is the measure, converted by `length` (m).
     """
     measure = expected if scale is None else scale
     turning, moving = (float(np.linalg.norm(measure[b, b])) for b in (ROTATIONS, TRANSLATIONS))
@@ -65,13 +65,13 @@ def block_differences(
         "translation": (TRANSLATIONS, TRANSLATIONS, moving),
     }
     error = actual - expected
-    apart = {
+    errors = {
         name: max(float(np.linalg.norm(error[rows, columns])), float(np.linalg.norm(error[columns, rows])))
         for name, (rows, columns, _) in sizes.items()
     }
-    return {name: apart[name] / size if size > 0.0 else apart[name] for name, (_, _, size) in sizes.items()}
+    return {name: errors[name] / size if size > 0.0 else errors[name] for name, (_, _, size) in sizes.items()}
 
 
-def difference(actual: Array, expected: Array, length: float, vanishing: float = VANISHING) -> float:
-    """The largest of the relative differences of the blocks."""
+def difference(actual: Array, expected: Array, length: float, vanishing: float = RIGID_BLOCK_OF_ENGINE) -> float:
+    """Return the largest of the relative differences of the blocks."""
     return max(block_differences(actual, expected, length, vanishing).values())

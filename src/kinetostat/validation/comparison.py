@@ -1,4 +1,7 @@
-"""Our compliance beside that of an independent engine: which engines there are, and what they say of a machine."""
+"""The compliance of a machine compared with that of an independent engine, and the list of engines.
+
+How a machine is built in an engine is the business of the engine's own module, imported only when it is used.
+"""
 
 import math
 from collections.abc import Callable
@@ -18,26 +21,26 @@ from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Configuration, Machine, need_machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.rounding import ROUNDING, clean_matrix
+from kinetostat.tolerances import AGREED
 from kinetostat.validation.answer import Answer, block_differences, difference
 
 Array = npt.NDArray[np.float64]
 
-AGREED = 1e-6
-"""Relative difference up to which two compliances count as one."""
 INSTALL = "Install it with: pip install 'kinetostat[validate]'"
 
 
 @dataclass(frozen=True)
 class Engine:
-    """An engine that is not ours.
+    """An independent engine, in which a machine can be rebuilt.
 
     Attributes:
-        name: by which it is asked for.
-        package: as installed.
-        needs: modules that must be there.
-        builder: our module whose `solve` rebuilds a machine in it.
-        summary: what it makes of a machine.
+        name: as in `kinetostat validate --engine`.
+        package: its name for pip.
+        needs: modules that must be installed.
+        builder: the kinetostat module whose `solve` rebuilds a machine in it.
+        summary: how it models a machine.
     """
 
     name: str
@@ -48,7 +51,7 @@ class Engine:
 
     @property
     def version(self) -> str | None:
-        """Of the installed package; None if it is not installed."""
+        """Version of the installed package; None if it is not installed."""
         if any(find_spec(module) is None for module in self.needs):
             return None
         try:
@@ -57,10 +60,10 @@ class Engine:
             return None
 
     def solve(self, configuration: Configuration, reference: Vector) -> Answer:
-        """C of a placed machine at a point (base frame, m).
+        """Return C of a placed machine at a point (base frame, m).
 
         Raises:
-            InputError: if the engine is not installed, has no part for one of the machine's, or fails.
+            InputError: if the engine is not installed, has no counterpart of a part of the machine, or fails.
         """
         if self.version is None:
             raise InputError(f"The engine {self.name} is not installed. {INSTALL}")
@@ -69,9 +72,9 @@ class Engine:
             return solve(configuration, reference)
         except InputError:
             raise
-        except Exception as trouble:  # engines raise what they like, down to bare exceptions
+        except Exception as trouble:  # engines raise anything, down to bare exceptions
             reason = str(trouble).partition("\n")[0]
-            raise InputError(f"The engine {self.name} could not answer for this machine: {reason}") from trouble
+            raise InputError(f"The engine {self.name} failed for this machine: {reason}") from trouble
 
 
 KNOWN = (
@@ -79,7 +82,7 @@ KNOWN = (
         "exudyn",
         "exudyn",
         ("exudyn", "scipy"),
-        "kinetostat.validation.exudyn_answer",
+        "kinetostat.validation.exudyn_machine",
         "multibody dynamics: rigid bodies, exact constraints and springs",
     ),
     Engine(
@@ -90,21 +93,21 @@ KNOWN = (
         "frame analysis: straight members, releases and stiff parts",
     ),
 )
-"""Every engine that a machine can be rebuilt in, the one for any machine first."""
+"""Every engine in which a machine can be rebuilt; the first can build any machine."""
 
 
 @dataclass(frozen=True)
 class Validation:
-    """Two answers to one question; matrices at T in base axes, order rx ry rz x y z, SI.
+    """Compliance of a machine by kinetostat and by an independent engine, at T, base axes, order rx ry rz x y z, SI.
 
     Attributes:
-        machine: what was asked about.
-        engine, version: who answered beside us.
-        ours, theirs: C [6 x 6] without rounding; rows that a planar machine does not have are 0.
+        machine: at its pose.
+        engine, version: name and version of the independent engine.
+        ours, theirs: C by kinetostat and by the engine [6 x 6], without round-off; absent rows are 0.
         differences: relative, by block: rotation, coupling, translation.
-        uncertainty: how far the engine's two best answers differ, in the same measure; infinite if it has but one.
-        varied: what the engine's trials vary, for people.
-        trials: scale and difference from ours of each.
+        uncertainty: how far the engine's two best results differ, in the same measure; infinite if it has only one.
+        varied: the quantity that the engine's trials vary, in words.
+        trials: scale of each, and its difference from kinetostat's C.
     """
 
     machine: Machine
@@ -127,33 +130,35 @@ class Validation:
 
 
 def as_json(validation: Validation) -> dict[str, Any]:
-    """The validation as plain data for `--json`, SI."""
+    """Return the validation as plain data for `--json`, SI."""
     machine = validation.machine
     pose = {path.removeprefix("pose."): value for path, value in values(machine).items() if path.startswith("pose.")}
-    return {
-        "name": machine.name,
-        "pose": pose,
-        "order": list(COMPONENTS),
-        "engine": validation.engine,
-        "version": validation.version,
-        "ours": validation.ours.tolist(),
-        "theirs": validation.theirs.tolist(),
-        "differences": validation.differences,
-        "difference": validation.difference,
-        "allowed": AGREED,
-        "uncertainty": validation.uncertainty,
-        "varied": validation.varied,
-        "trials": [{"scale": scale, "difference": apart} for scale, apart in validation.trials],
-    }
+    return as_answer(
+        {
+            "name": machine.name,
+            "pose": pose,
+            "components": list(COMPONENTS),
+            "engine": validation.engine,
+            "version": validation.version,
+            "ours": validation.ours.tolist(),
+            "theirs": validation.theirs.tolist(),
+            "differences": validation.differences,
+            "difference": validation.difference,
+            "allowed": AGREED,
+            "uncertainty": validation.uncertainty,
+            "varied": validation.varied,
+            "trials": [{"scale": scale, "difference": apart} for scale, apart in validation.trials],
+        }
+    )
 
 
 def engines() -> dict[str, str]:
-    """Name and version of every engine that is installed."""
-    return {engine.name: found for engine in KNOWN if (found := engine.version) is not None}
+    """Return name and version of every engine that is installed."""
+    return {engine.name: number for engine in KNOWN if (number := engine.version) is not None}
 
 
 def choose(name: str | None) -> Engine:
-    """The engine of that name, or the first that is installed.
+    """Return the engine with a name or, without a name, the first that is installed.
 
     Raises:
         InputError: if there is none.
@@ -162,16 +167,16 @@ def choose(name: str | None) -> Engine:
         installed = [engine for engine in KNOWN if engine.version is not None]
         if not installed:
             names = " or ".join(engine.package for engine in KNOWN)
-            raise InputError(f"No independent engine is installed; {names} can be compared with. {INSTALL}")
+            raise InputError(f"No independent engine is installed; {names} can be used. {INSTALL}")
         return installed[0]
-    found = [engine for engine in KNOWN if engine.name == name]
-    if not found:
+    named = [engine for engine in KNOWN if engine.name == name]
+    if not named:
         raise InputError(f"There is no engine {shorten(name)}; known are {', '.join(e.name for e in KNOWN)}.")
-    return found[0]
+    return named[0]
 
 
 def validate(machine: Machine, engine: str | None = None) -> Validation:
-    """Rebuild a machine in an engine that is not ours and compare the compliances at its tool point.
+    """Rebuild a machine in an independent engine and compare the compliances at its tool point.
 
     Args:
         machine: at its pose, where it must be reachable, regular and without a free direction.
@@ -202,9 +207,9 @@ def validate(machine: Machine, engine: str | None = None) -> Validation:
 
 
 def _uncertainty(answer: Answer, ours: Array, length: float) -> float:
-    if answer.rival is None:
+    if answer.second_best is None:
         return math.inf
-    return max(block_differences(answer.rival, answer.compliance, length, scale=ours).values())
+    return max(block_differences(answer.second_best, answer.compliance, length, scale=ours).values())
 
 
 def _our_compliance(response: Response) -> Array:
@@ -213,7 +218,9 @@ def _our_compliance(response: Response) -> Array:
         raise InputError(f"There is nothing to validate at this pose. {status.sentence}")
     ours = np.array(response.compliance.rows(), dtype=float)
     if not np.all(np.isfinite(ours)):
-        raise InputError("A spring without stiffness leaves the platform free: there is no compliance to compare.")
+        raise InputError(
+            "A spring without stiffness leaves the platform free, so that there is no finite compliance to compare."
+        )
     if not np.any(ours):
         raise InputError("Every part is rigid: C is 0 in any engine, and there is nothing to compare.")
     return ours

@@ -1,4 +1,4 @@
-"""Rigid bodies in Exudyn, and what can hold two of them: exact constraints, 6x6 springs, bars. Knows no machine.
+"""Rigid bodies in Exudyn and connections between two of them: exact constraints, 6x6 springs, bars. No machine here.
 
 Every body's frame is the base frame moved to a point, so that all rotations are zero where the machine is unloaded.
 """
@@ -15,12 +15,12 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 TRANSLATION_FIRST = [3, 4, 5, 0, 1, 2]
-"""Where Exudyn's x y z rx ry rz are in our rx ry rz x y z, and the other way round."""
+"""Where Exudyn's x y z rx ry rz are in kinetostat's rx ry rz x y z, and the other way round."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """A body and where its frame is.
+    """A body and the place of its frame.
 
     Attributes:
         number: of the body in the engine.
@@ -34,14 +34,14 @@ class Body:
 
 
 class Multibody:
-    """A system of bodies in Exudyn, with forces measured in a unit of one's own.
+    """A system of bodies in Exudyn, with forces measured in a chosen unit.
 
     Attributes:
         engine, items: the imported package and its vocabulary.
         system: its `MainSystem`.
         ground: the base.
-        unit: N per unit of force in the engine: with the greatest stiffness near 1 its solver knows the small numbers
-            that matter from rounding.
+        unit: N per unit of force in the engine: with the greatest stiffness near 1 its solver tells small numbers that
+            matter from round-off.
     """
 
     def __init__(self, unit: float = 1.0) -> None:
@@ -53,14 +53,14 @@ class Multibody:
         self.unit = unit
 
     def body(self, at: Array) -> Body:
-        """A new body with its frame at a point (m); mass and inertia (1 kg, 1 kg·m²) play no part in statics."""
+        """Add a body with its frame at a point (m); mass and inertia (1 kg, 1 kg·m²) do not matter in statics."""
         inertia = import_module("exudyn.rigidBodyUtilities").RigidBodyInertia(mass=1.0, inertiaTensor=np.eye(3))
         kind = self.engine.NodeType.RotationRxyz
-        made = self.system.CreateRigidBody(referencePosition=at, inertia=inertia, nodeType=kind, returnDict=True)
-        return Body(made["bodyNumber"], made["nodeNumber"], at)
+        numbers = self.system.CreateRigidBody(referencePosition=at, inertia=inertia, nodeType=kind, returnDict=True)
+        return Body(numbers["bodyNumber"], numbers["nodeNumber"], at)
 
     def marker(self, body: Body, point: Array, axes: Array) -> int:
-        """A frame on a body, at a point (m) with the given axes as columns (base frame)."""
+        """Add a frame on a body, at a point (m) with the given axes as columns (base frame)."""
         place = self.engine.HT(rotation=axes, translation=point - body.at)
         return int(self.system.AddMarker(self.items.MarkerBodyRigid(bodyNumber=body.number, localHT=place)))
 
@@ -68,39 +68,39 @@ class Multibody:
         self,
         bodies: Sequence[Body],
         frame: tuple[Array, Array],
-        held: Sequence[bool],
+        constrained: Sequence[bool],
         stiffness: Array | None = None,
     ) -> None:
-        """Hold some of rx ry rz x y z between two bodies exactly, and let springs act on the others.
+        """Constrain some of rx ry rz x y z between two bodies exactly, and let springs act on the others.
 
         Args:
             bodies: near, far.
             frame: point (m) and axes (columns) of the six components, base frame.
-            held: which of them are constrained.
+            constrained: which of them are.
             stiffness: between them, N·m/rad, N/rad, N/m [6 x 6].
         """
         markers = [self.marker(body, *frame) for body in bodies]
-        if any(held):
-            axes = [int(held[i]) for i in TRANSLATION_FIRST]
+        if any(constrained):
+            axes = [int(constrained[i]) for i in TRANSLATION_FIRST]
             self.system.AddObject(self.items.GenericJoint(markerNumbers=markers, constrainedAxes=axes))
         if stiffness is not None:
             matrix = stiffness[np.ix_(TRANSLATION_FIRST, TRANSLATION_FIRST)] / self.unit
             self.system.AddObject(self.items.RigidBodySpringDamper(markerNumbers=markers, stiffness=matrix))
 
     def bar(self, bodies: Sequence[Body], ends: Sequence[Array], stiffness: float) -> None:
-        """A spring (N/m) between a point of the near and one of the far body (m), or a bar of constant length."""
+        """Add a spring (N/m) between a point of the near and one of the far body (m), or a bar of constant length."""
         markers = [self.marker(body, end, np.eye(3)) for body, end in zip(bodies, ends, strict=True)]
         length = float(np.linalg.norm(ends[1] - ends[0]))
         if math.isinf(stiffness):
-            made = self.items.DistanceConstraint(markerNumbers=markers, distance=length)
+            bar = self.items.DistanceConstraint(markerNumbers=markers, distance=length)
         else:
-            made = self.items.SpringDamper(
+            bar = self.items.SpringDamper(
                 markerNumbers=markers, referenceLength=length, stiffness=stiffness / self.unit
             )
-        self.system.AddObject(made)
+        self.system.AddObject(bar)
 
     def thread(self, bodies: Sequence[Body], line: tuple[Array, Array], pitch: float) -> None:
-        """Bind the slide along a line (point in m, direction) to the turn about it: `pitch` m per rad."""
+        """Couple the slide along a line (point in m, direction) to the turn about it: `pitch` m per rad."""
         point, axis = line
         markers, rows, rest = [], [], []
         for body in bodies:

@@ -1,9 +1,11 @@
-"""A placed machine as a multibody system in Exudyn: rigid bodies, exact constraints, springs; closed loops of any kind.
+"""The compliance of a machine by Exudyn: rigid bodies, exact constraints and springs; closed loops of any kind.
 
-Built from points, axes and sections; what holds two bodies is `exudyn_bodies`, what loads do is `exudyn_answer`.
+The multibody system is built from points, axes and cross-sections. Six unit wrenches act on it one by one, both in its
+linearised equations and as small finite loads on the nonlinear ones. `exudyn_bodies` makes bodies and connections.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,19 +15,145 @@ from kinetostat.machine.leg import Joint, Leg, Spring
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration, Plane
 from kinetostat.spec.errors import InputError
-from kinetostat.validation.cantilever import end_compliance, in_plane, section_axes
-from kinetostat.validation.exudyn_bodies import Body, Multibody
-from kinetostat.validation.pieces import Piece, Strut, array, columns, joint_of, pieces
+from kinetostat.tolerances import IDLE_MOTION, NEWTON_STATICS, UNBALANCED_LOAD, UNMOVED
+from kinetostat.validation.answer import Answer, Trial
+from kinetostat.validation.exudyn_bodies import TRANSLATION_FIRST, Body, Multibody
+from kinetostat.validation.pieces import (
+    Piece,
+    Strut,
+    array,
+    columns,
+    end_compliance,
+    in_plane,
+    joint_of,
+    pieces,
+    section_axes,
+)
 
 Array = npt.NDArray[np.float64]
 
+SHARES = (1e-3, 1e-4, 1e-5)
+"""How far finite loads move the platform: rad, or share of the machine's length."""
+VARIED = "how far loads move the platform, rad or share of the machine's length"
+EPS = float(np.finfo(float).eps)
 ALL = (True,) * 6
 PLANAR_JOINT = (True, True, False, False, False, True)
-"""What is held of rx ry rz x y z where z is the normal."""
+"""Constrained components of rx ry rz x y z where z is the normal."""
+
+
+def solve(configuration: Configuration, reference: Vector) -> Answer:
+    """Return C from the engine's linearised equations, confirmed by its nonlinear statics under ever smaller loads.
+
+    Args:
+        configuration: placed machine.
+        reference: where loads act and motions are read, base frame, m.
+
+    Raises:
+        InputError: if the machine has a part that cannot be built, or a motion that nothing resists.
+    """
+    length = float(configuration.length)
+    model, _ = build(configuration, reference)
+    model.system.Assemble()
+    greatest = float(np.max(np.abs(model.system.ComputeLinearizedSystem(_settings(model))[1]))) or 1.0
+    model, platform = build(configuration, reference, unit=greatest)
+    tangent = _tangent(model, platform)
+    if not np.any(tangent):
+        return Answer(tangent, tangent, VARIED, ())
+    trials = tuple(_finite_loads(model, platform, tangent, length))
+    return Answer(tangent, _without_load(trials), VARIED, trials)
+
+
+def _without_load(trials: tuple[Trial, ...]) -> Array | None:
+    """C under the two smallest loads extrapolated to none: central differences err by the load squared."""
+    if len(trials) < 2:
+        return None
+    small, large = trials[:2]
+    ratio = (large.scale / small.scale) ** 2
+    return (ratio * small.compliance - large.compliance) / (ratio - 1.0)
+
+
+def _tangent(model: Multibody, platform: Body) -> Array:
+    """C of the unloaded system; the engine linearises and projects onto what its constraints leave free."""
+    model.system.Assemble()
+    system = model.system.ComputeLinearizedSystem(
+        _settings(model), projectIntoConstraintNullspace=True, returnConstraintNullspace=True
+    )
+    stiffness = system[1]
+    free = np.asarray(system[4]) if len(system) > 3 else np.eye(len(stiffness))
+    rows = model.system.GetNodeODE2Index(platform.node) + np.array(TRANSLATION_FIRST)
+    loads = free[:, rows] / model.unit
+    if not loads.size:
+        return np.zeros((6, 6))
+    motion = np.linalg.lstsq(stiffness, loads, rcond=IDLE_MOTION)[0]
+    if np.max(np.abs(stiffness @ motion - loads)) > UNBALANCED_LOAD * np.max(np.abs(loads)):
+        raise InputError(
+            "Exudyn finds a motion that nothing resists in comparison with the machine's stiffest parts: either the "
+            "machine is free, or its stiffnesses differ by more than about nine decades."
+        )
+    return np.asarray((free.T @ motion)[rows])
+
+
+def _finite_loads(model: Multibody, platform: Body, tangent: Array, length: float) -> Iterable[Trial]:
+    """Nonlinear statics with loads that move the platform by each of SHARES, central differences; smallest first."""
+    system, items = model.system, model.items
+    marker = model.marker(platform, platform.at, np.eye(3))
+    loads = [system.AddLoad(kind(markerNumber=marker, loadVector=[0.0] * 3)) for kind in (items.Torque, items.Force)]
+    system.Assemble()
+    rest = system.systemData.GetODE2Coordinates()
+    unit_loads = _loads_for_unit_motion(tangent, length)
+    for share in sorted(SHARES):
+        compliance = np.zeros((6, 6))
+        for j in np.flatnonzero(unit_loads):
+            wrench = share * unit_loads[j] * np.eye(6)[j]
+            ends = [_displacement(model, platform, loads, rest, sign * wrench / model.unit) for sign in (1.0, -1.0)]
+            if ends[0] is None or ends[1] is None:
+                break
+            compliance[:, j] = (ends[0] - ends[1]) / (2.0 * wrench[j])
+        else:
+            yield Trial(share, compliance)
+
+
+def _loads_for_unit_motion(tangent: Array, length: float) -> Array:
+    """The N or N·m of each wrench that would move the platform by 1 rad or by `length` (m), whichever comes first.
+
+    A wrench that moves nothing gets the size of the others; one that a planar machine does not have is 0.
+    """
+    arms = np.repeat([length, 1.0], 3)
+    motion = np.max(np.abs(tangent) * np.repeat([1.0, 1.0 / length], 3)[:, None], axis=0) / arms
+    known = np.any(tangent != 0.0, axis=0)
+    felt = motion > UNMOVED * np.max(motion)
+    return np.asarray(known / (np.where(felt, motion, np.max(motion)) * arms))
+
+
+def _displacement(model: Multibody, platform: Body, loads: list[Any], rest: Any, wrench: Array) -> Array | None:
+    """Displacement of the platform (rad, m) under a wrench in the engine's unit of force; None without convergence."""
+    system, engine = model.system, model.engine
+    for load, part in zip(loads, (wrench[:3], wrench[3:]), strict=True):
+        system.SetLoadParameter(load, "loadVector", part)
+    system.systemData.SetODE2Coordinates(rest, engine.ConfigurationType.Initial)
+    if not engine.MainSolverStatic().SolveSystem(system, _settings(model)):
+        return None
+    moved = np.array(system.GetNodeOutput(platform.node, engine.OutputVariableType.Coordinates))
+    return moved[TRANSLATION_FIRST]
+
+
+def _settings(model: Multibody) -> Any:
+    """Settings: silent, without files, and with a solver that copes with redundant constraints and idle motions."""
+    settings = model.engine.SimulationSettings()
+    settings.linearSolver.solverType = model.engine.LinearSolverType.EigenDense
+    settings.linearSolver.ignoreSingularJacobian = True
+    settings.staticSolver.verboseMode = 0
+    settings.staticSolver.adaptiveStep = False
+    settings.solution.file.write = False
+    newton = settings.staticSolver.newton
+    newton.relativeTolerance = NEWTON_STATICS
+    newton.absoluteTolerance = 10.0 * EPS  # the greatest stiffness is 1: closer to balance, round-off decides
+    newton.maxIterations = 30
+    return settings
 
 
 def build(configuration: Configuration, reference: Vector, unit: float = 1.0) -> tuple[Multibody, Body]:
-    """The machine and its platform, whose frame is at `reference` (base frame, m); `unit` of force in N.
+    """Build the machine; return it and its platform, whose frame is at `reference` (base frame, m); `unit` in N.
 
     Raises:
         InputError: if the machine has a part that cannot be built.
@@ -38,7 +166,7 @@ def build(configuration: Configuration, reference: Vector, unit: float = 1.0) ->
 
 
 def _body(model: Multibody, at: Array, plane: Plane | None) -> Body:
-    """A new body, which moves in the plane only if there is one."""
+    """A new body; in a planar machine it is constrained to the plane."""
     body = model.body(at)
     if plane is not None:
         frame = array(plane.frame.translation), columns(plane.frame.rotation)
@@ -60,7 +188,7 @@ def _leg(model: Multibody, leg: Leg, platform: Body, plane: Plane | None) -> Non
 
 
 def _far_point(piece: Piece, before: Array) -> Array:
-    """A point of the body after a piece (m): a frame near its joints keeps the digits of what they do."""
+    """A point of the body after a piece (m); a frame near its joints loses fewer digits to cancellation."""
     if isinstance(piece, Joint | Spring):
         point = joint_of(piece).point
         return before if point is None else array(point)
@@ -83,25 +211,25 @@ def _connect(model: Multibody, piece: Piece, bodies: Sequence[Body], plane: Plan
 def _joint(
     model: Multibody, joint: Joint, bodies: Sequence[Body], plane: Plane | None, stiffness: float | None = None
 ) -> None:
-    """A joint, all but one of whose components are held, with a spring (N/m, N·m/rad) on that one or none."""
+    """A joint: all components but one are constrained; a spring (N/m, N·m/rad) may act on that one."""
     normal = None if plane is None else array(plane.frame.rotation.z)
     axes = _axes_around(array(joint.axis), normal)
     slide = joint.point is None
     point = bodies[0].at if joint.point is None else array(joint.point)
     free = 5 if slide else 2
-    held = [i != free for i in range(6)]
+    constrained = [i != free for i in range(6)]
     if plane is not None:
-        held = [i in ((0, 4) if slide else (3, 4)) for i in range(6)]
+        constrained = [i in ((0, 4) if slide else (3, 4)) for i in range(6)]
     if joint.pitch != 0.0:
-        held[5] = False
+        constrained[5] = False
         model.thread(bodies, (point, axes[:, 2]), float(joint.pitch))
     matrix = np.zeros((6, 6))
     matrix[free, free] = stiffness or 0.0
-    model.couple(bodies, (point, axes), held, None if stiffness is None else matrix)
+    model.couple(bodies, (point, axes), constrained, None if stiffness is None else matrix)
 
 
 def _axes_around(axis: Array, normal: Array | None = None) -> Array:
-    """Right-handed axes whose third is `axis`; their first is along `normal` where that is across."""
+    """Right-handed axes, the third along `axis`, the first along `normal` if that is across it."""
     if normal is None or abs(float(normal @ axis)) > 0.5:
         normal = np.eye(3)[np.argmin(abs(axis))]
     x = normal - (normal @ axis) * axis
@@ -110,17 +238,17 @@ def _axes_around(axis: Array, normal: Array | None = None) -> Array:
 
 
 def _beam(model: Multibody, beam: Beam, bodies: Sequence[Body], plane: Plane | None) -> None:
-    """The cantilever's 6x6 stiffness at the beam's end; components that do not yield are held."""
+    """The cantilever's 6x6 stiffness at the beam's end; rigid components are constrained."""
     compliance = end_compliance(beam)
     moving = ALL if plane is None else in_plane(beam, plane.frame.rotation.z)
     if not any(moving):
-        raise InputError(f'The section of "{beam.name}" is askew to the plane of a planar machine.')
-    yielding = [i for i in range(6) if moving[i] and compliance[i, i] > 0.0]
-    held = [moving[i] and i not in yielding for i in range(6)]
+        raise InputError(f'The cross-section of "{beam.name}" is askew to the plane of the planar machine.')
+    flexible = [i for i in range(6) if moving[i] and compliance[i, i] > 0.0]
+    constrained = [moving[i] and i not in flexible for i in range(6)]
     matrix = np.zeros((6, 6))
-    if yielding:
-        matrix[np.ix_(yielding, yielding)] = np.linalg.inv(compliance[np.ix_(yielding, yielding)])
-    model.couple(bodies, (array(beam.end), section_axes(beam)[0]), held, matrix if yielding else None)
+    if flexible:
+        matrix[np.ix_(flexible, flexible)] = np.linalg.inv(compliance[np.ix_(flexible, flexible)])
+    model.couple(bodies, (array(beam.end), section_axes(beam)[0]), constrained, matrix if flexible else None)
 
 
 def _parallelogram(model: Multibody, piece: Parallelogram, bodies: Sequence[Body], plane: Plane | None) -> None:

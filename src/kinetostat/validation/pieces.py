@@ -1,6 +1,8 @@
-"""A leg as an engine can build it: nothing rigid, free or idle is left in its chain. Geometry and stiffness only.
+"""A leg as another program can build it: nothing rigid, free or idle is left in its chain; and beams as cantilevers.
 
-Knows no engine, and no J, W or G: what it reads are the points, axes, sections and springs of `machine`.
+Knows no engine, and no J, W or G: it reads the points, axes, cross-sections and springs of `machine`. The stiffness of
+a beam is that of the textbook's cantilever, so that nothing of `machine.link` that turns a beam into springs is used:
+this keeps the comparison independent.
 """
 
 import math
@@ -16,16 +18,14 @@ from kinetostat.machine.link import Beam, Parallelogram, Rigidity
 from kinetostat.machine.machine import Plane
 from kinetostat.machine.parts import Arm
 from kinetostat.spec.errors import InputError
+from kinetostat.tolerances import COINCIDENT
 
 Array = npt.NDArray[np.float64]
-
-COINCIDENT = 1e-9
-"""Share of a leg's extent, or sine of an angle, below which points coincide and directions are parallel."""
 
 
 @dataclass(frozen=True)
 class Strut:
-    """A straight part between two spherical joints: it carries a force along its line; its idle spin is left out.
+    """A straight part between two spherical joints: it carries a force along its line; its idle spin is omitted.
 
     Attributes:
         name: of the part.
@@ -40,35 +40,35 @@ class Strut:
 
 
 Piece = Joint | Spring | Beam | Parallelogram | Strut
-"""What stands between two bodies of a chain; springs in it are neither free nor rigid."""
+"""A connection between two bodies of a chain; springs in it are neither free nor rigid."""
 
 
 def array(v: Vector) -> Array:
-    """A vector as an array [3]."""
+    """Return a vector as an array [3]."""
     return np.array([float(c) for c in v.components()])
 
 
 def columns(rotation: Rotation) -> Array:
-    """A rotation as an array [3 x 3]."""
+    """Return a rotation as an array with its axes as columns [3 x 3]."""
     return np.column_stack([array(rotation.x), array(rotation.y), array(rotation.z)])
 
 
 def pieces(leg: Leg, plane: Plane | None = None) -> tuple[Piece, ...]:
-    """The chain of a leg from base to platform, one piece between each body and the next.
+    """Return the chain of a leg from base to platform, one piece between each body and the next.
 
-    A spring of zero stiffness has become a joint, an infinitely stiff one has vanished, what lies between two
-    spherical joints is a strut, and a planar machine keeps what moves in its plane.
+    A spring of zero stiffness becomes a joint and an infinitely stiff one is omitted; the parts between two spherical
+    joints become a strut; of a planar machine only the pieces that move in its plane remain.
 
     Raises:
-        InputError: where an element is of a kind that no engine is told how to build.
+        InputError: if an element is of a kind that cannot be built in another engine.
     """
     size = _extent(leg)
-    found: list[Piece] = []
+    chain: list[Piece] = []
     for element in leg.chain:
-        found += _plain(leg, element)
+        chain += _plain(leg, element)
     if plane is None:
-        return _with_struts(leg.name, found, COINCIDENT * size)
-    return tuple(piece for piece in found if moves_in(plane, piece))
+        return _with_struts(leg.name, chain, COINCIDENT * size)
+    return tuple(piece for piece in chain if moves_in(plane, piece))
 
 
 def _plain(leg: Leg, element: Element) -> list[Piece]:
@@ -79,26 +79,26 @@ def _plain(leg: Leg, element: Element) -> list[Piece]:
     if isinstance(element, Joint | Beam | Parallelogram):
         return [element]
     if isinstance(element, Arm) and element.springs:
-        own = Rigidity(torsion=element.torsion, bending_y=element.bending, bending_z=element.bending)
-        return [Beam(element.name, element.start, element.end, element.up, own)]
+        rigidity = Rigidity(torsion=element.torsion, bending_y=element.bending, bending_z=element.bending)
+        return [Beam(element.name, element.start, element.end, element.up, rigidity)]
     if not element.freedoms and not element.springs:
         return []
-    raise InputError(f"{leg.name} holds a {type(element).__name__}, which validation cannot rebuild in another engine.")
+    raise InputError(f"{leg.name} has a {type(element).__name__}, which cannot be rebuilt in an independent engine.")
 
 
 def _extent(leg: Leg) -> float:
-    """Largest distance of two points of a leg, or 1 where it has but one, m."""
+    """Largest distance of two points of a leg, m; 1 if it has only one."""
     points = [array(p) for element in leg.chain for p in element.path]
     return max((float(np.linalg.norm(p - q)) for p in points for q in points), default=0.0) or 1.0
 
 
 def joint_of(piece: Joint | Spring) -> Joint:
-    """The freedom of a joint or of a spring."""
+    """Return the freedom of a joint or of a spring."""
     return piece.joint if isinstance(piece, Spring) else piece
 
 
 def moves_in(plane: Plane, piece: Piece) -> bool:
-    """Whether a piece has a motion in the plane: a revolute along its normal, a slide across it, any link.
+    """Return whether a piece moves in the plane: a revolute along its normal, a slide across it, or any link.
 
     Raises:
         InputError: if it is askew to the plane.
@@ -114,13 +114,13 @@ def moves_in(plane: Plane, piece: Piece) -> bool:
 
 def _with_struts(name: str, chain: Sequence[Piece], near: float) -> tuple[Piece, ...]:
     """The chain with every strut in it as one piece."""
-    made: list[Piece] = []
+    result: list[Piece] = []
     at = 0
     while at < len(chain):
         strut, after = _strut(name, chain, at, near)
-        made.append(strut or chain[at])
+        result.append(strut or chain[at])
         at = after if strut else at + 1
-    return tuple(made)
+    return tuple(result)
 
 
 def _strut(name: str, chain: Sequence[Piece], at: int, near: float) -> tuple[Strut | None, int]:
@@ -131,13 +131,13 @@ def _strut(name: str, chain: Sequence[Piece], at: int, near: float) -> tuple[Str
     for last in range(inside, len(chain)):
         second, after = _ball(chain, last, near)
         if second is not None and float(np.linalg.norm(array(second - first))) > near:
-            yielding = _in_a_row(chain[inside:last], first, second, near)
-            return (None, at) if yielding is None else (Strut(name, first, second, yielding), after)
+            stiffness = _in_a_row(chain[inside:last], first, second, near)
+            return (None, at) if stiffness is None else (Strut(name, first, second, stiffness), after)
     return None, at
 
 
 def _ball(chain: Sequence[Piece], at: int, near: float) -> tuple[Vector | None, int]:
-    """Centre of the spherical joint that begins at a position (three revolutes through a point), and what follows."""
+    """Centre of the spherical joint (three revolutes through a point) at a position, and the position after it."""
     axes: list[Array] = []
     centre: Vector | None = None
     for i, piece in enumerate(chain[at : at + 3], at + 1):
@@ -153,7 +153,7 @@ def _ball(chain: Sequence[Piece], at: int, near: float) -> tuple[Vector | None, 
 
 
 def _in_a_row(parts: Sequence[Piece], start: Vector, end: Vector, near: float) -> float | None:
-    """Stiffness (N/m) along the line of parts in a row; None where they do more than stretch along it."""
+    """Stiffness (N/m) of parts in a row along their line; None if they do more than stretch along it."""
     span = array(end - start)
     along = span / np.linalg.norm(span)
     compliance = 0.0
@@ -173,12 +173,48 @@ def _parallel(a: Array, b: Array) -> bool:
 
 def _spans(beam: Beam, ends: tuple[Vector, Vector], near: float) -> bool:
     pairs = zip((beam.start, beam.end), ends, strict=True)
-    return all(float(np.linalg.norm(array(own - end))) < near for own, end in pairs)
+    return all(float(np.linalg.norm(array(point - end))) < near for point, end in pairs)
 
 
 def _turns_about(joint: Joint, centres: Sequence[Vector], near: float) -> bool:
-    """Whether a revolute's axis passes through a spherical joint, which leaves it without a load."""
+    """Whether a revolute's axis passes through a spherical joint, so that it carries no load."""
     if joint.point is None or joint.pitch != 0.0:
         return False
     axis, point = array(joint.axis), joint.point
     return any(float(np.linalg.norm(np.cross(array(centre - point), axis))) < near for centre in centres)
+
+
+def section_axes(beam: Beam) -> tuple[Array, float]:
+    """Return the axes of a beam as columns x (along it), y, z [3 x 3] in the base frame, and its length, m."""
+    start, end, up = (array(v) for v in (beam.start, beam.end, beam.up))
+    length = float(np.linalg.norm(end - start))
+    x = (end - start) / length
+    z = up - (up @ x) * x
+    z = z / np.linalg.norm(z)
+    return np.column_stack([x, np.cross(z, x), z]), length
+
+
+def end_compliance(beam: Beam) -> Array:
+    """Return the compliance of a beam's end against its built-in start, in beam axes, order rx ry rz x y z [6 x 6].
+
+    A load F across deflects the end by F L³/3EI + F L/kGA and turns it by F L²/2EI; a moment M turns it by M L/EI and
+    deflects it by M L²/2EI; torsion M L/GJ, tension F L/EA. Source: Przemieniecki 1968, Theory of Matrix Structural
+    Analysis, section 5.6.
+    """
+    length, rigidity = section_axes(beam)[1], beam.rigidity
+    c = np.zeros((6, 6))
+    c[0, 0], c[3, 3] = length / float(rigidity.torsion), length / float(rigidity.axial)
+    planes = ((4, 2, 1.0, rigidity.bending_z, rigidity.shear_y), (5, 1, -1.0, rigidity.bending_y, rigidity.shear_z))
+    for across, about, sign, bending, shear in planes:
+        soft = 1.0 / float(bending)
+        c[across, across] = length**3 / 3.0 * soft + length / float(shear)
+        c[about, about] = length * soft
+        c[across, about] = c[about, across] = sign * length**2 / 2.0 * soft
+    return c
+
+
+def in_plane(beam: Beam, normal: Vector) -> tuple[bool, ...]:
+    """Return which of rx ry rz x y z, in beam axes, move in the plane of a planar machine; all False if it is askew."""
+    components = section_axes(beam)[0].T @ array(normal)
+    across = [math.isclose(abs(c), 1.0, abs_tol=COINCIDENT) for c in components]
+    return (*across, *(not c and any(across) for c in across))

@@ -1,6 +1,6 @@
-"""A placed machine as a frame of straight members in PyNite, and its compliance as what is rigid grows ever stiffer.
+"""The compliance of a machine by PyNite: a frame of straight members whose rigid parts are made ever stiffer.
 
-Built from points, axes and sections; the members themselves are `pynite_members`.
+The frame is built from points, axes and cross-sections; `pynite_members` makes the members.
 """
 
 import math
@@ -14,28 +14,26 @@ from kinetostat.machine.leg import Joint, Leg, Spring
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration
 from kinetostat.spec.errors import InputError
+from kinetostat.tolerances import BLOCK_BEING_EXTRAPOLATED
 from kinetostat.validation.answer import Answer, Trial, difference
-from kinetostat.validation.cantilever import section_axes
-from kinetostat.validation.pieces import Piece, Strut, array, columns, joint_of, pieces
+from kinetostat.validation.pieces import Piece, Strut, array, columns, joint_of, pieces, section_axes
 from kinetostat.validation.pynite_members import Frame
 
 Array = npt.NDArray[np.float64]
 
 TRIALS = 10
-"""How many stiffnesses of rigid parts are tried."""
+"""Number of stiffnesses that are tried for rigid parts."""
 STIFFER = 100.0
-"""The greatest of them, in units of the stiffest part; the least is the softest part's: what is rigid adds its own
-compliance, which extrapolation takes away again and exactly so where no leg is redundant."""
+"""The greatest of them, in units of the stiffest part; the least is that of the softest part. The compliance that rigid
+parts then have is taken away again by extrapolation, exactly so where no leg is redundant."""
 CONTRAST = 1e7
-"""Of stiffnesses in one machine, beyond which a redundant stiff part can stay hidden from every trial."""
-SMALL = 1e-4
-"""Share of the other below which a block of C is on its way to zero, so that its relative error says nothing."""
+"""Largest ratio of stiffnesses in one machine; beyond it a redundant stiff part can stay hidden from every trial."""
 MOST = 6
-"""Trials that one extrapolation uses at most."""
+"""Most trials that one extrapolation uses."""
 
 
 def solve(configuration: Configuration, reference: Vector) -> Answer:
-    """C with rigid parts of several stiffnesses k, extrapolated to 1/k = 0.
+    """Return C with rigid parts of several stiffnesses k, extrapolated to 1/k = 0.
 
     Args:
         configuration: placed machine.
@@ -48,23 +46,22 @@ def solve(configuration: Configuration, reference: Vector) -> Answer:
     softest, stiffest = _extremes(configuration)
     if stiffest > CONTRAST * softest:
         raise InputError(
-            "Stiffnesses of this machine differ by more than seven decades, too much for PyNite, where what is rigid "
-            "needs a finite stiffness beside them; use Exudyn."
+            "Stiffnesses of this machine differ by more than seven decades, too much for PyNite, in which rigid parts "
+            "must have a finite stiffness as well; use Exudyn."
         )
     stiffnesses = np.geomspace(softest, STIFFER * stiffest, TRIALS).tolist()
     trials = [Trial(stiff, _compliance(configuration, reference, stiff)) for stiff in stiffnesses]
-    found, rival = extrapolate([1.0 / t.scale for t in trials], [t.compliance for t in trials], length)
-    return Answer(found, rival, "stiffness of what is rigid, N/m", tuple(trials))
+    best, second_best = extrapolate([1.0 / t.scale for t in trials], [t.compliance for t in trials], length)
+    return Answer(best, second_best, "stiffness of rigid parts, N/m", tuple(trials))
 
 
 def extrapolate(steps: Sequence[float], values: Sequence[Array], length: float) -> tuple[Array, Array]:
-    """Values [6 x 6] at ever smaller steps, taken to step 0 by polynomials through some that follow each other.
+    """Extrapolate values [6 x 6] at ever smaller steps to step 0, by polynomials through consecutive ones (Neville).
 
     Returns:
-        Of all polynomials the value that differs least from those of one degree less, and that of these which differs
-        from it more.
+        The value that differs least from its two neighbours of one degree less, and the neighbour that differs more.
     """
-    least, best, rival = math.inf, values[-1], values[-2]
+    least, best, second_best = math.inf, values[-1], values[-2]
     column = list(values)
     for degree in range(1, min(MOST, len(steps))):
         finer = [
@@ -72,11 +69,11 @@ def extrapolate(steps: Sequence[float], values: Sequence[Array], length: float) 
             for i in range(len(column) - 1)
         ]
         for new, *older in zip(finer, column, column[1:], strict=False):
-            apart = [difference(old, new, length, SMALL) for old in older]
-            if degree > 1 and max(apart) < least:
-                least, best, rival = max(apart), new, older[apart.index(max(apart))]
+            gaps = [difference(old, new, length, BLOCK_BEING_EXTRAPOLATED) for old in older]
+            if degree > 1 and max(gaps) < least:
+                least, best, second_best = max(gaps), new, older[gaps.index(max(gaps))]
         column = finer
-    return best, rival
+    return best, second_best
 
 
 def _extremes(configuration: Configuration) -> tuple[float, float]:
@@ -116,9 +113,11 @@ def _compliance(configuration: Configuration, reference: Vector, stiff: float) -
 
 
 def _leg(frame: Frame, leg: Leg, chain: Sequence[Piece], axes: Array, platform: str) -> None:
-    """The members of one leg from a fixed node to the platform's."""
+    """Add the members of one leg from a fixed node to the platform's."""
     if not chain:
-        raise InputError(f"{leg.name} is rigid and welds the platform to the base, of which PyNite makes nothing.")
+        raise InputError(
+            f"{leg.name} is rigid and welds the platform to the base, which PyNite cannot represent; use Exudyn."
+        )
     at = frame.fixed_node(frame.points[platform])
     for piece in chain:
         at = _piece(frame, piece, axes, at)
@@ -126,7 +125,7 @@ def _leg(frame: Frame, leg: Leg, chain: Sequence[Piece], axes: Array, platform: 
 
 
 def _piece(frame: Frame, piece: Piece, axes: Array, at: str) -> str:
-    """The members of a piece that begins on the body of node `at`; a node of the body after it."""
+    """Add the members of a piece that begins on the body of node `at`; return a node of the body after it."""
     if isinstance(piece, Joint | Spring):
         return _joint(frame, piece, axes, at)
     if isinstance(piece, Beam):
@@ -149,17 +148,19 @@ def _joint(frame: Frame, piece: Joint | Spring, axes: Array, at: str) -> str:
 
 
 def _beam(frame: Frame, beam: Beam, axes: Array, at: str) -> str:
-    own = beam.rigidity
-    if math.isfinite(own.shear_y) or math.isfinite(own.shear_z):
-        raise InputError(f'"{beam.name}" yields to shear, PyNite\'s members do not; use Exudyn for this machine.')
+    rigidity = beam.rigidity
+    if math.isfinite(rigidity.shear_y) or math.isfinite(rigidity.shear_z):
+        raise InputError(
+            f'"{beam.name}" deflects in shear, which PyNite\'s members do not; use Exudyn for this machine.'
+        )
     near, far = frame.reach(at, axes.T @ array(beam.start)), frame.node(axes.T @ array(beam.end))
-    section = [float(k) for k in (own.axial, own.bending_y, own.bending_z, own.torsion)]
+    section = [float(k) for k in (rigidity.axial, rigidity.bending_y, rigidity.bending_z, rigidity.torsion)]
     frame.member((near, far), section, axes.T @ section_axes(beam)[0])
     return far
 
 
 def _parallelogram(frame: Frame, piece: Parallelogram, axes: Array, at: str) -> str:
-    """Two bars between bodies that stubs for the motions in the parallelogram's plane keep parallel to it."""
+    """Two bars between bodies; stubs for the motions in the parallelogram's plane keep the bodies parallel to it."""
     near, far, side = (axes.T @ array(v) for v in (piece.near, piece.far, piece.side))
     along = (far - near) / np.linalg.norm(far - near)
     normal = np.cross(side, along)

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from importlib.metadata import version
 
 from kinetostat.studies.paper.printed import CITATION
-from kinetostat.validation.comparison import AGREED, Validation
+from kinetostat.tolerances import AGREED
+from kinetostat.validation.comparison import Validation
 from kinetostat.views.comparison_tables import diagonal_table, difference_table, trial_table
 from kinetostat.views.report.content import Block, Formula, Listing, Paragraph, Section, Table
 from kinetostat.views.report.typesetting import printed, typeset
