@@ -6,7 +6,7 @@ from test_leg_by_leg import TASKS, known, moved, pose_of, written
 
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Table
-from kinetostat.kinematics.closure import CLOSED_FORMS, solver_of
+from kinetostat.kinematics.closure import CLOSED_FORMS, solver_of, task_of
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values, with_values
 
@@ -68,7 +68,7 @@ def test_machines_of_one_plan_are_judged_by_their_own_numbers():
     parallel = with_values(parallel, longer)
     tilted = with_values(parallel, {f"{axis}.1": 1.1 * longer[f"{axis}.1"]})
     assert parallel.family is tilted.family
-    assert solver_of(tilted) is CLOSED_FORMS
+    assert solver_of(task_of(tilted)) is CLOSED_FORMS
     points = Table({f"pose.{c}": np.array([values(parallel)[f"pose.{c}"]]) for c in "xyz"})
     for machine in (parallel, tilted):
         found, expected = (

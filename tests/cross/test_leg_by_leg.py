@@ -12,7 +12,7 @@ import pytest
 
 from kinetostat.engine.batch import NATIVE_FROM, evaluate
 from kinetostat.engine.points import Table
-from kinetostat.kinematics.closure import CLOSED_FORMS, NEWTON, solve_joints
+from kinetostat.kinematics.closure import CLOSED_FORMS, NEWTON, solve_joints, task_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.kinetostatics.response import respond
@@ -144,12 +144,12 @@ def test_batches_are_the_single_poses(name):
 
 def test_the_closed_form_of_a_leg_is_what_newton_finds():
     machine = load("tripteron", ["pose.x=0.31", "pose.y=0.82", "pose.z=0.17"])
-    joints = CLOSED_FORMS.over_scalars(machine)
+    joints = CLOSED_FORMS.over_scalars(machine.chains())
     angles = [a if isinstance(a, float) else math.atan2(a.sine, a.cosine) for a in joints.coordinates]
     away = load("tripteron", ["pose.x=0.31", "pose.y=0.82", "pose.z=0.17", "pose.roll=0"])
     assert joints.status == Status.OK
     assert np.allclose(angles, solve_joints(away).coordinates, atol=1e-12)
-    assert np.allclose(angles, NEWTON(machine).coordinates, atol=1e-12)
+    assert np.allclose(angles, NEWTON(task_of(machine)).coordinates, atol=1e-12)
 
 
 def test_dependent_coordinates_are_solved_for_and_checked():

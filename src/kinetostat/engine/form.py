@@ -194,7 +194,7 @@ def _joints(given: Inputs, closed: bool) -> tuple[Joints | None, tuple[Traced, .
     if given.machine.family.chains is None:
         return None, ()
     if closed:
-        return CLOSED_FORMS.over_scalars(given.machine), ()
+        return CLOSED_FORMS.over_scalars(given.machine.chains()), ()
     columns = tuple(given.graph.input() for _ in range(given.machine.chains().size + 1))
     return Joints(columns[:-1], columns[-1]), columns
 

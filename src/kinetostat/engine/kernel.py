@@ -14,7 +14,7 @@ import numpy as np
 
 from kinetostat.engine.form import Form, Kind, angles, form_of, joint_columns, objectives_of, reduced
 from kinetostat.engine.trace import Array, Codes, Runnable
-from kinetostat.kinematics.closure import solver_of
+from kinetostat.kinematics.closure import solver_of, task_of
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 
@@ -126,7 +126,7 @@ def slab_kernel(machine: Machine, varying: Sequence[str], quantities: Sequence[s
 
 def closes_inside(machine: Machine) -> bool:
     """Whether a program for a machine can compute its joint coordinates itself."""
-    return machine.family.chains is not None and solver_of(machine, traced=True).traceable
+    return machine.family.chains is not None and solver_of(task_of(machine), traced=True).traceable
 
 
 def _kernel(machine: Machine, varying: Sequence[str], quantities: Sequence[str], closed: bool) -> Kernel:

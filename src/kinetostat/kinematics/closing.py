@@ -7,16 +7,17 @@ Source: theory section 4 for links that meet, theory (19)-(21) for equations, (2
 placements are in the base frame.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.algebra.column import column
 from kinetostat.algebra.scalar import Scalar, cos, sin, smaller, sqrt
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector, rotation_x, rotation_y, rotation_z
 from kinetostat.machine.leg import Joint, Turn
-from kinetostat.machine.machine import Chains, Closure, Configuration
+from kinetostat.machine.machine import Chains, Closure, Configuration, Step
 from kinetostat.machine.written.family import place
 from kinetostat.tolerances import NO_ANGLE_RATES
 
@@ -75,19 +76,21 @@ class LegEnd:
     movers: tuple[Joint, ...]
 
 
-def leg_ends(chains: Chains, coordinates: Sequence[Scalar | Turn]) -> list[LegEnd]:
+def leg_ends(chains: Chains, coordinates: Sequence[Scalar]) -> list[LegEnd]:
     """Follow every leg from base to platform.
 
     Args:
         chains: the legs at the home pose.
-        coordinates: of their joints leg by leg, from the home pose, rad (or turns) or m.
+        coordinates: of their joints leg by leg, from the home pose, rad or m.
     """
     remaining = iter(coordinates)
-    ends = []
-    for steps in chains.legs:
-        chain, motion = place([step for step in steps if step.moves], remaining)
-        ends.append(LegEnd(motion @ chains.home, tuple(element.mover for element in chain)))  # type: ignore[attr-defined]
-    return ends
+    return [leg_end(steps, chains.home, remaining) for steps in chains.legs]
+
+
+def leg_end(steps: Sequence[Step], home: Displacement, coordinates: Iterator[Scalar | Turn]) -> LegEnd:
+    """Follow one leg from base to platform, and take its coordinates, rad (or turns) or m from the home pose."""
+    chain, motion = place([step for step in steps if step.moves], coordinates)
+    return LegEnd(motion @ home, tuple(element.mover for element in chain))  # type: ignore[attr-defined]
 
 
 def closing_equations(chains: Chains, coordinates: Sequence[Scalar]) -> list[Scalar]:
@@ -152,8 +155,8 @@ def squared_distance(start: Displacement, end: Displacement, length: Scalar) -> 
     shift = (end.translation - start.translation) * (1.0 / length)
     turns = ((start.rotation.x, end.rotation.x), (start.rotation.y, end.rotation.y), (start.rotation.z, end.rotation.z))
     square: Scalar = shift.dot(shift)
-    for column in [a - b for a, b in turns]:
-        square = square + 0.5 * column.dot(column)
+    for apart in [a - b for a, b in turns]:
+        square = square + 0.5 * apart.dot(apart)
     return square
 
 
@@ -206,7 +209,7 @@ def gaps_at(chains: Chains, coordinates: Array, goal: Array) -> Gaps:
     """
     count = len(coordinates)
     length = np.broadcast_to(np.asarray(chains.length, dtype=float), (count,))
-    ends = leg_ends(chains, list(coordinates.T))
+    ends = leg_ends(chains, [column(c) for c in coordinates.T])
     scale = np.stack([np.ones(count)] * 3 + [1.0 / length] * 3, axis=1)[:, :, None] * units_of(chains, length)[:, None]
     twists = [block * scale for block in _platform_twists(ends, count)]
     closure = stacked(_between_legs(ends, length), count) / length[:, None]

@@ -20,6 +20,7 @@ from kinetostat.kinematics.closing import (
     Array,
     clearance,
     gaps_at,
+    leg_end,
     leg_ends,
     platform_placement,
     pose_of,
@@ -63,22 +64,25 @@ class Joints:
     status: Scalar
 
 
-def solver_of(machine: Machine, traced: bool = False) -> "ClosedForms | Newton":
-    """Choose how the joints of a machine are found: the one place where that is decided.
+@dataclass(frozen=True)
+class Task:
+    """The legs of a machine, and the poses that they are to reach.
 
-    Args:
-        machine: written leg by leg.
-        traced: whether the solver is to be part of a program. A program neither iterates nor tests pose by pose whether
-            the given coordinates determine the platform, so that this is tested once, at the machine's own pose.
+    Attributes:
+        chains: the legs at the home pose, with floats or arrays.
+        goal: coordinates of the poses, in the order of the chains' pose [n x given], rad or m.
+        single: whether there is one pose and all numbers are floats.
     """
-    chains = machine.chains()
-    if any(inverse is None for inverse in chains.inverses) or len(chains.inverses) < len(chains.legs):
-        return NEWTON
-    if traced:
-        leaves_open = CLOSED_FORMS.over_scalars(machine).status == Status.NOT_CONVERGED
-        if leaves_open or CLOSED_FORMS(machine).status == Status.SINGULAR:
-            return NEWTON
-    return CLOSED_FORMS
+
+    chains: Chains
+    goal: Array
+    single: bool
+
+    def joints(self, coordinates: Array, status: Codes) -> Joints:
+        """Joints from coordinates [n x coordinates] and status codes [n]: floats for a single pose."""
+        if self.single:
+            return Joints(tuple(float(q) for q in coordinates[0]), int(status[0]))
+        return Joints(tuple(map(column, coordinates.T)), status)
 
 
 def solve_joints(machine: Machine) -> Joints:
@@ -86,92 +90,17 @@ def solve_joints(machine: Machine) -> Joints:
 
     In closed form where every leg has one, otherwise by Newton's method along the way from the home pose.
     """
-    return solver_of(machine)(machine)
+    task = task_of(machine)
+    return solver_of(task)(task)
 
 
-class Newton:
-    """Newton's method, along the way from the home pose."""
-
-    traceable = False
-
-    def __call__(self, machine: Machine) -> Joints:
-        """The joints of a machine whose numbers are floats or arrays."""
-        chains = machine.chains()
-        goal, single = _goal(machine, chains)
-        with np.errstate(all="ignore"):
-            coordinates = joints_on_the_way(chains, goal)
-            return _as_joints(coordinates, _status(chains, coordinates, goal), single)
-
-
-class ClosedForms:
-    """The closed form of every leg; Newton's method for poses at which these do not close the legs."""
-
-    traceable = True
-
-    def __call__(self, machine: Machine) -> Joints:
-        """The joints of a machine whose numbers are floats or arrays."""
-        chains = machine.chains()
-        goal, single = _goal(machine, chains)
-        with np.errstate(all="ignore"):
-            joints = self.over_scalars(machine)
-            coordinates = stacked([_angle(amount) for amount in joints.coordinates], len(goal))
-            status = np.broadcast_to(np.asarray(joints.status), (len(goal),))
-            left = status == Status.NOT_CONVERGED
-            if left.all():
-                return NEWTON(machine)
-            # Out of reach a coordinate is NaN, which would spoil the linear algebra of the other poses.
-            reached = np.where(np.isnan(coordinates), 0.0, coordinates)
-            status = np.where(status == Status.OK, _status(chains, reached, goal), status)
-            if left.any():
-                rest = NEWTON(machine)
-                coordinates = np.where(left[:, None], stacked(rest.coordinates, len(goal)), coordinates)
-                status = np.where(left, rest.status, status)
-        return _as_joints(coordinates, status, single)
-
-    @staticmethod
-    def over_scalars(machine: Machine) -> Joints:
-        """The joints over any scalar, angles as turns, by closed forms alone.
-
-        NOT_CONVERGED says that the legs close only if coordinates which the pose does not give differ from those of
-        the home pose, which Newton's method finds.
-        """
-        chains = machine.chains()
-        placement = platform_placement(chains)
-        motion = placement @ chains.home.inverse()
-        amounts: list[Scalar | Turn] = []
-        reached: Scalar = True
-        for inverse, steps in zip(chains.inverses, chains.legs, strict=True):
-            if inverse is None:
-                raise ValueError("a leg without a closed form")
-            leg_amounts, closure = inverse.amounts(steps, motion)
-            amounts += leg_amounts
-            reached = (clearance(closure) >= 0.0) & reached
-        gap: Scalar = 0.0
-        for end in leg_ends(chains, amounts):
-            gap = gap + squared_distance(placement, end.platform, chains.length)
-        status = where(gap < CLOSED * CLOSED, int(Status.OK), int(Status.NOT_CONVERGED))
-        return Joints(tuple(amounts), where(reached, status, int(Status.OUT_OF_REACH)))
-
-
-NEWTON, CLOSED_FORMS = Newton(), ClosedForms()
-
-
-def _angle(amount: Scalar | Turn) -> Scalar:
-    return np.arctan2(amount.sine, amount.cosine) if isinstance(amount, Turn) else amount
-
-
-def _as_joints(coordinates: Array, status: Codes, single: bool) -> Joints:
-    if single:
-        return Joints(tuple(float(q) for q in coordinates[0]), int(status[0]))
-    return Joints(tuple(map(column, coordinates.T)), status)
-
-
-def _goal(machine: Machine, chains: Chains) -> tuple[Array, bool]:
-    """Pose coordinates [n x given], and whether the machine is at one pose only."""
+def task_of(machine: Machine) -> Task:
+    """The legs and poses of a machine written leg by leg, whose numbers are floats or arrays."""
+    chains = machine.chains()
     given = np.stack(np.broadcast_arrays(*map(np.asarray, chains.pose.values())), axis=-1).astype(float)
     goal = np.atleast_2d(given)
     count = max(len(goal), _batch(machine, chains))
-    return np.broadcast_to(goal, (count, goal.shape[1])), given.ndim == 1 and count == 1
+    return Task(chains, np.broadcast_to(goal, (count, goal.shape[1])), given.ndim == 1 and count == 1)
 
 
 def _batch(machine: Machine, chains: Chains) -> int:
@@ -183,6 +112,92 @@ def _batch(machine: Machine, chains: Chains) -> int:
 def _numbers(table: object) -> list[Scalar]:
     values = list(vars(table).values())
     return [entry for value in values for entry in (value if isinstance(value, tuple) else (value,))]
+
+
+def solver_of(task: Task, traced: bool = False) -> "ClosedForms | Newton":
+    """Choose how joint coordinates are found: the one place where that is decided.
+
+    Args:
+        task: the legs, and the pose of the machine.
+        traced: whether the solver is to be part of a program. A program neither iterates nor tests pose by pose whether
+            the given coordinates determine the platform, so that this is tested once, at the machine's own pose.
+    """
+    chains = task.chains
+    if len([inverse for inverse in chains.inverses if inverse is not None]) < len(chains.legs):
+        return NEWTON
+    if traced:
+        leaves_open = CLOSED_FORMS.over_scalars(chains).status == Status.NOT_CONVERGED
+        if leaves_open or CLOSED_FORMS(task).status == Status.SINGULAR:
+            return NEWTON
+    return CLOSED_FORMS
+
+
+class Newton:
+    """Newton's method, along the way from the home pose."""
+
+    traceable = False
+
+    def __call__(self, task: Task) -> Joints:
+        """The joints, all by iteration."""
+        with np.errstate(all="ignore"):
+            coordinates = joints_on_the_way(task.chains, task.goal)
+            return task.joints(coordinates, _status(task.chains, coordinates, task.goal))
+
+
+class ClosedForms:
+    """The closed form of every leg; Newton's method for poses at which these do not close the legs."""
+
+    traceable = True
+    """Whether programs may contain it: `over_scalars` is arithmetic without iteration."""
+
+    def __call__(self, task: Task) -> Joints:
+        """The joints, in closed form where that closes the legs."""
+        count = len(task.goal)
+        with np.errstate(all="ignore"):
+            closed = self.over_scalars(task.chains)
+            coordinates = stacked([_angle(amount) for amount in closed.coordinates], count)
+            status = np.broadcast_to(np.asarray(closed.status), (count,))
+            left = status == Status.NOT_CONVERGED
+            if left.all():
+                return NEWTON(task)
+            # Out of reach a coordinate is NaN, which would spoil the linear algebra of the other poses.
+            reached = np.where(np.isnan(coordinates), 0.0, coordinates)
+            status = np.where(status == Status.OK, _status(task.chains, reached, task.goal), status)
+            if left.any():
+                rest = NEWTON(task)
+                coordinates = np.where(left[:, None], stacked(rest.coordinates, count), coordinates)
+                status = np.where(left, rest.status, status)
+        return task.joints(coordinates, status)
+
+    @staticmethod
+    def over_scalars(chains: Chains) -> Joints:
+        """The joints over any scalar, angles as turns, by closed forms alone.
+
+        NOT_CONVERGED says that the legs close only if coordinates which the pose does not give differ from those of
+        the home pose, which Newton's method finds.
+        """
+        placement = platform_placement(chains)
+        motion = placement @ chains.home.inverse()
+        amounts: list[Scalar | Turn] = []
+        reached: Scalar = True
+        gap: Scalar = 0.0
+        for inverse, steps in zip(chains.inverses, chains.legs, strict=True):
+            if inverse is None:
+                raise ValueError("a leg without a closed form")
+            leg_amounts, closure = inverse.amounts(steps, motion)
+            amounts += leg_amounts
+            reached = (clearance(closure) >= 0.0) & reached
+            end = leg_end(steps, chains.home, iter(leg_amounts)).platform
+            gap = gap + squared_distance(end, placement, chains.length)
+        status = where(gap < CLOSED * CLOSED, int(Status.OK), int(Status.NOT_CONVERGED))
+        return Joints(tuple(amounts), where(reached, status, int(Status.OUT_OF_REACH)))
+
+
+NEWTON, CLOSED_FORMS = Newton(), ClosedForms()
+
+
+def _angle(amount: Scalar | Turn) -> Scalar:
+    return np.arctan2(amount.sine, amount.cosine) if isinstance(amount, Turn) else amount
 
 
 def joints_on_the_way(chains: Chains, goal: Array) -> Array:
