@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from kinetostat.engine.batch import first_limit_passed, limits_used
 from kinetostat.engine.form import Kind, form_of, traced
 from kinetostat.engine.kernel import slab_kernel
-from kinetostat.engine.limits import first_passed, used
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import is_set
@@ -91,7 +91,7 @@ def test_floats_arrays_and_machine_code_give_one_status(name, load_settings, fie
     assert {Status.OK, Status.JOINT_LIMIT} <= set(expected)
     assert np.array_equal(arrays, expected)
     assert np.array_equal(codes, expected)
-    passed = first_passed(machine, columns, fields)
+    passed = first_limit_passed(machine, columns, fields)
     for i, response in enumerate(single):
         broken = [check.limit.name for check in response.checks if not check.kept]
         if expected[i] == Status.JOINT_LIMIT:
@@ -105,7 +105,7 @@ def test_what_is_used_is_what_single_poses_measure(name, load_settings, fields):
     columns = poses(machine)
     reached = [i for i in range(40) if respond(at(watched, columns, i)).status == Status.OK]
     columns = {path: column[reached] for path, column in columns.items()}
-    found = used(watched, columns)
+    found = limits_used(watched, columns)
     every = [check for i in range(len(reached)) for check in respond(at(watched, columns, i)).checks]
     assert found.keys() == set(fields)
     for field, ends in found.items():
@@ -135,6 +135,6 @@ def test_a_limit_that_varies_is_a_column_like_any_other():
     slab_kernel(machine, ["limits.longest_leg"], ["singularity_margin"]).run(
         {"limits.longest_leg": length}, results, codes
     )
-    reach = used(with_values(machine, {"limits.longest_leg": 1.0}), {"pose.x": np.zeros(1)})["longest_leg"][1]
+    reach = limits_used(with_values(machine, {"limits.longest_leg": 1.0}), {"pose.x": np.zeros(1)})["longest_leg"][1]
     assert np.array_equal(codes == Status.OK, length >= reach)
     assert is_set(length)

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from kinetostat.engine.kernel import Fill, fill_some, slab_kernel
 from kinetostat.engine.points import Array, Part, Points
+from kinetostat.kinematics.limits import Check
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
@@ -188,3 +189,43 @@ def responses(machine: Machine, points: Points) -> Response:
     """
     with np.errstate(all="ignore"):
         return respond(with_values(machine, points.columns(0, points.size)))
+
+
+def first_limit_passed(machine: Machine, columns: Mapping[str, Array], fields: Sequence[str]) -> npt.NDArray[np.int64]:
+    """Which limit is the first, in the order of the checks, that each point passes: its place in `fields`, or -1.
+
+    Args:
+        machine: with its limits.
+        columns: values of the varying parameters by leaf path, SI [points].
+        fields: names of the limits that are set.
+    """
+    size = len(next(iter(columns.values())))
+    first = np.full(size, -1)
+    for part, checks in _checked(machine, columns):
+        for check in checks:
+            beyond = ~np.broadcast_to(check.kept, first[part].shape) & (first[part] < 0)
+            first[part][beyond] = fields.index(check.limit.name)
+    return first
+
+
+def limits_used(machine: Machine, columns: Mapping[str, Array]) -> dict[str, tuple[float, float]]:
+    """Least and greatest measure of each limit over some points and all parts, by the limit's name.
+
+    Args:
+        machine: all of whose limits that are of interest are set.
+        columns: values of the varying parameters by leaf path, SI [points]; of points that can be reached.
+    """
+    ranges: dict[str, tuple[float, float]] = {}
+    for _, checks in _checked(machine, columns):
+        for check in checks:
+            least, most = ranges.get(check.limit.name, (np.inf, -np.inf))
+            ranges[check.limit.name] = min(least, float(np.min(check.measure))), max(most, float(np.max(check.measure)))
+    return ranges
+
+
+def _checked(machine: Machine, columns: Mapping[str, Array]) -> Iterator[tuple[slice, tuple[Check, ...]]]:
+    size = len(next(iter(columns.values())))
+    for start in range(0, size, NUMPY_SLAB):
+        part = slice(start, start + NUMPY_SLAB)
+        with np.errstate(all="ignore"):
+            yield part, respond(with_values(machine, {path: column[part] for path, column in columns.items()})).checks

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from kinetostat.engine.limits import used
+from kinetostat.engine.batch import limits_used
 from kinetostat.engine.points import Array
 from kinetostat.machine.limits import LIMITS, Limit, Limits
 from kinetostat.machine.machine import Machine
@@ -39,7 +39,7 @@ def demands(machine: Machine, poses: Mapping[str, Array]) -> tuple[Demand, ...]:
         return ()
     # A limit is compared with the poses only where it is set; how high it is set does not change what it is about.
     watched = replace(machine, tables={**machine.tables, "limits": Limits(**dict.fromkeys(LIMITS, 1.0))})
-    ranges = used(watched, poses)
+    ranges = limits_used(watched, poses)
     last = {limit.title: limit for limit in LIMITS.values()}  # the least and the greatest length share one range
     return tuple(_demand(limit, ranges[limit.name]) for limit in last.values() if limit.name in ranges)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.engine.limits import first_passed
+from kinetostat.engine.batch import first_limit_passed
 from kinetostat.engine.points import Array
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.aspect import aspect
@@ -101,7 +101,7 @@ class Judge:
         found[(status == Status.OK) & self._beyond(values)] = self.labels.index(BEYOND)
         limited = np.flatnonzero(status == Status.JOINT_LIMIT)
         if limited.size:
-            found.flat[limited] = len(PLAIN) + 1 + first_passed(self.machine, poses(limited), self.limits)
+            found.flat[limited] = len(PLAIN) + 1 + first_limit_passed(self.machine, poses(limited), self.limits)
         for place, condition in enumerate(self.conditions, len(PLAIN) + 1 + len(self.limits)):
             found[(found == 0) & ~condition.holds(np.asarray(values[condition.quantity]))] = place
         return found
