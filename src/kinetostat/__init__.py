@@ -1,7 +1,7 @@
 """kinetostat: how stiff a parallel kinematic machine is, where it is weak, why, and how to make it better.
 
     from kinetostat import analyze, load
-    found = analyze(load("zhang-gosselin-4dof", ["pose.x=5 mm"]))
+    analysis = analyze(load("zhang-gosselin-4dof", ["pose.x=5 mm"]))
 
 Names load their modules when first used, so that importing the package costs nothing; their types in `__init__.pyi`.
 """
@@ -44,7 +44,7 @@ _SHOWN = {
     "Result": "kinetostat.studies.optimisation.result",
     "Validation": "kinetostat.validation.comparison",
 }
-"""What notebooks show as HTML, and where it is defined: told to them by name, so that nothing is imported for it."""
+"""Classes that notebooks show as HTML, with their modules: IPython gets names only, so that nothing is imported."""
 
 __all__ = [
     "InputError", "Machine", "Status", "analyze", "build", "bundled", "changed", "compare", "evaluate_grid", "export",

@@ -3,7 +3,7 @@
 import pytest
 
 from kinetostat.views.optimisation_tables import times_stiffer
-from kinetostat.views.paper import held
+from kinetostat.views.paper import in_number
 
 
 @pytest.mark.parametrize(
@@ -19,4 +19,4 @@ def test_a_softer_direction_is_called_that(gain, said):
     [("holds", 1, "holds"), ("holds", 7, "hold"), ("holds with limits", 5, "hold with limits"), ("fails", 2, "fail")],
 )
 def test_one_statement_holds_and_many_hold(finding, count, said):
-    assert held(finding, count) == said
+    assert in_number(finding, count) == said

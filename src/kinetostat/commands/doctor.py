@@ -24,21 +24,21 @@ def _doctor(options: argparse.Namespace) -> int:
     from kinetostat.studies.diagnosis.diagnosis import as_json, healthy
 
     if options.json:
-        found = [*_checks()]
-        print_json(as_json(found))
+        checks = [*_checks()]
+        print_json(as_json(checks))
     else:
         from rich.console import Console
 
         from kinetostat.views.diagnosis_tables import print_checks, print_verdict
 
         console = Console(markup=False, emoji=False)
-        found = print_checks(console, _checks())
-        print_verdict(console, found)
-    return DONE if healthy(found) else NO_ANSWER
+        checks = print_checks(console, _checks())
+        print_verdict(console, checks)
+    return DONE if healthy(checks) else NO_ANSWER
 
 
 def _checks() -> "Iterator[Check]":
-    """All findings; what pictures and the studio add to them is known here alone."""
+    """Yield all findings, with those on pictures and the studio, which `studies.diagnosis` must not import."""
     from kinetostat.studies.diagnosis.diagnosis import Check, State, diagnose, reinstall, tried
     from kinetostat.studio.design.state_folder import usual_state
 
@@ -46,9 +46,9 @@ def _checks() -> "Iterator[Check]":
     yield tried("self-test", "pictures", _drawn, reinstall("matplotlib"))
     yield Check("places", "cache", State.ABSENT, "none: compiled programs live in memory only")
     yield Check("places", "configuration", State.ABSENT, "none: files and options say everything")
-    kept = usual_state()
-    said = f"{kept}: searches and favourites of the design tab"
-    yield Check("places", "studio", State.SOUND if kept.is_dir() else State.ABSENT, said)
+    folder = usual_state()
+    meaning = f"{folder}: searches and favourites of the design tab"
+    yield Check("places", "studio", State.SOUND if folder.is_dir() else State.ABSENT, meaning)
 
 
 def _drawn() -> str:

@@ -178,19 +178,19 @@ def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) ->
 
     try:
         with hired(_crew(options)) as compute, progress_bar("computing") as progress:
-            found = answer_into(question, options.output, stem, progress, compute, options.resume)
+            stored = answer_into(question, options.output, stem, progress, compute, options.resume)
     except KeyboardInterrupt:
         return stopped(f"the results so far are in {options.output}; the same command continues from there.")
     from kinetostat.studies.grid.stored_grid import summary_json
     from kinetostat.views.grid_tables import print_stored
 
-    drawn = [] if options.json or len(question.dims) > 2 else _draw_thinned(found.path)
+    drawn = [] if options.json or len(question.dims) > 2 else _draw_thinned(stored.path)
     return give(
         options,
-        bool(found.tally.answered),
-        lambda: summary_json(found),
-        lambda console: print_stored(console, found),
-        [found.path, *drawn],
+        bool(stored.tally.answered),
+        lambda: summary_json(stored),
+        lambda console: print_stored(console, stored),
+        [stored.path, *drawn],
     )
 
 

@@ -76,7 +76,7 @@ def _matrix_table(
 def shares_table(analysis: Analysis, full: bool = False) -> Table:
     """Attribution, by default of joints and links as a whole."""
     table = numeric_table("Attribution: share of each part in the diagonal of C", "part", analysis.components)
-    springs = {one.spring: [one] for one in analysis.attribution}
+    springs = {share.spring: [share] for share in analysis.attribution}
     for name, contributions in (springs if full else by_part(analysis.attribution)).items():
         columns = zip(*(contribution.compliance_share for contribution in contributions), strict=True)
         parts = [None if None in column else sum(c for c in column if c is not None) for column in columns]
@@ -88,8 +88,8 @@ def principal_table(analysis: Analysis) -> Table:
     """Least and largest stiffness of each block, free to follow and held; empty where there is none."""
     columns = ["least", "largest", "softest direction", "stiffest direction"]
     table = numeric_table("Principal stiffnesses (N/m, N·m/rad)", "", columns)
-    found = analysis.indices
-    free, guided = (found.free or {}, found.guided or {}) if found else ({}, {})
+    indices = analysis.indices
+    free, guided = (indices.free or {}, indices.guided or {}) if indices else ({}, {})
     for what, blocks, block in (
         ("force", free, "translation"),
         ("force, rotations held", guided, "translation"),
@@ -105,22 +105,22 @@ def along_table(along: Sequence[Along]) -> Table:
     """Stiffness along and about directions."""
     columns = ["force", "rotations held", "moment", "point held"]
     table = numeric_table("Stiffness along and about directions (N/m, N·m/rad)", "direction", columns)
-    for one in along:
-        values = (one.force, one.force_held, one.moment, one.moment_held)
-        table.add_row(_direction(one.direction), *(number(value, "rigid") for value in values))
+    for stiffness in along:
+        values = (stiffness.force, stiffness.force_held, stiffness.moment, stiffness.moment_held)
+        table.add_row(_direction(stiffness.direction), *(number(value, "rigid") for value in values))
     return table
 
 
-def _ellipsoid(found: PrincipalStiffness) -> list[str]:
+def _ellipsoid(block: PrincipalStiffness) -> list[str]:
     """Least and largest and their directions; once where there is but one."""
-    values = [number(value, "rigid") for value in (found.stiffnesses[0], found.stiffnesses[-1])]
-    directions = [_directions(found, found.stiffnesses[0]), _directions(found, found.stiffnesses[-1])]
-    return [*values, *directions] if len(found.stiffnesses) > 1 else [values[0], "", directions[0], ""]
+    values = [number(value, "rigid") for value in (block.stiffnesses[0], block.stiffnesses[-1])]
+    directions = [_directions(block, block.stiffnesses[0]), _directions(block, block.stiffnesses[-1])]
+    return [*values, *directions] if len(block.stiffnesses) > 1 else [values[0], "", directions[0], ""]
 
 
-def _directions(found: PrincipalStiffness, stiffness: float) -> str:
+def _directions(block: PrincipalStiffness, stiffness: float) -> str:
     """The direction of a principal stiffness; where several are alike, all that have it."""
-    pairs = list(zip(found.stiffnesses, found.directions, strict=True))
+    pairs = list(zip(block.stiffnesses, block.directions, strict=True))
     others = [way for k, way in pairs if not math.isclose(k, stiffness, rel_tol=ALIKE)]
     alike = len(pairs) - len(others)
     if alike == 1:
@@ -180,10 +180,10 @@ def remarks(analysis: Analysis) -> list[str]:
     """Mobility, internal loads, centre, condition and mass, a sentence each."""
     lines = []
     if analysis.mobility:
-        found = analysis.mobility
-        extra = f", {found.here.redundant} redundant constraints" if found.here.redundant else ""
-        lines.append(f"Mobility: {found.full_cycle} freedoms, {found.actuators} actuators{extra}.")
-        lines.append(f"{_sort_of_pose(found.kind)}. {margins(found)}")
+        mobility = analysis.mobility
+        extra = f", {mobility.here.redundant} redundant constraints" if mobility.here.redundant else ""
+        lines.append(f"Mobility: {mobility.full_cycle} freedoms, {mobility.actuators} actuators{extra}.")
+        lines.append(f"{_sort_of_pose(mobility.kind)}. {margins(mobility)}")
     if analysis.internal_loads and analysis.internal_loads.degree:
         legs = ", ".join(analysis.internal_loads.legs)
         lines.append(
@@ -222,7 +222,7 @@ def _decided(undecided: int) -> str:
 
 def _moving(analysis: Analysis) -> str:
     """Return the moving mass, and name the parts that are not counted because their mass is unknown."""
-    unknown = [one.name for one in analysis.masses if one.mass is None]
+    unknown = [part.name for part in analysis.masses if part.mass is None]
     if analysis.moving_mass is None:
         return "Moving mass: unknown; give links a cross-section, and the platform a mass in [tool]."
     shown = ", ".join(unknown[:MOST_NAMED])

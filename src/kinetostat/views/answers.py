@@ -49,13 +49,13 @@ from kinetostat.views.tables import print_machine
 
 @dataclass(frozen=True)
 class Kind:
-    """How answers of one kind are shown.
+    """How results of one kind are shown.
 
     Attributes:
-        type: of the answers.
-        tell: print one on a console.
-        figures: of one, by name, the one that says most first.
-        data: one as plain data; None where there is another way to keep it.
+        type: class of the results.
+        tell: prints a result of this kind on a console.
+        figures: draws them, by name; the most telling one first.
+        data: gives a result as plain data; None where it is kept in another way.
     """
 
     type: type
@@ -73,18 +73,20 @@ def _names(dataset: xr.Dataset) -> list[str]:
 
 
 def _grid_figures(dataset: xr.Dataset) -> dict[str, Figure]:
-    """Curves over one field, contours over two; of more there is no picture."""
+    """Draw curves over one field, or contours over two; a grid of more fields has no picture."""
     draw = {1: curves, 2: contour_maps}.get(dataset["status"].ndim)
     return {"map": draw(dataset, _names(dataset), dataset.attrs["machine"])} if draw else {}
 
 
-def _workspace_figures(found: Workspace) -> dict[str, Figure]:
-    drawn = workspace_figures.pictures(found.dataset, found.verdicts, found.conditions, found.dataset.attrs["machine"])
+def _workspace_figures(workspace: Workspace) -> dict[str, Figure]:
+    drawn = workspace_figures.pictures(
+        workspace.dataset, workspace.verdicts, workspace.conditions, workspace.dataset.attrs["machine"]
+    )
     return {name.removeprefix("-") or "region": figure for name, figure in drawn.items()}
 
 
-def _sensitivity_figures(found: Sensitivity) -> dict[str, Figure]:
-    return {"influences": sensitivity_figure(found)} if found.parameters else {}
+def _sensitivity_figures(sensitivity: Sensitivity) -> dict[str, Figure]:
+    return {"influences": sensitivity_figure(sensitivity)} if sensitivity.parameters else {}
 
 
 KINDS = (
@@ -92,7 +94,7 @@ KINDS = (
     Kind(Analysis, print_analysis, data=analysis.as_json),
     Kind(
         xr.Dataset,
-        lambda console, found: print_dataset(console, found, _names(found)),
+        lambda console, dataset: print_dataset(console, dataset, _names(dataset)),
         _grid_figures,
         grid.as_json,
     ),
@@ -102,44 +104,44 @@ KINDS = (
     Kind(
         Comparison,
         print_comparison,
-        lambda found: {"comparison": comparison_figure(found)},
+        lambda comparison: {"comparison": comparison_figure(comparison)},
         designs.as_json,
     ),
     Kind(Result, print_result, optimisation_figures.pictures, result_data.as_json),
     Kind(
         Validation,
-        lambda console, found: print_validation(console, found, validation.AGREED),
+        lambda console, result: print_validation(console, result, validation.AGREED),
         data=validation.as_json,
     ),
 )
-"""Everything that Python and notebooks show."""
+"""All kinds of results that Python and notebooks show."""
 
 
 def kind_of(answer: object) -> Kind:
-    """How an answer is shown.
+    """Look up how a result is shown.
 
     Raises:
         InputError: it is not a result of kinetostat.
     """
-    found = next((kind for kind in KINDS if isinstance(answer, kind.type)), None)
-    if found is None or (isinstance(answer, xr.Dataset) and "status" not in answer):
+    kind_of_answer = next((kind for kind in KINDS if isinstance(answer, kind.type)), None)
+    if kind_of_answer is None or (isinstance(answer, xr.Dataset) and "status" not in answer):
         known = ", ".join(kind.type.__name__ for kind in KINDS)
         raise InputError(
             f"An object of type {type(answer).__name__} is not a result of kinetostat; give one of: {known}."
         )
-    return found
+    return kind_of_answer
 
 
 def plot(answer: object, which: str | None = None) -> Figure:
-    """A figure of an answer; a notebook displays it, `save` writes it.
+    """Draw a figure of a result; a notebook displays it, `save` writes it.
 
     Args:
         answer: a machine (front, side and plan, to scale), a grid over one or two fields, a workspace, sensitivities,
             guidelines, a comparison or an optimisation's result.
-        which: of its figures, by name; the one that says most if None.
+        which: name of one of its figures; the most telling one if None.
 
     Raises:
-        InputError: there is no such figure; the message names those that there are.
+        InputError: there is no such figure; the message names the available ones.
     """
     figures = kind_of(answer).figures(answer)
     if not figures:
@@ -153,18 +155,18 @@ Writer = Callable[[Path], None]
 
 
 def save(what: object, path: str | Path) -> Path:
-    """Write something to a file, whole or not at all; the suffix says as what.
+    """Write a machine, a result or a figure to a file, completely or not at all; its suffix gives the format.
 
     Args:
         what: a machine (.toml; .png, a picture; .glb, its solids), an answer (.json), a grid or a workspace (.json,
             .nc), a figure (.png, .svg, .pdf), a picture (.png).
-        path: of the file; one that is there is replaced.
+        path: of the file; an existing file is replaced.
 
     Returns:
         The path.
 
     Raises:
-        InputError: there is no such way to keep it, or the place cannot be written.
+        InputError: the suffix does not fit what is saved, or the file cannot be written.
     """
     place = Path(path)
     writers = _writers(what)
@@ -173,7 +175,7 @@ def save(what: object, path: str | Path) -> Path:
 
 
 def _writers(what: object) -> dict[str, Writer]:
-    """How something can be written, by suffix."""
+    """Return the ways to write it, by suffix."""
     match what:
         case Figure():
             return dict.fromkeys((f".{name}" for name in FORMATS), lambda path: save_figure(what, path))

@@ -21,32 +21,37 @@ NAMED, CELL = 27, 20
 """Widths, in characters, of the first column and of one design: what fits is printed side by side."""
 MOST_SHARES = 3
 MISSING = "–"
-"""Of a design that has no such field."""
+"""Shown for a design that has no such field."""
 
 
-def print_comparison(console: Console, found: Comparison) -> None:
-    """Legend, differences, numbers, what is to blame, and the grid; as many designs abreast as the terminal takes."""
-    letters = string.ascii_uppercase[: len(found.designs)]
-    for letter, design in zip(letters, found.designs, strict=True):
-        said = f"  {design.label}  {design.machine.name}"
+def print_comparison(console: Console, comparison: Comparison) -> None:
+    """Print legend, differences, numbers, largest contributions and the grid.
+
+    As many designs stand side by side as the terminal is wide; each block repeats the first design.
+    """
+    letters = string.ascii_uppercase[: len(comparison.designs)]
+    for letter, design in zip(letters, comparison.designs, strict=True):
+        title = f"  {design.label}  {design.machine.name}"
         why = "" if design.answered else f": {design.analysis.message}"
-        console.print(Text.assemble((letter, "bold"), said, why))
+        console.print(Text.assemble((letter, "bold"), title, why))
     console.print("Percentages are changes against A; the best value of each row is bold.", style="dim")
-    _print_differences(console, found, letters)
-    _print_rows(console, "At the pose of each design", letters, found.rows)
-    _print_softest(console, found, letters)
-    if found.ranges:
-        counts = ", ".join(f"{letter} {n:,} of {m:,}" for letter, (n, m) in zip(letters, found.poses, strict=True))
-        _print_rows(console, f"Over {', '.join(found.ranges)}", letters, found.over, by_group=True)
+    _print_differences(console, comparison, letters)
+    _print_rows(console, "At the pose of each design", letters, comparison.rows)
+    _print_softest(console, comparison, letters)
+    if comparison.ranges:
+        counts = ", ".join(f"{letter} {n:,} of {m:,}" for letter, (n, m) in zip(letters, comparison.poses, strict=True))
+        _print_rows(console, f"Over {', '.join(comparison.ranges)}", letters, comparison.over, by_group=True)
         console.print(f"Poses with a result: {counts}.", highlight=False)
 
 
-def _print_differences(console: Console, found: Comparison, letters: str) -> None:
-    families = [design.machine.family.name for design in found.designs]
+def _print_differences(console: Console, comparison: Comparison, letters: str) -> None:
+    families = [design.machine.family.name for design in comparison.designs]
     rows = {"family": families} if len(set(families)) > 1 else {}
-    for one in found.differences:
-        pairs = zip(one.parameters, one.values, strict=True)
-        rows[one.path] = [readable(row, parameter.quantity) if parameter else MISSING for parameter, row in pairs]
+    for difference in comparison.differences:
+        pairs = zip(difference.parameters, difference.values, strict=True)
+        rows[difference.path] = [
+            readable(row, parameter.quantity) if parameter else MISSING for parameter, row in pairs
+        ]
     for abreast in _abreast(console, letters):
         table = text_table("Where the files differ", "field", *(letters[i] for i in abreast))
         for path, cells in rows.items():
@@ -57,11 +62,11 @@ def _print_differences(console: Console, found: Comparison, letters: str) -> Non
     if not rows:
         console.print("The files have equal values.")
     if len(set(families)) > 1:
-        console.print("Fields that only one design has are omitted.", style="dim")
+        console.print("Fields that only difference design has are omitted.", style="dim")
 
 
 def _abreast(console: Console, letters: str) -> Iterator[list[int]]:
-    """Places of the designs that are shown side by side: the first, and as many others as the terminal takes."""
+    """Yield the designs that fit side by side: always the first, and as many others as the terminal takes."""
     others = max((console.width - NAMED) // CELL, 2) - 1
     for start in range(1, len(letters), others):
         yield [0, *range(start, min(start + others, len(letters)))]
@@ -82,7 +87,7 @@ def _print_rows(console: Console, title: str, letters: str, rows: Sequence[Row],
 
 
 def _cell(row: Row, i: int) -> Text:
-    """A value and its change against the first, green where it is better."""
+    """Return a value and its change against the first design; green where it is better."""
     endless = "rigid" if row.better is Better.MORE else "free"
     value, percent = number(row.values[i], endless), row.percents[i]
     shown = Text(value, "bold" if i in row.best else "")
@@ -99,22 +104,22 @@ def _percent(percent: float) -> str:
     return f"{percent:+.1f} %" if abs(percent) < 1000.0 else f"× {1.0 + percent / 100.0:.3g}"
 
 
-def _print_softest(console: Console, found: Comparison, letters: str) -> None:
-    if not any(found.softest):
+def _print_softest(console: Console, comparison: Comparison, letters: str) -> None:
+    if not any(comparison.softest):
         return
     table = text_table("Largest contributions in the softest directions", "", "rotation", "translation")
-    for letter, own in zip(letters, found.softest, strict=True):
-        turning = next((one for one in own if one.component.startswith("r")), None)
-        sliding = next((one for one in own if not one.component.startswith("r")), None)
-        table.add_row(letter, _blame(turning), _blame(sliding))
+    for letter, softest in zip(letters, comparison.softest, strict=True):
+        turning = next((contribution for contribution in softest if contribution.component.startswith("r")), None)
+        sliding = next((contribution for contribution in softest if not contribution.component.startswith("r")), None)
+        table.add_row(letter, _contributions(turning), _contributions(sliding))
     console.print(table)
 
 
-def _blame(one: Blame | None) -> str:
-    if one is None:
+def _contributions(attribution: Blame | None) -> str:
+    if attribution is None:
         return "–"
-    parts = [f"{name} {100 * share:.0f} %" for name, share in one.shares[:MOST_SHARES] if share >= 0.005]
-    return f"{one.component}: {', '.join(parts)}"
+    parts = [f"{name} {100 * share:.0f} %" for name, share in attribution.shares[:MOST_SHARES] if share >= 0.005]
+    return f"{attribution.component}: {', '.join(parts)}"
 
 
 def print_validation(console: Console, validation: Validation, agreed: float) -> None:

@@ -26,8 +26,8 @@ def print_dataset(console: Console, dataset: xr.Dataset, names: Sequence[str]) -
     if len(dataset["status"].dims) == 1 and dataset["status"].size <= LONGEST:
         _print_curve(console, dataset, names)
     else:
-        found = {name: _extremes(dataset[name]) for name in names}
-        _print_extremes(console, dataset.attrs["machine"], {str(d): n for d, n in dataset.sizes.items()}, found)
+        extremes = {name: _extremes(dataset[name]) for name in names}
+        _print_extremes(console, dataset.attrs["machine"], {str(d): n for d, n in dataset.sizes.items()}, extremes)
     _print_failures(console, failures(dataset), dataset["status"].size)
 
 
@@ -70,8 +70,8 @@ def _extremes(data: xr.DataArray) -> Extremes:
 def _print_extremes(console: Console, machine: str, sizes: Mapping[str, int], extremes: Mapping[str, Extremes]) -> None:
     size = " × ".join(f"{dim} ({count})" for dim, count in sizes.items())
     table = numeric_table(f"{machine}: {size}", "quantity", ["unit", "least", "mean", "largest"])
-    for name, found in extremes.items():
-        statistics = (found.least, found.mean, found.largest)
+    for name, extreme in extremes.items():
+        statistics = (extreme.least, extreme.mean, extreme.largest)
         table.add_row(name, QUANTITIES[name].unit, *(number(value) for value in statistics))
     console.print(table)
 
@@ -80,51 +80,51 @@ ERRORS = 2
 """Standard errors that are printed: the truth lies within them 95 times of 100."""
 
 
-def print_workspace(console: Console, found: Workspace) -> None:
+def print_workspace(console: Console, workspace: Workspace) -> None:
     """Volume, why the rest is outside, how far the inside extends, and what it asks of the machine."""
-    for line in _summary(found):
+    for line in _summary(workspace):
         console.print(line, highlight=False)
-    total = found.dataset["verdict"].size
+    total = workspace.dataset["verdict"].size
     table = numeric_table(f"Nodes of the grid ({total:,})", "", ["nodes", "share"])
-    for label, count in sorted(found.counts.items(), key=lambda item: (item[0] != INSIDE, -item[1])):
+    for label, count in sorted(workspace.counts.items(), key=lambda item: (item[0] != INSIDE, -item[1])):
         if count:
             table.add_row(phrase(label), f"{count:,}", f"{100.0 * count / total:.3g} %")
     console.print(table)
-    if found.extents:
-        _print_extents(console, found)
-    if found.demands:
+    if workspace.extents:
+        _print_extents(console, workspace)
+    if workspace.demands:
         table = numeric_table("Demands on the machine within the workspace", "", ["from", "to", ""])
-        for demand in found.demands:
+        for demand in workspace.demands:
             table.add_row(demand.title, number(demand.least), number(demand.greatest), demand.unit)
         console.print(table)
 
 
-def _summary(found: Workspace) -> Iterator[str]:
-    volume = found.volume
-    name = "Area" if len(found.dataset["verdict"].dims) == 2 else "Volume"
-    yield found.dataset.attrs["machine"]
+def _summary(workspace: Workspace) -> Iterator[str]:
+    volume = workspace.volume
+    name = "Area" if len(workspace.dataset["verdict"].dims) == 2 else "Volume"
+    yield workspace.dataset.attrs["machine"]
     yield (
         f"{name}: {volume.value:.5g} ± {ERRORS * volume.standard_error:.2g} {volume.unit} "
         f"({100.0 * volume.share:.4g} % of the box; two random points in each of {volume.cells:,} cells, ± two "
         "standard errors)."
     )
-    if not found.found:
+    if not workspace.found:
         yield "No pose of the box is in the workspace; the table shows why."
-    elif found.joined is None:
+    elif workspace.joined is None:
         yield "The pose of the file is outside the workspace, so it is unknown which part can be reached from it."
-    elif found.joined < 1.0:
-        yield f"Only {100.0 * found.joined:.3g} % of the workspace is connected with the pose of the file."
-    if not found.divided:
+    elif workspace.joined < 1.0:
+        yield f"Only {100.0 * workspace.joined:.3g} % of the workspace is connected with the pose of the file."
+    if not workspace.divided:
         yield (
             "Singularities are not borders here: they do not divide the poses of this machine, or the pose of the file "
             "is singular."
         )
 
 
-def _print_extents(console: Console, found: Workspace) -> None:
+def _print_extents(console: Console, workspace: Workspace) -> None:
     table = numeric_table("Extent of the workspace", "", ["from", "to", ""])
-    for dim, ends in found.extents.items():
-        coordinate = found.dataset[dim]
+    for dim, ends in workspace.extents.items():
+        coordinate = workspace.dataset[dim]
         scale = coordinate_scale(coordinate.attrs["kind"], coordinate.attrs["units"], coordinate.values)
         low, high = (number(round(end * scale.factor, 9)) for end in ends)
         table.add_row(dim.removeprefix("pose."), low, high, scale.unit)

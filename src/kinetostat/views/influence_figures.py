@@ -33,17 +33,17 @@ DARK = 0.6
 """Share of the colour scale beyond which text on it is white."""
 
 
-def sensitivity_figure(answer: Sensitivity) -> Figure:
-    """A table of coloured cells: red where the index grows with the parameter, blue where it falls."""
-    rows = {with_leg(answer.machine, one.path): one.percents for one in answer.parameters}
-    heads = [QUANTITIES[name].symbol for name in answer.quantities]
-    return coloured_table((answer.machine.name, setting_of(answer.machine)), rows, heads, "RdBu_r", PER)
+def sensitivity_figure(sensitivity: Sensitivity) -> Figure:
+    """Draw a table of coloured cells: red where the index grows with the parameter, blue where it falls."""
+    rows = {with_leg(sensitivity.machine, influence.path): influence.percents for influence in sensitivity.parameters}
+    heads = [QUANTITIES[name].symbol for name in sensitivity.quantities]
+    return coloured_table((sensitivity.machine.name, setting_of(sensitivity.machine)), rows, heads, "RdBu_r", PER)
 
 
 def coloured_table(
     titles: tuple[str, str], rows: Mapping[str, Sequence[float | None]], heads: Sequence[str], colours: str, label: str
 ) -> Figure:
-    """Numbers in cells coloured by sign and size; the first rows, as many as a page takes.
+    """Draw numbers in cells coloured by sign and size; the first rows, as many as a page takes.
 
     Args:
         titles: over the figure, and below it where its numbers hold.
@@ -84,76 +84,80 @@ def _draw_cells(panel: Axes, cells: npt.NDArray[np.float64], colours: str, label
 
 
 MOST_PANELS = 6
-"""Elements that are shown."""
+"""Number of elements that are shown."""
 POINTS = 161
-"""Along each curve."""
+"""Number of points along each curve."""
 DECADES = 1.0
 """How far curves go beyond the limits of rigidity and the present stiffness, in powers of ten."""
 
 
-def guideline_figures(found: Guidelines) -> dict[str, Figure]:
-    """Figures by name: "design", and "rigid" where there are elements with a limit of rigidity."""
-    if found.here is None:
+def guideline_figures(guidelines: Guidelines) -> dict[str, Figure]:
+    """Draw the figures by name: "design", and "rigid" where elements have a limit of rigidity."""
+    if guidelines.here is None:
         return {}
-    drawn = {"design": design_figure(found)} if found.parameters else {}
-    rigid = limit_figure(found)
+    drawn = {"design": design_figure(guidelines)} if guidelines.parameters else {}
+    rigid = limit_figure(guidelines)
     return {**drawn, "rigid": rigid} if rigid else drawn
 
 
-def limit_figure(found: Guidelines) -> Figure | None:
-    """Stiffness of each direction against that of elements; None where no element has a limit of rigidity."""
-    if found.here is None:
+def limit_figure(guidelines: Guidelines) -> Figure | None:
+    """Draw the stiffness of each direction against that of elements; None if no element has a limit of rigidity."""
+    if guidelines.here is None:
         return None
-    limits = [(one, found.here.rigid[k, :, 0]) for k, one in enumerate(found.elements) if not one.actuated]
-    shown = [(one, row) for one, row in limits if (np.isfinite(row) & (row > 0.0)).any()]
-    return rigid_figure(found, shown[-MOST_PANELS:]) if shown else None
+    limits = [
+        (element, guidelines.here.rigid[k, :, 0])
+        for k, element in enumerate(guidelines.elements)
+        if not element.actuated
+    ]
+    shown = [(element, row) for element, row in limits if (np.isfinite(row) & (row > 0.0)).any()]
+    return rigid_figure(guidelines, shown[-MOST_PANELS:]) if shown else None
 
 
-def design_figure(found: Guidelines) -> Figure:
-    """Parameters against directions: blue where one percent more makes a direction stiffer, red where softer."""
-    rows = {with_leg(found.machine, move.path): move.percents for move in found.parameters}
-    titles = f"{found.machine.name}: effect of each parameter", setting_of(found.machine)
+def design_figure(guidelines: Guidelines) -> Figure:
+    """Draw parameters against directions: blue where 1 % more makes a direction stiffer, red where softer."""
+    rows = {with_leg(guidelines.machine, move.path): move.percents for move in guidelines.parameters}
+    titles = f"{guidelines.machine.name}: effect of each parameter", setting_of(guidelines.machine)
     label = "percent stiffer per 1 % more (angle: per 0.01 rad)"
-    return coloured_table(titles, rows, found.components, "RdBu", label)
+    return coloured_table(titles, rows, guidelines.components, "RdBu", label)
 
 
-def rigid_figure(found: Guidelines, shown: list[tuple[Element, np.ndarray]]) -> Figure:
-    """Stiffness of each direction against that of each element, with the points from which on it counts as rigid."""
+def rigid_figure(guidelines: Guidelines, shown: list[tuple[Element, np.ndarray]]) -> Figure:
+    """Draw the stiffness of each direction against that of each element, with dots where it becomes rigid."""
     columns = min(3, len(shown))
     rows = -(-len(shown) // columns)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(2.9 * columns + 0.9, 2.5 * rows + 0.7), layout="constrained")
         panels = figure.subplots(rows, columns, squeeze=False).flat
         for panel, (element, limits) in zip(panels, shown, strict=False):
-            _curves(panel, found, element, limits)
+            _curves(panel, guidelines, element, limits)
         for unused in list(figure.axes)[len(shown) :]:
             unused.remove()
-        styles = zip(found.components, COLOURS, DASHES, strict=False)
+        styles = zip(guidelines.components, COLOURS, DASHES, strict=False)
         lines = [Line2D([], [], color=colour, linestyle=dash, label=name) for name, colour, dash in styles]
         dot = Line2D([], [], color="#444444", marker="o", markersize=4, linestyle="", label="within 1 %")
         figure.legend(handles=[*lines, dot], loc="outside right center", title="direction")
-        figure.suptitle(f"{found.machine.name}: stiffness from which an element counts as rigid", fontsize=10)
-        note_setting(figure, setting_of(found.machine))
+        figure.suptitle(f"{guidelines.machine.name}: stiffness from which an element counts as rigid", fontsize=10)
+        note_setting(figure, setting_of(guidelines.machine))
         fix_layout(figure)
     return figure
 
 
-def _curves(panel: Axes, found: Guidelines, element: Element, limits: np.ndarray) -> None:
+def _curves(panel: Axes, guidelines: Guidelines, element: Element, limits: np.ndarray) -> None:
     finite = limits[np.isfinite(limits) & (limits > 0.0)]
     rigid_now = element.stiffness == math.inf
     ends = np.log10([*finite, *([] if rigid_now else [1.0])])
     factors = np.logspace(ends.min() - 2.0 * DECADES, ends.max() + DECADES, POINTS)
-    own = 1.0 if element.stiffness is None else limit_of(element.stiffness, 1.0)
-    stiff = stiffening(found.machine, element, factors)
+    present = 1.0 if element.stiffness is None else limit_of(element.stiffness, 1.0)
+    stiff = stiffening(guidelines.machine, element, factors)
     for colour, dash, curve, limit in zip(COLOURS, DASHES, stiff, limits, strict=False):
         if limit == math.inf:
             continue
-        panel.plot(own * factors, 100.0 * curve, linestyle=dash, color=colour, linewidth=1.3)
+        panel.plot(present * factors, 100.0 * curve, linestyle=dash, color=colour, linewidth=1.3)
         if 0.0 < limit < math.inf:
-            panel.plot(own * limit, 100.0 / (1.0 + EXCESS), "o", color=colour, markersize=4, zorder=3)
+            panel.plot(present * limit, 100.0 / (1.0 + EXCESS), "o", color=colour, markersize=4, zorder=3)
     if not rigid_now:
-        panel.axvline(own, color="#888888", linewidth=0.8, linestyle=":")
-        panel.text(own, 3.0, " now", fontsize=6.5, color="#666666", ha="left")
+        panel.axvline(present, color="#888888", linewidth=0.8, linestyle=":")
+        panel.text(present, 3.0, " now", fontsize=6.5, color="#666666", ha="left")
     unit = f"stiffness ({element.unit})" if element.stiffness is not None else "multiple of the present stiffness"
     panel.set(xscale="log", ylim=(0.0, 104.0), xlabel=unit, ylabel="stiffness, % of that with\na rigid element")
     panel.set_title(element.name)

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines.guidelines import Guidelines
-from kinetostat.studies.guidelines.moves import Move
+from kinetostat.studies.guidelines.parameters import Move
 from kinetostat.studies.guidelines.roles import Roles
 from kinetostat.studies.guidelines.sentences import LEAST, MATTERS, statements
 from kinetostat.studies.sensitivity import PER, Sensitivity, notes
@@ -27,30 +27,34 @@ NEGLIGIBLE = 0.0005
 """Percent per percent below which a 0 is printed."""
 
 
-def print_sensitivity(console: Console, answer: Sensitivity) -> None:
-    """The parameters that matter most, and what the numbers mean."""
-    console.print(influence_table(answer, MOST_INFLUENCES))
-    hidden = len(answer.parameters) - MOST_INFLUENCES
+def print_sensitivity(console: Console, sensitivity: Sensitivity) -> None:
+    """Print the parameters with the largest effect, and what the numbers mean."""
+    console.print(influence_table(sensitivity, MOST_INFLUENCES))
+    hidden = len(sensitivity.parameters) - MOST_INFLUENCES
     if hidden > 0:
         console.print(f"{omitted(hidden)} (--json has all).")
-    for note in notes(answer):
+    for note in notes(sensitivity):
         console.print(note, highlight=False)
 
 
-def influence_table(answer: Sensitivity, count: int) -> Table:
-    """The first parameters by rank, with their values and what they do to each index."""
-    group = family_of_names(answer.quantities)
-    heads = [spoken(name.removeprefix(f"{group}_")) for name in answer.quantities]
-    title = f"{answer.machine.name}: {spoken(group)}, {PER}" if group else f"{answer.machine.name}: {PER}"
+def influence_table(sensitivity: Sensitivity, count: int) -> Table:
+    """Return the first parameters by rank, with their values and their effect on each index."""
+    group = family_of_names(sensitivity.quantities)
+    heads = [spoken(name.removeprefix(f"{group}_")) for name in sensitivity.quantities]
+    title = f"{sensitivity.machine.name}: {spoken(group)}, {PER}" if group else f"{sensitivity.machine.name}: {PER}"
     table = numeric_table(title, "parameter", ["value", *heads])
-    for one in answer.parameters[:count]:
-        name = with_leg(answer.machine, one.path)
-        table.add_row(name, show(one.value, KINDS[one.kind].unit, 6), *(_percent(percent) for percent in one.percents))
+    for influence in sensitivity.parameters[:count]:
+        name = with_leg(sensitivity.machine, influence.path)
+        table.add_row(
+            name,
+            show(influence.value, KINDS[influence.kind].unit, 6),
+            *(_percent(percent) for percent in influence.percents),
+        )
     return table
 
 
 def _percent(value: float | None) -> str:
-    """Three digits after the point, a dash where there is none."""
+    """Return a number with three decimals, or a dash where there is none."""
     if value is None:
         return "–"
     return "0" if abs(value) < NEGLIGIBLE else f"{value:.3f}"
@@ -63,79 +67,81 @@ TOPICS = {
     "design": "What each parameter does",
 }
 MOST = 0.5
-"""Share from which on an element is printed in bold."""
+"""Share from which an element is printed in bold."""
 MOST_ROWS = 16
 """Parameters that are printed; all of them on demand."""
 MOST_NAMED = 8
 LEGEND = "· any stiffness suffices; never: nothing else is compliant in that direction."
-"""Of the table of limits."""
+"""Legend of the table of limits."""
 ALIKE = "poses: share of the poses at which all arrows of the row point the same way as here."
-"""Of the table of parameters."""
+"""Legend of the table of parameters."""
 
 
-def print_guidelines(console: Console, found: Guidelines, full: bool = False) -> None:
-    """Sentences and tables; every parameter, and a sentence for those that matter most, if `full`."""
-    console.print(Text.assemble((found.machine.name, "bold"), "  design guidelines"))
-    answered, poses = found.poses
-    about = f"Directions {' '.join(found.components)} (base axes): deflection under a load in the same direction."
+def print_guidelines(console: Console, guidelines: Guidelines, full: bool = False) -> None:
+    """Print sentences and tables; if `full`, every parameter and sentences on the most important ones."""
+    console.print(Text.assemble((guidelines.machine.name, "bold"), "  design guidelines"))
+    answered, poses = guidelines.poses
+    about = f"Directions {' '.join(guidelines.components)} (base axes): deflection under a load in the same direction."
     if poses:
-        about += f" Over {', '.join(found.ranges)}: {answered:,} of {poses:,} poses have a result."
+        about += f" Over {', '.join(guidelines.ranges)}: {answered:,} of {poses:,} poses have a result."
     console.print(about, style="dim", highlight=False)
-    if found.here is None:
+    if guidelines.here is None:
         return
-    _print_sentences(console, found, full)
-    _print_equations(console, found)
-    console.print(element_table(found, found.here))
-    console.print(limit_table(found, found.here))
+    _print_sentences(console, guidelines, full)
+    _print_equations(console, guidelines)
+    console.print(element_table(guidelines, guidelines.here))
+    console.print(limit_table(guidelines, guidelines.here))
     console.print(f"{LEGEND}\n", style="dim")
-    _print_moves(console, found, full)
+    _print_moves(console, guidelines, full)
 
 
-def _print_sentences(console: Console, found: Guidelines, full: bool) -> None:
-    said = statements(found)
+def _print_sentences(console: Console, guidelines: Guidelines, full: bool) -> None:
+    sentences = statements(guidelines)
     for topic, title in TOPICS.items():
-        own = [one for one in said if one.topic == topic]
-        if own and (full or topic != "design"):
+        selected = [statement for statement in sentences if statement.topic == topic]
+        if selected and (full or topic != "design"):
             console.print(Text(f"\n{title}", "bold"))
-            for one in own:
-                aside = "" if one.holds is None else f" [{over_poses(one.holds)}]"
-                console.print(Padding(Text.assemble(f"- {one.text}", (aside, "dim")), (0, 0, 0, 1)))
+            for statement in selected:
+                aside = "" if statement.holds is None else f" [{over_poses(statement.holds)}]"
+                console.print(Padding(Text.assemble(f"- {statement.text}", (aside, "dim")), (0, 0, 0, 1)))
     console.print()
 
 
 def over_poses(share: float) -> str:
-    """At how many poses something holds."""
+    """Say at how many poses a statement is true."""
     return "everywhere" if share == 1.0 else f"at {100 * share:.3g} % of the poses"
 
 
-def _print_equations(console: Console, found: Guidelines) -> None:
-    """K as sums over elements, as the paper's equations 33-38."""
-    if found.stiffness_equations is None:
+def _print_equations(console: Console, guidelines: Guidelines) -> None:
+    """Print K as sums over elements, in the form of the paper's equations 33-38."""
+    if guidelines.stiffness_equations is None:
         return
     console.print(
         Text.assemble(
             ("K at this pose", "bold"), " as a sum over elements; k is the stiffness of one part of the element (SI)"
         )
     )
-    for line in equations(found):
+    for line in equations(guidelines):
         console.print(f"  {line}", highlight=False)
     console.print()
 
 
-def equations(found: Guidelines) -> list[str]:
-    """The diagonal of K as sums over elements, a line each; none where K is no such sum."""
-    rows = (found.stiffness_equations or {}).items()
+def equations(guidelines: Guidelines) -> list[str]:
+    """Return the diagonal of K as sums over elements, a line each; no lines where K is not such a sum."""
+    rows = (guidelines.stiffness_equations or {}).items()
     sums = [
         " + ".join(f"{number(row[i])} k({element})" for element, row in rows if row[i] != 0.0)
-        for i in range(len(found.components))
+        for i in range(len(guidelines.components))
     ]
-    return [f"K_{name} = {terms or '0'}" for name, terms in zip(found.components, sums, strict=True)] if rows else []
+    return (
+        [f"K_{name} = {terms or '0'}" for name, terms in zip(guidelines.components, sums, strict=True)] if rows else []
+    )
 
 
-def element_table(found: Guidelines, here: Roles) -> Table:
-    """What each element contributes to each direction."""
-    table = numeric_table("Attribution: share of each element in the diagonal of C", "element", found.components)
-    for element, row in zip(found.elements, here.shares[:, :, 0].tolist(), strict=True):
+def element_table(guidelines: Guidelines, here: Roles) -> Table:
+    """Return the share of each element in the compliance of each direction."""
+    table = numeric_table("Attribution: share of each element in the diagonal of C", "element", guidelines.components)
+    for element, row in zip(guidelines.elements, here.shares[:, :, 0].tolist(), strict=True):
         table.add_row(element.name, *(_share(part) for part in row))
     return table
 
@@ -146,25 +152,28 @@ def _share(part: float) -> Text:
     return Text(f"{100 * part:.1f} %", "bold" if part >= MOST else "" if part >= MATTERS else "dim")
 
 
-def limit_table(found: Guidelines, here: Roles) -> Table:
-    """From which stiffness on each element counts as rigid: absolute where it has one stiffness, else relative."""
+def limit_table(guidelines: Guidelines, here: Roles) -> Table:
+    """Return the stiffness from which each element counts as rigid.
+
+    An element with several stiffnesses has no single value: its limits are multiples of the present stiffness.
+    """
     table = numeric_table(
-        "Stiffness from which an element counts as rigid (within 1 %)", "element", ["now", *found.components]
+        "Stiffness from which an element counts as rigid (within 1 %)", "element", ["now", *guidelines.components]
     )
-    for k, element in enumerate(found.elements):
+    for k, element in enumerate(guidelines.elements):
         row = here.rigid[k, :, 0].tolist()
         if element.stiffness is None:
             table.add_row(element.name, "1 × now", *(_limit(factor) for factor in row))
         else:
             rigid = element.stiffness == math.inf
-            own = 1.0 if rigid else element.stiffness
+            present = 1.0 if rigid else element.stiffness
             now = "rigid" if rigid else f"{_limit(element.stiffness)} {element.unit}"
-            table.add_row(element.name, now, *(_limit(factor * own) for factor in row))
+            table.add_row(element.name, now, *(_limit(factor * present) for factor in row))
     return table
 
 
 def _limit(value: float) -> str:
-    """A limit in at most five characters."""
+    """Return a limit in at most five characters."""
     if math.isnan(value):
         return "–"
     if value == 0.0 or math.isinf(value):
@@ -173,38 +182,40 @@ def _limit(value: float) -> str:
     return text.replace("e+0", "e").replace("e+", "e").replace("e-0", "e-")
 
 
-def _print_moves(console: Console, found: Guidelines, full: bool) -> None:
-    shown = found.parameters if full else found.parameters[:MOST_ROWS]
-    console.print(move_table(found, len(shown)))
-    if found.poses[0]:
+def _print_moves(console: Console, guidelines: Guidelines, full: bool) -> None:
+    shown = guidelines.parameters if full else guidelines.parameters[:MOST_ROWS]
+    console.print(move_table(guidelines, len(shown)))
+    if guidelines.poses[0]:
         console.print(ALIKE, style="dim")
-    console.print(found.meaning, highlight=False, style="dim")
-    for line in left_out(found, len(shown)):
+    console.print(guidelines.meaning, highlight=False, style="dim")
+    for line in left_out(guidelines, len(shown)):
         console.print(line, highlight=False)
 
 
-def move_table(found: Guidelines, count: int) -> Table:
-    """What each of the first parameters does to each direction."""
-    grid = bool(found.poses[0])
-    heads = ["parameter", *found.components, *(["poses"] if grid else [])]
+def move_table(guidelines: Guidelines, count: int) -> Table:
+    """Return the effect of the first parameters on each direction."""
+    grid = bool(guidelines.poses[0])
+    heads = ["parameter", *guidelines.components, *(["poses"] if grid else [])]
     title = "Effect of 1 % more (of an angle: 0.01 rad more), percent stiffer ▲ or softer ▼"
     table = numeric_table(title, heads[0], heads[1:])
-    for move in found.parameters[:count]:
+    for move in guidelines.parameters[:count]:
         table.add_row(
-            with_leg(found.machine, move.path), *(_arrow(p) for p in move.percents), *([_alike(move)] if grid else [])
+            with_leg(guidelines.machine, move.path),
+            *(_arrow(p) for p in move.percents),
+            *([_alike(move)] if grid else []),
         )
     return table
 
 
-def left_out(found: Guidelines, count: int) -> Iterator[str]:
-    """What the table of the first parameters does not show, in sentences."""
-    hidden = len(found.parameters) - count
+def left_out(guidelines: Guidelines, count: int) -> Iterator[str]:
+    """Yield sentences on the parameters that the table omits, and why."""
+    hidden = len(guidelines.parameters) - count
     if hidden:
         yield f"{omitted(hidden)} (--full shows them)."
-    if found.without_influence:
-        yield f"No direction depends on {_few(found.without_influence)}."
-    for reason in dict.fromkeys(why for _, why in found.left_out):
-        paths = [path for path, why in found.left_out if why == reason]
+    if guidelines.without_influence:
+        yield f"No direction depends on {_few(guidelines.without_influence)}."
+    for reason in dict.fromkeys(why for _, why in guidelines.left_out):
+        paths = [path for path, why in guidelines.left_out if why == reason]
         yield f"Omitted {reason}: {_few(paths)}."
 
 

@@ -18,20 +18,20 @@ CEILING = 99.0
 """Percentile of all designs up to which a front is drawn: far ones would squeeze it."""
 
 
-def pictures(found: Result) -> dict[str, Figure]:
-    """The figures of a study that found something, by file name."""
-    drawn = {"comparison": comparison(found)}
-    if len(found.problem.objectives) == 1:
-        drawn["convergence"] = convergence(found.log, found.problem.study.name)
+def pictures(result: Result) -> dict[str, Figure]:
+    """Draw the figures of a solved study, by file name."""
+    drawn = {"comparison": comparison(result)}
+    if len(result.problem.objectives) == 1:
+        drawn["convergence"] = convergence(result.log, result.problem.study.name)
     else:
-        drawn["front"] = front(found)
-    if found.robustness:
-        drawn["tolerances"] = tolerances(found)
+        drawn["front"] = front(result)
+    if result.robustness:
+        drawn["tolerances"] = tolerances(result)
     return drawn
 
 
 def convergence(log: Log, title: str) -> Figure:
-    """Best and mean of the designs that each step kept (Fig. 6 of the paper), and how far they are from the end."""
+    """Draw best and mean of the population after each step (Fig. 6 of the paper), and their distance to the end."""
     objective = log.problem.objectives[0]
     across = "descent" if log.problem.method == "gradient" else "generation"
     steps = np.arange(1, len(log.steps) + 1)
@@ -56,27 +56,27 @@ def convergence(log: Log, title: str) -> Figure:
     return figure
 
 
-def comparison(found: Result) -> Figure:
-    """How many times stiffer each direction is, and where each variable lies between its bounds, before and after."""
+def comparison(result: Result) -> Figure:
+    """Draw how many times stiffer each direction is, and each variable between its bounds before and after."""
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 0.9 + 0.3 * max(6, found.problem.space.size)), layout="constrained")
+        figure = Figure(figsize=(7.2, 0.9 + 0.3 * max(6, result.problem.space.size)), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
-        _gains(left, found)
-        _places(right, found)
-        figure.suptitle(f"{found.problem.study.name}: {found.problem.machine.name}", fontsize=10)
+        _gains(left, result)
+        _places(right, result)
+        figure.suptitle(f"{result.problem.study.name}: {result.problem.machine.name}", fontsize=10)
         fix_layout(figure)
     return figure
 
 
-def _gains(panel: Axes, found: Result) -> None:
-    known = [one for one in found.directions if np.isfinite(one.gain) and one.gain > 0.0]
-    places, gains = np.arange(len(known)), np.array([one.gain for one in known])
+def _gains(panel: Axes, result: Result) -> None:
+    known = [direction for direction in result.directions if np.isfinite(direction.gain) and direction.gain > 0.0]
+    places, gains = np.arange(len(known)), np.array([direction.gain for direction in known])
     colours = [COLOURS[2] if gain >= 1.0 else COLOURS[1] for gain in gains]
     panel.barh(places, gains - 1.0, left=1.0, color=colours, height=0.6)
     panel.axvline(1.0, color="#444444", linewidth=0.8)
     wide = gains.size and gains.max() / gains.min() > 30.0
     panel.set(xscale="log" if wide else "linear", xlabel="times as stiff as before")
-    panel.set_yticks(places, [one.name.removeprefix("compliance_") for one in known])
+    panel.set_yticks(places, [direction.name.removeprefix("compliance_") for direction in known])
     panel.invert_yaxis()
     panel.grid(visible=False, axis="y")
     for place, gain in zip(places, gains, strict=True):
@@ -88,11 +88,11 @@ def _gains(panel: Axes, found: Result) -> None:
     panel.margins(x=0.18)
 
 
-def _places(panel: Axes, found: Result) -> None:
-    """Each variable on its own scale from its lower to its upper bound."""
-    space = found.problem.space
+def _places(panel: Axes, result: Result) -> None:
+    """Draw each variable on a scale from its lower to its upper bound."""
+    space = result.problem.space
     most = np.where(space.catalogue > 0, np.maximum(space.catalogue - 1, 1), 1)
-    before, after = space.initial / most, found.genes / most
+    before, after = space.initial / most, result.genes / most
     for place, variable in enumerate(space.searched):
         panel.plot([0.0, 1.0], [place, place], color="#cccccc", linewidth=1.2, zorder=1)
         if -0.05 <= before[place] <= 1.05:
@@ -102,7 +102,7 @@ def _places(panel: Axes, found: Result) -> None:
                 arrowprops={"arrowstyle": "-", "color": "#888888", "linewidth": 0.8}, zorder=1,
             )  # fmt: skip
         panel.plot(after[place], place, "o", color=COLOURS[0], zorder=3)
-        value = variable.shown(float(space.values(found.genes)[place]))
+        value = variable.shown(float(space.values(result.genes)[place]))
         panel.annotate(value, (1.04, place), va="center", fontsize=7)
         ends = [variable.shown(0.0 if variable.choices is not None else variable.low)]
         ends.append(variable.shown(variable.high))
@@ -118,11 +118,11 @@ def _places(panel: Axes, found: Result) -> None:
     panel.spines[["top", "right", "bottom"]].set_visible(False)
 
 
-def front(found: Result) -> Figure:
-    """Every pair of objectives: all feasible designs, the front, and its knee."""
-    problem, outcome = found.problem, found.log.outcome()
+def front(result: Result) -> Figure:
+    """Draw every pair of objectives: all feasible designs, the front, and its knee."""
+    problem, outcome = result.problem, result.log.outcome()
     feasible = outcome.objectives[outcome.violation == 0.0]
-    best = outcome.objectives[found.front]
+    best = outcome.objectives[result.front]
     pairs = [(i, j) for i in range(best.shape[1]) for j in range(i + 1, best.shape[1])]
     columns = min(3, len(pairs))
     rows = -(-len(pairs) // columns)
@@ -136,10 +136,10 @@ def front(found: Result) -> Figure:
                 rasterized=True, label="evaluated designs",
             )  # fmt: skip
             panel.plot(best[:, i] * x.factor, best[:, j] * y.factor, "o", markersize=3, color=COLOURS[0], label="front")
-            knee = best[found.knee, [i, j]] * (x.factor, y.factor)
+            knee = best[result.knee, [i, j]] * (x.factor, y.factor)
             panel.plot(*knee, "D", markersize=7, markerfacecolor="none", markeredgecolor=COLOURS[1], label="knee")
-            if np.isfinite(found.initial.objectives).all():
-                before = found.initial.objectives[0, [i, j]] * (x.factor, y.factor)
+            if np.isfinite(result.initial.objectives).all():
+                before = result.initial.objectives[0, [i, j]] * (x.factor, y.factor)
                 panel.plot(*before, "s", color="#444444", markersize=4, label="initial")
             panel.set(xlabel=_axis(problem.objectives[i], x), ylabel=_axis(problem.objectives[j], y))
             panel.set_xlim(*_limits(best[:, i] * x.factor, feasible[:, i] * x.factor))
@@ -150,26 +150,26 @@ def front(found: Result) -> Figure:
     return figure
 
 
-def tolerances(found: Result) -> Figure:
-    """How each objective scatters over the machines that manufacture makes of the best design."""
-    scatters = found.robustness.scatters if found.robustness else ()
+def tolerances(result: Result) -> Figure:
+    """Draw how each objective scatters over random machines within the tolerances of the best design."""
+    scatters = result.robustness.scatters if result.robustness else ()
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(3.6 * len(scatters) + 0.6, 2.9), layout="constrained")
-        for panel, one in zip(figure.subplots(1, len(scatters), squeeze=False).flat, scatters, strict=True):
-            _histogram(panel, one)
-        figure.suptitle(f"{found.problem.study.name}: under the tolerances", fontsize=10)
+        for panel, scatter in zip(figure.subplots(1, len(scatters), squeeze=False).flat, scatters, strict=True):
+            _histogram(panel, scatter)
+        figure.suptitle(f"{result.problem.study.name}: under the tolerances", fontsize=10)
         fix_layout(figure)
     return figure
 
 
-def _histogram(panel: Axes, one: Scatter) -> None:
-    samples = one.samples[np.isfinite(one.samples)]
-    scale = prefixed_scale(one.unit, samples) if one.unit != "SI" else Scale(1.0, one.unit)
+def _histogram(panel: Axes, scatter: Scatter) -> None:
+    samples = scatter.samples[np.isfinite(scatter.samples)]
+    scale = prefixed_scale(scatter.unit, samples) if scatter.unit != "SI" else Scale(1.0, scatter.unit)
     panel.hist(samples * scale.factor, bins=BINS, color=COLOURS[5], edgecolor="white", linewidth=0.3)
-    marks = (("nominal", one.nominal, "-"), ("95 % within", one.usual, "--"), ("worst", one.worst, ":"))
+    marks = (("nominal", scatter.nominal, "-"), ("95 % within", scatter.usual, "--"), ("worst", scatter.worst, ":"))
     for (label, value, dash), colour in zip(marks, ("#222222", COLOURS[0], COLOURS[1]), strict=True):
         panel.axvline(value * scale.factor, color=colour, linestyle=dash, label=f"{label}: {value * scale.factor:.6g}")
-    panel.set(xlabel=scale.label(one.label), ylabel="machines")
+    panel.set(xlabel=scale.label(scatter.label), ylabel="machines")
     panel.margins(x=0.03)
     panel.set_ylim(top=panel.get_ylim()[1] * 1.4)
     panel.legend(loc="upper left", fontsize=6.5, frameon=True, framealpha=1.0, edgecolor="none")
@@ -185,7 +185,7 @@ def _axis(objective: Objective, scale: Scale) -> str:
 
 
 def _limits(front_values: np.ndarray, every: np.ndarray) -> tuple[float, float]:
-    """From a little before the front to where most designs are, at most three times its span."""
+    """Return limits from a little before the front to where most designs are, at most three times its span."""
     low, high = float(front_values.min()), float(front_values.max())
     span = (high - low) or abs(high) or 1.0
     near, far = np.percentile(every, [100.0 - CEILING, CEILING])

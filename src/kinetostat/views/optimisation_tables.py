@@ -20,7 +20,7 @@ from kinetostat.views.tables import number, numeric_table
 
 
 def print_study(console: Console, problem: Problem) -> None:
-    """The question of a study: where it is judged, what is wanted, and what may change."""
+    """Print the question of a study: poses, objectives, constraints and variables."""
     console.print(Text.assemble((problem.study.name, "bold"), f"  {problem.machine.name}"))
     console.print(f"Evaluated at {problem.poses.told}; method {problem.method}.", highlight=False)
     for aim in aims(problem):
@@ -32,24 +32,26 @@ def print_study(console: Console, problem: Problem) -> None:
 
 def aims(problem: Problem) -> list[str]:
     """Objectives and constraints, a line each."""
-    wanted = [f"Objective: {one.goal} {spoken(one.term.label)}{_unit(one.term.unit)}" for one in problem.objectives]
-    return wanted + [f"Constraint: {spoken(one.label)}" for one in problem.constraints]
+    objectives = [
+        f"Objective: {term.goal} {spoken(term.term.label)}{_unit(term.term.unit)}" for term in problem.objectives
+    ]
+    return objectives + [f"Constraint: {spoken(term.label)}" for term in problem.constraints]
 
 
 def bounds_table(problem: Problem) -> Table:
-    """The variables, between which values they may be, and what they are."""
+    """Return the variables with their bounds and meanings."""
     table = numeric_table("Variables", "variable", ["initial", "from", "to"])
     table.add_column("meaning")
-    for one in problem.space.searched:
-        low = 0.0 if one.choices is not None else one.low
-        cells = (one.shown(value) for value in (one.initial, low, one.high))
-        table.add_row(one.name, *cells, one.quantity.meaning)
+    for variable in problem.space.searched:
+        low = 0.0 if variable.choices is not None else variable.low
+        cells = (variable.shown(value) for value in (variable.initial, low, variable.high))
+        table.add_row(variable.name, *cells, variable.quantity.meaning)
     return table
 
 
 def not_searched(problem: Problem) -> str:
     """Names of the variables that only have a tolerance."""
-    return ", ".join(one.name for one in problem.space.variables if one.fixed)
+    return ", ".join(variable.name for variable in problem.space.variables if variable.fixed)
 
 
 def _unit(unit: str) -> str:
@@ -64,122 +66,130 @@ MUCH = 0.01
 """Stiffness that is left, as a share, below which the loss is pointed out."""
 
 
-def print_result(console: Console, found: Result) -> None:
-    """All tables of a study that found something."""
-    problem = found.problem
+def print_result(console: Console, result: Result) -> None:
+    """Print all tables of a solved study."""
+    problem = result.problem
     console.print(f"{problem.study.name}: {problem.machine.name}", style="bold", highlight=False)
-    console.print(f"{message(found)} Evaluated at {problem.poses.told}; method {problem.method}.", highlight=False)
+    console.print(f"{message(result)} Evaluated at {problem.poses.told}; method {problem.method}.", highlight=False)
     if len(problem.objectives) > 1:
-        console.print(front_table(found))
-    console.print(worth_table(found))
-    console.print(variable_table(found))
-    console.print(direction_table(found))
-    if found.robustness:
-        console.print(scatter_table(found.robustness))
-        if found.robustness.failing:
-            console.print(failing(found.robustness), highlight=False)
-    for line in remarks(found):
+        console.print(front_table(result))
+    console.print(worth_table(result))
+    console.print(variable_table(result))
+    console.print(direction_table(result))
+    if result.robustness:
+        console.print(scatter_table(result.robustness))
+        if result.robustness.failing:
+            console.print(failing(result.robustness), highlight=False)
+    for line in remarks(result):
         console.print(line, highlight=False)
 
 
-def worth_table(found: Result) -> Table:
+def worth_table(result: Result) -> Table:
     """Objectives and constraints before and after."""
-    best = "knee of the front" if len(found.problem.objectives) > 1 else "best"
+    best = "knee of the front" if len(result.problem.objectives) > 1 else "best"
     table = numeric_table(
-        "Objectives and constraints" if found.problem.constraints else "Objectives",
+        "Objectives and constraints" if result.problem.constraints else "Objectives",
         "",
         ["initial", best, "gain", "unit"],
     )
-    for k, objective in enumerate(found.problem.objectives):
-        before, after = found.initial.objectives[0, k], found.outcome.objectives[0, k]
+    for k, objective in enumerate(result.problem.objectives):
+        before, after = result.initial.objectives[0, k], result.outcome.objectives[0, k]
         gain = before / after if objective.sign > 0 else after / before
         name = f"{objective.goal} {objective.term.label}"
         table.add_row(name, _exact(before), _exact(after), _times(gain), objective.term.unit)
-    for k, one in enumerate(found.problem.constraints):
-        before, after = found.initial.constraints[0, k], found.outcome.constraints[0, k]
-        table.add_row(one.label, number(before), number(after), "", "" if one.term.unit == "1" else one.term.unit)
+    for k, constraint in enumerate(result.problem.constraints):
+        before, after = result.initial.constraints[0, k], result.outcome.constraints[0, k]
+        table.add_row(
+            constraint.label,
+            number(before),
+            number(after),
+            "",
+            "" if constraint.term.unit == "1" else constraint.term.unit,
+        )
     return table
 
 
-def variable_table(found: Result) -> Table:
-    """The variables before and after, where they meet bounds, and what they do to the objectives."""
-    objectives = found.problem.objectives
+def variable_table(result: Result) -> Table:
+    """Return the variables before and after, the bounds they meet, and their effect on the objectives."""
+    objectives = result.problem.objectives
     heads = ["% per %"] if len(objectives) == 1 else [f"% per % ({k + 1})" for k in range(len(objectives))]
     table = numeric_table(
         "Variables (% per %: change of the objective per 1 % more; of an angle, per 0.01 rad more)",
         "variable",
         ["initial", "best", "at bound", *heads],
     )
-    influences = {one.name: one for one in found.influences}
-    held = found.problem.space.values(found.genes)
-    for variable, value in zip(found.problem.space.searched, held, strict=True):
-        own = influences.get(variable.name)
-        percents = [_percent(p) for p in own.percents] if own else [""] * len(objectives)
-        bound = own.bound if own else ""
+    influences = {influence.name: influence for influence in result.influences}
+    values = result.problem.space.values(result.genes)
+    for variable, value in zip(result.problem.space.searched, values, strict=True):
+        influence = influences.get(variable.name)
+        percents = [_percent(p) for p in influence.percents] if influence else [""] * len(objectives)
+        bound = influence.bound if influence else ""
         table.add_row(variable.name, variable.shown(variable.initial), variable.shown(value), bound, *percents)
         for field in variable.fields[1:]:
             table.add_row(f"  with {field.path}", "", "", "", *[""] * len(heads))
     return table
 
 
-def direction_table(found: Result) -> Table:
+def direction_table(result: Result) -> Table:
     """The compliance of each direction before and after."""
-    worst = "" if found.problem.poses.count == 1 else ", the worst of all poses"
+    worst = "" if result.problem.poses.count == 1 else ", the worst of all poses"
     table = numeric_table(f"Compliance{worst}", "direction", ["initial", "best", "change", "unit"])
-    for one in found.directions:
-        name = one.name.removeprefix("compliance_")
-        table.add_row(name, number(one.before), number(one.after), times_stiffer(one.gain), one.unit)
+    for direction in result.directions:
+        name = direction.name.removeprefix("compliance_")
+        table.add_row(
+            name, number(direction.before), number(direction.after), times_stiffer(direction.gain), direction.unit
+        )
     return table
 
 
 def scatter_table(robustness: Robustness) -> Table:
-    """How the objectives scatter under the tolerances."""
+    """Return the scatter of the objectives under the tolerances."""
     title = f"Under the tolerances: {robustness.machines:,} random machines"
     title += f" and {robustness.corners:,} corners (every tolerance at an end)" if robustness.corners else ""
     table = numeric_table(title, "", ["nominal", "mean", "std. dev.", "95 % within", "worst", "unit"])
-    for one in robustness.scatters:
-        figures = (_exact(value) for value in (one.nominal, one.mean))
-        rest = (number(one.deviation), _exact(one.usual), _exact(one.worst))
-        table.add_row(one.label, *figures, *rest, one.unit)
+    for scatter in robustness.scatters:
+        figures = (_exact(value) for value in (scatter.nominal, scatter.mean))
+        rest = (number(scatter.deviation), _exact(scatter.usual), _exact(scatter.worst))
+        table.add_row(scatter.label, *figures, *rest, scatter.unit)
     return table
 
 
 def failing(robustness: Robustness) -> str:
-    """How many of the random machines are not feasible."""
+    """Return a sentence on the share of the random machines that are not feasible."""
     return f"{100.0 * robustness.failing:.3g} % of the random machines are not feasible."
 
 
-def front_table(found: Result) -> Table:
+def front_table(result: Result) -> Table:
     """Designs of the front, the knee among them."""
-    problem, outcome = found.problem, found.log.outcome(found.front)
-    shown = {round(k * (len(found.front) - 1) / (MOST_ROWS - 1)) for k in range(MOST_ROWS)} | {found.knee}
+    problem, outcome = result.problem, result.log.outcome(result.front)
+    shown = {round(k * (len(result.front) - 1) / (MOST_ROWS - 1)) for k in range(MOST_ROWS)} | {result.knee}
     names = [f"{one.term.label}\n{one.term.unit}".replace(" (", "\n(") for one in problem.objectives]
     variables = [variable.name.split(".", 1)[1].replace("_", "\n") for variable in problem.space.searched]
-    title = f"Pareto front: {len(found.front)} designs" + (
-        f", {len(shown)} shown" if len(found.front) > len(shown) else ""
+    title = f"Pareto front: {len(result.front)} designs" + (
+        f", {len(shown)} shown" if len(result.front) > len(shown) else ""
     )
     table = numeric_table(title, "", [*names, *variables])
-    for k in sorted(k for k in shown if k < len(found.front)):
-        genes = found.log.genes(found.front[k : k + 1])[0]
-        held = zip(problem.space.searched, problem.space.values(genes), strict=True)
-        cells = [number(value) for value in outcome.objectives[k]] + [one.shown(value) for one, value in held]
-        table.add_row("knee" if k == found.knee else "", *cells, style="bold" if k == found.knee else None)
+    for k in sorted(k for k in shown if k < len(result.front)):
+        genes = result.log.genes(result.front[k : k + 1])[0]
+        values = zip(problem.space.searched, problem.space.values(genes), strict=True)
+        cells = [number(value) for value in outcome.objectives[k]] + [one.shown(value) for one, value in values]
+        table.add_row("knee" if k == result.knee else "", *cells, style="bold" if k == result.knee else None)
     return table
 
 
-def remarks(found: Result) -> Iterator[str]:
-    """What a designer should not overlook."""
-    bounded = [one for one in found.influences if one.bound]
-    if bounded and len(found.problem.objectives) == 1:
-        names = ", ".join(f"{one.name} ({one.bound})" for one in bounded)
+def remarks(result: Result) -> Iterator[str]:
+    """Yield what a designer should not overlook: variables at bounds, stiffness given up, ridges."""
+    bounded = [term for term in result.influences if term.bound]
+    if bounded and len(result.problem.objectives) == 1:
+        names = ", ".join(f"{term.name} ({term.bound})" for term in bounded)
         yield f"At a bound: {names}. Wider bounds would improve the objective, by the percentages above."
-    lost = [one for one in found.directions if one.gain < MUCH]
-    for one in lost:
-        name = one.name.removeprefix("compliance_")
-        yield f"The best design gives up {name}: {one.gain:.2g} of its stiffness is left; add a constraint to keep it."
-    if len(found.problem.objectives) == 1:
-        yield from told(found.ridges, found.problem) or (
-            [found.no_ridges] if found.no_ridges else ["There is no ridge: the optimum is a single design."]
+    lost = [term for term in result.directions if term.gain < MUCH]
+    for term in lost:
+        name = term.name.removeprefix("compliance_")
+        yield f"The best design gives up {name}: {term.gain:.2g} of its stiffness is left; add a constraint to keep it."
+    if len(result.problem.objectives) == 1:
+        yield from told(result.ridges, result.problem) or (
+            [result.no_ridges] if result.no_ridges else ["There is no ridge: the optimum is a single design."]
         )
 
 
@@ -192,7 +202,7 @@ def _times(gain: float) -> str:
 
 
 def times_stiffer(gain: float) -> str:
-    """How many times stiffer, or softer, a direction has become."""
+    """Say how many times stiffer, or softer, a direction has become."""
     if not gain or not math.isfinite(gain):
         return _times(gain)
     return f"{_times(gain)} times stiffer" if gain >= 1.0 else f"{_times(1.0 / gain)} times softer"

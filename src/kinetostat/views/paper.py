@@ -1,4 +1,7 @@
-"""The reproduction of the paper as people see it: terminal, tables (CSV, JSON), figures and one HTML page."""
+"""The reproduction of the paper on the terminal and in files: tables (CSV, JSON), figures and an HTML page.
+
+Numbers and verdicts come from `studies.paper`; the page itself is written in `paper_page`.
+"""
 
 import csv
 import io
@@ -31,28 +34,28 @@ FIGURE_6 = "Fig. 6: the best design and the mean of the population"
 MACHINE = "The machine at its reference pose"
 
 
-def write_all(found: Reproduction, folder: Path) -> list[Path]:
+def write_all(reproduction: Reproduction, folder: Path) -> list[Path]:
     """Write tables, data, figures and the page into a folder.
 
     Returns:
         What was written, the page first.
     """
-    drawn = figures(found)
+    drawn = figures(reproduction)
     written = [folder / "index.html"]
-    write_text(written[0], page(found, drawn))
+    write_text(written[0], page(reproduction, drawn))
     written.append(folder / "reproduction.json")
-    write_json(written[-1], found.as_json())
+    write_json(written[-1], reproduction.as_json())
     for name, rows in (
-        ("numbers", found.comparisons),
-        ("equations", found.checks),
-        ("statements", found.claims),
-        ("search", found.search_claims),
+        ("numbers", reproduction.comparisons),
+        ("equations", reproduction.checks),
+        ("statements", reproduction.claims),
+        ("search", reproduction.search_claims),
     ):
         written.append(folder / f"{name}.csv")
         write_text(written[-1], _csv(rows))
     written.append(folder / "figure-6.nc")
-    write_dataset(written[-1], as_dataset(found.search))
-    for name, dataset in (("figure-4", found.curves), ("figure-5", found.maps)):
+    write_dataset(written[-1], as_dataset(reproduction.search))
+    for name, dataset in (("figure-4", reproduction.curves), ("figure-5", reproduction.maps)):
         written.append(folder / f"{name}.nc")
         write_dataset(written[-1], dataset)
     for name, figure in drawn.items():
@@ -60,53 +63,54 @@ def write_all(found: Reproduction, folder: Path) -> list[Path]:
     return written
 
 
-def figures(found: Reproduction) -> dict[str, Figure]:
+def figures(reproduction: Reproduction) -> dict[str, Figure]:
     """The figures by file name."""
-    section = found.maps.rename({"geometry.passive_leg_offset": "pose.y"})
+    section = reproduction.maps.rename({"geometry.passive_leg_offset": "pose.y"})
     return {
-        "machine": three_views(found.machine, MACHINE),
-        "figure-4": curves(found.curves, GROUPS["stiffness"], FIGURE_4),
+        "machine": three_views(reproduction.machine, MACHINE),
+        "figure-4": curves(reproduction.curves, GROUPS["stiffness"], FIGURE_4),
         "figure-5": contour_maps(section, GROUPS["compliance"], FIGURE_5),
-        "figure-6": convergence(found.search.log, FIGURE_6),
+        "figure-6": convergence(reproduction.search.log, FIGURE_6),
     }
 
 
-def print_summary(console: Console, found: Reproduction, written: Sequence[Path]) -> None:
-    """Every number beside the printed one, then equations, statements and the verdict."""
-    console.print(_numbers_table(found.comparisons))
+def print_summary(console: Console, reproduction: Reproduction, written: Sequence[Path]) -> None:
+    """Print every number next to the printed one, then equations, statements and the verdict."""
+    console.print(_numbers_table(reproduction.comparisons))
     equations = text_table(
         "Equations 1-32: matrices of the paper against those of kinetostat", "eq.", "statement", "residual", ""
     )
-    for check in found.checks:
+    for check in reproduction.checks:
         equations.add_row(
             check.equation, check.statement, f"{check.residual:.1e}", "holds" if check.holds else Text("FAILS", "red")
         )
     console.print(equations)
-    for claim in (*found.claims, *found.search_claims):
+    for claim in (*reproduction.claims, *reproduction.search_claims):
         console.print(Text.assemble((claim.place, "bold"), f"  {claim.finding.value}"))
         console.print(f"  {claim.statement}", highlight=False)
         console.print(f"  {claim.measured} {claim.limits}", highlight=False, style="dim")
     console.print()
-    console.print(verdict(found), style="bold green" if found.explained else "bold red", highlight=False)
+    console.print(verdict(reproduction), style="bold green" if reproduction.explained else "bold red", highlight=False)
     console.print(f"wrote {written[0]} and {len(written) - 1} more files beside it", highlight=False)
 
 
-def verdict(found: Reproduction) -> str:
-    """One sentence that counts."""
-    numbers = Counter(one.verdict for one in found.comparisons)
-    claims = (*found.claims, *found.search_claims)
+def verdict(reproduction: Reproduction) -> str:
+    """Return a sentence with the counts of numbers, equations and statements."""
+    numbers = Counter(comparison.verdict for comparison in reproduction.comparisons)
+    claims = (*reproduction.claims, *reproduction.search_claims)
     statements = Counter(claim.finding.value for claim in claims)
-    holding = sum(check.holds for check in found.checks)
-    findings = ", ".join(f"{count} {held(word, count)}" for word, count in statements.items())
+    holding = sum(check.holds for check in reproduction.checks)
+    findings = ", ".join(f"{count} {in_number(word, count)}" for word, count in statements.items())
     return (
-        f"{len(found.comparisons)} numbers: {numbers[Verdict.EQUAL]} equal to print, {numbers[Verdict.MISPRINT]} known "
-        f"misprints, {numbers[Verdict.DIFFERS]} differ. {len(found.checks)} groups of equations: {holding} hold. "
+        f"{len(reproduction.comparisons)} numbers: {numbers[Verdict.EQUAL]} equal to print, "
+        f"{numbers[Verdict.MISPRINT]} known misprints, {numbers[Verdict.DIFFERS]} differ. "
+        f"{len(reproduction.checks)} groups of equations: {holding} hold. "
         f"{len(claims)} statements: {findings}."
     )
 
 
-def held(finding: str, count: int) -> str:
-    """What so many statements do, from what one does: it holds, they hold."""
+def in_number(finding: str, count: int) -> str:
+    """Put a finding such as "holds in part" into the plural where it is about several statements."""
     verb, space, rest = finding.partition(" ")
     return (verb if count == 1 else verb.removesuffix("s")) + space + rest
 
@@ -119,10 +123,17 @@ def _numbers_table(comparisons: Sequence[Comparison]) -> Any:
         Verdict.MISPRINT: Text("misprint", "yellow"),
         Verdict.DIFFERS: Text("DIFFERS", "red"),
     }
-    for one in comparisons:
-        head = "" if one.place == place else one.place
-        place = one.place
-        table.add_row(head, one.component, one.printed, f"{one.computed:.7g}", one.unit, shown[one.verdict])
+    for comparison in comparisons:
+        head = "" if comparison.place == place else comparison.place
+        place = comparison.place
+        table.add_row(
+            head,
+            comparison.component,
+            comparison.printed,
+            f"{comparison.computed:.7g}",
+            comparison.unit,
+            shown[comparison.verdict],
+        )
     return table
 
 

@@ -48,11 +48,11 @@ CAPTIONS = {
 }
 
 
-def page(found: Reproduction, figures: Mapping[str, Figure]) -> str:
+def page(reproduction: Reproduction, figures: Mapping[str, Figure]) -> str:
     """The page.
 
     Args:
-        found: what to show.
+        reproduction: what to show.
         figures: by name, drawn; each name has a caption here.
     """
     pictures = {name: figure(as_svg(drawn), CAPTIONS[name]) for name, drawn in figures.items()}
@@ -61,23 +61,23 @@ def page(found: Reproduction, figures: Mapping[str, Figure]) -> str:
         '<p class="soft">' + escape(printed.CITATION) + ", "
         f"compared with the results of kinetostat {escape(version('kinetostat'))}. "
         "Order of components: rx ry rz x y z; SI units, base axes, at the platform point P.</p>",
-        _tiles(found),
+        _tiles(reproduction),
         "<h2>The machine</h2>",
         pictures["machine"],
         "<h2>Numbers</h2>",
         "<p>A number is equal to print if it rounds to the digits that are printed. A misprint is listed only where "
         "the corrected digits are reached, with the reason.</p>",
-        *_numbers(found.comparisons),
+        *_numbers(reproduction.comparisons),
         "<h2>Equations 1 to 32</h2>",
-        _equations(found),
+        _equations(reproduction),
         "<h2>Stiffness against link stiffness</h2>",
         pictures["figure-4"],
         "<h2>Compliance over the workspace</h2>",
         pictures["figure-5"],
         "<h2>Design guidelines and further facts, tested</h2>",
-        _statements(found.claims),
+        _statements(reproduction.claims),
         "<h2>Optimisation</h2>",
-        _statements(found.search_claims),
+        _statements(reproduction.search_claims),
         pictures["figure-6"],
         "<h2>Slips of typography</h2>",
         f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in printed.TYPOGRAPHY)}</ul>",
@@ -85,12 +85,12 @@ def page(found: Reproduction, figures: Mapping[str, Figure]) -> str:
     return whole_page("Zhang and Gosselin's machine, reproduced by kinetostat", STYLE, body)
 
 
-def _tiles(found: Reproduction) -> str:
-    equal = sum(one.verdict is Verdict.EQUAL for one in found.comparisons)
-    misprints = sum(one.verdict is Verdict.MISPRINT for one in found.comparisons)
-    differing = len(found.comparisons) - equal - misprints
-    equations = f"{sum(check.holds for check in found.checks)} of {len(found.checks)}"
-    claims = (*found.claims, *found.search_claims)
+def _tiles(reproduction: Reproduction) -> str:
+    equal = sum(comparison.verdict is Verdict.EQUAL for comparison in reproduction.comparisons)
+    misprints = sum(comparison.verdict is Verdict.MISPRINT for comparison in reproduction.comparisons)
+    differing = len(reproduction.comparisons) - equal - misprints
+    equations = f"{sum(check.holds for check in reproduction.checks)} of {len(reproduction.checks)}"
+    claims = (*reproduction.claims, *reproduction.search_claims)
     holding = sum(claim.finding is Finding.HOLDS for claim in claims)
     limited = sum(claim.finding is Finding.PARTLY for claim in claims)
     tiles = [
@@ -107,23 +107,23 @@ def _tiles(found: Reproduction) -> str:
 def _numbers(comparisons: Sequence[Comparison]) -> Iterable[str]:
     titles = {"Table": "Tables III and IV", "Eq.": "Equations 33 to 38", "Section": "Designs of section 4.3"}
     heads = ("place", "quantity", "printed", "computed", "unit", "verdict")
-    for head, group in groupby(comparisons, key=lambda one: one.place.split(" ")[0]):
+    for head, group in groupby(comparisons, key=lambda comparison: comparison.place.split(" ")[0]):
         rows = []
-        for place, members in groupby(group, key=lambda one: one.place):
-            rows += [_number_row(one, place if first else "") for one, first in _marking_first(members)]
+        for place, members in groupby(group, key=lambda comparison: comparison.place):
+            rows += [_number_row(comparison, place if first else "") for comparison, first in _marking_first(members)]
         yield table(titles[head], heads, rows, NUMERIC)
 
 
 def _marking_first(members: Iterable[Comparison]) -> Iterable[tuple[Comparison, bool]]:
-    return ((one, i == 0) for i, one in enumerate(members))
+    return ((member, i == 0) for i, member in enumerate(members))
 
 
-def _number_row(one: Comparison, place: str) -> tuple[str, ...]:
-    verdict = Markup(_mark(one.verdict) + (f" {escape(one.reason)}" if one.reason else ""))
-    return place, one.component, one.printed, f"{one.computed:.9g}", one.unit, verdict
+def _number_row(comparison: Comparison, place: str) -> tuple[str, ...]:
+    verdict = Markup(_mark(comparison.verdict) + (f" {escape(comparison.reason)}" if comparison.reason else ""))
+    return place, comparison.component, comparison.printed, f"{comparison.computed:.9g}", comparison.unit, verdict
 
 
-def _equations(found: Reproduction) -> str:
+def _equations(reproduction: Reproduction) -> str:
     rows = [
         (
             check.equation,
@@ -132,10 +132,10 @@ def _equations(found: Reproduction) -> str:
             f"{check.tolerance:.0e}",
             _mark(Finding.HOLDS if check.holds else Finding.FAILS),
         )
-        for check in found.checks
+        for check in reproduction.checks
     ]
     heads = ("equation", "statement", "residual", "tolerance", "verdict")
-    return table("The paper's own matrices A, B, J and J' against legs as (W, G)", heads, rows, NUMERIC[-5:])
+    return table("The paper's matrices A, B, J and J' against legs as (W, G)", heads, rows, NUMERIC[-5:])
 
 
 def _statements(claims: Sequence[Claim]) -> str:

@@ -20,11 +20,11 @@ from kinetostat.units import KINDS, show
 Number = float | None
 
 LARGE = 1e6
-"""From which on a value of a machine is written with a power of ten."""
+"""Size from which a value of a machine is written with a power of ten."""
 PIPED = 100
-"""Columns of text where there is no terminal."""
+"""Width of texts, in characters, where there is no terminal."""
 UNBOUND = 10_000
-"""Columns that no table needs."""
+"""Width that no table reaches, to measure what a table needs."""
 
 
 def print_machines(console: Console, bundled: Sequence[Machine], names: Sequence[str]) -> None:
@@ -48,13 +48,13 @@ def print_studies(console: Console, studies: Mapping[str, StudyFile]) -> None:
 
 
 def print_machine(console: Console, machine: Machine) -> None:
-    """Every value of a machine with its meaning, and those that are hardly meant."""
+    """Print every value of a machine with its meaning, and notes on implausible ones."""
     console.print(machine_table(machine))
     print_doubts(console, machine)
 
 
 def print_doubts(console: Console, machine: Machine) -> None:
-    """Values that are hardly meant, a line each."""
+    """Print a note on each implausible value."""
     for doubt in doubts(machine):
         console.print(f"Note: {doubt}", style="yellow", highlight=False)
 
@@ -62,25 +62,25 @@ def print_doubts(console: Console, machine: Machine) -> None:
 def machine_table(machine: Machine) -> Table:
     """Every value of a machine with its meaning."""
     table = text_table(f"{machine.name} ({machine.family.name})", "field", "value", "meaning")
-    held = values(machine)
-    found = list(parameters(machine.family))
-    entries = {leaf for parameter in found if parameter.quantity.count for leaf in parameter.leaves}
-    whole = [parameter for parameter in found if parameter.path not in entries]
+    numbers = values(machine)
+    fields = list(parameters(machine.family))
+    entries = {leaf for parameter in fields if parameter.quantity.count for leaf in parameter.leaves}
+    whole = [parameter for parameter in fields if parameter.path not in entries]
     for parameter in whole:
-        shown = readable([held[leaf] for leaf in parameter.leaves], parameter.quantity)
+        shown = readable([numbers[leaf] for leaf in parameter.leaves], parameter.quantity)
         table.add_row(parameter.path, shown, parameter.quantity.meaning)
     return table
 
 
 def readable(values: Sequence[float], quantity: Quantity) -> str:
-    """All entries of a field for a table; one for all where they are alike."""
+    """Return all entries of a field for a table, e.g. "3 x 0.5 m" where they are equal."""
     texts = [_readable(value, quantity) for value in values]
     alike = f"{len(texts)} x {texts[0]}" if len(texts) > 1 else texts[0]
     return alike if len(set(texts)) == 1 else ", ".join(texts)
 
 
 def _readable(value: float, quantity: Quantity) -> str:
-    """A value for a table: ten digits, a power of ten where it is large, angles in degrees."""
+    """Return a value with ten digits, large ones with a power of ten (7e10 Pa), angles in degrees."""
     unit = KINDS[quantity.kind].unit
     if math.isinf(value):
         return quantity.show(value)
@@ -91,11 +91,13 @@ def _readable(value: float, quantity: Quantity) -> str:
 
 
 class Piped(Console):
-    """The console where there is no terminal: as wide as six columns, and for tables of numbers as they need it."""
+    """Console for pipes and files: texts wrap at `PIPED` characters, tables of numbers take the width they need."""
 
     def print(self, *objects: Any, **options: Any) -> None:
         """Print as `Console` does, but cut no number and no name."""
-        tables = [one for one in objects if isinstance(one, Table) and all(own.no_wrap for own in one.columns)]
+        tables = [
+            item for item in objects if isinstance(item, Table) and all(column.no_wrap for column in item.columns)
+        ]
         unbound = self.options.update(width=UNBOUND)
         self.width = max([PIPED, *(self.measure(table, options=unbound).maximum for table in tables)])
         super().print(*objects, **options)

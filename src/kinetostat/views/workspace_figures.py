@@ -1,4 +1,7 @@
-"""Pictures of a workspace: regions filled by verdict, cross-sections, and the solid. Every axis has its unit."""
+"""Figures of a workspace: regions filled by verdict, cuts, and the solid; each axis has its unit.
+
+Verdicts come from `studies.workspace`; nothing is judged here.
+"""
 
 from collections.abc import Sequence
 
@@ -23,7 +26,7 @@ KNOWN = dict(zip([*PLAIN.values(), BEYOND], ("#9fd8c4", "#e4e4e4", "#555555", "#
 LIMITED = ("#f2c77a", "#eea27a", "#f3ea9a", "#d8b98a", "#e7d3b5", "#c9a27e", "#f5dfa8", "#dcae92", "#cfc08a")
 UNMET = ("#a9d2ee", "#7fa8cf", "#c5cbe9", "#8fc4d4", "#b7c7d9", "#9db4e0")
 SECTIONS = 9
-"""Cross-sections of a picture at most."""
+"""Greatest number of cuts in a picture."""
 SOLID = "#5fb39a"
 FINEST = 64
 """Nodes along an axis that the picture of a solid shows at most."""
@@ -36,8 +39,8 @@ def pictures(
 ) -> dict[str, Figure]:
     """The pictures of a workspace by what is added to the file's name.
 
-    Over two coordinates the region; over three, cross-sections along the third and the solid. Over more, the others are
-    held where the file's pose has them.
+    Over two coordinates there is a map of the region; over three, cuts along the third coordinate and the solid. With
+    more coordinates, the others stay at the values of the pose in the file.
 
     Args:
         dataset: of `studies.workspace.workspace.Workspace`.
@@ -46,10 +49,10 @@ def pictures(
         title: over each picture.
     """
     dims = [str(dim) for dim in dataset["verdict"].dims]
-    held = {dim: float(dataset.attrs.get(dim, dataset[dim].values.mean())) for dim in dims[3:]}
-    if held:
-        dataset = dataset.sel(held, method="nearest")
-        shown = ", ".join(_at(dataset, dim) for dim in held)
+    fixed = {dim: float(dataset.attrs.get(dim, dataset[dim].values.mean())) for dim in dims[3:]}
+    if fixed:
+        dataset = dataset.sel(fixed, method="nearest")
+        shown = ", ".join(_at(dataset, dim) for dim in fixed)
         title = f"{title}, {shown}"
     if len(dims) == 2:
         return {"": _sections([dataset], labels, conditions, title)}
@@ -58,13 +61,13 @@ def pictures(
 
 
 def _shown(dataset: xr.Dataset, dims: Sequence[str]) -> Array:
-    """Which values of the third coordinate have a section: equally spaced, no further than a step beyond the inside."""
+    """Choose the cuts: equally spaced values of the third coordinate, at most a step beyond the workspace."""
     reached = np.flatnonzero((dataset["verdict"] == 0).any(dims[:2]).values)
     last = dataset.sizes[dims[2]] - 1
     first, final = (max(0, reached[0] - 1), min(last, reached[-1] + 1)) if reached.size else (0, last)
     span = final - first
     finest = max(1, -(-span // (SECTIONS - 1)))
-    step = next((one for one in range(finest, 2 * finest) if span % one == 0), finest)
+    step = next((candidate for candidate in range(finest, 2 * finest) if span % candidate == 0), finest)
     return np.arange(first + span % step // 2, final + 1, step)
 
 
@@ -113,7 +116,7 @@ def _varied(cuts: Sequence[xr.Dataset], fallback: str) -> str:
 
 
 def _fill(panel: Axes, cut: xr.Dataset, labels: Sequence[str], conditions: Sequence[Condition]) -> set[Condition]:
-    """Fill one panel by verdict; the conditions of which it has an edge, drawn as a line."""
+    """Fill a panel by verdict and draw the border of each condition; return the conditions that have one."""
     across, up = (str(dim) for dim in cut["verdict"].dims)
     (x, x_label), (y, y_label) = axis_values(cut, across), axis_values(cut, up)
     verdict = cut["verdict"].transpose(up, across).values
@@ -137,7 +140,7 @@ def _fill(panel: Axes, cut: xr.Dataset, labels: Sequence[str], conditions: Seque
 
 
 def _patches(cuts: Sequence[xr.Dataset], labels: Sequence[str]) -> list[Patch]:
-    """What the colours mean that occur."""
+    """Return the legend of the colours that occur."""
     present = {int(code) for cut in cuts for code in np.unique(cut["verdict"].values)}
     return [
         Patch(facecolor=colour, edgecolor="#888888", linewidth=0.4, label=phrase(label))
@@ -147,7 +150,7 @@ def _patches(cuts: Sequence[xr.Dataset], labels: Sequence[str]) -> list[Patch]:
 
 
 def _lines(conditions: Sequence[Condition], edges: set[Condition]) -> list[Line2D]:
-    """What the lines mean that are drawn."""
+    """Return the legend of the lines that are drawn."""
     return [
         Line2D([], [], color=colour, linestyle="--", linewidth=1.2, label=_edge(condition))
         for condition, colour in zip(conditions, COLOURS, strict=False)
@@ -162,16 +165,16 @@ def _edge(condition: Condition) -> str:
 def _solid(dataset: xr.Dataset, dims: Sequence[str], title: str) -> Figure:
     """The inside as a lit solid in a box with scales."""
     thin = dataset.isel({dim: slice(None, None, -(-dataset.sizes[dim] // FINEST)) for dim in dims})
-    found = [axis_values(thin, dim) for dim in dims]
+    axes = [axis_values(thin, dim) for dim in dims]
     ends = [axis_values(dataset, dim)[0] for dim in dims]
-    triangles = surface(thin["verdict"].transpose(*dims).values == 0, [values for values, _ in found])
+    triangles = surface(thin["verdict"].transpose(*dims).values == 0, [values for values, _ in axes])
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(5.2, 4.8), layout="constrained")
         panel = figure.add_subplot(projection="3d")
         colours = _lit(triangles)
         solid = Poly3DCollection(triangles, facecolors=colours, edgecolors=colours, linewidths=0.2, rasterized=True)
         panel.add_collection3d(solid)
-        panel.set(xlabel=found[0][1], ylabel=found[1][1], zlabel=found[2][1])
+        panel.set(xlabel=axes[0][1], ylabel=axes[1][1], zlabel=axes[2][1])
         panel.set(xlim=_ends(ends[0]), ylim=_ends(ends[1]), zlim=_ends(ends[2]))
         lengths = all(dataset[dim].attrs["kind"] == "length" for dim in dims)
         panel.set_box_aspect([float(np.ptp(dataset[dim].values)) for dim in dims] if lengths else None, zoom=0.9)
