@@ -13,7 +13,7 @@ from rich.text import Text
 
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines.guidelines import Guidelines
-from kinetostat.studies.guidelines.parameters import Move
+from kinetostat.studies.guidelines.moves import Move
 from kinetostat.studies.guidelines.roles import Roles
 from kinetostat.studies.guidelines.sentences import LEAST, MATTERS, statements
 from kinetostat.studies.sensitivity import PER, Sensitivity, notes
