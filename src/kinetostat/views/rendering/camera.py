@@ -67,7 +67,7 @@ def axes_towards(forward: Sequence[float] | Array) -> Array:
 def camera_on(points: Array, direction: Sequence[float], width: int, height: int) -> Camera:
     """Place a camera so that the points [n x 3] (base frame, m) fill its picture.
 
-    In perspective there is no closed form for that: the camera is centred on the projected points and brought nearer
+    A perspective picture allows no closed form: the camera is centred on the projected points and brought nearer
     or farther until it fits, which converges in a few steps.
 
     Args:

@@ -146,7 +146,7 @@ def nearest_triangles(
 def _fragments(
     pixels: Array, nearness: Array, triangles: Indices, width: int, height: int
 ) -> Iterator[tuple[Indices, Array, Indices]]:
-    """Yield pixels, their nearness and their triangle, a pixel as often as triangles cover it, some at a time.
+    """Generate pixels, their nearness and their triangle, a pixel as often as triangles cover it, some at a time.
 
     Every triangle is cut into rows, and every row into pixels: long thin triangles have few pixels in a large box.
     """

@@ -75,7 +75,7 @@ ASSEMBLY = Formula(
 
 
 def verdict(validation: Validation | str) -> str:
-    """Say in a sentence whether an independent engine agrees, or why there is no comparison."""
+    """Say in a sentence whether an independent engine agrees, or why none was used."""
     if isinstance(validation, str):
         return validation
     agree = "agrees" if validation.difference <= AGREED else "DIFFERS"
@@ -86,7 +86,7 @@ def verdict(validation: Validation | str) -> str:
 
 
 def validation_section(validation: Validation | str) -> Section:
-    """Write the section that compares both compliances, or says why there is no comparison."""
+    """Write the section that compares both compliances, or gives the reason why none was made."""
     title = "Validation"
     if isinstance(validation, str):
         return Section(title, (Paragraph(validation),))

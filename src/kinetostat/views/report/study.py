@@ -54,7 +54,7 @@ def study_section(result: Result) -> Section:
 
 
 def gains(result: Result) -> Iterator[str]:
-    """Yield a sentence on each objective, with its value before and after."""
+    """Generate a sentence on each objective, with its value before and after."""
     for k, objective in enumerate(result.problem.objectives):
         before, after = result.initial.objectives[0, k], result.outcome.objectives[0, k]
         unit = "" if objective.term.unit in ("1", "SI") else f" {objective.term.unit}"

@@ -41,7 +41,7 @@ def leg_solids(leg: Anatomy, base: Plate | None, platform: Plate, sizes: Proport
         solids += _joint(joint, _neighbours(joint, leg, base, platform), radius, material)
     for rail in leg.rails:
         solids += _rail(rail, sizes, radius, leg.second_point - rail.point)
-    # A rigid spring is not there.
+    # A rigid spring does not deflect, so it is not drawn.
     solids += [_spring(spring, radius) for spring in leg.springs if not math.isinf(spring.stiffness)]
     return [replace(solid, leg=leg.leg) for solid in solids]
 
