@@ -1,0 +1,83 @@
+"""The recipes of docs/extending.md, followed to the letter in a copy of the package: what they promise comes true.
+
+A recipe is a section with these blocks, read in order:
+
+    ```python src/kinetostat/...    a new file of that name; or, if it exists, lines for it: the first or the last line
+    ```toml src/kinetostat/...      of the block stands in the file exactly once, and the others go below or above it
+    ```sh recipe                    commands that must succeed afterwards, in an empty folder
+    ```text recipe                  what the last of them says, as elsewhere in the documentation
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pages import ROOT, Block, blocks, commands, missing
+
+PAGE = ROOT / "docs" / "extending.md"
+TITLES = ("Add a machine family", "Add a joint type", "Add a limit", "Add an index", "Add an export format")
+
+
+def recipe(title: str) -> list[Block]:
+    """The blocks of a recipe, in order."""
+    starts = [(m.start(), m[1]) for m in re.finditer(r"^## (.+)$", PAGE.read_text("utf-8"), re.MULTILINE)]
+    lines = {PAGE.read_text("utf-8").count("\n", 0, start) + 1: name for start, name in starts}
+    inside = {block: max(line for line in lines if line < block.line) for block in blocks(PAGE)}
+    return [block for block, line in inside.items() if lines[line].startswith(title) and block.words]
+
+
+def follow(block: Block, tree: Path) -> None:
+    """Do in a tree what a block of source says."""
+    path, added = tree / block.words[0], block.text.rstrip("\n").split("\n")
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(block.text, "utf-8")
+        return
+    lines = path.read_text("utf-8").split("\n")
+    places = {anchor: [i for i, line in enumerate(lines) if line == anchor] for anchor in (added[0], added[-1])}
+    first, last = (places[anchor] for anchor in (added[0], added[-1]))
+    assert len(first) == 1 or len(last) == 1, f"{block.words[0]} has neither {added[0]!r} nor {added[-1]!r} once"
+    lines[slice(first[0], first[0] + 1) if len(first) == 1 else slice(last[0], last[0] + 1)] = added
+    path.write_text("\n".join(lines), "utf-8")
+
+
+@pytest.mark.parametrize(
+    ("added", "after"),
+    [("    1: 2,\n    3: 4,\n", "x = {\n    1: 2,\n    3: 4,\n}\n"), ("a = 0\nx = {\n", "a = 0\nx = {\n    1: 2,\n}\n")],
+)
+def test_lines_go_below_or_above_the_line_that_is_quoted(added, after, tmp_path):
+    (tmp_path / "a.py").write_text("x = {\n    1: 2,\n}\n", "utf-8")
+    follow(Block("python", ("a.py",), added, 1), tmp_path)
+    assert (tmp_path / "a.py").read_text("utf-8") == after
+
+
+@pytest.mark.parametrize("title", TITLES)
+def test_a_recipe_followed_word_by_word_works(title, tmp_path):
+    tree, there, said = tmp_path / "tree", tmp_path / "there", ""
+    shutil.copytree(ROOT / "src", tree / "src", ignore=shutil.ignore_patterns("__pycache__"))
+    there.mkdir()
+    steps = recipe(title)
+    assert any(block.words == ("recipe",) for block in steps), "a recipe ends with a command that shows its result"
+    for block in steps:
+        if block.words != ("recipe",):
+            follow(block, tree)
+        elif block.kind == "text":
+            absent = missing(block.text, said)
+            assert absent is None, f"not said: {absent}\nsaid:\n{said}"
+        else:
+            for words in commands(block.text):
+                done = subprocess.run(
+                    [sys.executable, "-m", *words],
+                    cwd=there,
+                    env={**os.environ, "PYTHONPATH": str(tree / "src"), "COLUMNS": "100"},
+                    capture_output=True,
+                    text=True,
+                    check=False,
+                )
+                said = done.stdout + done.stderr
+                assert done.returncode == 0, f"{' '.join(words)}\n{said}"
