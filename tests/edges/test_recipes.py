@@ -39,16 +39,23 @@ def follow(block: Block, tree: Path) -> None:
         path.write_text(block.text, "utf-8")
         return
     lines = path.read_text("utf-8").split("\n")
-    places = {anchor: [i for i, line in enumerate(lines) if line == anchor] for anchor in (added[0], added[-1])}
-    first, last = (places[anchor] for anchor in (added[0], added[-1]))
-    assert len(first) == 1 or len(last) == 1, f"{block.words[0]} has neither {added[0]!r} nor {added[-1]!r} once"
-    lines[slice(first[0], first[0] + 1) if len(first) == 1 else slice(last[0], last[0] + 1)] = added
-    path.write_text("\n".join(lines), "utf-8")
+    for anchor in (added[0], added[-1]):
+        places = [i for i, line in enumerate(lines) if line.strip() == anchor.strip()]
+        if len(places) == 1:
+            (place,) = places
+            indent, shift = (len(line) - len(line.lstrip()) for line in (lines[place], anchor))
+            lines[place : place + 1] = [" " * indent + line[shift:] if line.strip() else "" for line in added]
+            path.write_text("\n".join(lines), "utf-8")
+            return
+    raise AssertionError(f"{block.words[0]} has neither {added[0].strip()!r} nor {added[-1].strip()!r} just once")
 
 
 @pytest.mark.parametrize(
     ("added", "after"),
-    [("    1: 2,\n    3: 4,\n", "x = {\n    1: 2,\n    3: 4,\n}\n"), ("a = 0\nx = {\n", "a = 0\nx = {\n    1: 2,\n}\n")],
+    [
+        ("    1: 2,\n    3: 4,\n", "x = {\n    1: 2,\n    3: 4,\n}\n"),
+        ("a = 0\nx = {\n", "a = 0\nx = {\n    1: 2,\n}\n"),
+    ],
 )
 def test_lines_go_below_or_above_the_line_that_is_quoted(added, after, tmp_path):
     (tmp_path / "a.py").write_text("x = {\n    1: 2,\n}\n", "utf-8")

@@ -55,14 +55,21 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
     """
     platform, joints = placed(geometry, pose)
     legs = [
-        _leg(f"leg {i}", base, tip, k, stiffness.leg_axial)
+        planar_leg(f"leg {i}", base, tip, k, stiffness.leg_axial)
         for i, (base, tip, k) in enumerate(zip(*joints, stiffness.actuator, strict=True), 1)
     ]
     return Configuration(platform, tuple(numbered(legs)), (), geometry.size, Plane())
 
 
-def _leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, axial: Scalar) -> Leg:
-    """R-P-R: carries a force along the line of its joints."""
+def planar_leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, axial: Scalar) -> Leg:
+    """Return a leg R-P-R with an actuated slide: it carries a force along the line of its joints.
+
+    Args:
+        name: of the leg.
+        base, tip: its joints on the base and on the platform, base frame, m.
+        stiffness: of the actuator, N/m.
+        axial: axial rigidity EA, N.
+    """
     span = tip - base
     size = span.norm()
     along = span * reciprocal(size)
