@@ -29,7 +29,7 @@ def test_one_range_and_one_quantity_are_lists_of_one():
     assert guidelines(HEXAPOD, "x=-1 cm:1 cm:3").ranges == ("x=-1 cm:1 cm:3",)
     assert compare([HEXAPOD, HEXAPOD], "x=-1 cm:1 cm:3").ranges == ("x=-1 cm:1 cm:3",)
     assert sensitivity(HEXAPOD, "stiffness_z").quantities == ("stiffness_z",)
-    assert workspace(HEXAPOD, ["x=-1 cm:1 cm:3", "y=-1 cm:1 cm:3"], "stiffness_z > 1 N/um").found
+    assert workspace(HEXAPOD, ["x=-1 cm:1 cm:3", "y=-1 cm:1 cm:3"], "stiffness_z > 1 N/um").exists
 
 
 @pytest.mark.parametrize(

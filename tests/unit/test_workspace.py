@@ -61,8 +61,8 @@ def near(found, value):
 def test_two_links_reach_a_ring():
     found = workspace(build(document.parse(ARM, "arm"), "arm"), SQUARE)
     near(found, math.pi * (0.8**2 - 0.2**2))
-    assert found.joined == 1.0
-    assert found.counts["out of reach"] + found.counts[INSIDE] == 81 * 81
+    assert found.connected == 1.0
+    assert found.nodes["out of reach"] + found.nodes[INSIDE] == 81 * 81
     radius = np.hypot(*np.meshgrid(found.dataset["pose.x"], found.dataset["pose.y"], indexing="ij"))
     inside = found.dataset["verdict"].values == 0
     assert inside[(radius > 0.2 + RIM) & (radius < 0.8 - RIM)].all(), "also beside nodes at the very end of the reach"
@@ -85,15 +85,15 @@ def test_poses_at_the_end_of_the_reach_leave_the_joints_of_others_alone():
 def test_a_singular_circle_bounds_a_planar_machine():
     found = workspace(load("planar-3rpr"), PLANE)
     near(found, math.pi * CENTRES**2)
-    assert found.divided
-    assert found.counts[BEYOND] > 0
+    assert found.singularities_divide
+    assert found.nodes[BEYOND] > 0
 
 
 def test_legs_of_equal_reach_leave_a_reuleaux_triangle():
     """Three discs about the corners of an equilateral triangle, their radius its side; inside the singular circle."""
     found = workspace(load("planar-3rpr", [f"limits.longest_leg={SIDE}"]), PLANE)
     near(found, 0.5 * (math.pi - math.sqrt(3.0)) * SIDE**2)
-    assert found.joined == 1.0
+    assert found.connected == 1.0
 
 
 def test_short_legs_take_discs_out_of_it():
@@ -116,7 +116,7 @@ def test_slides_leave_a_box():
     ranges = [f"{name}=0.25 m:0.75 m:15" for name in "xyz"]
     found = workspace(load("tripteron", ["limits.travel_from=-0.12 m", "limits.travel_to=0.17 m"]), ranges)
     near(found, 0.29**3)
-    assert not found.divided
+    assert not found.singularities_divide
     demand = {d.name: d for d in found.demands}["travel_to"]
     assert -0.12 <= demand.least < -0.08
     assert 0.12 < demand.greatest <= 0.17
@@ -152,9 +152,9 @@ class TestVerdicts:
             assert labels[int(found.dataset["verdict"].values[index])] == expected
 
     def test_counts_are_those_of_the_nodes(self, found):
-        assert sum(found.counts.values()) == found.dataset["verdict"].size
-        assert found.counts[INSIDE] == int((found.dataset["verdict"] == 0).sum()) > 0
-        assert sum(count > 0 for count in found.counts.values()) >= 4
+        assert sum(found.nodes.values()) == found.dataset["verdict"].size
+        assert found.nodes[INSIDE] == int((found.dataset["verdict"] == 0).sum()) > 0
+        assert sum(count > 0 for count in found.nodes.values()) >= 4
 
     def test_demands_keep_within_the_limits(self, found):
         told = {demand.name: demand for demand in found.demands}
@@ -187,13 +187,13 @@ def test_regions_apart_are_told():
     """Beyond the singular circle another region of the same side does not exist; a ring of short legs cuts one off."""
     machine = load("planar-3rpr", ["pose.x=0", "pose.y=0"])
     found = workspace(machine, PLANE, [f"stiffness_x > {0.5 * respond(machine).stiffness.entry(3, 3)} N/m"])
-    assert found.joined == 1.0
+    assert found.connected == 1.0
 
 
 def test_a_pose_that_is_not_inside_joins_nothing():
     found = workspace(load("planar-3rpr"), ["x=0.3 m:0.4 m:5", "y=0.3 m:0.4 m:5"])
-    assert found.joined is None
-    assert not found.found
+    assert found.connected is None
+    assert not found.exists
     assert found.demands == ()
     assert found.extents == {}
 

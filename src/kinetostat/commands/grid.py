@@ -218,7 +218,7 @@ def _workspace(options: argparse.Namespace) -> int:
     written = _write_workspace(result, options.output) if options.output else []
     return give(
         options,
-        bool(result.found),
+        bool(result.exists),
         lambda: as_json(result),
         lambda console: print_workspace(console, result),
         written,

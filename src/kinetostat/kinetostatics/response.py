@@ -46,6 +46,7 @@ class Response:
         load: the wrench of the machine's table [load], at T, base axes (N·m, N).
         checks: the limits of the machine that are set, each with what it is compared with.
         mass: of what moves, as far as it is known, kg.
+        joint_status: `Status` code of the joints alone, before the pose is judged.
     """
 
     configuration: Configuration
@@ -60,6 +61,7 @@ class Response:
     load: Wrench
     checks: tuple[Check, ...] = ()
     mass: Scalar = 0.0
+    joint_status: Scalar = int(Status.OK)
     regularity = renamed_property("singularity_margin")
 
 
@@ -98,6 +100,7 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
         machine.load,
         (*geometric, *loaded),
         moving_mass(machine, configuration),
+        joints.status,
     )
 
 

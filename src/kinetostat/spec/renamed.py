@@ -4,9 +4,11 @@ An old word keeps working for one version. To rename one, add it to `RENAMED`; n
 """
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 RENAMED: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
@@ -55,6 +57,23 @@ def renamed_property(current: str) -> Any:
             return getattr(instance, current)
 
     return Former()
+
+
+def former_names(**current: str) -> Callable[[type[T]], type[T]]:
+    """Keep old names of a class's attributes alive as `renamed_property` does; a class decorator.
+
+    Args:
+        current: the present name for each old one.
+    """
+
+    def add(cls: type[T]) -> type[T]:
+        for former, name in current.items():
+            alias = renamed_property(name)
+            alias.__set_name__(cls, former)
+            setattr(cls, former, alias)
+        return cls
+
+    return add
 
 
 def with_former_keys(data: dict[str, Any], table: Mapping[str, str]) -> dict[str, Any]:

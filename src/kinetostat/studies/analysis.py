@@ -24,30 +24,30 @@ from kinetostat.machine.machine import Configuration, Machine, need_machine, spr
 from kinetostat.machine.mass import Mass, moving_masses
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.spec.renamed import renamed_property
+from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import Contribution, contributions
 from kinetostat.studies.indices import Along, Indices, indices_json, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
 from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
 from kinetostat.studies.refusal import why_not
 from kinetostat.studies.rounding import clean_matrix, clean_statics
+from kinetostat.tolerances import DEPENDENT_MOTIONS
 
 Rows = list[list[float]]
 
 AXES = ("base", "platform")
-"""In which results are given."""
-INDEPENDENT = 1e-9
-"""Relative size of a singular value below which the motions of springs are dependent."""
+"""Axes in which results are given."""
 NEARBY = 0.03
 """How far poses for the general mobility lie from the pose: in units of the machine's length, and in rad."""
 
 
+@former_names(shares="attribution", internal="internal_loads", length="characteristic_length", mass="moving_mass")
 @dataclass(frozen=True)
 class Analysis:
-    """The answer at one pose; matrices at the tool point T (P itself unless there is a tool), SI.
+    """Stiffness of a machine at one pose; matrices at the tool point T (P itself unless there is a tool), SI.
 
     Attributes:
-        machine: what was analysed.
+        machine: the machine, with its pose.
         status: of the pose; all that follows is None or empty unless it is OK.
         message: one readable paragraph.
         components: names of the rows and columns of K and C: rx ry rz x y z, or rz x y of a planar machine.
@@ -62,7 +62,7 @@ class Analysis:
         indices: numbers and directions read off K and C.
         mobility: what can move, and the kind of pose.
         internal_loads: statically indeterminate loads.
-        load: what the machine's [load] does, None without one.
+        load: effects of the machine's [load], None where it has none.
         masses: of what moves, part by part.
         wrench_condition: ratio of the extreme singular values of W, moments divided by the characteristic length.
         jacobian_condition: of the actuators' Jacobian, angles multiplied by that length; None where actuators are of
@@ -93,11 +93,6 @@ class Analysis:
     jacobian_condition: float | None = None
     characteristic_length: float | None = None
 
-    shares = renamed_property("attribution")
-    internal = renamed_property("internal_loads")
-    length = renamed_property("characteristic_length")
-    mass = renamed_property("moving_mass")
-
     def __repr__(self) -> str:
         return f"<Analysis of {self.machine.name!r}: {self.status.word}, components {' '.join(self.components)}>"
 
@@ -119,7 +114,7 @@ class Analysis:
 
 
 def analyze(machine: Machine, axes: str = "base") -> Analysis:
-    """K, C, attribution, indices, mobility and loads of a machine at its pose.
+    """Analyse a machine at its pose: K, C, attribution, indices, mobility and loads.
 
     A pose that cannot be reached or is singular is an answer too: see `status` and `message`.
 
@@ -226,9 +221,9 @@ def _rank(statics: Statics, endless: bool) -> int:
     """Rank of C, or of K where C is not finite; independent of how much the springs differ."""
     if endless:
         wrenches: list[Screw] = [wrench for wrench, k in statics.actions if k > 0.0]
-        return independent(wrenches, statics.length, INDEPENDENT)
+        return independent(wrenches, statics.length, DEPENDENT_MOTIONS)
     twists: list[Screw] = [twist for twist, s in statics.motions if s > 0.0]
-    return independent(twists, 1.0 / statics.length, INDEPENDENT)
+    return independent(twists, 1.0 / statics.length, DEPENDENT_MOTIONS)
 
 
 def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...], finite: bool) -> str:
@@ -280,7 +275,9 @@ def as_json(analysis: Analysis, along: Sequence[Along] = ()) -> dict[str, Any]:
         "load": analysis.load,
         "moving_mass": analysis.moving_mass,
         "masses": {part.name: part.mass for part in analysis.masses},
-        "attribution": [{**vars(one), "stiffness": stiffness_of_spring(one.stiffness)} for one in analysis.attribution],
+        "attribution": [
+            {**vars(spring), "stiffness": stiffness_of_spring(spring.stiffness)} for spring in analysis.attribution
+        ],
     }
     return as_answer(data)
 

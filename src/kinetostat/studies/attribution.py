@@ -11,9 +11,10 @@ from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.kinetostatics.assembly import Statics
 from kinetostat.kinetostatics.attribution import compliance_shares, stiffness_shares
 from kinetostat.machine.leg import Spring
-from kinetostat.spec.renamed import renamed_property
+from kinetostat.spec.renamed import former_names
 
 
+@former_names(name="spring", compliance="compliance_share")
 @dataclass(frozen=True)
 class Contribution:
     """What one spring contributes to the diagonal entries of C and K.
@@ -31,9 +32,6 @@ class Contribution:
     stiffness: float
     compliance_share: tuple[float | None, ...]
     stiffness_share: tuple[float | None, ...]
-
-    name = renamed_property("spring")
-    compliance = renamed_property("compliance_share")
 
 
 def contributions(

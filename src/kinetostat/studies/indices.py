@@ -27,11 +27,12 @@ from kinetostat.kinetostatics.indices import (
     principal_compliances,
 )
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.renamed import renamed_property
+from kinetostat.spec.renamed import former_names
 
 Rows = Sequence[Sequence[float]]
 
 
+@former_names(principal="principal_compliances", condition="stiffness_condition")
 @dataclass(frozen=True)
 class Indices:
     """Indices of a pose, at T and in the axes of K and C.
@@ -52,16 +53,13 @@ class Indices:
     centres: dict[str, Point | None]
     eigenscrews: tuple[Eigenscrew, ...]
 
-    principal = renamed_property("principal_compliances")
-    condition = renamed_property("stiffness_condition")
-
 
 @dataclass(frozen=True)
 class Along:
     """Stiffness along one direction, in the axes of K and C.
 
     Attributes:
-        direction: as asked for [3].
+        direction: as given [3].
         force, force_held: N/m, rotations free to follow, and held; None where there is no such direction or number.
         moment, moment_held: N·m/rad, about it, the point free to follow, and held.
     """
@@ -76,7 +74,7 @@ class Along:
 def stiffness_along(
     direction: Sequence[float], stiffness: Rows | None, compliance: Rows | None, components: tuple[int, ...]
 ) -> Along:
-    """Stiffness of the tool point along and about a direction.
+    """Compute the stiffness of the tool point along and about a direction.
 
     Args:
         direction: of any length, in the axes of K and C [3].
@@ -86,22 +84,22 @@ def stiffness_along(
     Raises:
         InputError: if the direction has no length, or none in the plane of a planar machine.
     """
-    found: dict[str, float | None] = {}
+    values: dict[str, float | None] = {}
     blocks: tuple[tuple[Block, str], ...] = (("translation", "force"), ("rotation", "moment"))
     for block, name in blocks:
         for kind, function in (("", free_stiffness_along), ("_held", guided_stiffness_along)):
             try:
-                found[name + kind] = function(direction, block, stiffness, compliance, components)
+                values[name + kind] = function(direction, block, stiffness, compliance, components)
             except ValueError:
-                found[name + kind] = None
-    if all(value is None for value in found.values()):
+                values[name + kind] = None
+    if all(value is None for value in values.values()):
         shown = ", ".join(f"{c:g}" for c in direction)
-        raise InputError(f"--along {shown} is no direction of this machine; give three numbers, e.g. --along 0,0,1.")
-    return Along(tuple(direction), **found)
+        raise InputError(f"--along {shown} is not a direction of this machine; give three numbers, e.g. --along 0,0,1.")
+    return Along(tuple(direction), **values)
 
 
 def indices_of(stiffness: Rows | None, compliance: Rows | None, length: float, components: tuple[int, ...]) -> Indices:
-    """Every index that K [n x n] and C [n x n] give, one of which may be missing.
+    """Compute every index that K [n x n] and C [n x n] give; either matrix may be missing.
 
     Args:
         stiffness, compliance: None where not finite.

@@ -1,4 +1,7 @@
-"""What the [load] of a machine does: deflection of the tool point, loads in springs and actuators, joint reactions."""
+"""Effects of a machine's [load]: deflection of the tool point, loads in springs and actuators, joint reactions.
+
+The formulas are in `kinetostatics.loading`.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -9,12 +12,13 @@ from kinetostat.algebra.vector import Rotation
 from kinetostat.kinetostatics.loading import JointReaction, deflection, joint_reactions, spring_loads
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import springs
-from kinetostat.studies.rounding import ROUNDING, clean_screw
+from kinetostat.studies.rounding import clean_screw
+from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 
 
 @dataclass(frozen=True)
 class SpringLoad:
-    """The load in a spring and how far it gives.
+    """The load in a spring and how far it deforms.
 
     Attributes:
         name: of the spring.
@@ -67,7 +71,11 @@ def load_case(response: Response, compliance: Symmetric6, turn: Rotation) -> Loa
         _deflection(compliance, seen),
         tuple(
             SpringLoad(
-                s.name, s.actuated, s.joint.point is not None, float(load), _give(float(load), float(s.stiffness))
+                s.name,
+                s.actuated,
+                s.joint.point is not None,
+                float(load),
+                _deformation(float(load), float(s.stiffness)),
             )
             for s, load in loads
         ),
@@ -79,14 +87,14 @@ def load_case(response: Response, compliance: Symmetric6, turn: Rotation) -> Loa
 
 
 def _deflection(compliance: Symmetric6, load: Wrench) -> tuple[float, ...]:
-    """C w without rounding: no component i can exceed sqrt(C_ii w C w), as C is positive semidefinite."""
+    """C w without round-off: no component i can exceed sqrt(C_ii w C w), because C is positive semidefinite."""
     twist = deflection(compliance, load)
     energy = float(load.work(twist))
     moved = zip(twist.components(), compliance.diagonal(), strict=True)
-    bounds = [(float(c), math.sqrt(max(energy * float(own), 0.0)) if own else 0.0) for c, own in moved]
-    return tuple(0.0 if abs(c) < ROUNDING * bound < math.inf else c for c, bound in bounds)
+    bounds = [(float(c), math.sqrt(max(energy * float(entry), 0.0)) if entry else 0.0) for c, entry in moved]
+    return tuple(0.0 if abs(c) < ROUND_OFF_OF_ENTRY * bound < math.inf else c for c, bound in bounds)
 
 
-def _give(load: float, stiffness: float) -> float:
-    """Deformation of a spring; an unloaded one gives nothing, free or not."""
+def _deformation(load: float, stiffness: float) -> float:
+    """Deformation of a spring; without a load it has none, even where it is free."""
     return load / stiffness if load else 0.0

@@ -1,10 +1,10 @@
-"""Why a pose has no answer, in a sentence that says what to change."""
+"""Refusals: the sentence that says why a pose has no answer, and what to change."""
 
 import math
 from collections.abc import Sequence
 
 from kinetostat.kinematics.closing import why_out_of_reach
-from kinetostat.kinematics.closure import nearest_pose, solve_joints
+from kinetostat.kinematics.closure import nearest_pose
 from kinetostat.kinematics.limits import why_beyond
 from kinetostat.kinematics.mobility import Kind, Mobility, mobility
 from kinetostat.kinematics.singularity import describe, why_singular
@@ -15,11 +15,17 @@ from kinetostat.machine.machine import Configuration, Machine, springs
 
 
 def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration]) -> str:
-    """The sentence for a pose whose status is not OK."""
+    """Explain why the status of a pose is not OK.
+
+    Args:
+        machine: with its pose.
+        response: of the machine, with that status.
+        nearby: the machine at poses around it, to tell what holds in general; may be empty.
+    """
     status = Status(int(response.status))
     configuration = response.configuration
     if machine.family.chains is not None:
-        placed = Status(int(solve_joints(machine).status))
+        placed = Status(int(response.joint_status))
         if placed is Status.OUT_OF_REACH:
             return _off_constraint(machine)
         if placed is not Status.OK:
@@ -28,12 +34,12 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
         return why_out_of_reach(configuration)
     if status is Status.JOINT_LIMIT:
         return why_beyond(response.checks)
-    found = _mobility(response, nearby)
-    if found and not nearby and _held(configuration) < found.full_cycle:
-        return _lacks_actuators(configuration, found)
+    motion = _mobility(response, nearby)
+    if motion and not nearby and _locked_joints(configuration) < motion.full_cycle:
+        return _lacks_actuators(configuration, motion)
     names = [leg.name for leg in configuration.legs]
     reason = why_singular(names, response.legs, configuration.length, SINGULAR)
-    kind = f" ({found.kind})" if found and found.kind is not Kind.REGULAR else ""
+    kind = f" ({motion.kind})" if motion and motion.kind is not Kind.REGULAR else ""
     return f"The pose is singular{kind}. {reason}"
 
 
@@ -45,8 +51,8 @@ def _mobility(response: Response, nearby: Sequence[Configuration]) -> Mobility |
     return mobility(response.configuration, nearby, response.reference)
 
 
-def _held(configuration: Configuration) -> int:
-    """How many joints are held: by actuators, or by a stiffness of their own."""
+def _locked_joints(configuration: Configuration) -> int:
+    """How many joints are held: by actuators, or by a stiffness in the joint itself."""
     return sum(_holds(spring) for spring in springs(configuration))
 
 
@@ -54,14 +60,14 @@ def _holds(spring: Spring) -> bool:
     return (spring.actuated or spring.hinge) and float(spring.stiffness) > 0.0
 
 
-def _lacks_actuators(configuration: Configuration, found: Mobility) -> str:
+def _lacks_actuators(configuration: Configuration, motion: Mobility) -> str:
     """The sentence for a machine with fewer actuators than freedoms, which moves at every pose."""
     idle = [leg.name for leg in configuration.legs if not any(_holds(spring) for spring in leg.springs)]
     where = f"; none is in {', '.join(idle)}" if 0 < len(idle) < len(configuration.legs) else ""
-    motions = " or ".join(describe(twist, ("rad", "m")) for twist in found.twists)
+    motions = " or ".join(describe(twist, ("rad", "m")) for twist in motion.twists)
     return (
-        f"Actuators are missing: {found.actuators} for {found.full_cycle} freedoms{where}. With all of them locked the "
-        f"platform can still move, by the twist {motions}; give another joint an actuator."
+        f"Actuators are missing: {motion.actuators} for {motion.full_cycle} freedoms{where}. With all of them "
+        f"locked the platform can still move, by the twist {motions}; give another joint an actuator."
     )
 
 

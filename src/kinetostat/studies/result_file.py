@@ -39,7 +39,7 @@ Array = npt.NDArray[Any]
 
 
 def check_space(folder: Path, points: int, quantities: int) -> None:
-    """See that a file of so many points and quantities fits the disk.
+    """Check that a file of so many points and quantities fits on the disk.
 
     Raises:
         InputError: it does not.
@@ -99,8 +99,8 @@ def _fill_status(stream: BinaryIO, offset: int, points: int) -> None:
 def _offsets(path: Path) -> dict[str, int]:
     """Where the block of each variable starts, bytes."""
     with h5py.File(path) as file:
-        found = {name: data.id.get_offset() for name, data in file.items()}
-    return {name: offset for name, offset in found.items() if offset is not None}
+        offsets = {name: data.id.get_offset() for name, data in file.items()}
+    return {name: offset for name, offset in offsets.items() if offset is not None}
 
 
 class ResultFile:
@@ -131,19 +131,19 @@ class ResultFile:
             settle(self._stream)
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._stream.close()
 
 
 def settle(stream: BinaryIO) -> None:
-    """See that what was written to a file is on the disk."""
+    """Write what the system still buffers to the disk."""
     stream.flush()
     os.fsync(stream.fileno())
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Failures to write as messages for people.
+    """Turn failures to write into messages.
 
     Raises:
         InputError: the disk is full or failing.
@@ -152,13 +152,13 @@ def writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise InputError(
-            f'"{path}" cannot be written: {error.strerror or error}; what was written before is kept: mend this, then '
-            "give the same command again."
+            f'"{path}" cannot be written: {error.strerror or error}; what was written before is kept: make room or '
+            "repair it, then give the same command again."
         ) from None
 
 
 def thinned(path: Path) -> xr.Dataset:
-    """Of a file, as many values along each dimension as a figure can show."""
+    """Read as many values of a file along each dimension as a figure can show."""
     with xr.open_dataset(path, engine="h5netcdf") as dataset:
         steps = {dim: slice(None, None, -(-size // SHOWN)) for dim, size in dataset.sizes.items()}
         return dataset.isel(steps).load()

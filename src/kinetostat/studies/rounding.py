@@ -10,13 +10,11 @@ from dataclasses import replace
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinetostatics.assembly import Statics
 from kinetostat.kinetostatics.leg import AnyScrew
-
-ROUNDING = 1e-12
-"""Share of what a number is compared with below which it is rounding."""
+from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 
 
 def clean_screw(screw: AnyScrew, length: float, least: float = 0.0) -> AnyScrew:
-    """The screw without components that rounding alone explains.
+    """Set components of a screw that are only round-off to zero.
 
     Args:
         screw: of floats.
@@ -25,13 +23,13 @@ def clean_screw(screw: AnyScrew, length: float, least: float = 0.0) -> AnyScrew:
         least: size of what it is a part of, measured as its first three components.
     """
     sizes = [abs(c) * scale for c, scale in zip(screw.components(), [1.0] * 3 + [length] * 3, strict=True)]
-    limit = ROUNDING * max(least, *sizes)
+    limit = ROUND_OFF_OF_ENTRY * max(least, *sizes)
     kept = [float(c) if size > limit else 0.0 for c, size in zip(screw.components(), sizes, strict=True)]
     return type(screw)(Vector(*kept[:3]), Vector(*kept[3:]))
 
 
-def clean_matrix(rows: Sequence[Sequence[float]], share: float = ROUNDING) -> list[list[float]]:
-    """K or C [n x n] without entries that are less than a `share` of the geometric mean of their diagonal ones."""
+def clean_matrix(rows: Sequence[Sequence[float]], share: float = ROUND_OFF_OF_ENTRY) -> list[list[float]]:
+    """Set entries of K or C [n x n] to zero that are below a `share` of the mean (geometric) of their diagonal ones."""
     sizes = [abs(row[i]) for i, row in enumerate(rows)]
     return [
         [0.0 if abs(c) < share * math.sqrt(size * other) else c for c, other in zip(row, sizes, strict=True)]

@@ -18,7 +18,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import Parameter, parameters, values
-from kinetostat.spec.renamed import renamed_property
+from kinetostat.spec.renamed import former_names
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
 from kinetostat.studies.plain_data import as_answer
@@ -89,7 +89,7 @@ class Influence:
             (whose percent is 0.01 rad), or "axis" (the direction's length).
         derivatives: of each index by it, SI; None where the index is infinite.
         percents: percent by which each index changes per percent of a change; None where the index is infinite, or 0 up
-            to rounding.
+            to round-off.
     """
 
     path: str
@@ -106,6 +106,13 @@ class Influence:
         return greatest_of(self.percents)
 
 
+@former_names(
+    found="indices",
+    length="characteristic_length",
+    influences="parameters",
+    none="without_influence",
+    skipped="without_derivative",
+)
 @dataclass(frozen=True)
 class Sensitivity:
     """Sensitivities at one pose, ranked.
@@ -131,12 +138,6 @@ class Sensitivity:
     parameters: tuple[Influence, ...] = ()
     without_influence: tuple[str, ...] = ()
     without_derivative: tuple[tuple[str, str], ...] = ()
-
-    found = renamed_property("indices")
-    length = renamed_property("characteristic_length")
-    influences = renamed_property("parameters")
-    none = renamed_property("without_influence")
-    skipped = renamed_property("without_derivative")
 
     def __repr__(self) -> str:
         return f"<Sensitivity of {self.machine.name!r}: {self.status.word}, {len(self.parameters)} parameters>"
@@ -176,8 +177,8 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     reasons = {p.path: _no_derivative(p, here, slopes) for p in candidates}
     known = [p for p in candidates if not reasons[p.path]]
     influences = [_influence(p, here, indices, slopes[p.path], length) for p in known]
-    ranked = sorted((one for one in influences if one.greatest > NO_INFLUENCE), key=lambda one: -one.greatest)
-    quiet = tuple(one.path for one in influences if one.greatest <= NO_INFLUENCE)
+    ranked = sorted((item for item in influences if item.greatest > NO_INFLUENCE), key=lambda item: -item.greatest)
+    quiet = tuple(item.path for item in influences if item.greatest <= NO_INFLUENCE)
     skipped = tuple((path, reason) for path, reason in reasons.items() if reason)
     return Sensitivity(machine, status, status.sentence, names, indices, length, tuple(ranked), quiet, skipped)
 
@@ -250,14 +251,14 @@ def as_json(answer: Sensitivity) -> dict[str, Any]:
             },
             "parameters": [
                 {
-                    "path": one.path,
-                    "value": one.value,
-                    "units": KINDS[one.kind].unit,
-                    "one_percent_of": {"measure": one.measure, "value": one.percent_of},
-                    "derivatives": dict(zip(names, one.derivatives, strict=True)),
-                    "percent_per_percent": dict(zip(names, one.percents, strict=True)),
+                    "path": parameter.path,
+                    "value": parameter.value,
+                    "units": KINDS[parameter.kind].unit,
+                    "one_percent_of": {"measure": parameter.measure, "value": parameter.percent_of},
+                    "derivatives": dict(zip(names, parameter.derivatives, strict=True)),
+                    "percent_per_percent": dict(zip(names, parameter.percents, strict=True)),
                 }
-                for one in answer.parameters
+                for parameter in answer.parameters
             ],
             "without_influence": answer.without_influence,
             "without_derivative": dict(answer.without_derivative),
@@ -267,7 +268,7 @@ def as_json(answer: Sensitivity) -> dict[str, Any]:
 
 def notes(answer: Sensitivity) -> Iterator[str]:
     """Explain the percentages: what a percent is of, and which parameters are omitted, in sentences."""
-    used = {one.measure for one in answer.parameters}
+    used = {parameter.measure for parameter in answer.parameters}
     length = show(answer.characteristic_length, "m")
     meanings = {
         "length": f"where a length is 0, a percent is one of the characteristic length, {length}",

@@ -1,4 +1,4 @@
-"""Where numbers of a machine hold, in words: reference point, axes, and the pose as far as it does not vary."""
+"""Captions of results: their reference point, their axes, and the coordinates of the pose that do not vary."""
 
 import math
 from collections.abc import Collection
@@ -9,19 +9,19 @@ from kinetostat.units import KINDS
 
 
 def frame_of(machine: Machine, axes: str = "base") -> str:
-    """The point to which K and C of a machine refer, and their axes, "base" or "platform"."""
+    """Name the axes, "base" or "platform", and the point to which K and C of a machine refer."""
     return f"{axes} axes at the {machine.reference}"
 
 
 def pose_of(machine: Machine, varied: Collection[str] = ()) -> str:
-    """The coordinates of its pose but those that vary, lengths in mm, angles in degrees; empty where all vary."""
-    held = values(machine)
-    found = [p for p in parameters(machine.family) if p.path.startswith("pose.") and p.path not in varied]
-    return ", ".join(f"{p.path.removeprefix('pose.')} {_shown(float(held[p.path]), p.quantity.kind)}" for p in found)
+    """List the coordinates of the pose that do not vary, lengths in mm, angles in degrees; empty where all vary."""
+    here = values(machine)
+    fixed = [p for p in parameters(machine.family) if p.path.startswith("pose.") and p.path not in varied]
+    return ", ".join(f"{p.path.removeprefix('pose.')} {_shown(float(here[p.path]), p.quantity.kind)}" for p in fixed)
 
 
 def setting_of(machine: Machine, varied: Collection[str] = ()) -> str:
-    """Frame and pose in one line, arguments as for `pose_of`."""
+    """Write frame and pose in one line; the arguments are those of `pose_of`."""
     return "; ".join(text for text in (frame_of(machine), pose_of(machine, varied)) if text)
 
 

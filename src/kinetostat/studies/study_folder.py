@@ -43,7 +43,7 @@ def in_use(folder: Path) -> bool:
 
 
 def noted(folder: Path, start: int = 0) -> tuple[list[Record], int]:
-    """What was noted from a place in the history on, in whole lines, and the place after it; waits for nobody.
+    """Read what was noted from a place in the history on, in whole lines, and the place after it, without waiting.
 
     Args:
         folder: of a study, in which another process may be at work.
@@ -66,24 +66,24 @@ class StudyFolder:
         self.path = path
         self._history = history
 
-    def question(self, asked: Record) -> Record | None:
-        """The question that is being answered here, the one that is asked, or None where there is none yet.
+    def question(self, wanted: Record) -> Record | None:
+        """Return the question that this folder answers, or None where it has none yet; check that it is the wanted one.
 
         Raises:
             InputError: it is another one, or cannot be read.
         """
         path = self.path / QUESTION
         try:
-            held: Record | None = json.loads(path.read_text("utf-8")) if path.exists() else None
+            stored: Record | None = json.loads(path.read_text("utf-8")) if path.exists() else None
         except (OSError, ValueError):
             raise InputError(f'"{path}" cannot be read; choose another folder, or remove this one.') from None
-        different = [key for key in asked if held is not None and asked[key] != held.get(key)]
+        different = [key for key in wanted if stored is not None and wanted[key] != stored.get(key)]
         if different:
             raise InputError(
                 f'"{self.path}" holds another study (different: {", ".join(different)}); choose another folder with '
                 "-o, or remove that one."
             )
-        return held
+        return stored
 
     def begin(self, question: Record) -> None:
         """Note a new question, to which nothing is known yet."""
@@ -97,8 +97,8 @@ class StudyFolder:
         whole = text[: text.rfind(b"\n") + 1]
         if len(whole) < len(text):
             self._history.truncate(len(whole))
-        found = [json.loads(line) for line in whole.splitlines()]
-        return {record["chunk"]: record for record in found}
+        records = [json.loads(line) for line in whole.splitlines()]
+        return {record["chunk"]: record for record in records}
 
     def note(self, record: Record) -> None:
         """Add a chunk that is done; when this returns it is on the disk."""
@@ -130,7 +130,7 @@ def study_folder(path: Path) -> Iterator[StudyFolder]:
 
 
 def _lock_soon(stream: BinaryIO) -> None:
-    """Take the lock of a file, also where somebody is just asking whether it is `in_use`; or fail."""
+    """Take the lock of a file, also where another process just checks whether it is `in_use`; or fail."""
     for _ in range(ATTEMPTS):
         try:
             _lock(stream)

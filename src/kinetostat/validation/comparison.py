@@ -22,8 +22,8 @@ from kinetostat.machine.machine import Configuration, Machine, need_machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studies.plain_data import as_answer
-from kinetostat.studies.rounding import ROUNDING, clean_matrix
-from kinetostat.tolerances import AGREED
+from kinetostat.studies.rounding import clean_matrix
+from kinetostat.tolerances import AGREED, ROUND_OFF_OF_ENTRY
 from kinetostat.validation.answer import Answer, block_differences, difference
 
 Array = npt.NDArray[np.float64]
@@ -192,7 +192,7 @@ def validate(machine: Machine, engine: str | None = None) -> Validation:
     answer = chosen.solve(response.configuration, response.reference)
     length = float(response.configuration.length)
     uncertainty = _uncertainty(answer, ours, length)
-    trusted = max(ROUNDING, uncertainty if uncertainty < AGREED else 0.0)
+    trusted = max(ROUND_OFF_OF_ENTRY, uncertainty if uncertainty < AGREED else 0.0)
     return Validation(
         machine,
         chosen.name,

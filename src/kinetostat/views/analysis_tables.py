@@ -14,7 +14,7 @@ from kinetostat.studies.analysis import Analysis, Rows
 from kinetostat.studies.attribution import by_part
 from kinetostat.studies.indices import Along
 from kinetostat.studies.loads import LoadCase
-from kinetostat.studies.rounding import ROUNDING
+from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 from kinetostat.views.tables import number, numeric_table, print_doubts
 
 UNITS_OF_K = "N·m/rad, N/rad, N/m"
@@ -145,7 +145,7 @@ def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str) -> Table:
 
 def _millimetres(point: Sequence[float]) -> str:
     """A point given in m, without rounding."""
-    return " ".join(f"{1e3 * c if abs(c) > ROUNDING else 0.0:.4g}" for c in point)
+    return " ".join(f"{1e3 * c if abs(c) > ROUND_OFF_OF_ENTRY else 0.0:.4g}" for c in point)
 
 
 def load_table(names: Sequence[str], load: LoadCase) -> Table:

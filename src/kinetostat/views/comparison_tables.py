@@ -12,7 +12,7 @@ from rich.text import Text
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.studies.comparison.design_rows import Better, Row
-from kinetostat.studies.comparison.designs import Blame, Comparison
+from kinetostat.studies.comparison.designs import Comparison, SoftDirection
 from kinetostat.validation.comparison import Array, Validation
 from kinetostat.views.analysis_tables import UNITS_OF_C
 from kinetostat.views.tables import number, numeric_table, readable, text_table
@@ -109,17 +109,17 @@ def _print_softest(console: Console, comparison: Comparison, letters: str) -> No
         return
     table = text_table("Largest contributions in the softest directions", "", "rotation", "translation")
     for letter, softest in zip(letters, comparison.softest, strict=True):
-        turning = next((contribution for contribution in softest if contribution.component.startswith("r")), None)
-        sliding = next((contribution for contribution in softest if not contribution.component.startswith("r")), None)
+        turning = next((contribution for contribution in softest if contribution.direction.startswith("r")), None)
+        sliding = next((contribution for contribution in softest if not contribution.direction.startswith("r")), None)
         table.add_row(letter, _contributions(turning), _contributions(sliding))
     console.print(table)
 
 
-def _contributions(attribution: Blame | None) -> str:
+def _contributions(attribution: SoftDirection | None) -> str:
     if attribution is None:
         return "–"
     parts = [f"{name} {100 * share:.0f} %" for name, share in attribution.shares[:MOST_SHARES] if share >= 0.005]
-    return f"{attribution.component}: {', '.join(parts)}"
+    return f"{attribution.direction}: {', '.join(parts)}"
 
 
 def print_validation(console: Console, validation: Validation, agreed: float) -> None:

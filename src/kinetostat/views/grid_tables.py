@@ -86,7 +86,7 @@ def print_workspace(console: Console, workspace: Workspace) -> None:
         console.print(line, highlight=False)
     total = workspace.dataset["verdict"].size
     table = numeric_table(f"Nodes of the grid ({total:,})", "", ["nodes", "share"])
-    for label, count in sorted(workspace.counts.items(), key=lambda item: (item[0] != INSIDE, -item[1])):
+    for label, count in sorted(workspace.nodes.items(), key=lambda item: (item[0] != INSIDE, -item[1])):
         if count:
             table.add_row(phrase(label), f"{count:,}", f"{100.0 * count / total:.3g} %")
     console.print(table)
@@ -108,13 +108,13 @@ def _summary(workspace: Workspace) -> Iterator[str]:
         f"({100.0 * volume.share:.4g} % of the box; two random points in each of {volume.cells:,} cells, ± two "
         "standard errors)."
     )
-    if not workspace.found:
+    if not workspace.exists:
         yield "No pose of the box is in the workspace; the table shows why."
-    elif workspace.joined is None:
+    elif workspace.connected is None:
         yield "The pose of the file is outside the workspace, so it is unknown which part can be reached from it."
-    elif workspace.joined < 1.0:
-        yield f"Only {100.0 * workspace.joined:.3g} % of the workspace is connected with the pose of the file."
-    if not workspace.divided:
+    elif workspace.connected < 1.0:
+        yield f"Only {100.0 * workspace.connected:.3g} % of the workspace is connected with the pose of the file."
+    if not workspace.singularities_divide:
         yield (
             "Singularities are not borders here: they do not divide the poses of this machine, or the pose of the file "
             "is singular."

@@ -16,11 +16,10 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.grid.grid import evaluate_grid
+from kinetostat.tolerances import EQUAL_DESIGNS
 
 PERCENTILE = 95.0
 """Of the poses of a grid, the share that is at least as good."""
-SAME = 1e-9
-"""Relative difference up to which two values are one."""
 
 
 class Better(StrEnum):
@@ -63,29 +62,29 @@ class Row:
         if len(known) < 2:
             return ()
         top = (min if self.better is Better.LESS else max)(known.values())
-        found = tuple(i for i, v in known.items() if v == top or math.isclose(v, top, rel_tol=SAME))
-        return found if len(found) < len(known) else ()
+        places = tuple(i for i, v in known.items() if v == top or math.isclose(v, top, rel_tol=EQUAL_DESIGNS))
+        return places if len(places) < len(known) else ()
 
 
 def rows_at_poses(analyses: Sequence[Analysis]) -> tuple[Row, ...]:
-    """Numbers at each design's pose; rows that no design has are left out."""
-    found = []
+    """Collect numbers at each design's pose; rows that no design has are left out."""
+    rows = []
     for group, letter, better in (("compliance", "C", Better.LESS), ("stiffness", "K", Better.MORE)):
         for name in COMPONENTS:
             entry = QUANTITIES[f"{group}_{name}"]
-            own = tuple(_diagonal(one, group, name) for one in analyses)
-            found.append(Row(group, f"{letter}_{name}", entry.unit, better, own))
+            numbers = tuple(_diagonal(analysis, group, name) for analysis in analyses)
+            rows.append(Row(group, f"{letter}_{name}", entry.unit, better, numbers))
     scalars: list[tuple[str, str, Better, Callable[[Analysis], float | None]]] = [
-        ("least stiffness, force", "N/m", Better.MORE, lambda one: _least(one, "translation")),
-        ("least stiffness, moment", "N·m/rad", Better.MORE, lambda one: _least(one, "rotation")),
+        ("least stiffness, force", "N/m", Better.MORE, lambda analysis: _least(analysis, "translation")),
+        ("least stiffness, moment", "N·m/rad", Better.MORE, lambda analysis: _least(analysis, "rotation")),
         ("condition of K", "1", Better.LESS, _condition),
         ("singularity margin", "1", Better.MORE, _singularity_margin),
-        ("moving mass", "kg", Better.LESS, lambda one: one.moving_mass),
+        ("moving mass", "kg", Better.LESS, lambda analysis: analysis.moving_mass),
     ]
     for name, unit, better, value in scalars:
-        own = tuple(value(one) if one.status is Status.OK else None for one in analyses)
-        found.append(Row("indices", name, unit, better, own))
-    return tuple(row for row in found if any(value is not None for value in row.values))
+        numbers = tuple(value(analysis) if analysis.status is Status.OK else None for analysis in analyses)
+        rows.append(Row("indices", name, unit, better, numbers))
+    return tuple(row for row in rows if any(value is not None for value in row.values))
 
 
 def _diagonal(analysis: Analysis, group: str, name: str) -> float | None:
@@ -96,7 +95,7 @@ def _diagonal(analysis: Analysis, group: str, name: str) -> float | None:
 def _least(analysis: Analysis, block: str) -> float | None:
     """The least principal stiffness of a block, the other free to follow."""
     blocks = analysis.indices.free if analysis.indices else None
-    return {str(name): one.stiffnesses[0] for name, one in (blocks or {}).items()}.get(block)
+    return {str(name): block_values.stiffnesses[0] for name, block_values in (blocks or {}).items()}.get(block)
 
 
 def _singularity_margin(analysis: Analysis) -> float:
@@ -111,27 +110,27 @@ def _condition(analysis: Analysis) -> float | None:
 def rows_over(
     machines: Sequence[Machine], ranges: Sequence[str], progress: Progress
 ) -> tuple[tuple[Row, ...], tuple[tuple[int, int], ...]]:
-    """Worst, percentile and mean over a grid; and for each design how many of how many poses have an answer.
+    """Compute worst, percentile and mean over a grid, and for each design how many of how many poses have an answer.
 
     Raises:
         InputError: a range that one of the machines does not take.
     """
-    common = [name for name in COMPONENTS if any(name in one.family.component_names for one in machines)]
-    found: list[dict[str, tuple[float, ...]]] = []
+    common = [name for name in COMPONENTS if any(name in machine.family.component_names for machine in machines)]
+    spreads: list[dict[str, tuple[float, ...]]] = []
     poses = []
     for done, machine in enumerate(machines, 1):
         dataset = evaluate_grid(machine, ranges, ["compliance", "singularity_margin"])
         good = dataset["status"].values == Status.OK
         poses.append((int(good.sum()), int(good.size)))
-        own = {str(name): dataset[name].values[good] for name in dataset.data_vars if name != "status"}
-        found.append({name: _spread(name, row) for name, row in own.items() if row.size})
+        columns = {str(name): dataset[name].values[good] for name in dataset.data_vars if name != "status"}
+        spreads.append({name: _spread(name, row) for name, row in columns.items() if row.size})
         progress(done, len(machines))
     rows = []
     for name in [*(f"compliance_{component}" for component in common), "singularity_margin"]:
         better = Better.MORE if name == "singularity_margin" else Better.LESS
         shown = name.replace("compliance_", "C_").replace("_margin", " margin")
         for k, what in enumerate(("worst", f"{PERCENTILE:g} %", "mean")):
-            own_values = tuple(spread[name][k] if name in spread else None for spread in found)
+            own_values = tuple(spread[name][k] if name in spread else None for spread in spreads)
             rows.append(Row(shown, what, QUANTITIES[name].unit, better, own_values))
     return tuple(rows), tuple(poses)
 

@@ -1,4 +1,4 @@
-"""Designs side by side: where their files differ, how stiff each is, and who gains what against the first.
+"""Designs side by side: where their files differ, how stiff each is, and what each gains against the first.
 
 Any machines can be compared, of one family or not; what only some of them have is missing for the others. What is
 printed or drawn is in `views`.
@@ -59,7 +59,7 @@ class Difference:
     Attributes:
         path: of the field.
         parameters: of each design; the kind need not be the same. None where it has no such field.
-        values: SI, entry by entry; empty likewise.
+        values: SI, entry by entry; empty where it has no such field.
     """
 
     path: str
@@ -68,21 +68,21 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Blame:
-    """What makes a direction of a design soft.
+class SoftDirection:
+    """The softest rotation or translation of a design, and what makes it soft.
 
     Attributes:
-        component: the softest one of its kind.
+        direction: the component.
         shares: of the elements in its compliance, the greatest first.
     """
 
-    component: str
+    direction: str
     shares: tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """The answer.
+    """Designs side by side.
 
     Attributes:
         designs: in order; the first is what the others are compared with.
@@ -97,7 +97,7 @@ class Comparison:
     designs: tuple[Design, ...]
     differences: tuple[Difference, ...]
     rows: tuple[Row, ...]
-    softest: tuple[tuple[Blame, ...], ...]
+    softest: tuple[tuple[SoftDirection, ...], ...]
     ranges: tuple[str, ...] = ()
     poses: tuple[tuple[int, int], ...] = ()
     over: tuple[Row, ...] = ()
@@ -107,7 +107,7 @@ class Comparison:
 
 
 def read_design(text: str, settings: Sequence[str] = ()) -> Design:
-    """A design from what people write: a file or bundled name, and after a colon overrides of its fields.
+    """Read a design from text: a file or bundled name, and after a colon overrides of its fields.
 
     Args:
         text: "NAME" or "NAME:path=value;path=value".
@@ -120,8 +120,8 @@ def read_design(text: str, settings: Sequence[str] = ()) -> Design:
     if match is None:
         machine = load(text, settings)
     else:
-        own = [setting.strip() for setting in match[2].split(SEPARATOR) if setting.strip()]
-        machine = load(match[1], [*settings, *own])
+        overrides = [setting.strip() for setting in match[2].split(SEPARATOR) if setting.strip()]
+        machine = load(match[1], [*settings, *overrides])
     return Design(text, machine, analyze(machine))
 
 
@@ -130,13 +130,13 @@ def compare(
     ranges: Sequence[str] = (),
     progress: Progress = silent,
 ) -> Comparison:
-    """Designs side by side, each at its own pose and, where ranges are given, all over the same grid.
+    """Compare designs, each at its own pose and, where ranges are given, all over the same grid.
 
     Args:
-        designs: two or more; machines, by names of your own if you like, or texts, "NAME" or
+        designs: two or more; machines, with names of your choice if you like, or texts, "NAME" or
             "NAME:path=value;path=value".
         ranges: "FIELD=from:to:count", of fields that all of them have.
-        progress: told how far the work is.
+        progress: receives how far the work is.
 
     Raises:
         InputError: fewer than two designs or too many, or a range that one of them does not take.
@@ -171,28 +171,31 @@ def _refuse_absent(design: Design, ranges: Sequence[str]) -> None:
 
 
 def _designs(given: Sequence[Design | Machine | str] | Mapping[str, Machine]) -> Iterator[Design]:
-    """What was given, analysed; machines without a name of their own are numbered."""
-    named = given.items() if isinstance(given, Mapping) else ((f"design {n}", one) for n, one in enumerate(given, 1))
-    for name, one in named:
-        if isinstance(one, Machine):
-            yield Design(name, one, analyze(one))
+    """The designs that were given, analysed; machines without a name are numbered."""
+    named = (
+        given.items() if isinstance(given, Mapping) else ((f"design {n}", design) for n, design in enumerate(given, 1))
+    )
+    for name, design in named:
+        if isinstance(design, Machine):
+            yield Design(name, design, analyze(design))
         else:
-            yield read_design(one) if isinstance(one, str) else one
+            yield read_design(design) if isinstance(design, str) else design
 
 
 def _differences(designs: Sequence[Design]) -> tuple[Difference, ...]:
     """Fields that two designs have at least, whole ones where they have entries, and of which not all say the same."""
-    held = [values(design.machine) for design in designs]
+    numbers_of = [values(design.machine) for design in designs]
     known = [_whole_fields(design.machine) for design in designs]
-    found = []
+    differences = []
     for path in dict.fromkeys(path for fields in known for path in fields):
-        own = tuple(fields.get(path) for fields in known)
+        fields_of = tuple(fields.get(path) for fields in known)
         rows = tuple(
-            tuple(numbers[leaf] for leaf in p.leaves) if p else () for numbers, p in zip(held, own, strict=True)
+            tuple(numbers[leaf] for leaf in p.leaves) if p else ()
+            for numbers, p in zip(numbers_of, fields_of, strict=True)
         )
-        if len({(p.quantity.kind, row) for p, row in zip(own, rows, strict=True) if p}) > 1:
-            found.append(Difference(path, own, rows))
-    return tuple(found)
+        if len({(p.quantity.kind, row) for p, row in zip(fields_of, rows, strict=True) if p}) > 1:
+            differences.append(Difference(path, fields_of, rows))
+    return tuple(differences)
 
 
 def _whole_fields(machine: Machine) -> dict[str, Parameter]:
@@ -202,24 +205,24 @@ def _whole_fields(machine: Machine) -> dict[str, Parameter]:
     return {parameter.path: parameter for parameter in every if parameter.path not in entries}
 
 
-def _softest(design: Design) -> tuple[Blame, ...]:
-    """The softest rotation and translation of a design, and what is to blame."""
+def _softest(design: Design) -> tuple[SoftDirection, ...]:
+    """The softest rotation and translation of a design, with the shares of its elements."""
     if not design.answered:
         return ()
     response, components = respond(design.machine), design.machine.family.components
     whole = without_rounding(response.compliance.diagonal(), response)[:, 0]
-    found = []
+    softest = []
     for block in (ROTATIONS, TRANSLATIONS):
-        own = [i for i in components if i in block and 0.0 < whole[i] < math.inf]
-        if own:
-            i = max(own, key=lambda i: whole[i])
+        known = [i for i in components if i in block and 0.0 < whole[i] < math.inf]
+        if known:
+            i = max(known, key=lambda i: whole[i])
             parts = [
                 (element.name, float(element_share(response, element)[i] / whole[i]))
                 for element in elements(response.configuration)
                 if element.stiffness != math.inf
             ]
-            found.append(Blame(COMPONENTS[i], tuple(sorted(parts, key=lambda part: -part[1]))))
-    return tuple(found)
+            softest.append(SoftDirection(COMPONENTS[i], tuple(sorted(parts, key=lambda part: -part[1]))))
+    return tuple(softest)
 
 
 def as_json(comparison: Comparison) -> dict[str, Any]:
@@ -239,7 +242,9 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
                     "components": design.analysis.components,
                     "status": design.analysis.status.word,
                     "message": design.analysis.message,
-                    "softest": [{"direction": one.component, "shares": dict(one.shares)} for one in softest],
+                    "softest": [
+                        {"direction": direction.direction, "shares": dict(direction.shares)} for direction in softest
+                    ],
                 }
                 for design, softest in zip(comparison.designs, comparison.softest, strict=True)
             ],

@@ -1,4 +1,4 @@
-"""Is this installation sound? All findings, one after the other; whatever is broken, the others are still made."""
+"""Checks of an installation, one after the other; where one breaks, the others are still made."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Check:
 
 
 class UnsoundError(Exception):
-    """A check that found something wrong; says what."""
+    """A check has found a fault, which the message names."""
 
 
 def tried(group: str, name: str, question: Callable[[], str], fix: str) -> Check:
@@ -65,8 +65,8 @@ def diagnose() -> Iterator[Check]:
         try:
             yield from import_module(f"{__package__}.{part}").checks()
         except Exception as trouble:
-            said = f"cannot be looked at, {type(trouble).__name__}: {str(trouble).partition(chr(10))[0]}"
-            yield Check(group, group, State.FAILED, said, reinstall("kinetostat"))
+            text = f"cannot be looked at, {type(trouble).__name__}: {str(trouble).partition(chr(10))[0]}"
+            yield Check(group, group, State.FAILED, text, reinstall("kinetostat"))
 
 
 def healthy(checks: Sequence[Check]) -> bool:
@@ -75,9 +75,9 @@ def healthy(checks: Sequence[Check]) -> bool:
 
 
 def as_json(checks: Sequence[Check]) -> dict[str, Any]:
-    """As plain data: the verdict, then by group and name what was found."""
+    """Write the verdict, then the finding of each check by group and name, as plain data."""
     groups: dict[str, Any] = {}
     for check in checks:
-        found = {"state": check.state.value, "said": check.said} | ({"fix": check.fix} if check.fix else {})
-        groups.setdefault(check.group, {})[check.name] = found
+        entry = {"state": check.state.value, "said": check.said} | ({"fix": check.fix} if check.fix else {})
+        groups.setdefault(check.group, {})[check.name] = entry
     return {"healthy": healthy(checks), **groups}

@@ -27,13 +27,12 @@ from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.comparison import Verdict
 from kinetostat.studies.paper.tables import table_3, table_4
 from kinetostat.studies.storage import write_dataset
+from kinetostat.tolerances import EQUAL_ROUTES
 
 GROUP = "self-test"
 QUANTITIES = (*GROUPS["stiffness"], *GROUPS["compliance"])
 FEW, MANY = 500, 200_000
 """Poses for a comparison; poses for a measurement, enough to keep some cores busy for a tenth of a second."""
-SAME = 1e-9
-"""Relative difference up to which two routes to one number agree."""
 
 
 def checks() -> Iterator[Check]:
@@ -47,17 +46,17 @@ def checks() -> Iterator[Check]:
 
 def paper_numbers() -> str:
     """Tables III and IV of the paper, as far as they are printed."""
-    found = [*table_3(), *table_4()]
-    wrong = [one for one in found if one.verdict is Verdict.DIFFERS]
+    numbers = [*table_3(), *table_4()]
+    wrong = [number for number in numbers if number.verdict is Verdict.DIFFERS]
     if wrong:
         first = wrong[0]
         raise UnsoundError(
-            f"{len(wrong)} of {len(found)} numbers differ from print; {first.place}, {first.component}: "
+            f"{len(wrong)} of {len(numbers)} numbers differ from print; {first.place}, {first.component}: "
             f"{first.computed:.9g} for {first.printed}"
         )
-    misprints = sum(one.verdict is Verdict.MISPRINT for one in found)
-    equal = len(found) - misprints
-    return f"{equal} of {len(found)} numbers of Tables III and IV as printed, {misprints} known misprints"
+    misprints = sum(number.verdict is Verdict.MISPRINT for number in numbers)
+    equal = len(numbers) - misprints
+    return f"{equal} of {len(numbers)} numbers of Tables III and IV as printed, {misprints} known misprints"
 
 
 def routes_agree() -> str:
@@ -70,8 +69,8 @@ def routes_agree() -> str:
     first = np.array([compiled.values[name][0] for name in QUANTITIES])
     alone = np.array([*single.stiffness_diagonal, *single.compliance_diagonal])
     apart = max(_apart(compiled, plain), float(np.abs(first / alone - 1.0).max()))
-    if not apart <= SAME or (compiled.status != Status.OK).any():
-        raise UnsoundError(f"it differs from NumPy or from a single pose by {apart:.1e}; {SAME:g} is allowed")
+    if not apart <= EQUAL_ROUTES or (compiled.status != Status.OK).any():
+        raise UnsoundError(f"it differs from NumPy or from a single pose by {apart:.1e}; {EQUAL_ROUTES:g} is allowed")
     return f"K and C at {FEW} poses as by NumPy and pose by pose, to {apart:.0e}"
 
 
@@ -113,6 +112,6 @@ def _poses(count: int) -> Table:
     return Table({"pose.x": source.uniform(-0.02, 0.02, count), "pose.z": source.uniform(0.66, 0.70, count)})
 
 
-def _apart(ours: Evaluation, others: Evaluation) -> float:
+def _apart(first: Evaluation, others: Evaluation) -> float:
     """Greatest relative difference of two evaluations."""
-    return max(float(np.abs(ours.values[name] / others.values[name] - 1.0).max()) for name in QUANTITIES)
+    return max(float(np.abs(first.values[name] / others.values[name] - 1.0).max()) for name in QUANTITIES)

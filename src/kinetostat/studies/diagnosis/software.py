@@ -34,8 +34,8 @@ def checks() -> Iterator[Check]:
     try:
         yield Check(CORE, PACKAGE, State.SOUND, version(PACKAGE))
     except PackageNotFoundError:
-        said = "runs from its source files and is not installed: what it needs cannot be looked up"
-        yield Check(CORE, PACKAGE, State.FAILED, said, "pip install . (in the folder with pyproject.toml)")
+        text = "runs from its source files and is not installed: what it needs cannot be looked up"
+        yield Check(CORE, PACKAGE, State.FAILED, text, "pip install . (in the folder with pyproject.toml)")
         return
     yield Check(CORE, "python", State.SOUND, f"{platform.python_version()} ({platform.python_implementation()})")
     for requirement in requirements():
@@ -46,38 +46,44 @@ def checks() -> Iterator[Check]:
 
 def requirements(extra: str = "") -> list[Requirement]:
     """What the package needs on this system; with an extra, what that adds."""
-    found = [Requirement(text) for text in requires(PACKAGE) or ()]
-    core = [one for one in found if one.marker is None or one.marker.evaluate({"extra": ""})]
+    every = [Requirement(text) for text in requires(PACKAGE) or ()]
+    core = [
+        requirement for requirement in every if requirement.marker is None or requirement.marker.evaluate({"extra": ""})
+    ]
     if not extra:
         return core
-    return [one for one in found if one not in core and one.marker and one.marker.evaluate({"extra": extra})]
+    return [
+        requirement
+        for requirement in every
+        if requirement not in core and requirement.marker and requirement.marker.evaluate({"extra": extra})
+    ]
 
 
 def suited(requirement: Requirement) -> Check:
     """Whether a package that is needed is installed, in a version that suits, and loads."""
     wanted = f"{requirement.name}{requirement.specifier}"
-    found = installed(requirement)
-    if found is None:
+    present = installed(requirement)
+    if present is None:
         return Check(CORE, requirement.name, State.FAILED, "is not installed", f"pip install '{wanted}'")
-    if not requirement.specifier.contains(found, prereleases=True):
-        said = f"{found} is installed, but {requirement.specifier} is needed"
-        return Check(CORE, requirement.name, State.FAILED, said, f"pip install '{wanted}'")
+    if not requirement.specifier.contains(present, prereleases=True):
+        text = f"{present} is installed, but {requirement.specifier} is needed"
+        return Check(CORE, requirement.name, State.FAILED, text, f"pip install '{wanted}'")
     try:
         import_module(USED[requirement.name.lower()])
     except Exception as trouble:
-        said = f"{found} is installed, but does not load: {str(trouble).partition(chr(10))[0]}"
-        return Check(CORE, requirement.name, State.FAILED, said, reinstall(requirement.name))
-    return Check(CORE, requirement.name, State.SOUND, found)
+        text = f"{present} is installed, but does not load: {str(trouble).partition(chr(10))[0]}"
+        return Check(CORE, requirement.name, State.FAILED, text, reinstall(requirement.name))
+    return Check(CORE, requirement.name, State.SOUND, present)
 
 
 def extra_of(extra: str) -> Check:
     """Whether all that an extra adds is installed."""
-    known = {one.name: installed(one) for one in requirements(extra)}
-    missing = [name for name, found in known.items() if found is None]
+    known = {requirement.name: installed(requirement) for requirement in requirements(extra)}
+    missing = [name for name, present in known.items() if present is None]
     if missing:
-        said = f"not installed ({', '.join(missing)})"
-        return Check(EXTRAS, extra, State.ABSENT, said, f"pip install 'kinetostat[{extra}]'")
-    return Check(EXTRAS, extra, State.SOUND, ", ".join(f"{name} {found}" for name, found in known.items()))
+        text = f"not installed ({', '.join(missing)})"
+        return Check(EXTRAS, extra, State.ABSENT, text, f"pip install 'kinetostat[{extra}]'")
+    return Check(EXTRAS, extra, State.SOUND, ", ".join(f"{name} {present}" for name, present in known.items()))
 
 
 def installed(requirement: Requirement) -> str | None:

@@ -53,7 +53,7 @@ class GridQuestion:
 
 
 def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[str]) -> GridQuestion:
-    """A question about a grid, as people write it; see `evaluate_grid`.
+    """Read a question about a grid from texts; see `evaluate_grid`.
 
     Raises:
         InputError: an unknown field or quantity, one that the machine cannot have, a bad range, a field twice, or more
@@ -67,13 +67,13 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
             "give the others one value each with --set."
         )
     wanted = [parse_range(text) for text in ranges]
-    chosen = [find(machine.family, one.field) for one in wanted]
+    chosen = [find(machine.family, span.field) for span in wanted]
     taken = [leaf for parameter in chosen for leaf in parameter.leaves]
     for leaf in taken:
         if taken.count(leaf) > 1:
             raise InputError(f"{leaf} is varied twice; give each field one range.")
     pairs = list(zip(wanted, chosen, strict=True))
-    grid = Grid([Axis(parameter.leaves, one.values(parameter.quantity)) for one, parameter in pairs])
+    grid = Grid([Axis(parameter.leaves, span.values(parameter.quantity)) for span, parameter in pairs])
     names = resolve_quantities(quantities, machine.family.component_names)
     refuse_absent(machine, names, chosen)
     origin = {"machine": machine.name, "machine_file": as_toml(machine), "kinetostat": version("kinetostat")}
@@ -83,12 +83,12 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
 
 
 def _coordinates(grid: Grid, pairs: Sequence[tuple[Range, Parameter]]) -> dict[str, Any]:
-    found = {}
-    for axis, (one, parameter) in zip(grid.axes, pairs, strict=True):
+    coordinates = {}
+    for axis, (span, parameter) in zip(grid.axes, pairs, strict=True):
         kind = KINDS[parameter.quantity.kind]
         about = {"units": kind.unit, "long_name": parameter.quantity.meaning, "kind": kind.name}
-        found[parameter.path] = (parameter.path, axis.values, {**about, "log": int(one.logarithmic)})
-    return found
+        coordinates[parameter.path] = (parameter.path, axis.values, {**about, "log": int(span.logarithmic)})
+    return coordinates
 
 
 def evaluate_grid(
@@ -97,13 +97,13 @@ def evaluate_grid(
     quantities: Sequence[str] = ("compliance",),
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Quantities over all combinations of some ranges.
+    """Evaluate quantities over all combinations of some ranges.
 
     Args:
         machine: gives all parameters that do not vary.
         ranges: one axis each, "FIELD=from:to:count[:log]"; a field with several entries varies them together.
         quantities: names of quantities or groups.
-        progress: told how far the work is.
+        progress: receives how far the work is.
 
     Returns:
         One variable per quantity and `status`, over dimensions named by the fields' paths; units in `attrs`.
@@ -116,12 +116,12 @@ def evaluate_grid(
 
 
 def answer(question: GridQuestion, progress: Progress = silent, compute: Compute = here) -> xr.Dataset:
-    """The answer to a question about a grid, in memory; see `evaluate_grid`.
+    """Answer a question about a grid in memory; see `evaluate_grid`.
 
     Args:
         question: of at most `IN_MEMORY` points.
-        progress: told how far the work is.
-        compute: who computes; bit for bit the same whoever does.
+        progress: receives how far the work is.
+        compute: where chunks are computed; results are the same bit for bit.
 
     Raises:
         InputError: too many points.
@@ -131,10 +131,12 @@ def answer(question: GridQuestion, progress: Progress = silent, compute: Compute
             f"the grid has {question.grid.size:,} points, more than the {IN_MEMORY:,} that are kept in memory: "
             "give -o FOLDER, into which results are written while they are computed, or lower the counts."
         )
-    found = _evaluated(question, progress, compute)
+    evaluation = _evaluated(question, progress, compute)
     shape = question.grid.shape
-    content = {name: (question.dims, found.values[name].reshape(shape), about(name)) for name in question.names}
-    return question.labels.assign(content).assign(status=(question.dims, found.status.reshape(shape), ABOUT_STATUS))
+    content = {name: (question.dims, evaluation.values[name].reshape(shape), about(name)) for name in question.names}
+    return question.labels.assign(content).assign(
+        status=(question.dims, evaluation.status.reshape(shape), ABOUT_STATUS)
+    )
 
 
 def _evaluated(question: GridQuestion, progress: Progress, compute: Compute) -> Evaluation:

@@ -31,12 +31,12 @@ def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONE
         InputError: an unknown name, or one of a component that the machine does not have.
     """
     groups = {group: [name for name in members if _exists(name, components)] for group, members in GROUPS.items()}
-    found: list[str] = []
+    resolved: list[str] = []
     for name in (current_name(given, "quantity") for given in several(names)):
         if name not in GROUPS and not (name in QUANTITIES and _exists(name, components)):
             raise InputError(_no_quantity(name, groups, components))
-        found += groups.get(name, [name])
-    return list(dict.fromkeys(found))
+        resolved += groups.get(name, [name])
+    return list(dict.fromkeys(resolved))
 
 
 def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Sequence[str]) -> str:
@@ -64,7 +64,7 @@ def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Param
     Raises:
         InputError: names the quantity, and what the machine lacks or its file must say.
     """
-    if "mass" in names and not any(KINDS[one.quantity.kind].heavy for one in varied):
+    if "mass" in names and not any(KINDS[parameter.quantity.kind].heavy for parameter in varied):
         _refuse_unknown_mass(machine)
     wanted = [name for name in names if name in PARTS]
     if not wanted:
@@ -73,19 +73,19 @@ def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Param
     for name in wanted:
         if np.isnan(QUANTITIES[name].value(response)) and response.status == Status.OK:
             raise InputError(f'"{name}" has no meaning here: {machine.name} lacks {PARTS[name]}; leave it out.')
-    loaded = any(machine.load.components()) or any(one.path.startswith("load.") for one in varied)
+    loaded = any(machine.load.components()) or any(parameter.path.startswith("load.") for parameter in varied)
     for name in UNDER_LOAD:
         if name in names and not loaded:
             raise InputError(
-                f'"{name}" is not known: nothing says which load {machine.name} bears; add to its file a table [load], '
+                f'"{name}" is not known: the file of {machine.name} gives no load; add a table [load], '
                 'e.g. force = ["0 N", "0 N", "-500 N"].'
             )
 
 
 def _refuse_unknown_mass(machine: Machine) -> None:
     masses = moving_masses(machine, respond(machine).configuration)
-    if all(one.mass is None for one in masses):
+    if all(part.mass is None for part in masses):
         raise InputError(
-            f'"mass" is not known: nothing says what {machine.name} weighs; give its links a cross-section with a '
-            'density or material, or its table [tool] mass = "12 kg".'
+            f'"mass" is not known: the file of {machine.name} does not say what it weighs; give links a cross-section '
+            'with a density or material, or its table [tool] mass = "12 kg".'
         )

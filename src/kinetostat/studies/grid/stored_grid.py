@@ -27,7 +27,7 @@ STUDY_VERSION = 1
 
 @dataclass(frozen=True)
 class Extremes:
-    """Of one quantity, SI, over the points where it has a value; NaN where there is none."""
+    """Extremes and mean of a quantity, SI, over the points where it has a value; NaN where there is none."""
 
     least: float
     mean: float
@@ -36,7 +36,7 @@ class Extremes:
 
 @dataclass(frozen=True)
 class Tally:
-    """Over all points of a grid.
+    """Counts and extremes over all points of a grid.
 
     Attributes:
         statuses: how many points have each status.
@@ -57,7 +57,7 @@ class StoredGrid:
     """The answer to a question about a grid, in a file.
 
     Attributes:
-        question: that was asked.
+        question: that is answered.
         path: of the NetCDF file.
         tally: how many points have which status, and the extremes of each quantity.
         chunks: in all.
@@ -87,8 +87,8 @@ def answer_into(
         question: of any size that the disk holds.
         folder: of this study alone.
         stem: name of the file.
-        progress: told how far the work is.
-        compute: who computes; bit for bit the same whoever does.
+        progress: receives how far the work is.
+        compute: where chunks are computed; results are the same bit for bit.
         resume: insist that the folder holds a part of the answer.
 
     Raises:
@@ -96,7 +96,7 @@ def answer_into(
     """
     _check_size(question)
     if resume and not holds_study(folder):
-        raise InputError(f'"{folder}" holds no study that could be resumed; check -o, or leave out --resume.')
+        raise InputError(f'"{folder}" does not hold a study that could be resumed; check -o, or leave out --resume.')
     final = folder / f"{stem}.nc"
     if not holds_study(folder):
         _check_room(question, final)
@@ -109,8 +109,8 @@ def answer_into(
         if _partial(final).exists():
             _partial(final).replace(final)
         records = study.records()
-        found = combined([records[number] for number in range(work.count)], question.names)
-        return StoredGrid(question, final, found, work.count, len(missing))
+        summary = combined([records[number] for number in range(work.count)], question.names)
+        return StoredGrid(question, final, summary, work.count, len(missing))
 
 
 def _check_size(question: GridQuestion) -> None:
@@ -133,18 +133,18 @@ def _partial(final: Path) -> Path:
 
 
 def _taken_up(question: GridQuestion, study: StudyFolder, final: Path) -> Work:
-    """The work as the folder has it, or begun anew where the folder has none."""
+    """The work as the folder has it, or new work where the folder has none."""
     work = in_chunks(question.machine, question.grid, question.names)
-    asked = _as_record(question, final.name)
-    held = study.question(asked)
-    if held is None:
+    wanted = _as_record(question, final.name)
+    stored = study.question(wanted)
+    if stored is None:
         attributes = {**{name: about(name) for name in question.names}, STATUS: _about_status()}
         create(_partial(final), question.labels, question.dims, attributes)
-        study.begin({**asked, "chunk": work.chunk})
+        study.begin({**wanted, "chunk": work.chunk})
         return work
     if not final.exists() and not _partial(final).exists():
         raise InputError(f'"{final}" was removed from its study; remove the folder "{study.path}" to begin again.')
-    return Work(work.machine, work.points, work.quantities, int(held["chunk"]))
+    return Work(work.machine, work.points, work.quantities, int(stored["chunk"]))
 
 
 def _about_status() -> Mapping[str, Any]:
@@ -153,7 +153,7 @@ def _about_status() -> Mapping[str, Any]:
 
 
 def _as_record(question: GridQuestion, file: str) -> Record:
-    """All that the numbers depend on."""
+    """Everything that the numbers depend on: a folder with another record holds another study."""
     attributes = question.labels.attrs
     axes = [
         {"field": dim, "from": float(axis.values[0]), "to": float(axis.values[-1]), "count": len(axis.values)}
@@ -179,26 +179,26 @@ def _compute_missing(
     progress(done, total)
     with closing(ResultFile(path)) as file, ThreadPoolExecutor(1) as writer:
         pending: Future[None] | None = None
-        for number, found in compute(work, missing):
+        for number, evaluation in compute(work, missing):
             if pending:
                 pending.result()
-            pending = writer.submit(_keep, file, study, number, work.part(number).start, found)
-            done += len(found.status)
+            pending = writer.submit(_keep, file, study, number, work.part(number).start, evaluation)
+            done += len(evaluation.status)
             progress(done, total)
         if pending:
             pending.result()
 
 
-def _keep(file: ResultFile, study: StudyFolder, number: int, start: int, found: Evaluation) -> None:
-    file.write(start, found.values, found.status)
-    study.note({"chunk": number, **tally(found)})
+def _keep(file: ResultFile, study: StudyFolder, number: int, start: int, evaluation: Evaluation) -> None:
+    file.write(start, evaluation.values, evaluation.status)
+    study.note({"chunk": number, **tally(evaluation)})
 
 
-def tally(found: Evaluation) -> dict[str, Any]:
-    """Counts and extremes of one chunk as plain data."""
-    codes, counts = np.unique(found.status, return_counts=True)
+def tally(evaluation: Evaluation) -> dict[str, Any]:
+    """Count and bound the results of one chunk, as plain data."""
+    codes, counts = np.unique(evaluation.status, return_counts=True)
     quantities = {}
-    for name, values in found.values.items():
+    for name, values in evaluation.values.items():
         known = values[~np.isnan(values)]
         least, largest = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
         quantities[name] = {"count": len(known), "least": least, "sum": float(known.sum()), "largest": largest}
@@ -209,7 +209,7 @@ def tally(found: Evaluation) -> dict[str, Any]:
 
 
 def combined(parts: Iterable[Mapping[str, Any]], names: Sequence[str]) -> Tally:
-    """Counts and extremes over several chunks."""
+    """Combine counts and extremes of several chunks."""
     kept = list(parts)
     words: Counter[str] = Counter()
     for part in kept:
@@ -219,11 +219,11 @@ def combined(parts: Iterable[Mapping[str, Any]], names: Sequence[str]) -> Tally:
 
 
 def _extremes(parts: Sequence[Mapping[str, float]]) -> Extremes:
-    held = [part for part in parts if part["count"]]
-    if not held:
+    known = [part for part in parts if part["count"]]
+    if not known:
         return Extremes(np.nan, np.nan, np.nan)
-    mean = sum(part["sum"] for part in held) / sum(part["count"] for part in held)
-    return Extremes(min(part["least"] for part in held), mean, max(part["largest"] for part in held))
+    mean = sum(part["sum"] for part in known) / sum(part["count"] for part in known)
+    return Extremes(min(part["least"] for part in known), mean, max(part["largest"] for part in known))
 
 
 def summary_json(stored: StoredGrid) -> dict[str, Any]:

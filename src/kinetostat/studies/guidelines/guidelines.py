@@ -21,7 +21,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, several
-from kinetostat.spec.renamed import renamed_property
+from kinetostat.spec.renamed import former_names
 from kinetostat.studies.grid.grid import grid_question
 from kinetostat.studies.guidelines.moves import Move, axes_left_out, designed, moves_at, with_signs
 from kinetostat.studies.guidelines.roles import Roles, equations_of_k, roles_at, roles_over
@@ -31,6 +31,14 @@ MOST_POSES = 10_000
 """Poses of a grid: whole responses of all of them are kept in memory."""
 
 
+@former_names(
+    compliance="compliance_diagonal",
+    found="elements",
+    equations="stiffness_equations",
+    moves="parameters",
+    idle="without_influence",
+    skipped="left_out",
+)
 @dataclass(frozen=True)
 class Guidelines:
     """Design guidelines.
@@ -69,13 +77,6 @@ class Guidelines:
     poses: tuple[int, int] = (0, 0)
     everywhere: Roles | None = None
 
-    compliance = renamed_property("compliance_diagonal")
-    found = renamed_property("elements")
-    equations = renamed_property("stiffness_equations")
-    moves = renamed_property("parameters")
-    idle = renamed_property("without_influence")
-    skipped = renamed_property("left_out")
-
     def __repr__(self) -> str:
         count = len(self.parameters)
         return f"<Guidelines for {self.machine.name!r}: {self.status.word}, {count} parameters that matter>"
@@ -96,7 +97,7 @@ def guidelines(machine: Machine, ranges: Sequence[str] = (), progress: Progress 
         progress: receives how far the work is.
 
     Raises:
-        InputError: a bad range, one that is no coordinate of the pose, or too many poses.
+        InputError: a bad range, one that is not of a coordinate of the pose, or too many poses.
     """
     ranges = several(ranges)
     grid = _grid(machine, ranges) if ranges else None

@@ -31,7 +31,8 @@ class Move:
         path: of the parameter.
         percents: percent by which each direction gets stiffer per percent more of the parameter, of an angle per 0.01
             rad; None where rigid or free.
-        stiffer, softer: share of the poses of the grid at which it does so by more than rounding; empty without a grid.
+        stiffer, softer: share of the poses of the grid at which it does so by more than round-off; empty
+            without a grid.
         turning: whether the parameter is an angle.
     """
 

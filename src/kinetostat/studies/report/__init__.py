@@ -1,1 +1,1 @@
-"""All that a report says of a machine, asked of the other studies. Nothing is written here."""
+"""All answers that a report on a machine needs, collected from the other studies. Nothing is written here."""

@@ -28,7 +28,7 @@ PROBES = 48
 NEAR = {"length": 0.3, "angle": math.radians(15.0)}
 """Farthest from the pose, by kind: in units of the characteristic length, and in rad."""
 FAR = {"length": 1.0, "angle": math.radians(90.0)}
-"""Likewise of a machine whose file has limits, which then say how far it goes."""
+"""The same for a machine whose file has limits, which then say how far it goes."""
 REGULAR = 0.1
 """Share of the pose's singularity margin that is kept, so that maps are not about singularities."""
 SLACK = 1e-6
@@ -74,14 +74,14 @@ def gather(
     result: Result | None = None,
     progress: Progress = silent,
 ) -> Answers:
-    """Ask everything of a machine.
+    """Answer every question of a report on a machine.
 
     Args:
         machine: with its pose.
         ranges: of the maps, "FIELD=from:to:count[:log]", one or two; none to choose them.
-        without: what is left out, of `PARTS`; validation is another engine's answer and not asked for here.
+        without: what is left out, of `PARTS`; validation is computed elsewhere, by an independent engine.
         result: of a study whose best design the machine is.
-        progress: told how far the work on a report is: five of `STEPS`.
+        progress: receives how far the work on a report is: five of `STEPS`.
 
     Raises:
         InputError: a bad range, too many, or an unknown part.
@@ -89,7 +89,7 @@ def gather(
     for part in without:
         choice(part, PARTS, "the part of a report to leave out")
     if len(ranges) > MOST_AXES:
-        raise InputError(f"a report maps one coordinate or two, not {len(ranges)}; leave out an --over.")
+        raise InputError(f"a report maps one coordinate or two, not {len(ranges)}; leave out one --over.")
     analysis = analyze(machine)
     if analysis.status is not Status.OK:
         return Answers(machine, analysis, result=result)
@@ -133,15 +133,15 @@ def usual_ranges(machine: Machine, count: int) -> list[str]:
     kinds = FAR if any(map(is_set, vars(limited).values())) else NEAR
     coordinates = [p for p in parameters(machine.family) if p.path.startswith("pose.") and len(p.leaves) == 1]
     ordered = sorted(coordinates, key=lambda p: p.quantity.kind != "length")
-    length, found = float(respond(machine).configuration.length), []
+    length, ranges = float(respond(machine).configuration.length), []
     for parameter in ordered:
         reach = kinds[parameter.quantity.kind] * (length if parameter.quantity.kind == "length" else 1.0)
         low, high = _extent(machine, parameter, reach)
         if high > low:
-            found.append(f"{parameter.path}={low:.9g}:{high:.9g}:{count}")
-        if len(found) == 2:
+            ranges.append(f"{parameter.path}={low:.9g}:{high:.9g}:{count}")
+        if len(ranges) == 2:
             break
-    return found
+    return ranges
 
 
 def coarser(ranges: Sequence[str], most: int) -> list[str]:
@@ -152,7 +152,8 @@ def coarser(ranges: Sequence[str], most: int) -> list[str]:
     """
     read = [parse_range(text) for text in ranges]
     return [
-        f"{one.field}={one.start}:{one.end}:{min(one.count, most)}{':log' if one.logarithmic else ''}" for one in read
+        f"{span.field}={span.start}:{span.end}:{min(span.count, most)}{':log' if span.logarithmic else ''}"
+        for span in read
     ]
 
 

@@ -19,7 +19,7 @@ class Volume:
 
     Attributes:
         value: product of the coordinates' units, SI.
-        standard_error: of it, likewise.
+        standard_error: of the value, in the same unit.
         unit: of both, e.g. "m³" or "m²·rad".
         box: volume of all cells together.
         cells, divided: how many there are, and in how many of them one point is inside and the other outside.
@@ -34,7 +34,6 @@ class Volume:
 
     @property
     def share(self) -> float:
-        """Of the box."""
         return self.value / self.box
 
 
@@ -122,7 +121,7 @@ def _cut(nodes: Array, values: Array) -> list[Array]:
     count = (values > HALF).sum(axis=1)
     sides = {1: [((0, 1), (0, 2), (0, 3))], 3: [((0, 3), (1, 3), (2, 3))]}
     sides[2] = [((0, 2), (0, 3), (1, 3)), ((0, 2), (1, 3), (1, 2))]
-    found = []
+    triangles_of = []
     for inner, triangles in sides.items():
         chosen = count == inner
         corners, at = nodes[chosen], values[chosen]
@@ -132,10 +131,10 @@ def _cut(nodes: Array, values: Array) -> list[Array]:
             normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
             inverted = (normal * outward).sum(axis=1) < 0.0
             points[inverted] = points[inverted][:, ::-1]
-            found.append(points)
-    return found
+            triangles_of.append(points)
+    return triangles_of
 
 
-def _crossing(corners: Array, values: Array, one: int, other: int) -> Array:
-    share = (HALF - values[:, one]) / (values[:, other] - values[:, one])
-    return corners[:, one] + share[:, None] * (corners[:, other] - corners[:, one])
+def _crossing(corners: Array, values: Array, first: int, other: int) -> Array:
+    share = (HALF - values[:, first]) / (values[:, other] - values[:, first])
+    return corners[:, first] + share[:, None] * (corners[:, other] - corners[:, first])

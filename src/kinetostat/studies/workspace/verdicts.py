@@ -1,21 +1,25 @@
-"""Whether a pose belongs to the workspace of a machine, and if not, why: from status, aspect and conditions."""
+"""Verdicts on poses: whether each belongs to the workspace, why not, and which figures the inside poses demand.
+
+Verdicts follow from status, aspect and conditions; demands from the measures of the limits.
+"""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.engine.batch import first_limit_passed
+from kinetostat.engine.batch import first_limit_passed, limits_used
 from kinetostat.engine.points import Array
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.aspect import aspect
 from kinetostat.kinetostatics.response import SINGULAR, respond
-from kinetostat.machine.limits import LIMITS, limits_set
+from kinetostat.machine.limits import LIMITS, Limit, Limits, limits_set
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.workspace.conditions import Condition
+from kinetostat.units import as_read
 
 Mask = npt.NDArray[np.bool_]
 Codes = npt.NDArray[np.int8]
@@ -30,19 +34,19 @@ PLAIN = {
     Status.SINGULAR: "singular",
     Status.NOT_CONVERGED: "not converged",
 }
-"""Verdicts of statuses; a limit that is passed is named instead."""
+"""Verdicts of statuses; for a limit that is passed, the verdict names the limit."""
 LIMIT, FAILS = "limits.", "fails "
 """How the verdicts of limits and of conditions begin."""
 
 
 def phrase(label: str) -> str:
-    """A verdict for people."""
+    """Write a verdict in a few words."""
     return next((limit.phrase for limit in LIMITS.values() if label == f"{LIMIT}{limit.name}"), label)
 
 
 @dataclass(frozen=True)
 class Judge:
-    """What makes a pose one of the workspace.
+    """The rule by which a pose belongs to the workspace.
 
     Attributes:
         machine: with its limits, at the file's pose.
@@ -78,33 +82,72 @@ class Judge:
 
     @property
     def quantities(self) -> list[str]:
-        """What has to be known of a pose beside its status."""
+        """Quantities that decide beside the status of a pose."""
         return list(dict.fromkeys(["aspect", *(condition.quantity for condition in self.conditions)]))
 
     def inside(self, status: Codes, values: Mapping[str, Any]) -> Mask:
-        """Which poses are inside, from their status and quantities."""
+        """Tell which poses are inside, from their status and quantities."""
         good = np.asarray(status == Status.OK) & ~self._beyond(values)
         for condition in self.conditions:
             good &= condition.holds(np.asarray(values[condition.quantity]))
         return good
 
     def verdicts(self, status: Codes, values: Mapping[str, Any], poses: Callable[[Numbers], Poses]) -> Codes:
-        """What becomes of each pose: its place in `labels`.
+        """Judge poses; a verdict is a place in `labels`.
 
         Args:
             status, values: of the poses, of any shape.
             poses: from numbers of some of them to their coordinates.
         """
-        found = np.zeros(status.shape, dtype=np.int8)
+        codes = np.zeros(status.shape, dtype=np.int8)
         for place, plain in enumerate(PLAIN):
-            found[status == plain] = place
-        found[(status == Status.OK) & self._beyond(values)] = self.labels.index(BEYOND)
+            codes[status == plain] = place
+        codes[(status == Status.OK) & self._beyond(values)] = self.labels.index(BEYOND)
         limited = np.flatnonzero(status == Status.JOINT_LIMIT)
         if limited.size:
-            found.flat[limited] = len(PLAIN) + 1 + first_limit_passed(self.machine, poses(limited), self.limits)
+            codes.flat[limited] = len(PLAIN) + 1 + first_limit_passed(self.machine, poses(limited), self.limits)
         for place, condition in enumerate(self.conditions, len(PLAIN) + 1 + len(self.limits)):
-            found[(found == 0) & ~condition.holds(np.asarray(values[condition.quantity]))] = place
-        return found
+            codes[(codes == 0) & ~condition.holds(np.asarray(values[condition.quantity]))] = place
+        return codes
 
     def _beyond(self, values: Mapping[str, Any]) -> Mask:
         return np.asarray((np.asarray(values["aspect"]) * self.aspect) < 0.0)
+
+
+@dataclass(frozen=True)
+class Demand:
+    """The range of what a limit is about.
+
+    Attributes:
+        name: of the limit.
+        title: of the measure.
+        least, greatest: over all poses and parts, in the unit.
+        unit: m, deg, N or N·m.
+    """
+
+    name: str
+    title: str
+    least: float
+    greatest: float
+    unit: str
+
+
+def demands(machine: Machine, poses: Mapping[str, Array]) -> tuple[Demand, ...]:
+    """Compute the ranges of lengths, angles and loads over poses that can be reached; empty where there are none.
+
+    Args:
+        machine: with its load.
+        poses: coordinates by leaf path, SI [poses].
+    """
+    if not next(iter(poses.values())).size:
+        return ()
+    # A limit is compared with the poses only where it is set; how high it is set does not change what it is about.
+    watched = replace(machine, tables={**machine.tables, "limits": Limits(**dict.fromkeys(LIMITS, 1.0))})
+    ranges = limits_used(watched, poses)
+    last = {limit.title: limit for limit in LIMITS.values()}  # the least and the greatest length share one range
+    return tuple(_demand(limit, ranges[limit.name]) for limit in last.values() if limit.name in ranges)
+
+
+def _demand(limit: Limit, ends: tuple[float, float]) -> Demand:
+    (least, unit), (greatest, _) = (as_read(number, limit.unit) for number in sorted(map(limit.shown, ends)))
+    return Demand(limit.name, limit.title, least, greatest, unit)

@@ -17,17 +17,18 @@ from kinetostat.engine.points import Cells
 from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.renamed import former_names
 from kinetostat.studies.grid.grid import IN_MEMORY, MOST_DIMENSIONS, GridQuestion, answer, grid_question
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.workspace.conditions import Condition, parse_condition
-from kinetostat.studies.workspace.demands import Demand, demands
 from kinetostat.studies.workspace.region import METHOD, Volume, estimate_volume
-from kinetostat.studies.workspace.verdicts import INSIDE, Codes, Judge, Mask, Numbers, Poses
+from kinetostat.studies.workspace.verdicts import INSIDE, Codes, Demand, Judge, Mask, Numbers, Poses, demands
 
 MOST_DEMANDS = 200_000
-"""Inside nodes of which it is computed what they ask of the machine; of more, evenly chosen ones."""
+"""Inside nodes at which lengths, angles and loads are computed; of more nodes, evenly chosen ones."""
 
 
+@former_names(found="exists", counts="nodes", joined="connected", divided="singularities_divide")
 @dataclass(frozen=True)
 class Workspace:
     """Where a machine can work.
@@ -36,39 +37,39 @@ class Workspace:
         dataset: over the nodes of the grid: `status` (`Status` codes), `verdict` (place in `verdicts`), `connected`
             (whether inside and joined to the file's pose), `singularity_margin` and the quantities of the conditions.
         verdicts: what may become of a node, "inside" first; then why not.
-        counts: how many nodes have each verdict.
+        nodes: how many nodes have each verdict.
         volume: of the inside, whether joined to the file's pose or not.
-        joined: share of the inside nodes that hang together with the file's pose; None if that is not inside.
+        connected: share of the inside nodes that hang together with the file's pose; None if that is not inside.
         extents: least and greatest value of each coordinate over the inside nodes, SI; empty where there are none.
-        demands: what the workspace asks of legs, joints and actuators.
-        conditions: that were asked for.
-        divided: whether singularities divide pose space and the file's pose has an aspect to stay in.
+        demands: ranges of lengths, angles and loads of legs, joints and actuators over the inside nodes.
+        conditions: that poses had to meet.
+        singularities_divide: whether they divide pose space and the file's pose has an aspect to stay in.
     """
 
     dataset: xr.Dataset
     verdicts: tuple[str, ...]
-    counts: dict[str, int]
+    nodes: dict[str, int]
     volume: Volume
-    joined: float | None
+    connected: float | None
     extents: dict[str, tuple[float, float]]
     demands: tuple[Demand, ...]
     conditions: tuple[Condition, ...]
-    divided: bool
+    singularities_divide: bool
 
     def __repr__(self) -> str:
-        of = sum(self.counts.values())
-        return f"<Workspace of {self.dataset.attrs['machine']!r}: {self.counts[INSIDE]:,} of {of:,} nodes inside>"
+        of = sum(self.nodes.values())
+        return f"<Workspace of {self.dataset.attrs['machine']!r}: {self.nodes[INSIDE]:,} of {of:,} nodes inside>"
 
     @property
-    def found(self) -> bool:
-        """Whether there is any."""
-        return self.volume.value > 0.0 or self.counts[INSIDE] > 0
+    def exists(self) -> bool:
+        """Whether any pose is inside."""
+        return self.volume.value > 0.0 or self.nodes[INSIDE] > 0
 
 
 def workspace(
     machine: Machine, ranges: Sequence[str], conditions: Sequence[str] = (), progress: Progress = silent, seed: int = 0
 ) -> Workspace:
-    """The region of pose space where a machine can work.
+    """Determine the region of pose space where a machine can work.
 
     A pose is inside if it can be reached within the limits of the file, is not singular, lies on the same side of the
     singularities as the file's pose, and meets the conditions.
@@ -77,11 +78,11 @@ def workspace(
         machine: with its limits; its pose gives the coordinates that do not vary.
         ranges: "FIELD=from:to:count", two to six coordinates of the pose.
         conditions: "QUANTITY > VALUE".
-        progress: told how far the work is.
+        progress: receives how far the work is.
         seed: of the random points for the volume.
 
     Raises:
-        InputError: a field that is no coordinate of the pose, a bad range or condition, too many points.
+        InputError: a field that is not a coordinate of the pose, a bad range or condition, too many points.
     """
     need_machine(machine)
     judge = Judge(machine, tuple(parse_condition(text, machine.family.component_names) for text in several(conditions)))
@@ -94,8 +95,8 @@ def workspace(
     )
     inside = verdict == 0
     volume = _volume(judge, question, seed, lambda done, _: progress(question.grid.size + done, total))
-    seat = _seat(question)
-    connected = connected_to(inside, seat) if seat is not None else np.zeros_like(inside)
+    home = _home(question)
+    connected = connected_to(inside, home) if home is not None else np.zeros_like(inside)
     return Workspace(
         _labelled(nodes, verdict, connected, judge, volume),
         judge.labels,
@@ -115,7 +116,7 @@ def _check(question: GridQuestion) -> None:
     for dim in question.dims:
         if dim not in poses:
             raise InputError(
-                f"{dim} is no coordinate of the pose; a workspace extends over {', '.join(poses)}. For other fields "
+                f"{dim} is not a coordinate of the pose; a workspace extends over {', '.join(poses)}. For other fields "
                 "use `kinetostat map`."
             )
         if question.labels[dim].attrs["log"]:
@@ -142,22 +143,22 @@ def _poses(question: GridQuestion, numbers: Numbers) -> Poses:
 
 def _volume(judge: Judge, question: GridQuestion, seed: int, progress: Progress) -> Volume:
     axes = question.grid.axes
-    found = evaluate(judge.machine, Cells(axes, seed), judge.quantities, progress)
+    evaluation = evaluate(judge.machine, Cells(axes, seed), judge.quantities, progress)
     sizes = [float(axis.values[-1] - axis.values[0]) for axis in axes]
     units = [str(question.labels[dim].attrs["units"]) for dim in question.dims]
-    return estimate_volume(judge.inside(found.status, found.values), sizes, units)
+    return estimate_volume(judge.inside(evaluation.status, evaluation.values), sizes, units)
 
 
-def _seat(question: GridQuestion) -> tuple[int, ...] | None:
+def _home(question: GridQuestion) -> tuple[int, ...] | None:
     """The node nearest to the file's pose; None where that is off the grid by more than half a step."""
-    held = values(question.machine)
-    found = []
+    here = values(question.machine)
+    node = []
     for axis in question.grid.axes:
-        apart = np.abs(axis.values - float(held[axis.paths[0]]))
+        apart = np.abs(axis.values - float(here[axis.paths[0]]))
         if apart.min() > 0.5001 * float(axis.values[1] - axis.values[0]):
             return None
-        found.append(int(apart.argmin()))
-    return tuple(found)
+        node.append(int(apart.argmin()))
+    return tuple(node)
 
 
 def connected_to(region: Mask, seed: tuple[int, ...]) -> Mask:
@@ -172,13 +173,13 @@ def connected_to(region: Mask, seed: tuple[int, ...]) -> Mask:
 
 
 def _extents(question: GridQuestion, inside: Mask) -> dict[str, tuple[float, float]]:
-    found = {}
+    extents = {}
     for number, (dim, axis) in enumerate(zip(question.dims, question.grid.axes, strict=True)):
         others = tuple(i for i in range(inside.ndim) if i != number)
         reached = axis.values[inside.any(axis=others)]
         if reached.size:
-            found[dim] = float(reached[0]), float(reached[-1])
-    return found
+            extents[dim] = float(reached[0]), float(reached[-1])
+    return extents
 
 
 def _labelled(nodes: xr.Dataset, verdict: Codes, connected: Mask, judge: Judge, volume: Volume) -> xr.Dataset:
@@ -186,10 +187,14 @@ def _labelled(nodes: xr.Dataset, verdict: Codes, connected: Mask, judge: Judge, 
     dims = nodes["status"].dims
     words = " ".join("_".join(label.split()) for label in judge.labels)
     about = {"flag_values": list(range(len(judge.labels))), "flag_meanings": words}
-    told = {"long_name": "inside and joined to the file's pose", "flag_values": [0, 1], "flag_meanings": "no yes"}
+    about_connected = {
+        "long_name": "inside and joined to the file's pose",
+        "flag_values": [0, 1],
+        "flag_meanings": "no yes",
+    }
     figures = {"volume": volume.value, "volume_standard_error": volume.standard_error, "volume_units": volume.unit}
     wanted = nodes.drop_vars("aspect").assign(
-        verdict=(dims, verdict, about), connected=(dims, connected.astype(np.int8), told)
+        verdict=(dims, verdict, about), connected=(dims, connected.astype(np.int8), about_connected)
     )
     pose = {path: float(value) for path, value in values(judge.machine).items() if path.startswith("pose.")}
     return wanted.assign_attrs({**figures, "volume_method": METHOD, **pose})
@@ -220,9 +225,9 @@ def as_json(workspace: Workspace) -> dict[str, Any]:
                 "cells": volume.cells,
                 "method": METHOD,
             },
-            "nodes": workspace.counts,
-            "connected": workspace.joined,
-            "singularities_divide": workspace.divided,
-            "demands": workspace.demands,
+            "nodes": workspace.nodes,
+            "connected": workspace.connected,
+            "singularities_divide": workspace.singularities_divide,
+            "demands": workspace.verdicts,
         }
     )

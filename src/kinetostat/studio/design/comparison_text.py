@@ -8,7 +8,7 @@ import string
 from html import escape
 
 from kinetostat.studies.comparison.design_rows import Better, Row
-from kinetostat.studies.comparison.designs import Blame, Comparison
+from kinetostat.studies.comparison.designs import Comparison, SoftDirection
 from kinetostat.studio.wording import DASH, engineering, gains, heading, paragraph, table
 from kinetostat.views.tables import readable
 
@@ -100,15 +100,15 @@ def _differences(comparison: Comparison, letters: str) -> str:
     return table("Where they differ", ["", *letters], rows) if rows else paragraph("The designs do not differ.")
 
 
-def _softest(weakest: tuple[Blame, ...]) -> list[str]:
+def _softest(weakest: tuple[SoftDirection, ...]) -> list[str]:
     """Write the most compliant rotation and translation of a design, each with the parts that contribute most."""
-    turning = next((each for each in weakest if each.component.startswith("r")), None)
-    sliding = next((each for each in weakest if not each.component.startswith("r")), None)
+    turning = next((each for each in weakest if each.direction.startswith("r")), None)
+    sliding = next((each for each in weakest if not each.direction.startswith("r")), None)
     return [_contributions(turning), _contributions(sliding)]
 
 
-def _contributions(weakest: Blame | None) -> str:
+def _contributions(weakest: SoftDirection | None) -> str:
     if weakest is None:
         return DASH
     parts = [f"{name} {100 * share:.0f} %" for name, share in weakest.shares[:MOST_SHARES] if share >= LEAST_SHARE]
-    return f"{weakest.component}: {', '.join(parts)}"
+    return f"{weakest.direction}: {', '.join(parts)}"
