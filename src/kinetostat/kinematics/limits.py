@@ -101,27 +101,27 @@ def parts_of(
 
 def _checks(machine: Machine, rows: Sequence[Limit], parts: Parts, length: Scalar) -> list[Check]:
     order = list(About)
-    found = []
+    checks = []
     for limit in rows:
         bound = limit.compared(getattr(machine.tables["limits"], limit.name))
         slack = LIMIT_SLACK * limit.scale(bound, length)
         for place, part, measure in limit.measure(parts):
-            found.append((order.index(limit.about), place, Check(limit, part, measure, bound, slack)))
+            checks.append((order.index(limit.about), place, Check(limit, part, measure, bound, slack)))
     # Part by part, not limit by limit: the first limit that a pose passes is that of the first part that passes one.
-    return [check for _, _, check in sorted(found, key=lambda item: item[:2])]
+    return [check for _, _, check in sorted(checks, key=lambda item: item[:2])]
 
 
 def travels(chains: Chains, joints: Sequence[Scalar]) -> list[tuple[str, Scalar]]:
     """Return the actuated slides whose travel counts from the home pose, each with its coordinate (m), leg by leg."""
     coordinates = iter(joints)
-    found = []
+    checks = []
     for steps in chains.legs:
         counted = driven_slides([step.element for step in steps])
         for i, step in enumerate(steps):
             amount = next(coordinates) if step.moves else None
             if i in counted:
-                found.append((step.element.part, amount))
-    return found
+                checks.append((step.element.part, amount))
+    return checks
 
 
 def why_beyond(checks: Sequence[Check]) -> str:

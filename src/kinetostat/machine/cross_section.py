@@ -106,7 +106,7 @@ def rigidity(young: Scalar, slide: Scalar, profile: CrossSection, shear: bool = 
     Args:
         young, slide: elastic moduli E and G, Pa.
         profile: its cross-section.
-        shear: whether it yields in shear.
+        shear: whether it deflects in shear as well.
     """
     sheared = profile.shear_factor * slide * profile.area if shear else RIGID
     return Rigidity(
@@ -147,7 +147,7 @@ def rigidity_of(shape: str, data: Any, shear: bool) -> Rigidity:
     Args:
         shape: a key of `SHAPES`.
         data: an instance of its table.
-        shear: whether it yields in shear (Timoshenko).
+        shear: whether it deflects in shear as well (Timoshenko).
     """
     return rigidity(data.youngs_modulus, data.shear_modulus, _profile(shape, data), shear)
 

@@ -19,7 +19,7 @@ UNSEEN = 1e-12
 """Share of the sizes of a wrench and a twist below which the work of one on the other is the rounding of zero."""
 
 RIGID = float("inf")
-"""Stiffness of what does not yield: exact, not large."""
+"""Stiffness of a rigid part: exactly infinite, not merely large."""
 
 
 class PartName(str):
@@ -181,7 +181,7 @@ class Spring:
 
 
 class Element(Protocol):
-    """A part of a leg's chain: a joint, a spring, or a link that yields."""
+    """A part of a leg's chain: a joint, a spring, or a flexible link."""
 
     @property
     def freedoms(self) -> tuple[Joint, ...]:
@@ -189,7 +189,7 @@ class Element(Protocol):
 
     @property
     def springs(self) -> tuple[Spring, ...]:
-        """What yields."""
+        """Its elastic coordinates."""
 
     @property
     def path(self) -> tuple[Vector, ...]:
@@ -317,7 +317,7 @@ class Leg:
         """Load in a spring per unit of each wrench, by virtual work; exactly 1 in a slide along the line of force."""
         along = [spring.joint.point is None and line.direction is spring.joint.axis for line in self.lines]
         if any(along):
-            return tuple(1.0 if own else wrench.work(twist) for own, wrench in zip(along, wrenches, strict=True))
+            return tuple(1.0 if same else wrench.work(twist) for same, wrench in zip(along, wrenches, strict=True))
         if is_zero(spring.stiffness):
             return tuple(_felt(wrench, twist) for wrench in wrenches)
         return tuple(wrench.work(twist) for wrench in wrenches)
@@ -342,17 +342,17 @@ def two_force_leg(
         name: of the leg.
         base_joint, platform_joint: centres of the universal and of the spherical joint, base frame, m.
         stiffness: of the actuator, N/m.
-        axial: EA of the leg's cross-section, N: it yields over its whole length.
+        axial: EA of the leg's cross-section, N: the leg is stretched over its whole length.
     """
     span = platform_joint - base_joint
     size = span.norm()
     along = span * reciprocal(size)
-    yielding = [Spring(PartName(name, "actuator"), Joint(along), stiffness, actuated=True)]
+    springs = [Spring(PartName(name, "actuator"), Joint(along), stiffness, actuated=True)]
     if not (type(axial) is float and axial == RIGID):
-        yielding.append(Spring(PartName(name, "rod"), Joint(along), axial * reciprocal(size)))
+        springs.append(Spring(PartName(name, "rod"), Joint(along), axial * reciprocal(size)))
     chain: tuple[Element, ...] = (
         *revolutes(base_joint, AXES, f"{name} base joint"),
-        *yielding,
+        *springs,
         *revolutes(platform_joint, AXES, f"{name} platform joint"),
     )
     return Leg(name, chain, (Line(platform_joint, along),))

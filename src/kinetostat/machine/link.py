@@ -1,4 +1,4 @@
-"""Links that yield: beams, lumped virtual joints, parallelograms, and a compliance matrix of one's own, all as springs.
+"""Flexible links as springs: beams, lumped virtual joints, parallelograms, and compliance matrices from elsewhere.
 
 What a cross-section and a material make of a link is `cross_section`'s; where links lie is the family's business.
 
@@ -16,14 +16,14 @@ from kinetostat.algebra.vector import IDENTITY, Displacement, Rotation, Vector, 
 from kinetostat.machine.leg import RIGID, Joint, Spring
 
 NEGLIGIBLE = 1e-14
-"""Share of its trace below which a block of a compliance does not yield: the rounding of zero."""
+"""Share of its trace below which a block of a compliance counts as rigid: its entries are round-off."""
 FLAT = 1e-12
-"""Share of its motion below which the pitch of a screw is the rounding of zero."""
+"""Share of its motion below which the pitch of a screw is round-off."""
 
 
 @dataclass(frozen=True)
 class Rigidity:
-    """How a prismatic bar resists, from its cross-section and material; infinity where it does not yield.
+    """How a prismatic bar resists, from its cross-section and material; infinity where it is rigid.
 
     Attributes:
         axial: E A, N.
@@ -86,13 +86,13 @@ class Beam:
     def springs(self) -> tuple[Spring, ...]:
         """Six at the middle: torsion GJ/L, bending EI/L, tension EA/L, and shear 1/(L^3/12EI + L/kappa GA)."""
         axes, length = self.axes
-        middle, shrink, own = (self.start + self.end) * 0.5, reciprocal(length), self.rigidity
+        middle, shrink, rigidity = (self.start + self.end) * 0.5, reciprocal(length), self.rigidity
         cubed = length * length * length * (1.0 / 12.0)
         shear = [
             0.0
             if is_zero(bending) or is_zero(sliding)
             else reciprocal(cubed * reciprocal(bending) + length * reciprocal(sliding))
-            for bending, sliding in ((own.bending_z, own.shear_y), (own.bending_y, own.shear_z))
+            for bending, sliding in ((rigidity.bending_z, rigidity.shear_y), (rigidity.bending_y, rigidity.shear_z))
         ]
         turning = zip(("torsion", "bending y", "bending z"), (axes.x, axes.y, axes.z), strict=True)
         sliding_along = zip(("tension", "shear y", "shear z"), (axes.x, axes.y, axes.z), strict=True)
@@ -100,9 +100,9 @@ class Beam:
             *_springs(
                 self.name,
                 [(what, Joint(axis, middle)) for what, axis in turning],
-                [k * shrink for k in (own.torsion, own.bending_y, own.bending_z)],
+                [k * shrink for k in (rigidity.torsion, rigidity.bending_y, rigidity.bending_z)],
             ),
-            *_springs(self.name, [(what, Joint(a)) for what, a in sliding_along], [own.axial * shrink, *shear]),
+            *_springs(self.name, [(what, Joint(a)) for what, a in sliding_along], [rigidity.axial * shrink, *shear]),
         )
 
     @property
@@ -216,7 +216,7 @@ class Parallelogram:
 
 
 def matrix_springs(name: str, compliance: npt.ArrayLike, point: Vector) -> tuple[Spring, ...]:
-    """Springs that together yield as a 6x6 compliance does: turns about its principal axes, then slides.
+    """Return springs that together deflect as a 6x6 compliance does: turns about its principal axes, then slides.
 
     Where it turns under a pure moment gives up to three screws; what it moves beyond them, the Schur complement of that
     block, up to three slides. Their dyads add up to the matrix.
@@ -228,21 +228,21 @@ def matrix_springs(name: str, compliance: npt.ArrayLike, point: Vector) -> tuple
     """
     matrix = np.asarray(compliance, dtype=float)
     turning, coupling, moving = matrix[:3, :3], matrix[3:, :3], matrix[3:, 3:]
-    found: list[tuple[Joint, float]] = []
+    springs: list[tuple[Joint, float]] = []
     for value, axis in _principal(turning, float(np.trace(turning))):
         moved = coupling @ axis / value
         moving = moving - value * np.outer(moved, moved)
         pitch = float(axis @ moved)
         pitch = pitch if abs(pitch) > FLAT * np.linalg.norm(moved) else 0.0
         foot = point + Vector(*np.cross(axis, moved).tolist())
-        found.append((Joint(Vector(*axis.tolist()), foot, pitch=pitch), 1.0 / value))
+        springs.append((Joint(Vector(*axis.tolist()), foot, pitch=pitch), 1.0 / value))
     for value, axis in _principal(moving, float(np.trace(matrix[3:, 3:]))):
-        found.append((Joint(Vector(*axis.tolist())), 1.0 / value))
-    return tuple(Spring(f"{name} mode {n}", joint, k, part=name) for n, (joint, k) in enumerate(found, 1))
+        springs.append((Joint(Vector(*axis.tolist())), 1.0 / value))
+    return tuple(Spring(f"{name} mode {n}", joint, k, part=name) for n, (joint, k) in enumerate(springs, 1))
 
 
 def _principal(block: npt.NDArray[np.float64], size: float) -> list[tuple[float, npt.NDArray[np.float64]]]:
-    """Principal compliances of a block and their directions, the softest first, without those that are rounding."""
+    """Principal compliances of a block and their directions, the softest first, without those that are round-off."""
     values, axes = np.linalg.eigh(block)
     pairs = zip(values[::-1].tolist(), axes.T[::-1], strict=True)
     return [(value, axis) for value, axis in pairs if value > NEGLIGIBLE * size]

@@ -38,12 +38,12 @@ class LinkKind:
 
 def density_table(kinds: Sequence[LinkKind]) -> type:
     """Make the table [linear_density] of a family with these links; it may be left out."""
-    found = {}
+    fields = {}
     for kind in kinds:
         words = kind.name.replace("_", " ")
         quantity = Quantity("linear density", f"mass per length of the {words}; 0: not counted", count=kind.count)
-        found[kind.name] = Field(quantity, 0.0 if kind.count is None else (0.0,) * kind.count)
-    return made_table("LinearDensity", found)
+        fields[kind.name] = Field(quantity, 0.0 if kind.count is None else (0.0,) * kind.count)
+    return made_table("LinearDensity", fields)
 
 
 def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[tuple[str, str, Scalar]]:

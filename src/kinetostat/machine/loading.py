@@ -43,8 +43,8 @@ STUDY = (
 @cache
 def bundled() -> dict[str, str]:
     """The text of every bundled machine file by name, in alphabetical order."""
-    found = (resources.files("kinetostat.machine") / "bundled").iterdir()
-    files = sorted((f for f in found if f.name.endswith(SUFFIX)), key=lambda f: f.name)
+    known_families = (resources.files("kinetostat.machine") / "bundled").iterdir()
+    files = sorted((f for f in known_families if f.name.endswith(SUFFIX)), key=lambda f: f.name)
     return {f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files}
 
 
@@ -133,10 +133,10 @@ def _counts(family: Family) -> dict[str, int]:
 
 
 def _family(name: object, origin: str) -> Family:
-    found = families()
-    if isinstance(name, str) and name in found:
-        return found[name]
-    known = [*found, NAME]
+    known_families = families()
+    if isinstance(name, str) and name in known_families:
+        return known_families[name]
+    known = [*known_families, NAME]
     if name is None:
         raise InputError(f'"{origin}": family is missing; add family = "..." with one of: {", ".join(known)}.')
     near = difflib.get_close_matches(str(name), known, 1)
@@ -175,10 +175,10 @@ def _left_out(fields: type, table: Any) -> bool:
 
 def _quantity_lines(fields: type, table: Any) -> Iterator[str]:
     for field, quantity in quantities(fields).items():
-        held = getattr(table, field)
-        if quantity.unset is not None and held == quantity.unset:
+        values = getattr(table, field)
+        if quantity.unset is not None and values == quantity.unset:
             continue
-        texts = [json.dumps(quantity.show(value)) for value in (held if quantity.count else (held,))]
+        texts = [json.dumps(quantity.show(value)) for value in (values if quantity.count else (values,))]
         yield f"{field} = {'[' + ', '.join(texts) + ']' if quantity.count else texts[0]}"
 
 

@@ -193,8 +193,8 @@ class Family:
         tables: the tables of a machine file by name (dots for tables in tables): dataclasses of annotated fields.
         configure: from one instance per table, by keyword, to the machine at its pose.
         planar: whether its platform moves in the x-y plane only.
-        chains: where there is no closed form, from the tables to the legs at the home pose, so that joint coordinates
-            can be found that close them (`kinematics.closure`); `configure` then takes these as `joints`.
+        chains: where a pose has to be solved for, from the tables to the legs at the home pose, so that joint
+            coordinates can be found that close them (`kinematics.closure`); `configure` then takes these as `joints`.
         literals: what its machine files say beside numbers, by table.
         links: those with a mass, of a family in closed form.
         members: of a machine written leg by leg, from the tables to all links that can move.
@@ -248,7 +248,7 @@ class Machine:
         return f"<Machine {self.name!r}, family {self.family.name}>"
 
     def configure(self, joints: Sequence[Scalar] = ()) -> Configuration:
-        """The machine at its pose; `joints` are its coordinates where the family has no closed form for them."""
+        """The machine at its pose; `joints` are its coordinates where the family must be solved for them."""
         placed = {"joints": joints} if self.family.chains else {}
         return self.family.configure(**self.family_tables, **placed)
 
@@ -280,7 +280,7 @@ class Machine:
 
 
 def need_machine(given: object) -> None:
-    """Refuse what is no machine.
+    """Refuse anything but a machine.
 
     Raises:
         InputError: says how to get one.

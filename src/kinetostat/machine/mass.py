@@ -53,10 +53,10 @@ def _members(machine: Machine, configuration: Configuration) -> list[Member]:
     family = machine.family
     if family.members is not None:
         return family.members(**machine.family_tables)
-    found = []
+    members = []
     for kind in family.links:
         density = getattr(machine.tables["linear_density"], kind.name)
         placed = configuration.legs, configuration.platform.translation, machine.tables["geometry"]
         for i, (leg, name, length) in enumerate(kind.lengths(*placed)):
-            found.append(Member(leg, name, length, density if kind.count is None else density[i]))
-    return found
+            members.append(Member(leg, name, length, density if kind.count is None else density[i]))
+    return members

@@ -19,7 +19,7 @@ FULL_TURN = 2.0 * math.pi
 BEYOND = 100.0
 """How many times the longest of all other lengths a length may be."""
 SOFTEST = 100.0
-"""N/m: what gives 10 mm under 1 N is no drive and no link of a machine."""
+"""N/m: a part that gives 10 mm under 1 N can be neither a drive nor a link of a machine."""
 
 
 @dataclass(frozen=True)
@@ -53,12 +53,12 @@ def find(family: Family, text: str) -> Parameter:
     Raises:
         InputError: none, several, or several numbers that are never alike; the message lists what is near.
     """
-    found = _find(family, text)
-    if found.quantity.apart and len(found.leaves) > 1:
+    matches = _find(family, text)
+    if matches.quantity.apart and len(matches.leaves) > 1:
         raise InputError(
-            f"{found.path} holds {len(found.leaves)} numbers; name one of them: {', '.join(found.leaves)}."
+            f"{matches.path} holds {len(matches.leaves)} numbers; name one of them: {', '.join(matches.leaves)}."
         )
-    return found
+    return matches
 
 
 def _find(family: Family, text: str) -> Parameter:
@@ -79,13 +79,13 @@ def _find(family: Family, text: str) -> Parameter:
 
 def values(machine: Machine) -> dict[str, Scalar]:
     """Every scalar of a machine by path, SI."""
-    found: dict[str, Scalar] = {}
+    scalars: dict[str, Scalar] = {}
     for table, fields in machine.family.every_table.items():
         for name, quantity in quantities(fields).items():
-            held = getattr(machine.tables[table], name)
-            entries = (held,) if quantity.count is None else held
-            found.update(zip(leaves(f"{table}.{name}", quantity), entries, strict=True))
-    return found
+            given = getattr(machine.tables[table], name)
+            entries = (given,) if quantity.count is None else given
+            scalars.update(zip(leaves(f"{table}.{name}", quantity), entries, strict=True))
+    return scalars
 
 
 def with_values(machine: Machine, changes: Mapping[str, Any]) -> Machine:
@@ -113,11 +113,11 @@ def with_leg(machine: Machine, path: str) -> str:
 
 def doubts(machine: Machine) -> Iterator[str]:
     """A sentence for each implausible number: an angle beyond a turn, one length beyond all, no stiffness."""
-    found = list(_numbers(machine))
-    for path, field, kind, value in found:
+    numbers = list(_numbers(machine))
+    for path, field, kind, value in numbers:
         if kind == "angle" and abs(value) > FULL_TURN * (1.0 + 1e-9):
             yield f'{path} is {value:g} rad, more than a turn; if degrees are meant, write "{value:g} deg".'
-        others = [abs(v) for _, other, k, v in found if k == kind == "length" and other != field]
+        others = [abs(v) for _, other, k, v in numbers if k == kind == "length" and other != field]
         if 0.0 < BEYOND * max(others, default=0.0) < abs(value):
             yield f'{path} is {value:g} m, over {BEYOND:g} times all others; if mm are meant, write "{value:g} mm".'
         if kind == "linear stiffness" and 0.0 < value < SOFTEST:
@@ -126,10 +126,10 @@ def doubts(machine: Machine) -> Iterator[str]:
 
 def _numbers(machine: Machine) -> Iterator[tuple[str, str, str, float]]:
     """Path, field, kind and value of every finite number; once for all entries of a field that are alike."""
-    held = values(machine)
+    given = values(machine)
     fields = {p.path: p for p in parameters(machine.family)}
     entries = {leaf for p in fields.values() if p.quantity.count for leaf in p.leaves}
     for field in (p for p in fields.values() if p.path not in entries):
-        own = {leaf: float(held[leaf]) for leaf in field.leaves if math.isfinite(held[leaf])}
-        alike = {field.path: next(iter(own.values()))} if len(set(own.values())) == 1 else own
+        finite = {leaf: float(given[leaf]) for leaf in field.leaves if math.isfinite(given[leaf])}
+        alike = {field.path: next(iter(finite.values()))} if len(set(finite.values())) == 1 else finite
         yield from ((path, field.path, field.quantity.kind, value) for path, value in alike.items())

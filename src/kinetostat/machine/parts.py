@@ -48,7 +48,7 @@ def in_series(stiffness: Scalar, rigidity: Scalar, length: Scalar, factor: float
 
 def bent_links(lengths: Sequence[Scalar], stiffness: Sequence[Scalar], bending: Sequence[Scalar]) -> list[Scalar]:
     """Torsional springs (N·m/rad) for links built in at their lower ends: k52, k54 in a row with 3 EI / length."""
-    return [in_series(k, own, size, 3.0) for k, own, size in zip(stiffness, bending, lengths, strict=True)]
+    return [in_series(k, rigidity, size, 3.0) for k, rigidity, size in zip(stiffness, bending, lengths, strict=True)]
 
 
 def servo(joint: Joint, name: str, stiffness: Scalar) -> Joint | Spring:

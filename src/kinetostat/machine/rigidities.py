@@ -38,22 +38,22 @@ def resolve(document: Document, family: Family, origin: str) -> Document:
     stiffness = document.get("stiffness")
     if not isinstance(stiffness, dict):
         return document
-    found = {
+    resolved = {
         name: _resolved(stiffness[name], WHICH[quantity.kind], f'"{origin}": stiffness.{name}')
         for name, quantity in quantities(family.tables["stiffness"]).items()
         if quantity.kind in WHICH and name in stiffness
     }
-    result = {**document, "stiffness": {**stiffness, **{name: numbers for name, (numbers, _) in found.items()}}}
-    heavy = _densities(family, {name: density for name, (_, density) in found.items()}, origin)
+    result = {**document, "stiffness": {**stiffness, **{name: numbers for name, (numbers, _) in resolved.items()}}}
+    heavy = _densities(family, {name: density for name, (_, density) in resolved.items()}, origin)
     written = document.get("linear_density", {})
     return {**result, "linear_density": {**heavy, **written}} if heavy and isinstance(written, dict) else result
 
 
-def _densities(family: Family, found: Mapping[str, Densities], origin: str) -> dict[str, Densities]:
+def _densities(family: Family, resolved: Mapping[str, Densities], origin: str) -> dict[str, Densities]:
     """Mass per length of each kind of links whose cross-section is known, kg/m."""
     heavy: dict[str, Densities] = {}
     for kind in family.links:
-        known = {name: found[name] for name in kind.rigidities if np.any(found.get(name, 0.0))}
+        known = {name: resolved[name] for name in kind.rigidities if np.any(resolved.get(name, 0.0))}
         for density in known.values():
             if not np.allclose(density, heavy.setdefault(kind.name, density), rtol=SAME, atol=0.0):
                 raise InputError(
@@ -101,8 +101,8 @@ def _size(value: object, kind: str, where: str, may_be_zero: bool = False) -> fl
     try:
         number = parse(value, kind)
     except UnitError as error:
-        said = "missing" if value is None else shorten(value)
-        raise InputError(f"{where} is {said}: {error}.") from None
+        given = "missing" if value is None else shorten(value)
+        raise InputError(f"{where} is {given}: {error}.") from None
     if number < 0.0 or (number == 0.0 and not may_be_zero):
         raise InputError(f"{where} is {shorten(value)}; it must be greater than 0.")
     return number

@@ -107,11 +107,13 @@ def with_struts(
     """
 
     def configure(geometry: Any, stiffness: Any, pose: Any) -> Configuration:
-        found = placed(geometry, stiffness, pose)
-        return found.moved_by(two_force_legs(*found.joints, stiffness.actuator, stiffness.leg_axial), geometry.size)
+        placement = placed(geometry, stiffness, pose)
+        return placement.moved_by(
+            two_force_legs(*placement.joints, stiffness.actuator, stiffness.leg_axial), geometry.size
+        )
 
-    legs = LinkKind("legs", ("leg_axial",), straight_legs)
-    return Family(name=name, summary=summary, tables=tables, configure=configure, links=(legs, *links))
+    kind = LinkKind("legs", ("leg_axial",), straight_legs)
+    return Family(name=name, summary=summary, tables=tables, configure=configure, links=(kind, *links))
 
 
 def with_cranks(
@@ -126,11 +128,11 @@ def with_cranks(
     """
 
     def configure(geometry: Any, stiffness: Any, pose: Any) -> Configuration:
-        found = placed(geometry, stiffness, pose)
-        sides = outward(found.joints[0], geometry.base_radius, geometry.crank_turn)
+        placement = placed(geometry, stiffness, pose)
+        sides = outward(placement.joints[0], geometry.base_radius, geometry.crank_turn)
         bars = CrankLinks(geometry.crank_length, geometry.rod_length, stiffness.crank_bending, stiffness.leg_axial)
-        legs, limits = crank_legs(found.joints, sides, stiffness.actuator, bars)
-        return found.moved_by(legs, geometry.size, limits)
+        legs, limits = crank_legs(placement.joints, sides, stiffness.actuator, bars)
+        return placement.moved_by(legs, geometry.size, limits)
 
     cranked = {**tables, **_crank_tables(tables["geometry"], tables["stiffness"])}
     return Family(name=name, summary=summary, tables=cranked, configure=configure, links=(*CRANK_LINKS, *links))

@@ -77,8 +77,8 @@ def _deeper_than(document: Any, levels: int) -> bool:
     """Whether tables and lists are nested in more than so many levels."""
     at = [document]
     for _ in range(levels):
-        held = [part for part in at if isinstance(part, dict | list)]
-        at = [child for part in held for child in (part.values() if isinstance(part, dict) else part)]
+        nested = [part for part in at if isinstance(part, dict | list)]
+        at = [child for part in nested for child in (part.values() if isinstance(part, dict) else part)]
     return any(isinstance(part, dict | list) for part in at)
 
 
@@ -118,10 +118,10 @@ def _repeat(document: Document, path: str, counts: Mapping[str, int]) -> None:
 
 def _value(text: str) -> object:
     try:
-        found = tomllib.loads(f"value = {text}\n")
+        parsed = tomllib.loads(f"value = {text}\n")
     except (ValueError, RecursionError):
         return text
-    return found["value"] if len(found) == 1 else text
+    return parsed["value"] if len(parsed) == 1 else text
 
 
 def _put(document: Document, path: str, value: object) -> None:

@@ -48,7 +48,7 @@ class Quantity:
         per_leg: whether there is a value for each actuated leg, in their order.
         apart: whether each of them must be written, as components and angles; otherwise one may stand for all.
         most: the largest value that is allowed, SI.
-        unset: of a limit, the infinity that stands for "none"; None for what is no limit.
+        unset: of a limit, the infinity that stands for "none"; None for a quantity that is not a limit.
     """
 
     kind: str
@@ -98,8 +98,8 @@ class Quantity:
             number = parse(value, self.kind)
             self.check(number)
         except UnitError as error:
-            said = f"{where}{shorten(value)}: " if where else ""
-            raise PydanticCustomError("quantity", "{said}{reason}", {"said": said, "reason": str(error)}) from None
+            entry = f"{where}{shorten(value)}: " if where else ""
+            raise PydanticCustomError("quantity", "{said}{reason}", {"said": entry, "reason": str(error)}) from None
         return number
 
     def check(self, number: float) -> None:
@@ -136,16 +136,16 @@ class Quantity:
     def __get_pydantic_json_schema__(self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler) -> Any:
         kind = KINDS[self.kind]
         table = ["object"] if kind.name.endswith("rigidity") else []
-        one = {"type": ["number", "string", *table], "examples": [kind.example]}
+        single = {"type": ["number", "string", *table], "examples": [kind.example]}
         rule = f"{self.meaning}; a {kind.name} with its unit, or a bare number in {kind.unit}"
         rule += f', or "{RIGID}"' if self.stiff else ""
         rule += f', or "{NO_LIMIT}"' if self.unset is not None else ""
         if self.count is None:
-            return {**one, "description": rule}
-        many = {"type": "array", "items": one, "minItems": self.count, "maxItems": self.count}
+            return {**single, "description": rule}
+        many = {"type": "array", "items": single, "minItems": self.count, "maxItems": self.count}
         if self.apart:
             return {**many, "description": f"{rule}; a list of {self.count}"}
-        return {"anyOf": [one, many], "description": f"{rule}; one for all, or a list of {self.count}"}
+        return {"anyOf": [single, many], "description": f"{rule}; one for all, or a list of {self.count}"}
 
 
 @dataclass(frozen=True)
@@ -159,9 +159,9 @@ class Field:
 def made_table(name: str, given: Mapping[str, Field], bases: tuple[type, ...] = ()) -> type:
     """Make the class of a table from its fields, optional ones last, and from the tables that it extends."""
     ordered = dict(sorted(given.items(), key=lambda item: item[1].default is not None))
-    kinds = {key: float if one.quantity.count is None else tuple[float, ...] for key, one in ordered.items()}
-    hints = {key: Annotated[kinds[key], one.quantity] for key, one in ordered.items()}
-    defaults = {key: one.default for key, one in ordered.items() if one.default is not None}
+    kinds = {key: float if single.quantity.count is None else tuple[float, ...] for key, single in ordered.items()}
+    hints = {key: Annotated[kinds[key], single.quantity] for key, single in ordered.items()}
+    defaults = {key: single.default for key, single in ordered.items() if single.default is not None}
     return table(type(name, bases, {"__annotations__": hints, "__module__": __name__, **defaults}))
 
 

@@ -1,6 +1,6 @@
 """Study files: what people may write about an optimisation, and what is wrong with it. Nothing is looked up or solved.
 
-Which fields and quantities exist depends on the machine and is checked by whoever builds the problem.
+Which fields and quantities exist depends on the machine and is checked where the problem is built.
 """
 
 import difflib
@@ -167,9 +167,9 @@ def read_study(document: Document, origin: str, settings: Sequence[str] = ()) ->
     try:
         return StudyFile.model_validate(changed)
     except ValidationError as error:
-        found = list(dict.fromkeys(_sentence(dict(mistake), changed) for mistake in error.errors()))
-        more = f" (and {len(found) - 5} more)" if len(found) > 5 else ""
-        raise InputError(f'"{origin}": {" ".join(found[:5])}{more}') from None
+        sentences = list(dict.fromkeys(_sentence(dict(mistake), changed) for mistake in error.errors()))
+        more = f" (and {len(sentences) - 5} more)" if len(sentences) > 5 else ""
+        raise InputError(f'"{origin}": {" ".join(sentences[:5])}{more}') from None
 
 
 def study_schema() -> dict[str, Any]:
@@ -189,8 +189,8 @@ def _sentence(mistake: dict[str, Any], document: Document) -> str:
         return f"{name} is not known; " + (f"did you mean {near[0]}?" if near else f"it may be {', '.join(known)}.")
     if mistake["type"] in ("model_type", "model_attributes_type"):
         return f"{name} is {shorten(value)}; it must be a table with the keys {', '.join(_allowed(path))}."
-    said = str(mistake["msg"]).removeprefix("Input ")
-    return f"{name} is {shorten(value)}: it {said[0].lower()}{said[1:]}{_hint(path)}."
+    message = str(mistake["msg"]).removeprefix("Input ")
+    return f"{name} is {shorten(value)}: it {message[0].lower()}{message[1:]}{_hint(path)}."
 
 
 def _place(location: Sequence[Any], document: Document) -> tuple[list[str], Any]:

@@ -13,14 +13,14 @@ LISTS = ("variables", "objectives", "constraints")
 
 def study_toml(study: StudyFile) -> str:
     """The TOML text of a study; what is as it would be without being written is left out."""
-    held = study.model_dump(mode="json", by_alias=True, exclude_defaults=True)
-    lines = ["schema = 1", *_pairs({key: held[key] for key in ("name", "machine")})]
-    lines += _table("[set]", held.get("set", {}))
+    content = study.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+    lines = ["schema = 1", *_pairs({key: content[key] for key in ("name", "machine")})]
+    lines += _table("[set]", content.get("set", {}))
     for name in LISTS:
-        for table in held.get(name, []):
+        for table in content.get(name, []):
             lines += _table(f"[[{name}]]", table)
     for name in TABLES[1:]:
-        lines += _table(f"[{name}]", held.get(name, {}))
+        lines += _table(f"[{name}]", content.get(name, {}))
     return "\n".join(lines) + "\n"
 
 
@@ -37,5 +37,5 @@ def _value(value: Any) -> str:
     if isinstance(value, dict):
         return f"{{ {', '.join(_pairs(value))} }}"
     if isinstance(value, list):
-        return f"[{', '.join(_value(one) for one in value)}]"
+        return f"[{', '.join(_value(entry) for entry in value)}]"
     return json.dumps(value, ensure_ascii=False)

@@ -54,14 +54,14 @@ def _table_model(title: str, tables: Mapping[str, type], content: dict[str, Any]
 
 def tables_in(data: BaseModel, tables: Mapping[str, type]) -> dict[str, Any]:
     """Return one instance per table, by dotted name, from a validated document."""
-    found = {}
+    instances = {}
     for path in tables:
         at: Any = data
         for key in path.split("."):
             names = {field.alias or name: name for name, field in type(at).model_fields.items()}
             at = getattr(at, names[key])
-        found[path] = at
-    return found
+        instances[path] = at
+    return instances
 
 
 def validate(document: Document, origin: str, model: type[BaseModel], tables: Mapping[str, type]) -> BaseModel:
@@ -78,9 +78,9 @@ def validate(document: Document, origin: str, model: type[BaseModel], tables: Ma
     try:
         return model.model_validate(document)
     except ValidationError as error:
-        found = [_sentence(dict(mistake), document, tables) for mistake in error.errors()]
-        more = f" (and {len(found) - 5} more)" if len(found) > 5 else ""
-        raise InputError(f'"{origin}": {" ".join(found[:5])}{more}') from None
+        sentences = [_sentence(dict(mistake), document, tables) for mistake in error.errors()]
+        more = f" (and {len(sentences) - 5} more)" if len(sentences) > 5 else ""
+        raise InputError(f'"{origin}": {" ".join(sentences[:5])}{more}') from None
 
 
 def _sentence(mistake: dict[str, Any], document: Document, tables: Mapping[str, type]) -> str:

@@ -11,5 +11,5 @@ from kinetostat.machine.machine import Family
 def families() -> dict[str, Family]:
     """Return every family by name, in alphabetical order."""
     modules = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
-    found = [value for module in modules for value in vars(module).values() if isinstance(value, Family)]
-    return {family.name: family for family in sorted(found, key=lambda family: family.name)}
+    defined = [value for module in modules for value in vars(module).values() if isinstance(value, Family)]
+    return {family.name: family for family in sorted(defined, key=lambda family: family.name)}

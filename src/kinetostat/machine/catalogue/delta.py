@@ -1,7 +1,7 @@
 """Delta: three actuated cranks, each with a pair of bars that keeps the platform from turning; freedoms x, y, z.
 
-Source: R. Clavel, "Delta, a fast robot with parallel geometry" (1988), for the architecture; symbols are ours
-(theory section 4). The base plate is at z = 0, the platform below it.
+Source: R. Clavel, "Delta, a fast robot with parallel geometry" (1988), for the architecture; symbols as in
+theory section 4. The base plate is at z = 0, the platform below it.
 """
 
 from typing import Annotated
@@ -55,12 +55,12 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Translations) -> C
     tip = Vector(pose.x, pose.y, pose.z)
     base, top = ring(geometry.base_radius, geometry.leg_angles), ring(geometry.platform_radius, geometry.leg_angles)
     radial = [polar(1.0, angle) for angle in geometry.leg_angles]
-    found = [
+    placed = [
         _leg(f"leg {i}", low, tip + high, outward.cross(Z_AXIS), k, geometry, stiffness)
         for i, (low, high, outward, k) in enumerate(zip(base, top, radial, stiffness.actuator, strict=True), 1)
     ]
-    limits = tuple(limit for _, own in found for limit in own)
-    return Configuration(Displacement(IDENTITY, tip), tuple(numbered(leg for leg, _ in found)), limits, geometry.size)
+    limits = tuple(limit for _, conditions in placed for limit in conditions)
+    return Configuration(Displacement(IDENTITY, tip), tuple(numbered(leg for leg, _ in placed)), limits, geometry.size)
 
 
 def _leg(

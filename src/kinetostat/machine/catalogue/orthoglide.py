@@ -1,8 +1,8 @@
 """Orthoglide: three actuated slides along x, y and z, each with a pair of bars to the platform; freedoms x, y, z.
 
 Source: Chablat and Wenger, "Architecture optimization of a 3-DOF translational parallel mechanism for machining
-applications, the Orthoglide" (2003), for the architecture; bars on spherical joints and symbols are ours (theory
-section 4). At the origin all bars point along their slides: there the machine is isotropic.
+applications, the Orthoglide" (2003), for the architecture; bars on spherical joints
+and symbols as in theory section 4. At the origin all bars point along their slides: there the machine is isotropic.
 """
 
 from dataclasses import replace
@@ -54,13 +54,13 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Translations) -> C
         geometry, stiffness, pose: SI; base frame.
     """
     tip = Vector(pose.x, pose.y, pose.z)
-    found = [
+    placed = [
         _leg(f"leg {name}", tip, (AXES[i], AXES[(i + 1) % LEGS]), k, geometry, stiffness)
         for i, (name, k) in enumerate(zip("xyz", stiffness.actuator, strict=True))
     ]
     legs, limits = (
-        tuple(numbered(replace(leg, short=axis) for axis, (leg, _) in zip("xyz", found, strict=True))),
-        tuple(limit for _, limit in found),
+        tuple(numbered(replace(leg, short=axis) for axis, (leg, _) in zip("xyz", placed, strict=True))),
+        tuple(limit for _, limit in placed),
     )
     return Configuration(Displacement(IDENTITY, tip), legs, limits, geometry.bar_length)
 

@@ -1,6 +1,6 @@
 """Three U-P-S legs and a central ram P-U: P slides along the base z axis and carries the platform on a Hooke joint.
 
-The paper names the class of 3-dof machines but no leg; this one is ours (theory section 4).
+The paper names the class of 3-dof machines but no leg; this leg is chosen here (theory section 4).
 """
 
 from typing import Annotated
@@ -56,7 +56,7 @@ def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
     tip = Vector(0.0, 0.0, pose.z)
     platform = Displacement(pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2)), tip)
     rigidities = ((stiffness.ram_bending, 3.0), (stiffness.ram_bending, 3.0), (stiffness.ram_torsion, 1.0))
-    built_in = [in_series(k, own, abs(pose.z), n) for k, (own, n) in zip(stiffness.ram, rigidities, strict=True)]
+    built_in = [in_series(k, r, abs(pose.z), n) for k, (r, n) in zip(stiffness.ram, rigidities, strict=True)]
     springs = tuple(
         Spring(f"ram {name}", Joint(axis, ZERO), k)
         for name, axis, k in zip(("bending x", "bending y", "torsion"), AXES, built_in, strict=True)

@@ -1,6 +1,6 @@
 """Five U-P-S legs and a passive leg U - link - R - link - U: the 4-dof machine's leg whose base joint is a Hooke joint.
 
-The paper names the class of 5-dof machines but no leg; this one is ours (theory section 4).
+The paper names the class of 5-dof machines but no leg; this leg is chosen here (theory section 4).
 """
 
 from collections.abc import Sequence

@@ -2,7 +2,7 @@
 
 All elbows lie on the left of the way from base joint to platform joint, seen from +z (theory section 4).
 Source: Gosselin and Angeles, "The optimum kinematic design of a planar three-degree-of-freedom parallel manipulator"
-(1988), for the architecture; symbols are ours.
+(1988), for the architecture; symbols are those of the theory.
 """
 
 from typing import Annotated
@@ -48,12 +48,12 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
     """
     platform, joints = placed(geometry, pose)
     links = CrankLinks(geometry.proximal_link, geometry.distal_link, stiffness.proximal_bending, stiffness.distal_axial)
-    found = [
+    built = [
         _leg(f"leg {i}", base, tip, k, links)
         for i, (base, tip, k) in enumerate(zip(*joints, stiffness.actuator, strict=True), 1)
     ]
-    limits = tuple(limit for _, own in found for limit in own)
-    return Configuration(platform, tuple(numbered(leg for leg, _ in found)), limits, geometry.size, Plane())
+    limits = tuple(limit for _, conditions in built for limit in conditions)
+    return Configuration(platform, tuple(numbered(leg for leg, _ in built)), limits, geometry.size, Plane())
 
 
 def _leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, links: CrankLinks) -> tuple[Leg, tuple[Closure, ...]]:

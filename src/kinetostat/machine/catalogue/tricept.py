@@ -1,6 +1,6 @@
 """Three U-P-S legs and a central tube U-P (Tricept): a Hooke joint at the base, a slide, the platform built in.
 
-The paper names the class of 3-dof machines but no leg; this one is ours (theory section 4).
+The paper names the class of 3-dof machines but no leg; this leg is chosen here (theory section 4).
 """
 
 from typing import Annotated
@@ -55,7 +55,7 @@ def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
     turn = pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2))
     platform = Displacement(turn, turn.z * pose.length)
     rigidities = ((stiffness.tube_bending, 3.0), (stiffness.tube_bending, 3.0), (stiffness.tube_torsion, 1.0))
-    built_in = [in_series(k, own, pose.length, n) for k, (own, n) in zip(stiffness.tube, rigidities, strict=True)]
+    built_in = [in_series(k, r, pose.length, n) for k, (r, n) in zip(stiffness.tube, rigidities, strict=True)]
     springs = tuple(
         Spring(f"tube {name}", Joint(axis, platform.translation), k)
         for name, axis, k in zip(("bending x", "bending y", "torsion"), (turn.x, turn.y, turn.z), built_in, strict=True)

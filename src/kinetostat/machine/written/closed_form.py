@@ -51,16 +51,16 @@ class ParallelAxes:
         goal = motion.apply(last)
         lower, upper, span = (_across(v, axis) for v in (middle - first, last - middle, goal - first))
         bent, closure = self._triangle(axis, lower, upper, span)
-        one = _turn(axis, lower, bent)
+        first_turn = _turn(axis, lower, bent)
         both = _turn(axis, upper, span - bent)
         whole = _turn(axis, lower, motion.rotation.apply(lower))
-        found: list[Scalar | Turn] = [0.0] * len(movers)
-        turns = (one, _between(one, both), _between(both, whole))
+        amounts: list[Scalar | Turn] = [0.0] * len(movers)
+        turns = (first_turn, _between(first_turn, both), _between(both, whole))
         for i, turn in zip(self.revolutes, turns, strict=True):
-            found[i] = Turn(turn.cosine, self.signs[i] * turn.sine)
+            amounts[i] = Turn(turn.cosine, self.signs[i] * turn.sine)
         if self.slide is not None:
-            found[self.slide] = self.signs[self.slide] * axis.dot(goal - last)
-        return found, closure
+            amounts[self.slide] = self.signs[self.slide] * axis.dot(goal - last)
+        return amounts, closure
 
     def _triangle(self, axis: Vector, lower: Vector, upper: Vector, span: Vector) -> tuple[Vector, Closure]:
         """Where the lower link points, and the condition for the two links to bridge the span."""
@@ -114,6 +114,6 @@ def closed_form(name: str, steps: Sequence[Step]) -> ParallelAxes | None:
     bend = float(np.cross(upper, lower) @ axis)
     if min(np.linalg.norm(lower), np.linalg.norm(upper)) < NO_LINK or bend == 0.0:
         return None
-    signs = tuple(float(np.sign(one @ axis)) for one in axes)
+    signs = tuple(float(np.sign(first_turn @ axis)) for first_turn in axes)
     first, middle, last = turning
     return ParallelAxes(name, (first, middle, last), next(iter(sliding), None), signs, float(np.sign(bend)))

@@ -71,7 +71,7 @@ def _merged(leg: dict[str, Any], where: str) -> dict[str, Any]:
 
 
 def _named(entries: list[Any], where: str, what: str) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    parts: dict[str, Any] = {}
     for i, entry in enumerate(entries, 1):
         name = entry.get("name") if isinstance(entry, dict) else None
         if not isinstance(name, str) or not name.strip() or "." in name or len(name) > 40 or not name.isprintable():
@@ -79,10 +79,10 @@ def _named(entries: list[Any], where: str, what: str) -> dict[str, Any]:
                 f"{where}: the name of {what} {i} is {shorten(name)}; give each a short name without dots, "
                 f'e.g. name = "{what} {i}".'
             )
-        if name in found:
+        if name in parts:
             raise InputError(f'{where}: two {what}s are called "{name}"; give each a name of its own.')
-        found[name] = {key: value for key, value in entry.items() if key != "name"}
-    return found
+        parts[name] = {key: value for key, value in entry.items() if key != "name"}
+    return parts
 
 
 def check_paths(document: Document, settings: Iterable[str]) -> None:
@@ -152,8 +152,8 @@ def _leg(name: str, leg: dict[str, Any], where: str, shapes: Mapping[str, str]) 
     bodies = {plan.joins[1] for plan in plans[:-1]}
     for key in links:
         choice(key, bodies, f"{where}: links name")
-    found = {key: _link(key, leg.pop(key), f'{where}, link "{key}"', shapes) for key in links}
-    return LegPlan(name, plans, found)
+    parts = {key: _link(key, leg.pop(key), f'{where}, link "{key}"', shapes) for key in links}
+    return LegPlan(name, plans, parts)
 
 
 def _joint(name: str, part: dict[str, Any], where: str) -> JointPlan:

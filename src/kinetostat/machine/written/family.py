@@ -78,20 +78,21 @@ def chain_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[S
     steps: list[Step] = []
     for i, joint in enumerate(leg.joints):
         title = PartName(leg.name, joint.name)
-        own = (
+        bearing = (
             matrix_springs(
                 PartName(leg.name, f"{joint.name} bearing compliance"), joint.compliance, Vector(*data[i].point)
             )
             if joint.compliance
             else ()
         )
-        steps += [Step(spring, False) for spring in own]
+        steps += [Step(spring, False) for spring in bearing]
         steps += [Step(element, True) for element in _elements(title, joint, data[i])]
         link = leg.links.get(joint.joins[1])
         if link is not None:
             ends = Vector(*data[i].point), Vector(*data[i + 1].point)
             steps += [
-                Step(element, False) for element in _yielding(PartName(leg.name, link.name), link, ends, plan, tables)
+                Step(element, False)
+                for element in _link_elements(PartName(leg.name, link.name), link, ends, plan, tables)
             ]
     return steps
 
@@ -106,25 +107,25 @@ def _elements(title: str, joint: JointPlan, data: Any) -> Sequence[Element]:
     return (Spring(name, freedom, data.stiffness, title, joint.actuated, not joint.actuated),)
 
 
-def _yielding(
+def _link_elements(
     title: str, link: LinkPlan, ends: tuple[Vector, Vector], plan: Plan, tables: Mapping[str, Any]
 ) -> Sequence[Element]:
-    """What stands for a link that yields."""
+    """Return the elements that stand for a flexible link."""
     if link.model == "rigid":
         return ()
     if link.model == "matrix":
         return matrix_springs(title, link.compliance, ends[1])
     up = Vector(*link.up) if link.up else _any_up(ends)
     shape, data = plan.shapes[link.cross_section], tables[f"sections.{link.cross_section}"]
-    own = rigidity_of(shape, data, link.model == "timoshenko")
+    rigidity = rigidity_of(shape, data, link.model == "timoshenko")
     if link.model == "lumped":
-        return lumped_springs(title, *ends, up, own)
-    return (Beam(title, *ends, up, own),)
+        return lumped_springs(title, *ends, up, rigidity)
+    return (Beam(title, *ends, up, rigidity),)
 
 
 def members(plan: Plan, **tables: Any) -> list[Member]:
     """The links between two joints that can move: those after the first joint of their leg that is not fixed."""
-    found = []
+    links = []
     for leg in plan.legs:
         points = [Vector(*tables[f"legs.{leg.name}.{joint.name}"].point) for joint in leg.joints]
         moves = False
@@ -132,10 +133,10 @@ def members(plan: Plan, **tables: Any) -> list[Member]:
             moves = moves or joint.kind != "fixed"
             if moves:
                 section = leg.links[joint.joins[1]].cross_section if joint.joins[1] in leg.links else ""
-                held = tables[f"sections.{section}"] if section else None
-                density = linear_density_of(plan.shapes[section], held) if section else 0.0
-                found.append(Member(leg.name, f"{leg.name} {joint.joins[1]}", (end - start).norm(), density))
-    return found
+                data = tables[f"sections.{section}"] if section else None
+                density = linear_density_of(plan.shapes[section], data) if section else 0.0
+                links.append(Member(leg.name, f"{leg.name} {joint.joins[1]}", (end - start).norm(), density))
+    return links
 
 
 def _any_up(ends: tuple[Vector, Vector]) -> Vector:

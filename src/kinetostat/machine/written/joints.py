@@ -1,6 +1,6 @@
 """The types of joints that a machine written leg by leg may have: what is written about one, and what it is made of.
 
-A type is one class in `JOINT_TYPES`. Reading, units, schema, messages and `--set` follow from its row; how its joints
+A type is one row of `JOINT_TYPES`. Reading, units, schema, messages and `--set` follow from its row; how its joints
 are joined to legs is `family`'s business. Points and axes are in the base frame, at the home pose.
 """
 

@@ -14,13 +14,13 @@ BASE, PLATFORM = "base", "platform"
 """Names of the two bodies that every leg joins."""
 
 LINK_MODELS = {
-    "rigid": "does not yield",
+    "rigid": "rigid: it does not deflect",
     "lumped": "torsional and linear springs where the link is built in, at its first joint",
     "beam": "Euler-Bernoulli beam between its two joints",
-    "timoshenko": "beam that yields in shear as well",
+    "timoshenko": "beam that deflects in shear as well",
     "matrix": "a 6x6 compliance of its own, of its end against its beginning, at the end",
 }
-"""How a link may yield."""
+"""How a link may deflect."""
 
 SPATIAL_POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 PLANAR_POSE = ("x", "y", "yaw")
@@ -71,7 +71,7 @@ class LinkPlan:
 
 @dataclass(frozen=True)
 class LegPlan:
-    """A leg: its joints from base to platform, and those of its links that yield by name.
+    """A leg: its joints from base to platform, and those of its links that are flexible, by name.
 
     Attributes:
         name: unique within the machine.
@@ -111,33 +111,33 @@ class Plan:
 
 def literals(plan: Plan) -> dict[str, dict[str, object]]:
     """What machine files with this plan say beside numbers, by table: they then have it back."""
-    found: dict[str, dict[str, object]] = {"": {"space": "planar" if plan.planar else "spatial"}}
+    tables: dict[str, dict[str, object]] = {"": {"space": "planar" if plan.planar else "spatial"}}
     for name, shape in plan.shapes.items():
         material = plan.materials[name]
-        found[f"sections.{name}"] = {"shape": shape, **({"material": material} if material else {})}
+        tables[f"sections.{name}"] = {"shape": shape, **({"material": material} if material else {})}
     for leg in plan.legs:
         for joint in leg.joints:
-            found[f"legs.{leg.name}.{joint.name}"] = _joint_literals(joint)
+            tables[f"legs.{leg.name}.{joint.name}"] = _joint_literals(joint)
         for link in leg.links.values():
-            found[f"legs.{leg.name}.{link.name}"] = _link_literals(link)
-    return found
+            tables[f"legs.{leg.name}.{link.name}"] = _link_literals(link)
+    return tables
 
 
 def _joint_literals(joint: JointPlan) -> dict[str, object]:
-    said: dict[str, object] = {"type": joint.kind, "joins": list(joint.joins)}
+    written: dict[str, object] = {"type": joint.kind, "joins": list(joint.joins)}
     if joint.actuated:
-        said["actuated"] = True
+        written["actuated"] = True
     if joint.compliance:
-        said["compliance"] = [list(row) for row in joint.compliance]
-    return said
+        written["compliance"] = [list(row) for row in joint.compliance]
+    return written
 
 
 def _link_literals(link: LinkPlan) -> dict[str, object]:
-    said: dict[str, object] = {"model": link.model}
+    written: dict[str, object] = {"model": link.model}
     if link.cross_section:
-        said["section"] = link.cross_section
+        written["section"] = link.cross_section
     if link.up:
-        said["up"] = list(link.up)
+        written["up"] = list(link.up)
     if link.compliance:
-        said["compliance"] = [list(row) for row in link.compliance]
-    return said
+        written["compliance"] = [list(row) for row in link.compliance]
+    return written

@@ -14,14 +14,14 @@ POSE_KINDS = {"x": "length", "y": "length", "z": "length", "roll": "angle", "pit
 def tables_of(plan: Plan) -> dict[str, type]:
     """The tables of the plan's machine files, by dotted name."""
     point = Quantity("length", "platform point P at the home pose, base frame", count=3, apart=True)
-    found = {"platform": made_table("Platform", {"point": Field(point)})}
+    tables = {"platform": made_table("Platform", {"point": Field(point)})}
     for name, shape in plan.shapes.items():
-        found[f"sections.{name}"] = made_table("CrossSection", _shape_fields(shape, plan.materials[name]))
+        tables[f"sections.{name}"] = made_table("CrossSection", _shape_fields(shape, plan.materials[name]))
     for leg in plan.legs:
         for joint in leg.joints:
-            found[f"legs.{leg.name}.{joint.name}"] = made_table("JointTable", _joint_fields(joint))
+            tables[f"legs.{leg.name}.{joint.name}"] = made_table("JointTable", _joint_fields(joint))
     pose = {name: Field(Quantity(POSE_KINDS[name], f"{name} of the platform")) for name in plan.pose}
-    return {**found, "pose": made_table("Pose", pose)}
+    return {**tables, "pose": made_table("Pose", pose)}
 
 
 def _joint_fields(joint: JointPlan) -> dict[str, Field]:
