@@ -30,13 +30,13 @@ NATIVE_SLAB = 32768
 """Points per call of machine code: 2 ms of work, so that calls cost little and an interrupt is soon heard."""
 
 Progress = Callable[[int, int], None]
-"""Told (points done, points in all) after each slab."""
+"""Called with (points done, points in all) after each slab."""
 
 Codes = npt.NDArray[np.int8]
 
 
 def silent(_done: int, _total: int) -> None:
-    """Progress that nobody watches."""
+    """Report no progress."""
 
 
 @dataclass(frozen=True)
@@ -62,18 +62,18 @@ def evaluate(
     threads: int | None = None,
     repeated: bool = False,
 ) -> Evaluation:
-    """Quantities and status of a machine at many points.
+    """Compute quantities and status of a machine at many points.
 
     Args:
         machine: gives all parameters that do not vary.
         points: where; leaf paths of the machine's family and their values, SI.
         quantities: names from `kinetostatics.quantities.QUANTITIES`.
-        progress: told how far the work is.
+        progress: called after each slab.
         part: only these points; where it starts at a multiple of `NATIVE_SLAB`, results are those of the whole batch
             bit for bit, because the size of the whole decides the arithmetic, and slabs are the same.
         threads: slabs under way at once; all processors unless given.
-        repeated: whether the same will be asked of other numbers again and again, as by a slider: then compiling pays
-            for few points as well, once; a thousand poses take a millisecond from then on.
+        repeated: whether the same quantities will be wanted again and again at other numbers, as by a slider: then
+            compiling once pays for few points as well; a thousand poses take a millisecond from then on.
     """
     method: Method
     if repeated or points.size >= NATIVE_FROM:
@@ -93,15 +93,15 @@ Method = Callable[[Machine, Sequence[str], Sequence[str]], Fill]
 def in_slabs(
     points: Points, fill: Fill, rows: int, slab: int, threads: int, progress: Progress = silent
 ) -> tuple[Array, Codes]:
-    """Results [rows x points] and status codes, slab by slab.
+    """Compute results [rows x points] and status codes, slab by slab.
 
     Args:
         points: where.
         fill: evaluates a slab.
         rows: of results.
-        slab: points of one.
+        slab: points of each slab.
         threads: how many slabs are under way at once.
-        progress: told how far the work is.
+        progress: called after each slab.
     """
     results, status = np.empty((rows, points.size)), np.empty(points.size, dtype=np.int8)
 
@@ -118,7 +118,7 @@ def in_slabs(
 
 
 def by_free_springs(machine: Machine, paths: Sequence[str], quantities: Sequence[str], method: Method) -> Fill:
-    """Points at which a varying stiffness is exactly 0 apart from the others: there it is 0 by form, a free joint."""
+    """Evaluate points at which a varying stiffness is exactly 0 apart from the others: it is a free joint there."""
     stiff = {p.path for p in parameters(machine.family) if p.quantity.stiff}
     watched = [path for path in paths if path in stiff]
     ordinary = method(machine, paths, quantities)
@@ -171,14 +171,14 @@ def _in_threads(task: Callable[[int], int], starts: Sequence[int], threads: int)
 
 
 def available_cores() -> int:
-    """Processors that the system lets this process run on."""
+    """Count the processors that the system lets this process run on."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def responses(machine: Machine, points: Points) -> Response:
-    """The response of a machine at all points: every scalar in it is an array [points] or the same at all of them.
+    """Compute whole responses at all points: every scalar is an array [points] or the same at all of them.
 
     For studies that need more than a few numbers of each of some thousand points. Results are meaningless where the
     status is not OK.
@@ -192,7 +192,7 @@ def responses(machine: Machine, points: Points) -> Response:
 
 
 def first_limit_passed(machine: Machine, columns: Mapping[str, Array], fields: Sequence[str]) -> npt.NDArray[np.int64]:
-    """Which limit is the first, in the order of the checks, that each point passes: its place in `fields`, or -1.
+    """Find the first limit, in the order of the checks, that each point passes: its place in `fields`, or -1.
 
     Args:
         machine: with its limits.
@@ -209,7 +209,7 @@ def first_limit_passed(machine: Machine, columns: Mapping[str, Array], fields: S
 
 
 def limits_used(machine: Machine, columns: Mapping[str, Array]) -> dict[str, tuple[float, float]]:
-    """Least and greatest measure of each limit over some points and all parts, by the limit's name.
+    """Return the least and greatest measure of each limit over some points and all parts, by the limit's name.
 
     Args:
         machine: all of whose limits that are of interest are set.

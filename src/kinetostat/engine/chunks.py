@@ -22,12 +22,12 @@ from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError
 
 CHUNK_NUMBERS = 1 << 20
-"""Results of one chunk, 8 MB: a tenth of a second of work at least, and little to lose or to hold."""
+"""Results of one chunk, 8 MB: at least a tenth of a second of work, and little to lose or to keep in memory."""
 
 
 @dataclass(frozen=True)
 class Work:
-    """What is to be computed, in chunks.
+    """A batch to be computed in chunks.
 
     Attributes:
         machine: gives all parameters that do not vary.
@@ -57,11 +57,11 @@ class Work:
 
 
 Compute = Callable[[Work, Sequence[int]], Iterator[tuple[int, Evaluation]]]
-"""Computes some chunks: yields (number, results), each once, in any order."""
+"""Computes some chunks: gives (number, results), each once, in any order."""
 
 
 def in_chunks(machine: Machine, points: Points, quantities: Sequence[str]) -> Work:
-    """A batch cut into chunks of a suitable size."""
+    """Cut a batch into chunks of a suitable size."""
     slabs = max(1, CHUNK_NUMBERS // (NATIVE_SLAB * max(1, len(quantities))))
     return Work(machine, points, tuple(quantities), slabs * NATIVE_SLAB)
 
@@ -84,7 +84,7 @@ PATIENCE = "10 s"
 
 @dataclass(frozen=True)
 class Crew:
-    """Who computes.
+    """The processes that compute: workers on this machine, a cluster, or neither.
 
     Attributes:
         workers: so many processes on this machine.
@@ -97,7 +97,7 @@ class Crew:
 
 @contextmanager
 def hired(crew: Crew) -> Iterator[Compute]:
-    """A way to compute chunks with a crew, or in this process where the crew names nobody.
+    """Give a way to compute chunks with a crew, or in this process where the crew is empty.
 
     Raises:
         InputError: Dask is not installed, the cluster does not answer, or its workers run another kinetostat.
@@ -147,13 +147,13 @@ def dask_setup(_worker: Any) -> None:
 
 
 def _check_versions(client: Any) -> None:
-    """See that all workers there are run this kinetostat, so that results are the same wherever they come from."""
+    """Check that all workers run this kinetostat, so that results are the same wherever they come from."""
     ours = version("kinetostat")
     try:
-        found = client.run(_version_here)
+        versions = client.run(_version_here)
     except ImportError as error:
         raise InputError(f"a worker of the cluster lacks kinetostat {ours} ({error}); install it there.") from None
-    for worker, theirs in found.items():
+    for worker, theirs in versions.items():
         if theirs != ours:
             raise InputError(f"worker {worker} runs kinetostat {theirs}, here is {ours}; install the same everywhere.")
 
@@ -174,10 +174,10 @@ def _computed(distributed: Any, client: Any, work: Work, numbers: Sequence[int])
     try:
         finished = distributed.as_completed(hand_out(_places(client)))
         for future in finished:
-            number, found = future.result()
+            number, evaluation = future.result()
             future.release()
             finished.update(hand_out(max(1, _places(client) - finished.count())))
-            yield number, found
+            yield number, evaluation
     except distributed.KilledWorker:
         raise InputError("worker after worker died over the same chunk; their logs say why. " + GO_ON) from None
     except (distributed.CancelledError, OSError):

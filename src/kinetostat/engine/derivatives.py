@@ -65,16 +65,16 @@ def evaluate_gradient(
     *,
     repeated: bool = False,
 ) -> Gradients:
-    """Objectives of a machine at many points, and their exact derivatives.
+    """Compute objectives of a machine at many points, and their exact derivatives.
 
     Args:
         machine: gives all parameters that do not vary.
         points: where; leaf paths of the machine's family and their values, SI.
         objectives: one or several; names are from `kinetostatics.quantities.QUANTITIES`.
         paths: leaf paths of the parameters to differentiate by, whether they vary over the points or not.
-        progress: told how far the work is.
-        repeated: whether the same will be asked at other points again and again, as by a search: then compiling pays
-            for few points as well, once.
+        progress: called after each slab.
+        repeated: whether the same derivatives will be wanted again and again at other points, as by a search: then
+            compiling once pays for few points as well.
     """
     several = [objectives] if isinstance(objectives, str | Mapping) else list(objectives)
     weights = tuple(((entry, 1.0),) if isinstance(entry, str) else tuple(entry.items()) for entry in several)
@@ -209,7 +209,7 @@ def _following(slopes: Array, rates: Array, count: int) -> Array:
 
 
 def total_slopes(slopes: Array, by_joints: Array, joint_rates: Array, rates: Array) -> Array:
-    """Derivatives with the joints following: J_p + J_q dq/dp, where F_q dq/dp = -F_p, of least norm.
+    """Return derivatives with the joints following: J_p + J_q dq/dp, where F_q dq/dp = -F_p, of least norm.
 
     Joint coordinates q(p) satisfy F(p, q) = 0; there may be more equations than coordinates, and coordinates that no
     equation needs.

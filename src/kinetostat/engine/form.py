@@ -44,7 +44,7 @@ class Form:
 
 
 def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()) -> tuple[Form, Array]:
-    """The form of a machine's programs and the values of their fixed inputs, SI.
+    """Return the form of a machine's programs and the values of their fixed inputs, SI.
 
     Parameters of one size share an input: what cancels by form, like heights of joints in one plane, is then not
     computed at all.
@@ -52,7 +52,7 @@ def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()
     Args:
         machine: its family, and all parameters that do not vary.
         varying: leaf paths of the parameters that vary.
-        kept: leaf paths of those that are inputs of their own, even if they are 0.
+        kept: leaf paths of those that get an input each, even if they are 0.
     """
     fixed = {path: float(value) for path, value in values(machine).items() if path not in varying}
     turns = [path for path in angles(machine) & fixed.keys() if math.isfinite(fixed[path])]
@@ -76,17 +76,17 @@ def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()
 
 
 def angles(machine: Machine) -> frozenset[str]:
-    """Leaf paths of all angles."""
+    """Return the leaf paths of all angles."""
     return frozenset(p.path for p in parameters(machine.family) if p.quantity.kind == "angle")
 
 
 def directions(machine: Machine) -> frozenset[str]:
-    """Leaf paths of all components of axes."""
+    """Return the leaf paths of all components of axes."""
     return frozenset(leaf for p in parameters(machine.family) if p.quantity.kind == "direction" for leaf in p.leaves)
 
 
 def reduced(angle: Array) -> Array:
-    """The angles (rad), turned back to between -pi and pi if any is beyond what traced cosines take."""
+    """Turn angles (rad) back to between -pi and pi if any is beyond what traced cosines take."""
     if angle.size == 0 or max(angle.max(), -angle.min()) <= LARGEST_ANGLE:
         return angle
     with np.errstate(invalid="ignore"):
@@ -126,7 +126,7 @@ class Inputs:
 
 
 def traced(kind: Kind, form: Form) -> Inputs:
-    """A machine of this kind with the inputs of a form, in a new graph."""
+    """Return a machine of this kind with the inputs of a form, in a new graph."""
     graph = Graph()
     fixed = tuple(graph.input(True, ORDINARY if ordinary else None) for ordinary in form.inputs)
     columns = {path: graph.input() for path in form.varying}

@@ -1,7 +1,7 @@
-"""Derivatives of traced results by their inputs: reverse mode. Knows no machine.
+"""Derivatives of traced results by their inputs, in reverse mode. Machines are not known here.
 
 Every operation passes on to its operands how a result depends on them, from the result back to the inputs. The rules
-hold over any scalar: over nodes, derivatives are further nodes of the same graph, and equal ones are one; over arrays
+hold over any scalar: over nodes, derivatives are further nodes of the same graph, shared where equal; over arrays
 they are numbers (`interpreter`).
 
 At a kink a derivative is that of the branch that is taken, of |0| that of the positive side. What a branch not taken
@@ -21,7 +21,7 @@ TURN = "turn"
 
 
 def with_gradients(body: Body, inputs: Sequence[Traced]) -> Body:
-    """A body with further results: of each result in turn, its derivative by each input."""
+    """Return a body with further results: of each result in turn, its derivative by each input."""
     slopes = [slope for result in body.results for slope in gradient(result, inputs)]
     return Body(body.fixed, body.columns, [*body.results, *slopes], body.code)
 
@@ -55,14 +55,14 @@ def gradient(result: Operand, inputs: Sequence[Traced]) -> list[Operand]:
 
 def active_nodes(results: Iterable[Node], inputs: Iterable[Traced]) -> list[Node]:
     """The nodes on which a result depends smoothly and which so depend on an input, both included, operands first."""
-    found, given = set(results), set(inputs)
-    waiting = list(found)
+    reached, given = set(results), set(inputs)
+    waiting = list(reached)
     while waiting:
-        fresh = {operand for _, operand in parents(waiting.pop())} - found
-        found |= fresh
+        fresh = {operand for _, operand in parents(waiting.pop())} - reached
+        reached |= fresh
         waiting.extend(fresh)
     active: dict[Node, None] = {}
-    for node in sorted(found, key=lambda one: one.number):
+    for node in sorted(reached, key=lambda node: node.number):
         if node in given or any(operand in active for _, operand in parents(node)):
             active[node] = None
     return list(active)

@@ -1,4 +1,7 @@
-"""A traced graph evaluated node by node with NumPy: for one point or a few, where machine code would not pay."""
+"""Evaluation of a traced graph node by node with NumPy, for a few points, where machine code would not pay.
+
+The rules of derivatives are those of `gradient`.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -25,7 +28,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 UNBOUNDED = {"mul", "div", "sqrt", TURN}
 """Operations whose derivative may be infinite."""
 
-Held = dict[int, Any]
+Values = dict[int, Any]
 """Values by numbers of nodes."""
 
 
@@ -41,20 +44,20 @@ class Interpreted:
     def run(self, fixed: Array, columns: Sequence[Array], results: Array, codes: Codes) -> None:
         """Evaluate points, see `body.Runnable`."""
         body, count = self._body, len(self._body.results)
-        held: Held = {node.number: value for node, value in zip(body.fixed, fixed, strict=True)}
-        held |= {node.number: column for node, column in zip(body.columns, columns, strict=True)}
+        values: Values = {node.number: value for node, value in zip(body.fixed, fixed, strict=True)}
+        values |= {node.number: column for node, column in zip(body.columns, columns, strict=True)}
         with np.errstate(all="ignore"):
             for node in self._lines:
-                held[node.number] = FUNCTIONS[node.operation](*(_value(held, o) for o in node.operands))
+                values[node.number] = FUNCTIONS[node.operation](*(_value(values, o) for o in node.operands))
             for row, result in zip(results[:count], body.results, strict=True):
-                row[:] = _value(held, result)
-            codes[:] = _value(held, body.code)
-            self._backward(held, results[count:].reshape(count, len(self._inputs), len(codes)))
+                row[:] = _value(values, result)
+            codes[:] = _value(values, body.code)
+            self._backward(values, results[count:].reshape(count, len(self._inputs), len(codes)))
 
-    def _backward(self, held: Held, found: Array) -> None:
-        """Slopes of all results at once, into `found` [results x inputs x points]."""
-        found[:] = 0.0
-        slopes = self._seeds(len(found[0, 0]) if found.size else 0)
+    def _backward(self, values: Values, gradients: Array) -> None:
+        """Pass slopes of all results back to the inputs at once, into `gradients` [results x inputs x points]."""
+        gradients[:] = 0.0
+        slopes = self._seeds(len(gradients[0, 0]) if gradients.size else 0)
         rows = {node.number: k for k, node in enumerate(self._inputs)}
         members = {node.number for node in self._active}
         for node in reversed(self._active):
@@ -62,12 +65,12 @@ class Interpreted:
             if slope is None:
                 continue
             if node.number in rows:
-                found[:, rows[node.number]] = slope
+                gradients[:, rows[node.number]] = slope
             operation, operands = rule(node)
-            given = [_value(held, operand) for operand in operands]
+            given = [_value(values, operand) for operand in operands]
             for place, operand in parents(node):
                 if operand.number in members:
-                    share = share_of(operation, given, held[node.number], place, slope)
+                    share = share_of(operation, given, values[node.number], place, slope)
                     if operation in UNBOUNDED:
                         share = np.where(slope == 0.0, 0.0, share)
                     slopes[operand.number] = slopes[operand.number] + share if operand.number in slopes else share
@@ -81,5 +84,5 @@ class Interpreted:
         return seeds
 
 
-def _value(held: Held, operand: Operand) -> Any:
-    return held[operand.number] if isinstance(operand, Node) else operand
+def _value(values: Values, operand: Operand) -> Any:
+    return values[operand.number] if isinstance(operand, Node) else operand

@@ -102,7 +102,7 @@ class Kernel:
 
 
 def program_columns(columns: Mapping[str, Array], varying: Sequence[str], turning: frozenset[str]) -> list[Array]:
-    """The varying parameters as a program takes them: contiguous, angles within what traced cosines take.
+    """Return the varying parameters as a program takes them: contiguous, angles within what traced cosines take.
 
     Args:
         columns: values by leaf path, SI [points].
@@ -114,7 +114,7 @@ def program_columns(columns: Mapping[str, Array], varying: Sequence[str], turnin
 
 
 def slab_kernel(machine: Machine, varying: Sequence[str], quantities: Sequence[str]) -> Kernel:
-    """The program for slabs of points of a machine; about 0.1 s unless one of the same form has been compiled.
+    """Return the program for slabs of points of a machine; 0.1 s unless one of its form has been compiled.
 
     Args:
         machine: its family, and all parameters that do not vary.
@@ -125,7 +125,7 @@ def slab_kernel(machine: Machine, varying: Sequence[str], quantities: Sequence[s
 
 
 def closes_inside(machine: Machine) -> bool:
-    """Whether a program for a machine can compute its joint coordinates itself."""
+    """Tell whether a program for a machine can compute its joint coordinates itself."""
     return machine.family.chains is not None and solver_of(task_of(machine), traced=True).traceable
 
 

@@ -51,13 +51,13 @@ class Program:
         self._call(_address(fixed), _address(starts), _address(rows), _address(codes), count)
 
     def _run_few(self, fixed: Array, columns: Sequence[Array], results: Array, codes: Codes) -> None:
-        """Fewer points than lanes: repeat the last one."""
+        """Evaluate fewer points than there are lanes, by repeating the last of them."""
         count = len(codes)
         if count:
             longer = [np.pad(column, (0, self._lanes - count), mode="edge") for column in columns]
-            found, all_codes = np.empty((len(results), self._lanes)), np.empty(self._lanes, dtype=np.int8)
-            self.run(fixed, longer, found, all_codes)
-            results[:], codes[:] = found[:, :count], all_codes[:count]
+            padded, all_codes = np.empty((len(results), self._lanes)), np.empty(self._lanes, dtype=np.int8)
+            self.run(fixed, longer, padded, all_codes)
+            results[:], codes[:] = padded[:, :count], all_codes[:count]
 
 
 def _address(array: npt.NDArray[Any]) -> int:
@@ -117,7 +117,7 @@ exit:
 
 
 def source(body: Body, lanes: int) -> str:
-    """A body as LLVM assembly; lanes are the points of one vector."""
+    """Write a body as LLVM assembly; lanes are the points of a vector."""
     numbers = type_of(Traced, lanes)
     before, inside = [], []
     for k, given in enumerate(body.fixed):
@@ -152,9 +152,9 @@ def _vector(operand: Operand, lanes: int) -> str:
 
 def _spread(node: Node, lanes: int) -> list[str]:
     """A fixed value in all lanes of a vector; code for those that no vector needs is dropped by LLVM."""
-    one, many, name = type_of(type(node), 1), type_of(type(node), lanes), f"%s{node.number}"
+    number, many, name = type_of(type(node), 1), type_of(type(node), lanes), f"%s{node.number}"
     return [
-        f"{name}.first = insertelement {many} poison, {one} %v{node.number}, i64 0",
+        f"{name}.first = insertelement {many} poison, {number} %v{node.number}, i64 0",
         f"{name} = shufflevector {many} {name}.first, {many} poison, <{lanes} x i32> zeroinitializer",
     ]
 
@@ -170,7 +170,7 @@ FUNCTIONS = {"abs": "fabs", "sqrt": "sqrt"}
 
 
 def line(node: Node, names: Sequence[str], lanes: int) -> str:
-    """The instruction of a node on its operands, by their names or constants, as vectors of so many points."""
+    """Write the instruction of a node on its operands (names or constants) for a vector of `lanes` points."""
     numbers, conditions = type_of(Traced, lanes), type_of(Condition, lanes)
     match node.operation:
         case "add" | "sub" | "mul" | "div":
@@ -190,13 +190,13 @@ def line(node: Node, names: Sequence[str], lanes: int) -> str:
 
 
 def _relaxed(node: Node) -> str:
-    """Nothing for a difference of two products, which would not vanish where both are equal if one were not rounded."""
+    """No fusion in a difference of two products: it must vanish where they are equal, so both must be rounded."""
     products = [isinstance(operand, Node) and operand.operation == "mul" for operand in node.operands]
     return "" if node.operation == "sub" and all(products) else f" {FUSIBLE}"
 
 
 def name_of(operand: Operand, lanes: int) -> str:
-    """The name of a node's value, or a constant as a vector of so many points."""
+    """Return the name of a node's value, or a constant for a vector of `lanes` points."""
     if isinstance(operand, Node):
         return f"%v{operand.number}"
     bits = f"0x{struct.unpack('<Q', struct.pack('<d', operand))[0]:016X}"
@@ -204,9 +204,9 @@ def name_of(operand: Operand, lanes: int) -> str:
 
 
 def type_of(kind: type[Node], lanes: int) -> str:
-    """The type of a value as a vector of so many points."""
-    one = "i1" if issubclass(kind, Condition) else "double"
-    return one if lanes == 1 else f"<{lanes} x {one}>"
+    """Return the type of a value for a vector of `lanes` points."""
+    number = "i1" if issubclass(kind, Condition) else "double"
+    return number if lanes == 1 else f"<{lanes} x {number}>"
 
 
 def _intrinsic(operation: str, lanes: int) -> str:
@@ -214,7 +214,7 @@ def _intrinsic(operation: str, lanes: int) -> str:
 
 
 def declarations(lanes: int) -> str:
-    """What the instructions call."""
+    """Declare the functions that the instructions call."""
     widths = [(operation, width) for operation in FUNCTIONS for width in sorted({1, lanes})]
     return "\n".join(
         f"declare {type_of(Traced, width)} {_intrinsic(operation, width)}({type_of(Traced, width)})"

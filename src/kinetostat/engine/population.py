@@ -1,4 +1,4 @@
-"""Many designs at many poses each, again and again: programs are compiled once and kept. Holds no formula."""
+"""Many designs at many poses each, evaluated repeatedly by programs compiled once. Holds no formula."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -43,8 +43,8 @@ class Population:
     def columns(self, start: int, stop: int) -> dict[str, Array]:
         """Values of each varying parameter at points `start` to `stop` - 1, SI."""
         design, pose = np.divmod(np.arange(start, stop), self.shape[1])
-        return {path: held[design] for path, held in self.designs.items()} | {
-            path: held[pose] for path, held in self.poses.items()
+        return {path: column[design] for path, column in self.designs.items()} | {
+            path: column[pose] for path, column in self.poses.items()
         }
 
 
@@ -65,7 +65,7 @@ class Answers:
 
 
 class Evaluator:
-    """Quantities of whole populations of a machine's designs, always in machine code."""
+    """Evaluates quantities of whole populations of a machine's designs, always in machine code."""
 
     def __init__(self, machine: Machine, paths: Sequence[str], quantities: Sequence[str]) -> None:
         """Compile.
@@ -86,7 +86,9 @@ class Evaluator:
 
 
 def differentiate(machine: Machine, population: Population, quantities: Sequence[str], by: Sequence[str]) -> Answers:
-    """Quantities of a few designs and their exact derivatives by parameters of the design; compiled at the first call.
+    """Compute quantities of a few designs and their exact derivatives by parameters of the design.
+
+    Programs are compiled at the first call.
 
     Args:
         machine: gives all parameters that do not vary.
@@ -94,9 +96,9 @@ def differentiate(machine: Machine, population: Population, quantities: Sequence
         quantities: names from `kinetostatics.quantities.QUANTITIES`.
         by: leaf paths of what to differentiate by.
     """
-    found = evaluate_gradient(machine, population, quantities, by, repeated=True)
-    slopes = found.gradients.reshape(len(quantities), len(by), *population.shape)
-    return _answers(population, quantities, found.values, found.status, slopes)
+    sloped = evaluate_gradient(machine, population, quantities, by, repeated=True)
+    slopes = sloped.gradients.reshape(len(quantities), len(by), *population.shape)
+    return _answers(population, quantities, sloped.values, sloped.status, slopes)
 
 
 def _answers(

@@ -1,4 +1,4 @@
-"""Traced scalars: run a formula once on them and its arithmetic is left behind as a graph. Compiles nothing.
+"""Traced scalars: a formula that runs once on them leaves its arithmetic behind as a graph. Nothing is compiled here.
 
 Equal expressions are one node, constants are folded, and signs move outward, so that what is left is what has to be
 computed. Every rewriting is exact in IEEE arithmetic, infinities and NaN included, up to the sign of a zero.
@@ -188,11 +188,11 @@ class Graph:
 
     def _node(self, kind: Callable[..., Any], operation: str, operands: tuple[Operand, ...]) -> Any:
         key = _key(operation, operands)
-        found = self._known.get(key)
-        if found is None:
+        node = self._known.get(key)
+        if node is None:
             fixed = all(isinstance(operand, float) or operand.fixed for operand in operands)
-            found = self._known[key] = kind(self, operation, operands, fixed, bounds_of(operation, operands))
-        return found
+            node = self._known[key] = kind(self, operation, operands, fixed, bounds_of(operation, operands))
+        return node
 
 
 @dataclass(frozen=True)
@@ -228,14 +228,14 @@ class Runnable(Protocol):
 
 def needed(results: Iterable[Operand]) -> list[Node]:
     """The nodes on which some results depend, in the order in which they were traced: operands first."""
-    found: set[Node] = set()
+    seen: set[Node] = set()
     waiting = list(results)
     while waiting:
         operand = waiting.pop()
-        if isinstance(operand, Node) and operand not in found:
-            found.add(operand)
+        if isinstance(operand, Node) and operand not in seen:
+            seen.add(operand)
             waiting.extend(operand.operands)
-    return sorted(found, key=lambda node: node.number)
+    return sorted(seen, key=lambda node: node.number)
 
 
 def _key(operation: str, operands: tuple[Operand, ...]) -> tuple[Any, ...]:
@@ -252,24 +252,24 @@ def bounds_of(operation: str, operands: tuple[Operand, ...]) -> Bounds | None:
     known = []
     for operand in operands:
         if not isinstance(operand, Condition):
-            bounds = _bounds(operand)
-            if bounds is None:
+            between = _bounds(operand)
+            if between is None:
                 return None
-            known.append(bounds)
+            known.append(between)
     match operation, known:
         case "add", [(low, high), (least, most)]:
-            found = low + least, high + most
+            bounds = low + least, high + most
         case "mul", [(low, high), (least, most)]:
-            found = low * least, high * most
+            bounds = low * least, high * most
         case "div", [(low, high), (least, most)]:
-            found = low / most, high / least
+            bounds = low / most, high / least
         case "where", [(low, high), (least, most)]:
-            found = min(low, least), max(high, most)
+            bounds = min(low, least), max(high, most)
         case "sqrt", [(low, high)]:
-            found = math.sqrt(low), math.sqrt(high)
+            bounds = math.sqrt(low), math.sqrt(high)
         case _:
             return None
-    return found if ORDINARY[0] < found[0] and found[1] < ORDINARY[1] else None
+    return bounds if ORDINARY[0] < bounds[0] and bounds[1] < ORDINARY[1] else None
 
 
 def _bounds(operand: Operand) -> Bounds | None:

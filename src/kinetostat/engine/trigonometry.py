@@ -31,7 +31,7 @@ COSINE = (
 
 
 def cos_and_sin(angle: Scalar) -> tuple[Scalar, Scalar]:
-    """Cosine and sine of an angle (rad, at most `LARGEST_ANGLE`), to two units in the last place.
+    """Return cosine and sine of an angle (rad, at most `LARGEST_ANGLE`), to two units in the last place.
 
     Take off the nearest number of quarter turns q, use the series for the rest r, and turn back by q modulo 4.
     """

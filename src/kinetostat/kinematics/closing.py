@@ -27,12 +27,12 @@ POINT, ANGLES = ("x", "y", "z"), ("roll", "pitch", "yaw")
 
 
 def clearance(closure: Closure) -> Scalar:
-    """How far the leg is from its nearest limit, m; negative where it cannot close."""
+    """Return how far the leg is from its nearest limit, m; negative where it cannot close."""
     return smaller(closure.longest - closure.span, closure.span - closure.shortest)
 
 
 def within_reach(configuration: Configuration) -> Scalar:
-    """Whether every leg closes."""
+    """Tell whether every leg closes."""
     result: Scalar = True
     for closure in configuration.closures:
         result = (clearance(closure) >= 0.0) & result
@@ -40,7 +40,7 @@ def within_reach(configuration: Configuration) -> Scalar:
 
 
 def why_out_of_reach(configuration: Configuration) -> str:
-    """One sentence for each leg that does not close, with its figures in m and the way out."""
+    """Say which legs do not close, a sentence each, with the lengths in m and what to change."""
     sentences = []
     for closure in configuration.closures:
         if clearance(closure) >= 0.0:
@@ -56,7 +56,7 @@ def why_out_of_reach(configuration: Configuration) -> str:
 
 
 def platform_placement(chains: Chains) -> Displacement:
-    """Placement of the platform at the pose; coordinates that the pose does not give are those of the home pose."""
+    """Place the platform at the pose; coordinates that the pose does not give are those of the home pose."""
     given, home = chains.pose, chains.home.translation
     roll, pitch, yaw = (given.get(name, 0.0) for name in ANGLES)
     turn = rotation_z(cos(yaw), sin(yaw)) @ rotation_y(cos(pitch), sin(pitch)) @ rotation_x(cos(roll), sin(roll))
@@ -151,7 +151,7 @@ def _sides(turn: Rotation) -> dict[str, tuple[Scalar, Scalar]]:
 
 
 def squared_distance(start: Displacement, end: Displacement, length: Scalar) -> Scalar:
-    """Square of how far two placements differ, rad and units of the length; 0 only where they are the same."""
+    """Square how far two placements differ, rad and units of the length; 0 only where they are the same."""
     shift = (end.translation - start.translation) * (1.0 / length)
     turns = ((start.rotation.x, end.rotation.x), (start.rotation.y, end.rotation.y), (start.rotation.z, end.rotation.z))
     square: Scalar = shift.dot(shift)
@@ -196,7 +196,7 @@ class Gaps:
 
 
 def gaps_at(chains: Chains, coordinates: Array, goal: Array) -> Gaps:
-    """The closing equations and their rates for arrays of poses.
+    """Evaluate the closing equations and their rates at arrays of poses.
 
     Rates come from the joints' screws instead of differences. Angles of the pose are compared as angles, not by a sine
     as in `closing_equations`: on the way from the home pose they may be far apart, and a sine vanishes half a turn away
@@ -219,7 +219,7 @@ def gaps_at(chains: Chains, coordinates: Array, goal: Array) -> Gaps:
 
 
 def units_of(chains: Chains, length: Array) -> Array:
-    """The unit of each joint coordinate: 1 rad, or the machine's length of a slide, m [n x coordinates]."""
+    """Return the unit of each joint coordinate: 1 rad, or the machine's length of a slide, m [n x coordinates]."""
     slides = np.array([step.element.mover.point is None for steps in chains.legs for step in steps if step.moves])
     return np.where(slides, length[:, None], 1.0)
 
@@ -238,7 +238,7 @@ def _platform_twists(ends: Sequence[LegEnd], count: int) -> list[Array]:
 
 
 def stacked(scalars: Sequence[Scalar], count: int) -> Array:
-    """Scalars as columns [n x scalars]."""
+    """Stack scalars as columns [n x scalars]."""
     if not scalars:
         return np.zeros((count, 0))
     return np.stack([np.broadcast_to(np.asarray(s, dtype=float), (count,)) for s in scalars], axis=1)
@@ -261,7 +261,7 @@ def _pose_gaps(end: Displacement, twists: Array, chains: Chains, goal: Array, le
 
 
 def pose_of(end: Displacement) -> dict[str, Array]:
-    """Pose coordinates of a placement: P (m), and the angles of Q = Rz(yaw) Ry(pitch) Rx(roll), rad; arrays [n]."""
+    """Pose coordinates of a placement: P (m) and the angles of Q = Rz(yaw) Ry(pitch) Rx(roll) (rad), arrays [n]."""
     angles = {name: np.arctan2(sine, cosine) for name, (cosine, sine) in _sides(end.rotation).items()}
     return {name: np.asarray(getattr(end.translation, name)) for name in POINT} | angles
 

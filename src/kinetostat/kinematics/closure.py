@@ -86,7 +86,7 @@ class Task:
 
 
 def solve_joints(machine: Machine) -> Joints:
-    """The joint coordinates of a machine at its pose, reached from the home pose without leaving its branch.
+    """Solve for the joint coordinates of a machine at its pose, reached from the home pose without leaving its branch.
 
     In closed form where every leg has one, otherwise by Newton's method along the way from the home pose.
     """
@@ -95,7 +95,7 @@ def solve_joints(machine: Machine) -> Joints:
 
 
 def task_of(machine: Machine) -> Task:
-    """The legs and poses of a machine written leg by leg, whose numbers are floats or arrays."""
+    """Collect legs and poses of a machine written leg by leg, whose numbers are floats or arrays."""
     chains = machine.chains()
     given = np.stack(np.broadcast_arrays(*map(np.asarray, chains.pose.values())), axis=-1).astype(float)
     goal = np.atleast_2d(given)
@@ -115,7 +115,7 @@ def _numbers(table: object) -> list[Scalar]:
 
 
 def solver_of(task: Task, traced: bool = False) -> "ClosedForms | Newton":
-    """Choose how joint coordinates are found: the one place where that is decided.
+    """Choose how joint coordinates are solved for: the one place where that is decided.
 
     Args:
         task: the legs, and the pose of the machine.
@@ -201,7 +201,7 @@ def _angle(amount: Scalar | Turn) -> Scalar:
 
 
 def joints_on_the_way(chains: Chains, goal: Array) -> Array:
-    """Coordinates [n x coordinates] that come nearest to closing the legs at poses [n x given].
+    """Return the coordinates [n x coordinates] that come nearest to closing the legs at poses [n x given].
 
     The pose moves from the home pose to its goal in steps short enough to stay on the branch of the home pose, with a
     few iterations at each, and is refined at the goal alone.
@@ -278,7 +278,7 @@ def _undetermined(rates: Array, platform_rates: Array) -> npt.NDArray[np.bool_]:
 
 
 def nearest_pose(machine: Machine) -> dict[str, float]:
-    """All coordinates of an admissible pose near one that the legs cannot take, m and rad: what a refusal offers.
+    """Return all coordinates (m, rad) of an admissible pose near a pose that the legs cannot take.
 
     Distance is that of the pose coordinates given, angles times the machine's characteristic length. It is found by
     least squares in the joint coordinates, from where Newton's method came to, on the branch of the home pose.

@@ -114,14 +114,14 @@ def _checks(machine: Machine, rows: Sequence[Limit], parts: Parts, length: Scala
 def travels(chains: Chains, joints: Sequence[Scalar]) -> list[tuple[str, Scalar]]:
     """Return the actuated slides whose travel counts from the home pose, each with its coordinate (m), leg by leg."""
     coordinates = iter(joints)
-    checks = []
+    moved = []
     for steps in chains.legs:
         counted = driven_slides([step.element for step in steps])
         for i, step in enumerate(steps):
             amount = next(coordinates) if step.moves else None
             if i in counted:
-                checks.append((step.element.part, amount))
-    return checks
+                moved.append((step.element.part, amount))
+    return moved
 
 
 def why_beyond(checks: Sequence[Check]) -> str:

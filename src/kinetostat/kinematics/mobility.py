@@ -1,4 +1,4 @@
-"""Mobility and singularities from the screws: what can move, what is constrained twice, what is lost or gained here.
+"""Mobility and singularities from the screws: which motions are free, constrained twice, lost or gained at a pose.
 
 Freedoms of the platform are those that all legs leave it with rigid links and free actuators.
 
@@ -75,31 +75,31 @@ class Mobility:
 
 
 def mobility(here: Configuration, nearby: Sequence[Configuration], reference: Vector) -> Mobility:
-    """Mobility of a machine and kind of a pose.
+    """Return the mobility of a machine and the kind of its pose.
 
     Args:
         here: the machine at the pose.
         nearby: at some poses around it, to tell what holds in general from what is special here.
         reference: point of reference of twists, base frame, m.
     """
-    found = freedoms(here, reference)
-    general = [freedoms(one, one.platform.translation) for one in nearby] or [found]
-    full_cycle = min(one.platform for one in general)
-    usual = [max(one.legs[i] for one in general) for i in range(len(here.legs))]
-    lost = tuple(leg.name for leg, has, may in zip(here.legs, found.legs, usual, strict=True) if has < may)
+    ranks = freedoms(here, reference)
+    general = [freedoms(pose, pose.platform.translation) for pose in nearby] or [ranks]
+    full_cycle = min(pose.platform for pose in general)
+    usual = [max(pose.legs[i] for pose in general) for i in range(len(here.legs))]
+    lost = tuple(leg.name for leg, has, may in zip(here.legs, ranks.legs, usual, strict=True) if has < may)
     constraints, holding = _platform_wrenches(here, reference)
     kind = Kind.REGULAR
     twists: tuple[tuple[float, ...], ...] = ()
-    if found.platform > full_cycle:
-        kind, twists = Kind.CONSTRAINT, _free_twists(constraints, found.platform, float(here.length))
-    elif found.locked:
-        kind, twists = Kind.ACTUATION, _free_twists(holding, found.locked, float(here.length))
+    if ranks.platform > full_cycle:
+        kind, twists = Kind.CONSTRAINT, _free_twists(constraints, ranks.platform, float(here.length))
+    elif ranks.locked:
+        kind, twists = Kind.ACTUATION, _free_twists(holding, ranks.locked, float(here.length))
     elif lost:
         kind = Kind.LEG
     away = _away(here)
     legs = [_least(_leg_screws(here, leg, reference), rank + away) for leg, rank in zip(here.legs, usual, strict=True)]
     actuators = sum(len(_drives(leg)) for leg in here.legs)
-    return Mobility(found, full_cycle, actuators, kind, lost, twists, min(legs, default=1.0), _least(holding, SPATIAL))
+    return Mobility(ranks, full_cycle, actuators, kind, lost, twists, min(legs, default=1.0), _least(holding, SPATIAL))
 
 
 def _away(configuration: Configuration) -> int:
@@ -108,7 +108,7 @@ def _away(configuration: Configuration) -> int:
 
 
 def freedoms(configuration: Configuration, reference: Vector) -> Freedoms:
-    """Ranks of a configuration; `reference` in the base frame, m."""
+    """Count the freedoms of a configuration; `reference` in the base frame, m."""
     away = _away(configuration)
     legs = [_rank(_leg_screws(configuration, leg, reference)) - away for leg in configuration.legs]
     constraints, holding = _platform_wrenches(configuration, reference)
@@ -123,7 +123,7 @@ def freedoms(configuration: Configuration, reference: Vector) -> Freedoms:
 
 
 def task_coordinates(configuration: Configuration, reference: Vector) -> tuple[int, ...]:
-    """Coordinates that give the platform's freedoms, actuators free: as few as do, translations before rotations.
+    """Choose coordinates that give the platform's freedoms, actuators free: the fewest, translations first.
 
     Args:
         configuration: at the pose.
@@ -176,8 +176,8 @@ def _platform_wrenches(configuration: Configuration, reference: Vector) -> tuple
     absent = configuration.plane.absent if configuration.plane else ()
     guide = []
     if configuration.plane:
-        held = _unit_screws([joint.twist(reference) for joint in configuration.plane.freedoms], configuration)
-        guide = [_reciprocal(held)]
+        plane = _unit_screws([joint.twist(reference) for joint in configuration.plane.freedoms], configuration)
+        guide = [_reciprocal(plane)]
     constraints, holding = list(guide), list(guide)
     for leg in configuration.legs:
         constraints.append(_reciprocal(_leg_screws(configuration, leg, reference)))
@@ -210,9 +210,9 @@ def _free_twists(wrenches: Array, count: int, length: float) -> tuple[tuple[floa
     """The twists that no wrench resists, each of 1 rad, or of 1 m where it does not turn."""
     left, _, _ = np.linalg.svd(wrenches)
     twists = left[:, SPATIAL - count :] * np.repeat([1.0, length], 3)[:, None]
-    found = []
+    scaled = []
     for twist in twists.T:
         turning, sliding = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])
         size = turning if turning * length > DEPENDENT * sliding else sliding
-        found.append(tuple(float(c) for c in np.where(np.abs(twist) < DEPENDENT * size, 0.0, twist) / size))
-    return tuple(found)
+        scaled.append(tuple(float(c) for c in np.where(np.abs(twist) < DEPENDENT * size, 0.0, twist) / size))
+    return tuple(scaled)

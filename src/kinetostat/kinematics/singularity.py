@@ -1,4 +1,4 @@
-"""One pose from its screws: which leg locks up, which twist the locked machine leaves free, how actuators move it.
+"""Singularities and the Jacobian of a pose from its screws: locked legs, free twists, motion by the actuators.
 
 Source: theory (3) and sections 2 and 8; screws are at one reference point, in base axes.
 """
@@ -16,14 +16,14 @@ Array = npt.NDArray[np.float64]
 
 
 def columns(screws: Sequence[Screw], rotational_scale: float, translational_scale: float) -> Array:
-    """Screws as columns [6 x n], scaled so that rotations and translations compare."""
+    """Return screws as columns [6 x n], scaled so that rotations and translations compare."""
     rows = [screw.components() for screw in screws]
     scale = np.repeat([rotational_scale, translational_scale], 3)
     return np.array(rows, dtype=float).T * scale[:, None]
 
 
 def conditioning(legs: Sequence[LegScrews], length: float, guide: Sequence[Wrench] = ()) -> Array:
-    """Singular values of W with moments divided by `length` (m), decreasing: their ratio is dimensionless.
+    """Return the singular values of W with moments divided by `length` (m), decreasing: their ratio is dimensionless.
 
     Args:
         legs: at one reference point, base axes.
@@ -38,7 +38,7 @@ def conditioning(legs: Sequence[LegScrews], length: float, guide: Sequence[Wrenc
 
 
 def independent(screws: Sequence[Screw], translational_scale: float, tolerance: float) -> int:
-    """How many of the screws are independent, each taken at unit size (rank at a relative `tolerance`)."""
+    """Count how many of the screws are independent, each taken at unit size (rank at a relative `tolerance`)."""
     if not screws:
         return 0
     matrix = columns(screws, 1.0, translational_scale)
@@ -48,7 +48,7 @@ def independent(screws: Sequence[Screw], translational_scale: float, tolerance: 
 
 
 def free_twist(legs: Sequence[LegScrews], length: float) -> list[float]:
-    """The twist that the wrenches of all legs resist least: at a singularity, the one they leave free.
+    """Return the twist that the wrenches of all legs resist least: at a singularity, the twist they leave free.
 
     Returns:
         [omega; v] at P in base axes: of 1 rad, or of 1 m where it is a pure translation.
@@ -62,7 +62,7 @@ def free_twist(legs: Sequence[LegScrews], length: float) -> list[float]:
 
 
 def why_singular(names: Sequence[str], legs: Sequence[LegScrews], length: float, tolerance: float) -> str:
-    """One sentence per cause.
+    """Name the causes of a singularity, a sentence each.
 
     Args:
         names: of the legs.
@@ -81,7 +81,7 @@ def why_singular(names: Sequence[str], legs: Sequence[LegScrews], length: float,
 
 
 def describe(screw: Sequence[float], units: tuple[str, str]) -> str:
-    """A screw in words: its components beyond rounding, with their units (rotational, translational)."""
+    """Put a screw in words: its components beyond round-off, with their units (rotational, translational)."""
     size = max(abs(c) for c in screw)
     shown = [
         f"{name} {value:+.4g} {units[i // 3]}"
@@ -94,7 +94,7 @@ def describe(screw: Sequence[float], units: tuple[str, str]) -> str:
 def actuator_jacobian(
     legs: Sequence[LegScrews], springs: Sequence[Sequence[Spring]], length: float, guide: Sequence[Wrench] = ()
 ) -> Array:
-    """Platform twist per unit rate of each actuator, W^T t = (J_e^T W)^T rates with rates of actuators alone.
+    """Return the platform's twist per unit rate of actuators, W^T t = (J_e^T W)^T rates with rates of actuators alone.
 
     Where legs impose constraints twice, the equations agree for rates that the machine can have.
 

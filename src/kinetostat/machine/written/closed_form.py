@@ -1,4 +1,4 @@
-"""Legs whose joint coordinates follow in closed form from where the platform is: three parallel revolutes, and a slide.
+"""Closed-form joint coordinates of legs with three parallel revolutes and at most one slide along them.
 
 Which legs these are is seen from their axes at the home pose. All other legs are closed by Newton's method
 (`kinematics.closure`), and so are these where the platform turns out of the leg's plane.
@@ -35,7 +35,7 @@ class ParallelAxes:
     bend: float
 
     def amounts(self, steps: Sequence[Step], motion: Displacement) -> tuple[list[Scalar | Turn], Closure]:
-        """Joint coordinates that displace the platform end by `motion` as far as the leg can, on the home branch.
+        """Find joint coordinates that displace the platform end by `motion` as far as the leg can, on the home branch.
 
         Args:
             steps: the leg at the home pose.
@@ -51,11 +51,11 @@ class ParallelAxes:
         goal = motion.apply(last)
         lower, upper, span = (_across(v, axis) for v in (middle - first, last - middle, goal - first))
         bent, closure = self._triangle(axis, lower, upper, span)
-        first_turn = _turn(axis, lower, bent)
+        lower_turn = _turn(axis, lower, bent)
         both = _turn(axis, upper, span - bent)
         whole = _turn(axis, lower, motion.rotation.apply(lower))
         amounts: list[Scalar | Turn] = [0.0] * len(movers)
-        turns = (first_turn, _between(first_turn, both), _between(both, whole))
+        turns = (lower_turn, _between(lower_turn, both), _between(both, whole))
         for i, turn in zip(self.revolutes, turns, strict=True):
             amounts[i] = Turn(turn.cosine, self.signs[i] * turn.sine)
         if self.slide is not None:
@@ -99,7 +99,7 @@ def _between(first: Turn, whole: Turn) -> Turn:
 
 
 def closed_form(name: str, steps: Sequence[Step]) -> ParallelAxes | None:
-    """The closed form of a leg at the home pose, if it has one; its numbers must be floats."""
+    """Recognise the closed form of a leg at the home pose, if it has one; its numbers must be floats."""
     movers = [step.element.mover for step in steps if step.moves and hasattr(step.element, "mover")]
     turning = [i for i, joint in enumerate(movers) if joint.point is not None]
     sliding = [i for i, joint in enumerate(movers) if joint.point is None]
@@ -114,6 +114,6 @@ def closed_form(name: str, steps: Sequence[Step]) -> ParallelAxes | None:
     bend = float(np.cross(upper, lower) @ axis)
     if min(np.linalg.norm(lower), np.linalg.norm(upper)) < NO_LINK or bend == 0.0:
         return None
-    signs = tuple(float(np.sign(first_turn @ axis)) for first_turn in axes)
+    signs = tuple(float(np.sign(direction @ axis)) for direction in axes)
     first, middle, last = turning
     return ParallelAxes(name, (first, middle, last), next(iter(sliding), None), signs, float(np.sign(bend)))
