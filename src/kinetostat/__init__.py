@@ -22,7 +22,7 @@ _HOMES = {
     "guidelines": "kinetostat.studies.guidelines.guidelines",
     "compare": "kinetostat.studies.comparison.designs",
     "load_problem": "kinetostat.studies.optimisation.problem",
-    "optimize": "kinetostat.studies.optimisation.result",
+    "optimize": "kinetostat.studies.optimisation.search",
     "validate": "kinetostat.validation.comparison",
     "reproduce": "kinetostat.studies.paper.reproduction",
     "machine_picture": "kinetostat.views.picture",

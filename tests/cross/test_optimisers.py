@@ -7,9 +7,8 @@ import pytest
 from pymoo.indicators.hv import HV
 
 from kinetostat.studies.optimisation.assessment import Assessor, Outcome
-from kinetostat.studies.optimisation.front import front_of, knee_of
 from kinetostat.studies.optimisation.genetic import Genetic
-from kinetostat.studies.optimisation.log import Log, record_of
+from kinetostat.studies.optimisation.log import Log, front_of, knee_of, record_of
 from kinetostat.studies.optimisation.search import search
 from kinetostat.studies.optimisation.slopes import Surveyor
 from studies import FEW, best, problem, solved, written

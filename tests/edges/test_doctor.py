@@ -15,7 +15,7 @@ from kinetostat.commands.common import DONE, NO_ANSWER
 from kinetostat.studies.diagnosis import diagnosis, self_test, software
 from kinetostat.studies.diagnosis.diagnosis import Check, State
 from kinetostat.studies.paper import printed
-from kinetostat.studies.paper.tables import table_3
+from kinetostat.studies.paper.comparison import table_3
 from kinetostat.views.diagnosis_tables import print_checks, print_verdict
 
 

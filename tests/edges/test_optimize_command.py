@@ -14,7 +14,7 @@ from kinetostat.machine.loading import load
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.optimisation.assessment import Assessor, Verdict
-from kinetostat.studies.optimisation.front import front_of
+from kinetostat.studies.optimisation.log import front_of
 from kinetostat.studies.optimisation.search import search, search_into
 from kinetostat.studies.study_folder import study_folder
 from studies import PAPER, SMALL, best, problem, written
@@ -95,7 +95,7 @@ import os, signal, sys
 from pathlib import Path
 from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.problem import load_problem
-from kinetostat.studies.optimisation.front import front_of
+from kinetostat.studies.optimisation.log import front_of
 from kinetostat.studies.optimisation.search import search_into
 from kinetostat.studies.result_file import RowFile
 from kinetostat.studies.study_folder import StudyFolder

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.optimisation.aggregate import parse_aggregate
+from kinetostat.studies.optimisation.terms import parse_aggregate
 
 VALUES = np.random.default_rng(0).normal(size=(40, 9))
 ALL = np.ones(VALUES.shape, dtype=bool)

@@ -70,8 +70,7 @@ def _search(options: argparse.Namespace, least: int = 1) -> "Result":
     from kinetostat.spec.document import exists
     from kinetostat.spec.errors import InputError
     from kinetostat.studies.optimisation.problem import load_problem
-    from kinetostat.studies.optimisation.result import optimize
-    from kinetostat.studies.optimisation.search import stored_problem
+    from kinetostat.studies.optimisation.search import optimize, stored_problem
     from kinetostat.studies.study_folder import holds_study
 
     folder = Path(options.study)

@@ -112,7 +112,7 @@ def _report(options: argparse.Namespace) -> int:
 
 def _search(problem: "Problem", folder: Path | None) -> "Result":
     """Search the best design of a study; continue in its folder if it has one."""
-    from kinetostat.studies.optimisation.result import optimize
+    from kinetostat.studies.optimisation.search import optimize
 
     with search_bar("searching") as update:
         return optimize(

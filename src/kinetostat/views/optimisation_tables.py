@@ -13,7 +13,7 @@ from rich.text import Text
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.result_data import message
-from kinetostat.studies.optimisation.ridges import told
+from kinetostat.studies.optimisation.ridges import ridge_sentences
 from kinetostat.studies.optimisation.robustness import Robustness
 from kinetostat.views.display import spoken
 from kinetostat.views.tables import number, numeric_table
@@ -22,7 +22,7 @@ from kinetostat.views.tables import number, numeric_table
 def print_study(console: Console, problem: Problem) -> None:
     """Print the question of a study: poses, objectives, constraints and variables."""
     console.print(Text.assemble((problem.study.name, "bold"), f"  {problem.machine.name}"))
-    console.print(f"Evaluated at {problem.poses.told}; method {problem.method}.", highlight=False)
+    console.print(f"Evaluated at {problem.poses.description}; method {problem.method}.", highlight=False)
     for aim in aims(problem):
         console.print(aim, highlight=False)
     console.print(bounds_table(problem))
@@ -70,7 +70,8 @@ def print_result(console: Console, result: Result) -> None:
     """Print all tables of a solved study."""
     problem = result.problem
     console.print(f"{problem.study.name}: {problem.machine.name}", style="bold", highlight=False)
-    console.print(f"{message(result)} Evaluated at {problem.poses.told}; method {problem.method}.", highlight=False)
+    evaluated = f"Evaluated at {problem.poses.description}; method {problem.method}."
+    console.print(f"{message(result)} {evaluated}", highlight=False)
     if len(problem.objectives) > 1:
         console.print(front_table(result))
     console.print(worth_table(result))
@@ -188,7 +189,7 @@ def remarks(result: Result) -> Iterator[str]:
         name = term.name.removeprefix("compliance_")
         yield f"The best design gives up {name}: {term.gain:.2g} of its stiffness is left; add a constraint to keep it."
     if len(result.problem.objectives) == 1:
-        yield from told(result.ridges, result.problem) or (
+        yield from ridge_sentences(result.ridges, result.problem) or (
             [result.no_ridges] if result.no_ridges else ["There is no ridge: the optimum is a single design."]
         )
 

@@ -16,8 +16,8 @@ SIMPLEST = "zhang-gosselin-2002"
 @cache
 def bundled_studies() -> dict[str, str]:
     """The text of every bundled study file by name, in alphabetical order."""
-    found = resources.files("kinetostat.studies.bundled").iterdir()
-    files = sorted((f for f in found if f.name.endswith(SUFFIX)), key=lambda f: f.name)
+    entries = resources.files("kinetostat.studies.bundled").iterdir()
+    files = sorted((f for f in entries if f.name.endswith(SUFFIX)), key=lambda f: f.name)
     return {f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files}
 
 

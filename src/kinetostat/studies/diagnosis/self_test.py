@@ -20,12 +20,11 @@ from kinetostat.studies.analysis import analyze
 from kinetostat.studies.diagnosis.diagnosis import Check, UnsoundError, reinstall, tried
 from kinetostat.studies.grid.grid import evaluate_grid
 from kinetostat.studies.optimisation.assessment import Assessor
+from kinetostat.studies.optimisation.log import best_feasible
 from kinetostat.studies.optimisation.problem import load_problem
-from kinetostat.studies.optimisation.result import best_feasible
 from kinetostat.studies.optimisation.search import search
 from kinetostat.studies.paper import printed
-from kinetostat.studies.paper.comparison import Verdict
-from kinetostat.studies.paper.tables import table_3, table_4
+from kinetostat.studies.paper.comparison import Verdict, table_3, table_4
 from kinetostat.studies.storage import write_dataset
 from kinetostat.tolerances import EQUAL_ROUTES
 

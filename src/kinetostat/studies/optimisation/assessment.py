@@ -1,4 +1,4 @@
-"""How good designs are: all poses, and all that manufacture makes of each, in one call of the engine.
+"""How good designs are, at all poses and with all manufacturing deviations, in one call of the engine.
 
 Designs that cannot be judged are not errors: their verdict says why, and their violation how far they are from it.
 """
@@ -6,6 +6,7 @@ Designs that cannot be judged are not errors: their verdict says why, and their 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -14,19 +15,23 @@ from kinetostat.engine.points import Array
 from kinetostat.engine.population import Evaluator, Population
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.tolerance import deviations
 
 AT_ONCE = 1 << 20
 """Points that are evaluated before they are summed up: a few quantities of them fit in a hundred megabytes."""
 
 MET = 1e-9
-"""Relative excess up to which a constraint counts as met: whoever ends at its bound is not refused by rounding."""
+"""Relative excess up to which a constraint counts as met, so that a design at its bound is not refused by round-off."""
+
+MOST_CORNERS = 12
+"""Tolerances of which all combinations of ends are tried: 4096 machines."""
+SIGMAS = 3.0
+"""Standard deviations of a normal distribution within the tolerance; what lies beyond is drawn at its end."""
 
 Codes = npt.NDArray[np.int8]
 
 
 class Verdict(IntEnum):
-    """What became of a design; up to `NOT_CONVERGED` as the `Status` of the poses that it lacks."""
+    """Why a design is or is not feasible; up to `NOT_CONVERGED` as the `Status` of the poses that it lacks."""
 
     FEASIBLE = 0
     OUT_OF_REACH = 1
@@ -38,7 +43,7 @@ class Verdict(IntEnum):
 
     @property
     def phrase(self) -> str:
-        """For people."""
+        """The verdict in words."""
         return {5: "a constraint is violated", 6: "an objective is infinite"}.get(
             self.value, self.name.lower().replace("_", " ")
         )
@@ -46,10 +51,10 @@ class Verdict(IntEnum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What designs are worth.
+    """Objectives, constraints and verdicts of designs.
 
     Attributes:
-        objectives: SI, as people count them [designs x objectives]; NaN where a design cannot be judged.
+        objectives: SI, with the sign of the quantity [designs x objectives]; NaN where a design cannot be judged.
         constraints: values of their terms, SI [designs x constraints].
         violation: 0 for a feasible design; below the number of constraints where some are violated, more beyond
             [designs].
@@ -112,8 +117,8 @@ class Assessor:
         pairs = [(o.term, o.sign) for o in problem.objectives] + [(c.term, c.sign) for c in problem.constraints]
         numbers = [self._over_made(term.values(answers.values, there), each, sign > 0) for term, sign in pairs]
         status = answers.status.reshape(-1, each * answers.status.shape[1])
-        found, count = np.array(numbers).T.reshape(len(status), len(pairs)), len(problem.objectives)
-        return _verdicts(problem, found[:, :count], found[:, count:], status)
+        numbers_of_designs, count = np.array(numbers).T.reshape(len(status), len(pairs)), len(problem.objectives)
+        return _verdicts(problem, numbers_of_designs[:, :count], numbers_of_designs[:, count:], status)
 
     def _over_made(self, values: Array, each: int, high_is_bad: bool) -> Array:
         if each == 1 or self.problem.robust is None:
@@ -126,8 +131,8 @@ def _verdicts(problem: Problem, objectives: Array, constraints: Array, status: C
     """From numbers and the status of all poses [designs x poses] to outcomes."""
     most = len(problem.constraints)
     excess = np.zeros(constraints.shape)
-    for k, one in enumerate(problem.constraints):
-        over = one.sign * (constraints[:, k] - one.bound) / one.scale
+    for k, constraint in enumerate(problem.constraints):
+        over = constraint.sign * (constraints[:, k] - constraint.bound) / constraint.scale
         over = np.where(over <= MET, 0.0, over)
         with np.errstate(invalid="ignore"):
             excess[:, k] = np.where(np.isfinite(over), over / (1.0 + over), 1.0)
@@ -149,3 +154,30 @@ def joined(parts: Sequence[Outcome]) -> Outcome:
     if len(parts) == 1:
         return parts[0]
     return Outcome(*(np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])))
+
+
+def deviations(problem: Problem, samples: int, stream: int) -> dict[str, Array]:
+    """Return deviations of as many machines as there are samples, SI, by variable [samples]; the first one has none.
+
+    Args:
+        problem: with tolerances and the seed.
+        samples: how many machines, the nominal one included.
+        stream: of random numbers; streams are independent.
+    """
+    source = np.random.default_rng([problem.study.optimizer.seed, 0, 1 + stream])
+    tolerated = [variable for variable in problem.space.variables if variable.tolerance]
+    if problem.study.robustness.distribution == "normal":
+        drawn = np.clip(source.standard_normal((samples, len(tolerated))) / SIGMAS, -1.0, 1.0)
+    else:
+        drawn = source.uniform(-1.0, 1.0, (samples, len(tolerated)))
+    drawn[0] = 0.0
+    return {variable.name: variable.tolerance * row for variable, row in zip(tolerated, drawn.T, strict=True)}
+
+
+def corners(problem: Problem) -> dict[str, Array]:
+    """Return all combinations of the ends of the tolerances, SI, by variable; empty if there are too many."""
+    tolerated = [variable for variable in problem.space.variables if variable.tolerance]
+    if not 0 < len(tolerated) <= MOST_CORNERS:
+        return {}
+    ends = np.array(list(product((-1.0, 1.0), repeat=len(tolerated))))
+    return {variable.name: variable.tolerance * row for variable, row in zip(tolerated, ends.T, strict=True)}

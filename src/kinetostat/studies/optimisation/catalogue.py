@@ -10,9 +10,8 @@ from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.renamed import current_name
 from kinetostat.spec.study import TermTable
 from kinetostat.studies.grid.quantities import refuse_absent
-from kinetostat.studies.optimisation.aggregate import parse_aggregate
 from kinetostat.studies.optimisation.poses import PoseSet
-from kinetostat.studies.optimisation.terms import PoseTerm, StrokeTerm, Term, VolumeTerm
+from kinetostat.studies.optimisation.terms import PoseTerm, StrokeTerm, Term, VolumeTerm, parse_aggregate
 
 SUMS = {"compliance_sum": "compliance", "stiffness_sum": "stiffness"}
 """Weighted sums of the diagonal of C (eq. 40) and of K (eq. 39)."""
@@ -30,8 +29,10 @@ AXES = "xyz"
 def known_terms(machine: Machine) -> list[str]:
     """Names of all terms that a machine of this kind may be asked for."""
     there = machine.family.component_names
-    own = [name for name, q in QUANTITIES.items() if all(part in there for part in q.components) and name != "aspect"]
-    return [*SUMS, *ALONG, STROKE, VOLUME, *own]
+    of_poses = [
+        name for name, q in QUANTITIES.items() if all(part in there for part in q.components) and name != "aspect"
+    ]
+    return [*SUMS, *ALONG, STROKE, VOLUME, *of_poses]
 
 
 def more_is_better(name: str) -> bool:
@@ -81,7 +82,7 @@ def _known(machine: Machine, name: str, where: str) -> str:
     entries = [entry for entry in known if entry in QUANTITIES and QUANTITIES[entry].components]
     if name in known or difflib.get_close_matches(name, known, 1):
         return choice(name, known, where)
-    return choice(name, [*(one for one in known if one not in entries), entries[0], entries[-1]], where)
+    return choice(name, [*(term for term in known if term not in entries), entries[0], entries[-1]], where)
 
 
 def _volume(poses: PoseSet, where: str) -> Term:
@@ -111,7 +112,7 @@ def _direction_weights(
     if direction is None or size == 0.0:
         raise InputError(f"{where} needs a direction, e.g. direction = [0, 0, 1].")
     rotation = "r" if first == 0 else ""
-    found: dict[str, float] = {}
+    weights: dict[str, float] = {}
     for i in range(3):
         for j in range(i, 3):
             weight = direction[i] * direction[j] / size**2 * (1.0 if i == j else 2.0)
@@ -119,5 +120,5 @@ def _direction_weights(
             if weight and not all(part in machine.family.component_names for part in parts):
                 raise InputError(f"{where}.direction leaves the plane of {machine.name}, which has no {parts[-1]}.")
             if weight:
-                found["_".join([matrix, *parts])] = weight
-    return found
+                weights["_".join([matrix, *parts])] = weight
+    return weights

@@ -101,13 +101,13 @@ class Genetic:
 
     def _children(self, parents: Array, place: Rows, source: np.random.Generator) -> Array:
         """As many new designs as there are parents, none of them twice or one of the parents, as far as possible."""
-        found = np.empty((0, parents.shape[1]))
+        children = np.empty((0, parents.shape[1]))
         for _ in range(ATTEMPTS):
             fresh = self._mated(parents, place, source)
-            found = np.concatenate([found, fresh[_new(fresh, np.concatenate([parents, found]))]])
-            if len(found) >= len(parents):
+            children = np.concatenate([children, fresh[_new(fresh, np.concatenate([parents, children]))]])
+            if len(children) >= len(parents):
                 break
-        return found[: len(parents)] if len(found) else self._mated(parents, place, source)
+        return children[: len(parents)] if len(children) else self._mated(parents, place, source)
 
     def _mated(self, parents: Array, place: Rows, source: np.random.Generator) -> Array:
         count, size = parents.shape
@@ -127,11 +127,11 @@ class Genetic:
         index, swap = np.full((couples, 1), CROSSOVER_INDEX), np.full((couples, 1), 0.5)
         picked = self.problem.space.catalogue > 0
         upper = np.where(picked, 0.0, 1.0)  # equal bounds: the operator leaves choices alone
-        found = cross_sbx(both, np.zeros(size), upper, index, GENE_CROSSED, swap, random_state=source)
+        children = cross_sbx(both, np.zeros(size), upper, index, GENE_CROSSED, swap, random_state=source)
         exchanged = (source.random((couples, size)) < 0.5) & picked
-        found[:, :, picked] = both[:, :, picked]
-        found[:, exchanged] = both[::-1, exchanged]
-        return found
+        children[:, :, picked] = both[:, :, picked]
+        children[:, exchanged] = both[::-1, exchanged]
+        return children
 
     def _mutated(self, genes: Array, source: np.random.Generator) -> Array:
         count, size = genes.shape
@@ -139,20 +139,20 @@ class Genetic:
         picked = catalogue > 0
         upper = np.where(picked, 0.0, 1.0)
         index, share = np.full(count, MUTATION_INDEX), np.full(count, 1.0 / size)
-        found = mut_pm(genes, np.zeros(size), upper, index, share, False, random_state=source)
+        mutated = mut_pm(genes, np.zeros(size), upper, index, share, False, random_state=source)
         drawn = np.floor(source.random((count, size)) * np.maximum(catalogue, 1))
-        anew = (source.random((count, size)) < 1.0 / size) & picked
-        found[:, picked] = genes[:, picked]
-        return np.where(anew, drawn, found)
+        redrawn = (source.random((count, size)) < 1.0 / size) & picked
+        mutated[:, picked] = genes[:, picked]
+        return np.where(redrawn, drawn, mutated)
 
 
 def _new(fresh: Array, known: Array) -> Rows:
     """Which designs are neither known nor earlier in the list."""
     seen = {row.tobytes() for row in known}
-    found = []
+    numbers = []
     for number, row in enumerate(fresh):
         key = row.tobytes()
         if key not in seen:
             seen.add(key)
-            found.append(number)
-    return np.array(found, dtype=np.int64)
+            numbers.append(number)
+    return np.array(numbers, dtype=np.int64)

@@ -85,15 +85,18 @@ class Gradient:
         outcome = self.assess(genes)
         signed = self.problem.objectives[0].sign * outcome.objectives[:, 0]
         best = int(np.lexsort([signed, outcome.violation])[0])
-        found = [log.count + best]
+        kept = [log.count + best]
         if log.steps:
-            found = self._better(log, log.kept[0], found[0], signed[best], float(outcome.violation[best]))
-        return Step(genes, outcome, np.array(found), {"method": "gradient"})
+            kept = self._better(log, log.kept[0], kept[0], signed[best], float(outcome.violation[best]))
+        return Step(genes, outcome, np.array(kept), {"method": "gradient"})
 
     def _better(self, log: Log, old: int, new: int, value: float, violation: float) -> list[int]:
         """The better of the best so far and a new design, then the other."""
-        held = log.outcome([int(old)])
-        before = (float(held.violation[0]), self.problem.objectives[0].sign * float(held.objectives[0, 0]))
+        known = log.outcome([int(old)])
+        before = (
+            float(known.violation[0]),
+            self.problem.objectives[0].sign * float(known.objectives[0, 0]),
+        )
         return [new, int(old)] if (violation, value) < before else [int(old), new]
 
 
@@ -175,7 +178,7 @@ class _Descent:
             bounds = [*bounds, (-BLOCKED, BLOCKED)]
             conditions.append({"type": "ineq", "fun": lambda x: pieces(x)[0], "jac": lambda x: pieces(x)[1]})
             function = _last_unknown
-        found = minimize(
+        solution = minimize(
             function,
             unknowns,
             jac=True,
@@ -184,7 +187,7 @@ class _Descent:
             method="SLSQP",
             options={"maxiter": ITERATIONS, "ftol": PRECISION[kinked]},
         )
-        return np.clip(found.x[:count], 0.0, 1.0)
+        return np.clip(solution.x[:count], 0.0, 1.0)
 
     def _condition(self, term: Any, sign: float, bound: float, scale: float) -> dict[str, Any]:
         """A constraint as the solver takes it: a function that must not be negative, and its derivatives."""

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
 from kinetostat.engine.points import Array
 from kinetostat.studies.optimisation.assessment import Outcome, joined
@@ -21,19 +22,19 @@ Rows = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Step:
-    """What one step of a search did.
+    """One step of a search: the designs it judged and those it kept.
 
     Attributes:
         genes: designs that it judged, in order [designs x variables].
-        outcome: what they are worth.
+        outcome: their objectives, constraints and verdicts.
         kept: numbers in the log, these designs included, of those that the search goes on with, the best first.
-        told: plain data about it.
+        notes: plain data about it.
     """
 
     genes: Array
     outcome: Outcome
     kept: Rows
-    told: Mapping[str, Any] = field(default_factory=dict)
+    notes: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Log:
@@ -72,8 +73,10 @@ class Log:
 
     def as_rows(self, step: Step) -> Array:
         """The rows of a step."""
-        found = step.outcome
-        return np.column_stack([step.genes, found.objectives, found.constraints, found.violation, found.verdict])
+        outcome = step.outcome
+        return np.column_stack(
+            [step.genes, outcome.objectives, outcome.constraints, outcome.violation, outcome.verdict]
+        )
 
     def add(self, rows: Array, record: dict[str, Any]) -> None:
         """Add the rows of a step and what is noted about it."""
@@ -94,16 +97,52 @@ def record_of(log: Log, step: Step) -> dict[str, Any]:
     place = np.where(old, np.cumsum(old) - 1, old.sum() + step.kept - log.count)
     kept = every.chosen(place)
     feasible = kept.violation == 0.0
-    told: dict[str, Any] = {}
+    notes: dict[str, Any] = {}
     if len(problem.objectives) == 1 and feasible.any():
         values = kept.objectives[feasible, 0]
         best = values.min() if problem.objectives[0].sign > 0 else values.max()
-        told = {"best": float(best), "mean": float(values.mean())}
+        notes = {"best": float(best), "mean": float(values.mean())}
     return {
         "chunk": len(log.steps),
         "designs": len(step.genes),
         "kept": step.kept.tolist(),
         "feasible": int(feasible.sum()),
-        **told,
-        **step.told,
+        **notes,
+        **step.notes,
     }
+
+
+def best_feasible(log: Log) -> Rows:
+    """Return the number of the best design of a log; empty if it is not feasible."""
+    first = log.kept[:1]
+    return first if log.outcome(first).violation[0] == 0.0 else first[:0]
+
+
+def front_of(log: Log) -> Rows:
+    """Return the Pareto-optimal designs among those that the search kept, ordered by the first objective."""
+    outcome = log.outcome(log.kept)
+    feasible = np.flatnonzero(outcome.violation == 0.0)
+    if not feasible.size:
+        return feasible
+    wanted = _wanted(log)[log.kept[feasible]]
+    _, single = np.unique(wanted, axis=0, return_index=True)
+    first = NonDominatedSorting().do(wanted[single], only_non_dominated_front=True)
+    return log.kept[feasible][single][first[np.argsort(wanted[single][first, 0], kind="stable")]]
+
+
+def knee_of(log: Log, front: Rows) -> int:
+    """Which design of a front is its knee: the farthest from the plane through its ends, towards the better side.
+
+    With each objective from 0 (its best on the front) to 1 (its worst), that is where their sum is least.
+
+    Source: Das, On characterizing the "knee" of the Pareto curve, Structural Optimization 18 (1999).
+    """
+    wanted = _wanted(log)[front]
+    spans = np.ptp(wanted, axis=0)
+    shares = (wanted - wanted.min(axis=0)) / np.where(spans > 0.0, spans, 1.0)
+    return int(np.argmin(shares.sum(axis=1)))
+
+
+def _wanted(log: Log) -> Array:
+    """Objectives of all designs, with signs so that less is better."""
+    return np.array([objective.sign for objective in log.problem.objectives]) * log.outcome().objectives

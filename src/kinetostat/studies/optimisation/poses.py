@@ -27,13 +27,13 @@ class PoseSet:
         columns: values by leaf path, SI [poses]; empty for the machine's own pose.
         required: share of the poses that a design must reach.
         box: of a grid over coordinates of the pose alone, its volume and the unit of that.
-        told: what they are, for people.
+        description: of the poses, in words.
     """
 
     columns: Mapping[str, Array]
     required: float
     box: tuple[float, str] | None
-    told: str
+    description: str
 
     @property
     def count(self) -> int:
@@ -62,14 +62,14 @@ def read_poses(machine: Machine, table: PosesTable) -> PoseSet:
 
 
 def _listed(machine: Machine, rows: Sequence[Mapping[str, float | str]]) -> dict[str, Array]:
-    held = values(machine)
+    numbers = values(machine)
     read = [_row(machine, row, f"poses.list.{i}") for i, row in enumerate(rows)]
     paths = dict.fromkeys(path for row in read for path in row)
-    return {path: np.array([row.get(path, float(held[path])) for row in read]) for path in paths}
+    return {path: np.array([row.get(path, float(numbers[path])) for row in read]) for path in paths}
 
 
 def _row(machine: Machine, row: Mapping[str, float | str], where: str) -> dict[str, float]:
-    found = {}
+    row_values = {}
     for name, written in row.items():
         field = find(machine.family, name)
         try:
@@ -77,8 +77,8 @@ def _row(machine: Machine, row: Mapping[str, float | str], where: str) -> dict[s
             field.quantity.check(value)
         except UnitError as error:
             raise InputError(f"{where}.{name} is {shorten(written)}: {error}.") from None
-        found.update(dict.fromkeys(field.leaves, value))
-    return found
+        row_values.update(dict.fromkeys(field.leaves, value))
+    return row_values
 
 
 def _grid(machine: Machine, table: PosesTable) -> PoseSet:
@@ -93,8 +93,8 @@ def _grid(machine: Machine, table: PosesTable) -> PoseSet:
     if not inside.any():
         raise InputError("[poses]: no node of the grid lies in the workspace of the machine; widen over or where.")
     kept = {path: column[inside] for path, column in columns.items()}
-    told = f"{int(inside.sum())} poses in the workspace, of a grid of {size}"
-    return PoseSet(kept, table.required, None, told)
+    description = f"{int(inside.sum())} poses in the workspace, of a grid of {size}"
+    return PoseSet(kept, table.required, None, description)
 
 
 def _box(question: GridQuestion) -> tuple[float, str] | None:

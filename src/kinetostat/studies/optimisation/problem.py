@@ -13,10 +13,9 @@ from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, read_study
 from kinetostat.studies.bundled import bundled_studies, study_of
-from kinetostat.studies.optimisation.aggregate import Aggregate, parse_aggregate
 from kinetostat.studies.optimisation.catalogue import more_is_better, read_term
 from kinetostat.studies.optimisation.poses import PoseSet, read_poses
-from kinetostat.studies.optimisation.terms import Term
+from kinetostat.studies.optimisation.terms import Aggregate, Term, parse_aggregate
 from kinetostat.studies.optimisation.variables import Space, read_space
 from kinetostat.studies.workspace.conditions import value_of
 
@@ -97,7 +96,7 @@ class Problem:
     @property
     def terms(self) -> tuple[Term, ...]:
         """Of all objectives, then of all constraints."""
-        return *(one.term for one in self.objectives), *(one.term for one in self.constraints)
+        return *(item.term for item in self.objectives), *(item.term for item in self.constraints)
 
     @property
     def points(self) -> int:
@@ -107,7 +106,7 @@ class Problem:
     @property
     def differentiable(self) -> bool:
         """Whether there are derivatives, and few enough of them to be kept."""
-        smooth = all(one.term.differentiable for one in self.objectives)
+        smooth = all(item.term.differentiable for item in self.objectives)
         return smooth and bool((self.space.catalogue == 0).any()) and self.points <= MOST_DIFFERENTIATED
 
     @property
@@ -173,12 +172,12 @@ def problem_of(study: StudyFile, machine: Machine) -> Problem:
     constraints = tuple(
         _constraint(machine, table, poses, f"constraints.{i}") for i, table in enumerate(study.constraints)
     )
-    labels = [one.term.label for one in objectives]
+    labels = [item.term.label for item in objectives]
     if len(set(labels)) < len(labels):
         raise InputError("two objectives are the same; leave one out, or take it differently over the poses.")
-    found = Problem(study, machine, space, poses, objectives, constraints, _robust(study, space), _method(study))
-    _check(found)
-    return found
+    problem = Problem(study, machine, space, poses, objectives, constraints, _robust(study, space), _method(study))
+    _check(problem)
+    return problem
 
 
 def settings_of(changes: Mapping[str, Any], above: str = "") -> Iterator[str]:

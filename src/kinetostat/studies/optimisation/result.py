@@ -6,7 +6,6 @@ What is printed, drawn or written of it is elsewhere.
 from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
@@ -16,12 +15,10 @@ from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.optimisation.assessment import Assessor, Outcome, Verdict
-from kinetostat.studies.optimisation.front import front_of, knee_of
-from kinetostat.studies.optimisation.log import Log, Rows
+from kinetostat.studies.optimisation.log import Log, Rows, best_feasible, front_of, knee_of
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.ridges import Ridge, at_bounds, find_ridges
 from kinetostat.studies.optimisation.robustness import Robustness, robustness_of
-from kinetostat.studies.optimisation.search import Stop, Watch, never, search, search_into, unwatched
 from kinetostat.studies.optimisation.slopes import Surveyor
 from kinetostat.studies.sensitivity import relative_sensitivity
 
@@ -122,8 +119,8 @@ class Result:
     @property
     def counts(self) -> dict[Verdict, int]:
         """How many designs have each verdict."""
-        found = Counter(self.log.outcome().verdict.tolist())
-        return {verdict: found[verdict] for verdict in Verdict if found[verdict]}
+        counts = Counter(self.log.outcome().verdict.tolist())
+        return {verdict: counts[verdict] for verdict in Verdict if counts[verdict]}
 
 
 def designed(problem: Problem, genes: Array) -> Machine:
@@ -133,32 +130,13 @@ def designed(problem: Problem, genes: Array) -> Machine:
     return replace(machine, name=f"{problem.machine.name}, optimised"[:LONGEST_NAME])
 
 
-def optimize(
-    problem: Problem,
-    folder: Path | None = None,
-    watch: Watch = unwatched,
-    resume: bool = False,
-    stop: Stop = never,
-) -> Result:
-    """Solve a problem.
-
-    Args:
-        problem: from `load_problem`.
-        folder: where every step is kept, so that a search that was stopped goes on; None to keep nothing.
-        watch: told how far the search is, and the best objective.
-        resume: insist that the folder holds a part of the search.
-        stop: asked after each step of a search with a folder; the result is then that of the steps so far.
-
-    Raises:
-        InputError: another study or another process in the folder, nothing to resume, a full disk.
-    """
-    assess = Assessor(problem)
-    log = search(assess, watch) if folder is None else search_into(assess, folder, watch, resume, stop)
-    initial = assess(_as_it_is(problem))
-    several = len(problem.objectives) > 1
+def result_of(assess: Assessor, log: Log) -> Result:
+    """Return the result of a search: its best designs, compared with the machine as it was, and explained."""
+    problem, several = assess.problem, len(assess.problem.objectives) > 1
     front = front_of(log) if several else best_feasible(log)
-    found = Result(problem, log, initial, front, knee_of(log, front) if several and len(front) else 0)
-    return _explained(assess, found) if found.solved else found
+    initial = assess(_as_it_is(problem))
+    result = Result(problem, log, initial, front, knee_of(log, front) if several and len(front) else 0)
+    return _explained(assess, result) if result.solved else result
 
 
 def _as_it_is(problem: Problem) -> Array:
@@ -167,58 +145,52 @@ def _as_it_is(problem: Problem) -> Array:
     return np.where(picked, np.maximum(problem.space.initial, 0.0), problem.space.initial)[None]
 
 
-def best_feasible(log: Log) -> Rows:
-    """Where the best design of a log stands; nowhere if it is not feasible."""
-    first = log.kept[:1]
-    return first if log.outcome(first).violation[0] == 0.0 else first[:0]
-
-
-def _explained(assess: Assessor, found: Result) -> Result:
+def _explained(assess: Assessor, result: Result) -> Result:
     """The result with everything that is asked of its best design."""
     problem = assess.problem
     survey = Surveyor(problem) if problem.differentiable else None
     ridges: list[Ridge] = []
     reason = "The objective has no derivatives, or too many poses for them; ridges are not looked for."
     if survey is not None and len(problem.objectives) == 1:
-        ridges, reason = find_ridges(problem, survey, found.genes)
+        ridges, reason = find_ridges(problem, survey, result.genes)
     return replace(
-        found,
-        directions=tuple(_directions(problem, found.machine)),
-        influences=tuple(_influences(problem, survey, found.genes)) if survey else (),
+        result,
+        directions=tuple(_directions(problem, result.machine)),
+        influences=tuple(_influences(problem, survey, result.genes)) if survey else (),
         ridges=tuple(ridges),
         no_ridges=reason if len(problem.objectives) == 1 else "",
-        robustness=robustness_of(assess, found.genes),
+        robustness=robustness_of(assess, result.genes),
     )
 
 
 def _directions(problem: Problem, machine: Machine) -> list[Direction]:
     there = problem.machine.family.component_names
     names = [name for name in GROUPS["compliance"] if QUANTITIES[name].components[0] in there]
-    before, after = (_worst(problem, one, names) for one in (problem.machine, machine))
+    before, after = (_worst(problem, design, names) for design in (problem.machine, machine))
     return [Direction(name, QUANTITIES[name].unit, before[name], after[name]) for name in names]
 
 
 def _worst(problem: Problem, machine: Machine, names: list[str]) -> dict[str, float]:
     """The greatest compliance over the poses that are reached; NaN where none is."""
-    held = values(machine)
-    anywhere = next(path for path in held if path.startswith("pose."))
-    columns = dict(problem.poses.columns) or {anywhere: np.array([float(held[anywhere])])}
-    found = evaluate(machine, Table(columns), names)
-    reached = found.status == 0
-    return {name: float(found.values[name][reached].max()) if reached.any() else float("nan") for name in names}
+    numbers = values(machine)
+    anywhere = next(path for path in numbers if path.startswith("pose."))
+    columns = dict(problem.poses.columns) or {anywhere: np.array([float(numbers[anywhere])])}
+    answers = evaluate(machine, Table(columns), names)
+    reached = answers.status == 0
+    return {name: float(answers.values[name][reached].max()) if reached.any() else float("nan") for name in names}
 
 
 def _influences(problem: Problem, survey: Surveyor, genes: Array) -> list[Influence]:
-    here, bounds, held = survey(genes), at_bounds(problem, genes), problem.space.values(genes)
+    here, bounds, design = survey(genes), at_bounds(problem, genes), problem.space.values(genes)
     if not here.sound:
         return []
-    numbers = [here.term(one.term, one.sign > 0) for one in problem.objectives]
-    found = []
+    terms = [here.term(objective.term, objective.sign > 0) for objective in problem.objectives]
+    influences = []
     for place, k in enumerate(survey.free):
         variable = problem.space.searched[k]
-        slopes = tuple(float(slope[place]) / (variable.high - variable.low) for _, slope in numbers)
-        size = 1.0 if variable.quantity.kind == "angle" else float(held[k])
-        levels = [value for value, _ in numbers]
+        slopes = tuple(float(slope[place]) / (variable.high - variable.low) for _, slope in terms)
+        size = 1.0 if variable.quantity.kind == "angle" else float(design[k])
+        levels = [value for value, _ in terms]
         percents = tuple(relative_sensitivity(np.array(slopes), size, np.array(levels)).tolist())
-        found.append(Influence(variable.name, slopes, percents, bounds[k]))
-    return found
+        influences.append(Influence(variable.name, slopes, percents, bounds[k]))
+    return influences

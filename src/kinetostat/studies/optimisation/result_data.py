@@ -12,71 +12,71 @@ from kinetostat.machine.loading import as_toml
 from kinetostat.studies.optimisation.assessment import Outcome, Verdict
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import Result
-from kinetostat.studies.optimisation.ridges import told
+from kinetostat.studies.optimisation.ridges import ridge_sentences
 from kinetostat.studies.optimisation.robustness import Robustness
 from kinetostat.studies.storage import write_dataset, write_json, write_text
 
 INFEASIBLE = "No feasible design was found: {}. Widen the bounds, ease the constraints, or change [poses]."
 
 
-def message(found: Result) -> str:
+def message(result: Result) -> str:
     """What became of the search, in a sentence."""
-    lacking = ", ".join(f"{count} x {verdict.phrase}" for verdict, count in found.counts.items() if verdict)
-    if not found.solved:
+    lacking = ", ".join(f"{count} x {verdict.phrase}" for verdict, count in result.counts.items() if verdict)
+    if not result.solved:
         return INFEASIBLE.format(lacking)
-    return f"{found.log.count:,} designs judged, {found.counts[Verdict.FEASIBLE]:,} of them feasible" + (
+    return f"{result.log.count:,} designs judged, {result.counts[Verdict.FEASIBLE]:,} of them feasible" + (
         f" ({lacking})." if lacking else "."
     )
 
 
-def as_json(found: Result) -> dict[str, Any]:
+def as_json(result: Result) -> dict[str, Any]:
     """A result as plain data: SI numbers, null where there is no finite one."""
-    problem = found.problem
+    problem = result.problem
     settings = problem.study.optimizer
     head = {
         "name": problem.study.name,
         "machine": problem.machine.name,
-        "status": "ok" if found.solved else "infeasible",
-        "message": message(found),
+        "status": "ok" if result.solved else "infeasible",
+        "message": message(result),
         "method": problem.method,
         "seed": settings.seed,
-        "evaluations": found.log.count,
-        "infeasible": {verdict.name.lower(): count for verdict, count in found.counts.items() if verdict},
-        "poses": {"count": problem.poses.count, "about": problem.poses.told},
+        "evaluations": result.log.count,
+        "infeasible": {verdict.name.lower(): count for verdict, count in result.counts.items() if verdict},
+        "poses": {"count": problem.poses.count, "about": problem.poses.description},
     }
     initial = {
         "variables": {variable.name: variable.initial for variable in problem.space.searched},
-        **_worth(problem, found.initial, 0),
+        **_worth(problem, result.initial, 0),
     }
-    if not found.solved:
+    if not result.solved:
         return _plain({**head, "objective": None, "variables": {}, "initial": initial})
-    best = _worth(problem, found.outcome, 0)
+    best = _worth(problem, result.outcome, 0)
     return _plain(
         {
             **head,
-            "objective": float(found.outcome.objectives[0, 0]) if len(problem.objectives) == 1 else None,
-            "variables": variables_of(problem, found.genes),
+            "objective": float(result.outcome.objectives[0, 0]) if len(problem.objectives) == 1 else None,
+            "variables": variables_of(problem, result.genes),
             **best,
             "initial": initial,
             "directions": [
-                {"name": one.name, "units": one.unit, "initial": one.before, "best": one.after, "gain": one.gain}
-                for one in found.directions
+                {"name": item.name, "units": item.unit, "initial": item.before, "best": item.after, "gain": item.gain}
+                for item in result.directions
             ],
-            "at_bounds": {one.name: one.bound for one in found.influences if one.bound},
+            "at_bounds": {item.name: item.bound for item in result.influences if item.bound},
             "sensitivity": {
-                one.name: {"derivatives": list(one.slopes), "percent_per_percent": list(one.percents)}
-                for one in found.influences
+                item.name: {"derivatives": list(item.slopes), "percent_per_percent": list(item.percents)}
+                for item in result.influences
             },
             "ridges": [
                 {"variables": list(r.names), "from": list(r.start), "to": list(r.end), "relative_change": r.change}
-                for r in found.ridges
+                for r in result.ridges
             ],
-            "ridges_told": told(found.ridges, problem) or [found.no_ridges],
-            "robustness": _scatter(found.robustness) if found.robustness else None,
+            "ridges_told": ridge_sentences(result.ridges, problem) or [result.no_ridges],
+            "robustness": _scatter(result.robustness) if result.robustness else None,
             "convergence": {
-                key: [step.get(key) for step in found.log.steps] for key in ("designs", "feasible", "best", "mean")
+                key: [step.get(key) for step in result.log.steps] for key in ("designs", "feasible", "best", "mean")
             },
-            "front": front_rows(found) if len(problem.objectives) > 1 else None,
+            "front": front_rows(result) if len(problem.objectives) > 1 else None,
         }
     )
 
@@ -91,26 +91,26 @@ def variables_of(problem: Problem, genes: Array) -> dict[str, float]:
     }
 
 
-def front_rows(found: Result) -> list[dict[str, Any]]:
+def front_rows(result: Result) -> list[dict[str, Any]]:
     """The designs of a front, each with its variables, objectives and constraints."""
-    outcome = found.log.outcome(found.front)
+    outcome = result.log.outcome(result.front)
     return [
         {
-            "knee": k == found.knee,
-            "variables": variables_of(found.problem, genes),
-            **_worth(found.problem, outcome, k),
+            "knee": k == result.knee,
+            "variables": variables_of(result.problem, genes),
+            **_worth(result.problem, outcome, k),
         }
-        for k, genes in enumerate(found.log.genes(found.front))
+        for k, genes in enumerate(result.log.genes(result.front))
     ]
 
 
 def _worth(problem: Problem, outcome: Outcome, k: int) -> dict[str, Any]:
     return {
         "objectives": {
-            one.term.label: float(value) for one, value in zip(problem.objectives, outcome.objectives[k], strict=True)
+            item.term.label: float(value) for item, value in zip(problem.objectives, outcome.objectives[k], strict=True)
         },
         "constraints": {
-            one.label: float(value) for one, value in zip(problem.constraints, outcome.constraints[k], strict=True)
+            item.label: float(value) for item, value in zip(problem.constraints, outcome.constraints[k], strict=True)
         },
         "verdict": Verdict(int(outcome.verdict[k])).name.lower(),
     }
@@ -122,14 +122,14 @@ def _scatter(robustness: Robustness) -> dict[str, Any]:
         "corners": robustness.corners,
         "failing": robustness.failing,
         "objectives": {
-            one.label: {
-                "nominal": one.nominal,
-                "mean": one.mean,
-                "standard_deviation": one.deviation,
-                "percentile_95": one.usual,
-                "worst": one.worst,
+            item.label: {
+                "nominal": item.nominal,
+                "mean": item.mean,
+                "standard_deviation": item.deviation,
+                "percentile_95": item.usual,
+                "worst": item.worst,
             }
-            for one in robustness.scatters
+            for item in robustness.scatters
         },
     }
 
@@ -137,15 +137,15 @@ def _scatter(robustness: Robustness) -> dict[str, Any]:
 def _plain(value: Any) -> Any:
     """The same with null for what is not finite."""
     if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
+        return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
+        return [_plain(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def as_dataset(found: Result) -> xr.Dataset:
+def as_dataset(result: Result) -> xr.Dataset:
     """Every design that was judged: its step, variables (SI, or the number of a choice), worth and verdict."""
-    problem, log = found.problem, found.log
+    problem, log = result.problem, result.log
     outcome = log.outcome()
     steps = np.repeat(np.arange(len(log.steps)), [step["designs"] for step in log.steps])
     content: dict[str, Any] = {"step": ("design", steps, {"long_name": "step of the search"})}
@@ -167,12 +167,12 @@ def as_dataset(found: Result) -> xr.Dataset:
     return xr.Dataset(content, attrs=attributes)
 
 
-def write_result(found: Result, folder: Path) -> list[Path]:
+def write_result(result: Result, folder: Path) -> list[Path]:
     """Write the result, the table of all designs and the best design as a machine file; returns the paths."""
     written = [folder / "result.json", folder / "designs.nc"]
-    write_json(written[0], as_json(found))
-    write_dataset(written[1], as_dataset(found))
-    if found.solved:
+    write_json(written[0], as_json(result))
+    write_dataset(written[1], as_dataset(result))
+    if result.solved:
         written.append(folder / "best.toml")
-        write_text(written[-1], as_toml(found.machine))
+        write_text(written[-1], as_toml(result.machine))
     return written

@@ -1,4 +1,4 @@
-"""Ridges: ways through the design space along which the best objective does not change, so that taste may decide.
+"""Ridges: paths through the design space along which the best objective stays the same, so that other reasons decide.
 
 At a best design the derivatives by all variables that are free to move vanish; along a ridge the second ones vanish as
 well. From there the ridge is followed, back to its ground after each step, until it meets a bound or rises.
@@ -50,11 +50,11 @@ class Ridge:
 
 def at_bounds(problem: Problem, genes: Array) -> list[str]:
     """Of each searched variable, "lower" or "upper" if it is at that bound, else nothing."""
-    found = []
+    sides = []
     for gene, count in zip(genes, problem.space.catalogue, strict=True):
         at = "lower" if gene <= AT_BOUND else "upper" if gene >= 1.0 - AT_BOUND else ""
-        found.append("" if count else at)
-    return found
+        sides.append("" if count else at)
+    return sides
 
 
 def find_ridges(problem: Problem, survey: Surveyor, genes: Array) -> tuple[list[Ridge], str]:
@@ -87,16 +87,16 @@ def find_ridges(problem: Problem, survey: Surveyor, genes: Array) -> tuple[list[
 
 def _aligned(flat: Array) -> Array:
     """The same directions, turned so that each has as few variables as possible: reduced by columns."""
-    found = flat.copy()
-    for k in range(found.shape[1]):
-        pivot = int(np.argmax(np.abs(found[:, k:]).max(axis=1) * (np.abs(found[:, :k]).sum(axis=1) < 1e-12)))
-        column = k + int(np.argmax(np.abs(found[pivot, k:])))
-        found[:, [k, column]] = found[:, [column, k]]
-        found[:, k] /= found[pivot, k]
-        for other in range(found.shape[1]):
+    directions = flat.copy()
+    for k in range(directions.shape[1]):
+        pivot = int(np.argmax(np.abs(directions[:, k:]).max(axis=1) * (np.abs(directions[:, :k]).sum(axis=1) < 1e-12)))
+        column = k + int(np.argmax(np.abs(directions[pivot, k:])))
+        directions[:, [k, column]] = directions[:, [column, k]]
+        directions[:, k] /= directions[pivot, k]
+        for other in range(directions.shape[1]):
             if other != k:
-                found[:, other] -= found[pivot, other] * found[:, k]
-    return found / np.linalg.norm(found, axis=0)
+                directions[:, other] -= directions[pivot, other] * directions[:, k]
+    return directions / np.linalg.norm(directions, axis=0)
 
 
 @dataclass(frozen=True)
@@ -148,15 +148,15 @@ class _Ground:
     def ridge(self, at: Array, way: Array) -> Ridge | None:
         """Follow a ridge both ways; None where it is only a point."""
         level = self.value(at)
-        one, first = self._followed(at, -way, level)
-        other, second = self._followed(at, way, level)
-        moved = np.abs(other - one)
+        first_end, first = self._followed(at, -way, level)
+        second_end, second = self._followed(at, way, level)
+        moved = np.abs(second_end - first_end)
         if moved.max() <= STEP / 10.0:
             return None
         taking_part = np.flatnonzero(moved > SHARE * moved.max())
         numbers = self.survey.free[self.free]
         ends = []
-        for point in (one, other):
+        for point in (first_end, second_end):
             whole = self.genes.copy()
             whole[numbers] = point
             ends.append(self.problem.space.values(whole)[numbers][taking_part])
@@ -187,17 +187,17 @@ def _room(at: Array, way: Array) -> float:
     return float(np.clip(limits.min(initial=1.0), 0.0, 1.0))
 
 
-def told(ridges: Sequence[Ridge], problem: Problem) -> list[str]:
-    """Ridges in sentences."""
+def ridge_sentences(ridges: Sequence[Ridge], problem: Problem) -> list[str]:
+    """Describe ridges in sentences."""
     by_name = {variable.name: variable for variable in problem.space.searched}
-    said = []
+    sentences = []
     for ridge in ridges:
         ways = [
             f"{name} from {by_name[name].shown(start)} to {by_name[name].shown(end)}"
             for name, start, end in zip(ridge.names, ridge.start, ridge.end, strict=True)
         ]
         how = f", together with {', '.join(ways[1:])}" if ways[1:] else ""
-        said.append(
+        sentences.append(
             f"Ridge: {ways[0]}{how} leaves the objective as it is (to {ridge.change:.0e}); choose freely there."
         )
-    return said
+    return sentences

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinetostat.engine.points import Array
-from kinetostat.studies.optimisation.assessment import Assessor, Outcome
-from kinetostat.studies.optimisation.tolerance import corners, deviations
+from kinetostat.studies.optimisation.assessment import Assessor, Outcome, corners, deviations
 
 STREAM = 1
 """Of random numbers: not the machines of the search."""

@@ -1,7 +1,8 @@
-"""Runs a search step by step, in memory or into a study folder, from where it stands."""
+"""`optimize` and the searches behind it: step by step, in memory or into a study folder, from where it was stopped."""
 
 import json
 from collections.abc import Callable
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
@@ -15,9 +16,9 @@ from kinetostat.spec.study import read_study
 from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.genetic import Genetic
 from kinetostat.studies.optimisation.gradient import Gradient
-from kinetostat.studies.optimisation.hybrid import Hybrid
 from kinetostat.studies.optimisation.log import Log, Step, record_of
 from kinetostat.studies.optimisation.problem import Problem, problem_of
+from kinetostat.studies.optimisation.result import Result, result_of
 from kinetostat.studies.result_file import KIND, RowFile
 from kinetostat.studies.study_folder import QUESTION, Record, StudyFolder, holds_study, study_folder
 
@@ -25,20 +26,20 @@ ROWS = "designs.bin"
 STUDY_VERSION = 1
 
 Watch = Callable[[int, int, float | None], None]
-"""Told (steps done, steps in all, best objective so far) after each step."""
+"""Called with (steps done, steps in all, best objective so far) after each step."""
 
 
 Stop = Callable[[], bool]
-"""Asked after each step whether to leave the rest for later."""
+"""Called after each step; True leaves the rest for later."""
 
 
 def never() -> bool:
-    """A search that nobody stops."""
+    """Never stop a search."""
     return False
 
 
 def unwatched(_done: int, _total: int, _best: float | None) -> None:
-    """A search that nobody watches."""
+    """Ignore the progress of a search."""
 
 
 class Method(Protocol):
@@ -52,8 +53,32 @@ class Method(Protocol):
         """The one of that number."""
 
 
+@dataclass(frozen=True)
+class Hybrid:
+    """A genetic search, then one descent.
+
+    Attributes:
+        first: the genetic search.
+        then: the descent.
+    """
+
+    first: Genetic
+    then: Gradient
+
+    @property
+    def steps(self) -> int:
+        """Generations, and one more."""
+        return self.first.steps + 1
+
+    def step(self, number: int, log: Log) -> Step:
+        """A generation, or the descent from the best of the last one."""
+        if number < self.first.steps:
+            return self.first.step(number, log)
+        return self.then.descend(log.genes(log.kept[:1])[0], log)
+
+
 def method_of(assess: Assessor) -> Method:
-    """The method that a study asks for."""
+    """Return the search method that a study names."""
     match assess.problem.method:
         case "gradient":
             return Gradient(assess)
@@ -64,8 +89,32 @@ def method_of(assess: Assessor) -> Method:
     return Genetic(assess)
 
 
+def optimize(
+    problem: Problem,
+    folder: Path | None = None,
+    watch: Watch = unwatched,
+    resume: bool = False,
+    stop: Stop = never,
+) -> Result:
+    """Search for the best design of a problem and explain it.
+
+    Args:
+        problem: from `load_problem`.
+        folder: where every step is kept, so that a search that was stopped goes on; None to keep nothing.
+        watch: called with the progress and the best objective.
+        resume: insist that the folder holds a part of the search.
+        stop: called after each step of a search with a folder; True ends it with the result so far.
+
+    Raises:
+        InputError: another study or another process in the folder, nothing to resume, a full disk.
+    """
+    assess = Assessor(problem)
+    log = search(assess, watch) if folder is None else search_into(assess, folder, watch, resume, stop)
+    return result_of(assess, log)
+
+
 def search(assess: Assessor, watch: Watch = unwatched) -> Log:
-    """Search in memory."""
+    """Search in memory and return the log of all designs."""
     log = Log(assess.problem)
     method = method_of(assess)
     while len(log.steps) < method.steps:
@@ -77,14 +126,14 @@ def search(assess: Assessor, watch: Watch = unwatched) -> Log:
 def search_into(
     assess: Assessor, folder: Path, watch: Watch = unwatched, resume: bool = False, stop: Stop = never
 ) -> Log:
-    """Search into a folder; go on with what it holds of the same study.
+    """Search into a folder, continuing a search of the same study that is there; return the log of all designs.
 
     Args:
         assess: of the problem.
         folder: of this study alone.
-        watch: told how far the search is.
+        watch: called with the progress.
         resume: insist that the folder holds a part of it.
-        stop: asked after each step.
+        stop: called after each step; True ends the search for now.
 
     Raises:
         InputError: another study or another process in the folder, nothing to resume, a full disk.
@@ -115,27 +164,27 @@ def _take(method: Method, log: Log) -> None:
 
 
 def _take_up(problem: Problem, study: StudyFolder, log: Log) -> None:
-    """See that the folder holds this study, or begin it."""
-    asked = question_of(problem, log.width)
-    if study.question(asked) is None:
+    """Check that the folder holds this study, or begin it."""
+    question = question_of(problem, log.width)
+    if study.question(question) is None:
         (study.path / ROWS).unlink(missing_ok=True)
-        study.begin(asked)
+        study.begin(question)
 
 
 def stored_problem(folder: Path) -> Problem:
-    """The problem that a study folder is about.
+    """Return the problem of a study folder.
 
     Raises:
         InputError: it is not the folder of an optimisation.
     """
     try:
-        held = json.loads((folder / QUESTION).read_text("utf-8"))
+        question = json.loads((folder / QUESTION).read_text("utf-8"))
     except (OSError, ValueError):
-        held = None
-    if not isinstance(held, dict) or not {"optimisation", "machine"} <= held.keys():
+        question = None
+    if not isinstance(question, dict) or not {"optimisation", "machine"} <= question.keys():
         raise InputError(f'"{folder}" is not the folder of an optimisation; give a study file, or such a folder.')
-    machine = build(documents.parse(held["machine"], str(folder)), str(folder))
-    return problem_of(read_study(held["optimisation"], str(folder)), machine)
+    machine = build(documents.parse(question["machine"], str(folder)), str(folder))
+    return problem_of(read_study(question["optimisation"], str(folder)), machine)
 
 
 def begin_search(problem: Problem, folder: Path) -> None:
@@ -149,7 +198,7 @@ def begin_search(problem: Problem, folder: Path) -> None:
 
 
 def kept_log(problem: Problem, folder: Path, record: Record) -> Log:
-    """What a step kept, as a log of its own; another process may be at work in the folder.
+    """Return the designs that a step kept as a separate log; another process may be writing to the folder.
 
     Args:
         problem: of the folder.
@@ -164,7 +213,7 @@ def kept_log(problem: Problem, folder: Path, record: Record) -> Log:
 
 
 def question_of(problem: Problem, width: int) -> Record:
-    """All that the designs depend on."""
+    """Return everything on which the designs depend, as plain data."""
     question: dict[str, Any] = {
         "study": STUDY_VERSION,
         "kinetostat": version("kinetostat"),

@@ -9,10 +9,9 @@ import numpy.typing as npt
 from kinetostat.engine.points import Array
 from kinetostat.engine.population import Population, differentiate
 from kinetostat.kinematics.status import Status
-from kinetostat.studies.optimisation.aggregate import Mask
+from kinetostat.studies.optimisation.assessment import deviations
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.terms import PoseTerm, Term
-from kinetostat.studies.optimisation.tolerance import deviations
+from kinetostat.studies.optimisation.terms import Mask, PoseTerm, Term
 
 Rows = npt.NDArray[np.int64]
 
@@ -23,13 +22,13 @@ class Local:
 
     Attributes:
         problem: to which it belongs.
-        found: quantities by name [machines x poses].
+        values: quantities by name [machines x poses].
         there: which poses are reached [machines x poses].
         slopes: derivatives of each quantity by each continuous gene, by name [genes x machines x poses].
     """
 
     problem: Problem
-    found: dict[str, Array]
+    values: dict[str, Array]
     there: Mask
     slopes: dict[str, Array]
 
@@ -38,16 +37,16 @@ class Local:
         """Whether enough poses are reached and everything there is finite."""
         share = self.there.mean() if self.there.size else 0.0
         whole = bool(share >= self.problem.poses.required - 1e-12 and self.there.any(axis=-1).all())
-        values = [*self.found.values(), *self.slopes.values()]
-        return whole and all(bool(np.isfinite(np.where(self.there, one, 0.0)).all()) for one in values)
+        arrays = [*self.values.values(), *self.slopes.values()]
+        return whole and all(bool(np.isfinite(np.where(self.there, array, 0.0)).all()) for array in arrays)
 
     def term(self, term: Term, high_is_bad: bool) -> tuple[float, Array]:
         """The number of a term, and its derivatives by the genes: where it has a kink, of the part that decides."""
         numbers, slopes = [], []
         for k, there in enumerate(self.there):
-            own = {name: values[k] for name, values in self.found.items()}
-            numbers.append(float(term.values({name: own[name][None] for name in term.names}, there[None])[0]))
-            parts = term.slopes(own, there)
+            at_machine = {name: rows[k] for name, rows in self.values.items()}
+            numbers.append(float(term.values({name: at_machine[name][None] for name in term.names}, there[None])[0]))
+            parts = term.slopes(at_machine, there)
             slopes.append(sum(np.where(there, self.slopes[name][:, k], 0.0) @ outer for name, outer in parts.items()))
         made = np.array(numbers)
         if self.problem.robust is None or len(made) == 1:
@@ -58,15 +57,15 @@ class Local:
 
     def worst(self, term: PoseTerm, most: int) -> Rows:
         """Numbers of the worst machines and poses of a term, counted through all of them."""
-        values = term.at_poses(self.found)
-        badness = np.where(self.there, values if term.high_is_bad else -values, -np.inf)
+        at_poses = term.at_poses(self.values)
+        badness = np.where(self.there, at_poses if term.high_is_bad else -at_poses, -np.inf)
         return np.argsort(-badness, axis=None, kind="stable")[: min(most, int(self.there.sum()))]
 
     def pieces(self, term: PoseTerm, numbers: Rows) -> tuple[Array, Array]:
         """A term at some machines and poses, and its derivatives there by the genes [pieces], [pieces x genes]."""
         total = np.sum([weight * self.slopes[name] for name, weight in term.weights], axis=0)
         slopes = total.reshape(len(total), -1)[:, numbers].T
-        chosen = term.at_poses(self.found).flat[numbers]
+        chosen = term.at_poses(self.values).flat[numbers]
         return chosen, -slopes * (chosen * chosen)[:, None] if term.inverse else slopes
 
 
@@ -108,7 +107,7 @@ class Surveyor:
         answers = differentiate(problem.machine, population, problem.names, [*self._by])
         slopes = {}
         with np.errstate(invalid="ignore"):
-            for name, own in zip(problem.names, answers.slopes if answers.slopes is not None else (), strict=True):
-                parts = [sum(rate * own[self._by[leaf]] for leaf, rate in rates.items()) for rates in self._rates]
+            for name, by_leaf in zip(problem.names, answers.slopes if answers.slopes is not None else (), strict=True):
+                parts = [sum(rate * by_leaf[self._by[leaf]] for leaf, rate in rates.items()) for rates in self._rates]
                 slopes[name] = np.array(parts)
         return Local(problem, answers.values, answers.status == Status.OK, slopes)

@@ -3,13 +3,99 @@
 A term says which quantities it needs, what they make together, and how that changes with each of them.
 """
 
+import re
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from kinetostat.engine.points import Array
-from kinetostat.studies.optimisation.aggregate import Aggregate, Mask
+from kinetostat.spec.errors import InputError, shorten
+
+Mask = npt.NDArray[np.bool_]
+
+_FORM = re.compile(r"percentile\s+(\d{1,2}(?:\.\d+)?|100)")
+WORST, MEAN = "worst", "mean"
+
+
+@dataclass(frozen=True)
+class Aggregate:
+    """How values become one number.
+
+    Attributes:
+        text: as written.
+        share: of the values that are at least as good; 1 for the worst, None for the mean.
+    """
+
+    text: str
+    share: float | None
+
+    @property
+    def smooth(self) -> bool:
+        """Whether it has derivatives everywhere."""
+        return self.share is None
+
+    def over(self, values: Array, there: Mask, high_is_bad: bool) -> Array:
+        """Aggregates along the last axis.
+
+        Args:
+            values: [... x n].
+            there: which of them count [... x n].
+            high_is_bad: whether great values are the bad ones.
+
+        Returns:
+            [...]; NaN where none counts.
+        """
+        count = there.sum(axis=-1)
+        if self.share is None:
+            total = np.where(there, values, 0.0).sum(axis=-1)
+            return np.divide(total, count, out=np.full(count.shape, np.nan), where=count > 0)
+        sign = 1.0 if high_is_bad else -1.0
+        badness = np.where(there, sign * values, -np.inf)
+        if self.share == 1.0:
+            return np.where(count > 0, sign * badness.max(axis=-1), np.nan)
+        ordered = np.sort(badness, axis=-1)
+        low, high, part = self._between(count, values.shape[-1])
+        lower, upper = (np.take_along_axis(ordered, place[..., None], -1)[..., 0] for place in (low, high))
+        with np.errstate(invalid="ignore"):
+            between = np.where(part > 0.0, lower + part * (upper - lower), lower)
+        return np.where(count > 0, sign * between, np.nan)
+
+    def weights(self, values: Array, there: Mask, high_is_bad: bool) -> Array:
+        """The weights of one set of values in its aggregate [n]; of several worst ones, the first has it all."""
+        count = np.array(there.sum())
+        if self.share is None:
+            return there / max(int(count), 1)
+        weights = np.zeros(len(values))
+        order = np.argsort(np.where(there, values if high_is_bad else -values, -np.inf), kind="stable")
+        low, high, part = self._between(count, len(values))
+        weights[order[low]] += 1.0 - float(part)
+        weights[order[high]] += float(part)
+        return weights
+
+    def _between(self, count: npt.NDArray[Any], size: int) -> tuple[Any, Any, Any]:
+        """Places of the two neighbours in increasing order, those that do not count first, and the way between."""
+        rank = np.minimum((size - count) + (self.share or 0.0) * np.maximum(count - 1, 0), size - 1)
+        low = np.floor(rank).astype(int)
+        return low, np.minimum(low + 1, size - 1), rank - low
+
+
+def parse_aggregate(text: str, where: str) -> Aggregate:
+    """An aggregate from "worst", "mean" or "percentile P".
+
+    Raises:
+        InputError: none of them.
+    """
+    words = text.strip().lower()
+    if words in (WORST, MEAN):
+        return Aggregate(words, 1.0 if words == WORST else None)
+    match = _FORM.fullmatch(words)
+    if match is None:
+        raise InputError(
+            f'{where} is {shorten(text)}; write "worst", "mean", or "percentile 95" (that share is better).'
+        )
+    return Aggregate(words, float(match[1]) / 100.0)
 
 
 class Term(Protocol):
@@ -31,14 +117,14 @@ class Term(Protocol):
     def differentiable(self) -> bool:
         """Whether `slopes` shows a search the way: not where a term changes in steps."""
 
-    def values(self, found: dict[str, Array], there: Mask) -> Array:
+    def values(self, quantities: dict[str, Array], there: Mask) -> Array:
         """The numbers of some designs [designs], from their quantities and which poses count [designs x poses]."""
 
-    def slopes(self, found: dict[str, Array], there: Mask) -> dict[str, Array]:
+    def slopes(self, quantities: dict[str, Array], there: Mask) -> dict[str, Array]:
         """How the number of one design changes with each quantity at each pose [poses], by name.
 
         Args:
-            found, there: of one design [poses].
+            quantities, there: of one design [poses].
         """
 
 
@@ -72,19 +158,19 @@ class PoseTerm:
         """At one pose it is smooth; over several, it has derivatives wherever their order does not change."""
         return True
 
-    def at_poses(self, found: dict[str, Array]) -> Array:
+    def at_poses(self, quantities: dict[str, Array]) -> Array:
         """The sum, or its reciprocal, at every pose."""
         with np.errstate(all="ignore"):
-            total = sum(weight * found[name] for name, weight in self.weights)
+            total = sum(weight * quantities[name] for name, weight in self.weights)
             return np.asarray(1.0 / total if self.inverse else total)
 
-    def values(self, found: dict[str, Array], there: Mask) -> Array:
+    def values(self, quantities: dict[str, Array], there: Mask) -> Array:
         """See `Term`."""
-        return self.aggregate.over(self.at_poses(found), there, self.high_is_bad)
+        return self.aggregate.over(self.at_poses(quantities), there, self.high_is_bad)
 
-    def slopes(self, found: dict[str, Array], there: Mask) -> dict[str, Array]:
+    def slopes(self, quantities: dict[str, Array], there: Mask) -> dict[str, Array]:
         """See `Term`."""
-        values = self.at_poses(found)
+        values = self.at_poses(quantities)
         shares = self.aggregate.weights(values, there, self.high_is_bad)
         outer = np.where(shares != 0.0, -shares * values * values if self.inverse else shares, 0.0)
         return {name: weight * outer for name, weight in self.weights}
@@ -99,17 +185,17 @@ class StrokeTerm:
     names: tuple[str, ...] = ("longest_leg", "shortest_leg")
     differentiable: bool = True
 
-    def values(self, found: dict[str, Array], there: Mask) -> Array:
+    def values(self, quantities: dict[str, Array], there: Mask) -> Array:
         """See `Term`."""
-        longest, shortest = (found[name] for name in self.names)
+        longest, shortest = (quantities[name] for name in self.names)
         reach = np.where(there, longest, -np.inf).max(-1) - np.where(there, shortest, np.inf).min(-1)
         return np.where(there.any(-1), reach, np.nan)
 
-    def slopes(self, found: dict[str, Array], there: Mask) -> dict[str, Array]:
+    def slopes(self, quantities: dict[str, Array], there: Mask) -> dict[str, Array]:
         """See `Term`."""
         at = np.zeros((2, len(there)))
-        at[0, np.argmax(np.where(there, found["longest_leg"], -np.inf))] = 1.0
-        at[1, np.argmin(np.where(there, found["shortest_leg"], np.inf))] = -1.0
+        at[0, np.argmax(np.where(there, quantities["longest_leg"], -np.inf))] = 1.0
+        at[1, np.argmin(np.where(there, quantities["shortest_leg"], np.inf))] = -1.0
         return dict(zip(self.names, at, strict=True))
 
 
@@ -128,12 +214,12 @@ class VolumeTerm:
     names: tuple[str, ...] = ("aspect",)
     differentiable: bool = False
 
-    def values(self, found: dict[str, Array], there: Mask) -> Array:
+    def values(self, quantities: dict[str, Array], there: Mask) -> Array:
         """See `Term`."""
-        aspects = np.where(there, found["aspect"], np.nan)
+        aspects = np.where(there, quantities["aspect"], np.nan)
         most = np.maximum((aspects > 0.0).sum(-1), (aspects < 0.0).sum(-1)) + (aspects == 0.0).sum(-1)
         return self.box * most / there.shape[-1]
 
-    def slopes(self, found: dict[str, Array], _there: Mask) -> dict[str, Array]:
+    def slopes(self, quantities: dict[str, Array], _there: Mask) -> dict[str, Array]:
         """0: it changes in steps, and between them not at all."""
-        return {name: np.zeros_like(found[name]) for name in self.names}
+        return {name: np.zeros_like(quantities[name]) for name in self.names}

@@ -59,13 +59,13 @@ class Variable:
         """SI; of a catalogue none."""
         return "1" if self.choices is not None else KINDS[self.quantity.kind].unit
 
-    def columns(self, held: Array) -> dict[str, Array]:
+    def columns(self, numbers: Array) -> dict[str, Array]:
         """Values of its leaves by path, SI [designs], from its own values [designs]."""
-        found: dict[str, Array] = {}
+        columns: dict[str, Array] = {}
         for k, (field, ratio) in enumerate(zip(self.fields, self.ratios, strict=True)):
-            value = ratio * held if self.choices is None else self.choices[held.astype(int), k]
-            found.update(dict.fromkeys(field.leaves, value))
-        return found
+            value = ratio * numbers if self.choices is None else self.choices[numbers.astype(int), k]
+            columns.update(dict.fromkeys(field.leaves, value))
+        return columns
 
     def shown(self, value: float) -> str:
         """A value as people read it: a label, degrees, or SI with the unit."""
@@ -114,10 +114,10 @@ class Space:
         lows, spans = self._bounds
         return lows + spans * genes
 
-    def genes(self, held: Array) -> Array:
+    def genes(self, numbers: Array) -> Array:
         """Genes from values."""
         lows, spans = self._bounds
-        return (held - lows) / spans
+        return (numbers - lows) / spans
 
     def columns(self, genes: Array, deviations: Mapping[str, Array] | None = None) -> dict[str, Array]:
         """Values by leaf path, SI, in the order of `paths` [designs].
@@ -127,12 +127,12 @@ class Space:
             deviations: by name of a variable with bounds, what is added to its value, SI [designs].
         """
         added = deviations or {}
-        found: dict[str, Array] = {}
-        for variable, held in zip(self.searched, self.values(genes).T, strict=True):
-            found |= variable.columns(held + added.get(variable.name, 0.0))
-        for variable in (one for one in self.variables if one.fixed):
-            found |= variable.columns(np.full(len(genes), variable.initial) + added.get(variable.name, 0.0))
-        return found
+        columns: dict[str, Array] = {}
+        for variable, numbers in zip(self.searched, self.values(genes).T, strict=True):
+            columns |= variable.columns(numbers + added.get(variable.name, 0.0))
+        for variable in (v for v in self.variables if v.fixed):
+            columns |= variable.columns(np.full(len(genes), variable.initial) + added.get(variable.name, 0.0))
+        return columns
 
     @property
     def initial(self) -> Array:
@@ -151,14 +151,14 @@ def read_space(machine: Machine, tables: Sequence[VariableTable]) -> Space:
     Raises:
         InputError: an unknown field, one twice, a bound that the field does not allow, nothing left to search.
     """
-    found = tuple(_variable(machine, table, f"variables.{i}") for i, table in enumerate(tables))
-    taken = [leaf for variable in found for field in variable.fields for leaf in field.leaves]
+    variables = tuple(_variable(machine, table, f"variables.{i}") for i, table in enumerate(tables))
+    taken = [leaf for variable in variables for field in variable.fields for leaf in field.leaves]
     for leaf in taken:
         if taken.count(leaf) > 1:
             raise InputError(f"{leaf} is set by two variables; give each field to one.")
-    if all(variable.fixed for variable in found):
+    if all(variable.fixed for variable in variables):
         raise InputError("all variables are fixed; leave at least one free to be searched.")
-    return Space(found)
+    return Space(variables)
 
 
 def _variable(machine: Machine, table: VariableTable, where: str) -> Variable:
@@ -169,8 +169,8 @@ def _variable(machine: Machine, table: VariableTable, where: str) -> Variable:
         return _catalogue(machine, table, fields, where)
     name = f"{where} ({fields[0].path})"
     ratios = _ratios(table, fields, name)
-    held = values(machine)
-    initial = float(held[fields[0].leaves[0]]) / ratios[0]
+    numbers = values(machine)
+    initial = float(numbers[fields[0].leaves[0]]) / ratios[0]
     if table.fixed:
         low = high = initial
     else:
@@ -210,9 +210,9 @@ def _catalogue(machine: Machine, table: VariableTable, fields: tuple[Parameter, 
     labels = table.labels or [", ".join(str(value) for value in row) for row in rows]
     if len(labels) != len(rows):
         raise InputError(f"{name}.labels has {len(labels)} entries; give one for each of {len(rows)} choices.")
-    held = values(machine)
-    own = [[float(held[leaf]) for leaf in field.leaves] for field in fields]
-    same = [k for k, row in enumerate(read) if all({v} == set(leaves) for v, leaves in zip(row, own, strict=True))]
+    numbers = values(machine)
+    present = [[float(numbers[leaf]) for leaf in field.leaves] for field in fields]
+    same = [k for k, row in enumerate(read) if all({v} == set(leaves) for v, leaves in zip(row, present, strict=True))]
     if table.fixed and not same:
         raise InputError(f"{name} is fixed, but the machine has none of its choices; set it to one of them.")
     initial = float(same[0]) if same else -1.0

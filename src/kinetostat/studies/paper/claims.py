@@ -19,7 +19,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.paper import printed
-from kinetostat.studies.paper.tables import at, coefficients
+from kinetostat.studies.paper.comparison import at, coefficients
 
 FREE = (0, 1, 3, 5)
 """Components that the passive leg leaves free at the reference configuration: rx, ry, x, z."""
@@ -205,8 +205,8 @@ def _link_length() -> Claim:
     throughout = [np.asarray(falls.all(axis=0)) for falls in steps]
     always = throughout[0] & throughout[1]
     rising = "; ".join(
-        f"{way} {', '.join(_course(i, found) for i in range(6) if not falls[i])}"
-        for way, found, falls in zip(("z fixed:", "z growing alike:"), (fixed, grown), throughout, strict=True)
+        f"{way} {', '.join(_course(i, stiffness) for i in range(6) if not falls[i])}"
+        for way, stiffness, falls in zip(("z fixed:", "z growing alike:"), (fixed, grown), throughout, strict=True)
     )
     return Claim(
         "Further fact (i)",
@@ -219,9 +219,9 @@ def _link_length() -> Claim:
     )
 
 
-def _course(component: int, found: npt.NDArray[np.float64]) -> str:
+def _course(component: int, stiffness: npt.NDArray[np.float64]) -> str:
     """How one stiffness goes with the length of the links."""
-    return f"K_{COMPONENTS[component]} ({' to '.join(f'{k:.4g}' for k in found[:, component])})"
+    return f"K_{COMPONENTS[component]} ({' to '.join(f'{k:.4g}' for k in stiffness[:, component])})"
 
 
 def _count(flags: npt.NDArray[Any]) -> int:
@@ -233,23 +233,23 @@ def _stiffness_over(settings: list[tuple[str, ...]]) -> npt.NDArray[np.float64]:
 
 
 def _platform_size() -> Claim:
-    found = _stiffness_over([(f"geometry.platform_radius={radius}",) for radius in np.linspace(0.07, 0.18, 12)])
-    steps = np.diff(found, axis=0)
+    k = _stiffness_over([(f"geometry.platform_radius={radius}",) for radius in np.linspace(0.07, 0.18, 12)])
+    steps = np.diff(k, axis=0)
     up, down = bool((steps[:, :2] > 0).all()), bool((steps[:, [3, 5]] < 0).all())
     return Claim(
         "Further fact (ii)",
         "For given links, a larger platform (within a range) is stiffer about x and y and softer along x and z.",
-        f"Rp from 7 to 18 cm: K_rx {found[0, 0]:.3g} to {found[-1, 0]:.3g}, K_ry {found[0, 1]:.3g} to "
-        f"{found[-1, 1]:.3g} N·m/rad; K_x {found[0, 3]:.4g} to {found[-1, 3]:.4g}, K_z {found[0, 5]:.4g} to "
-        f"{found[-1, 5]:.4g} N/m, all without a turn.",
+        f"Rp from 7 to 18 cm: K_rx {k[0, 0]:.3g} to {k[-1, 0]:.3g}, K_ry {k[0, 1]:.3g} to "
+        f"{k[-1, 1]:.3g} N·m/rad; K_x {k[0, 3]:.4g} to {k[-1, 3]:.4g}, K_z {k[0, 5]:.4g} to "
+        f"{k[-1, 5]:.4g} N/m, all without a turn.",
         _judge(up and down),
         "Holds from 7 to 18 cm, a range of ours: below 7 cm K_z turns, above 19 cm K_x does.",
     )
 
 
 def _nonlinear() -> Claim:
-    found = _stiffness_over([(f"geometry.platform_radius={radius}",) for radius in (0.06, 0.12, 0.18)])
-    bend = np.abs(found[0] - 2 * found[1] + found[2]) / np.abs(found[2] - found[0])
+    stiffness = _stiffness_over([(f"geometry.platform_radius={radius}",) for radius in (0.06, 0.12, 0.18)])
+    bend = np.abs(stiffness[0] - 2 * stiffness[1] + stiffness[2]) / np.abs(stiffness[2] - stiffness[0])
     return Claim(
         "Further fact (iii)",
         "Stiffness depends on the structural parameters nonlinearly, so that optimising them makes sense.",

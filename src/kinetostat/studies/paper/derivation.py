@@ -89,8 +89,8 @@ def _rows(matrix: Symmetric6) -> Array:
     return np.array(matrix.rows())
 
 
-def _off(found: Array, expected: Array) -> float:
-    return float(np.abs(found - expected).max() / np.abs(expected).max())
+def _off(actual: Array, expected: Array) -> float:
+    return float(np.abs(actual - expected).max() / np.abs(expected).max())
 
 
 def _rank_excess(eigenvalues: npt.NDArray[Any], rank: int) -> float:

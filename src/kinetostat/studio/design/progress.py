@@ -10,9 +10,9 @@ from typing import Any
 
 from kinetostat.engine.points import Array
 from kinetostat.machine.machine import Machine
-from kinetostat.studies.optimisation.front import front_of, knee_of
+from kinetostat.studies.optimisation.log import best_feasible, front_of, knee_of
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.result import best_feasible, designed
+from kinetostat.studies.optimisation.result import designed
 from kinetostat.studies.optimisation.search import kept_log, stored_problem
 from kinetostat.studies.study_folder import Record, noted
 from kinetostat.studio.design.runs import FAILURE, RESULT, Run, Stage

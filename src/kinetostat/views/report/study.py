@@ -66,7 +66,7 @@ def gains(result: Result) -> Iterator[str]:
 def _question(problem: Problem) -> tuple[Block, ...]:
     fixed = not_searched(problem)
     return (
-        Paragraph(typeset(f"{problem.machine.name}, judged at {problem.poses.told}.")),
+        Paragraph(typeset(f"{problem.machine.name}, judged at {problem.poses.description}.")),
         Points(tuple((typeset(text), "") for text in aims(problem))),
         printed(bounds_table(problem), "Variables and their bounds."),
         *([Paragraph(f"{fixed}.", "Not searched:")] if fixed else []),
