@@ -2,7 +2,7 @@
 
 A generation is a function of the one before it and of the seed. Operators are pymoo's, with its defaults: simulated
 binary crossover, polynomial mutation, non-dominated sorting and crowding. Choices of a catalogue have no order: they
-are exchanged between parents and drawn anew.
+are exchanged between parents and drawn again.
 
 Sources: Deb and Agrawal, Simulated binary crossover for continuous search space, Complex Systems 9 (1995); Deb, An
 efficient constraint handling method for genetic algorithms, Comput. Methods Appl. Mech. Eng. 186 (2000); Deb et al., A
@@ -29,7 +29,7 @@ GENE_CROSSED = 0.5
 CROSSOVER_INDEX = 15.0
 """Of simulated binary crossover: the larger, the nearer children are to their parents."""
 MUTATION_INDEX = 20.0
-"""Of polynomial mutation, likewise."""
+"""Of polynomial mutation: the larger, the nearer a mutated design is to its parent."""
 ATTEMPTS = 20
 """Times that couples are mated to replace children that exist already."""
 

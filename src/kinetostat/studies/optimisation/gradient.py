@@ -111,7 +111,7 @@ class _Descent:
     _last: tuple[bytes, Local] | None = None
 
     def run(self) -> None:
-        """Descend; new rounds where the worst poses have to be chosen anew."""
+        """Descend; new rounds where the worst poses have to be chosen again."""
         self.tried.append(self.start)
         first = self._at(self.start[self.survey.free])
         if not first.sound:

@@ -36,7 +36,7 @@ class Direction:
 
     @property
     def gain(self) -> float:
-        """How many times stiffer it is afterwards; NaN where nothing yields."""
+        """How many times stiffer it is afterwards; NaN where nothing deflects."""
         if self.before == self.after:
             return 1.0 if self.after else float("nan")
         return self.before / self.after if self.after else float("inf")
@@ -140,7 +140,7 @@ def result_of(assess: Assessor, log: Log) -> Result:
 
 
 def _as_it_is(problem: Problem) -> Array:
-    """Genes of the machine as its file says; a value that is no choice of its catalogue counts as the first one."""
+    """Genes of the machine as its file says; a value that its catalogue does not contain counts as the first one."""
     picked = problem.space.catalogue > 0
     return np.where(picked, np.maximum(problem.space.initial, 0.0), problem.space.initial)[None]
 

@@ -103,7 +103,7 @@ class Term(Protocol):
 
     @property
     def label(self) -> str:
-        """For people, e.g. "compliance_sum (worst)"."""
+        """Name for tables, e.g. "compliance_sum (worst)"."""
 
     @property
     def unit(self) -> str:

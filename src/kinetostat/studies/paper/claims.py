@@ -1,7 +1,7 @@
 """The paper's design guidelines (i)-(vii) and its three further facts, each put to the test instead of quoted.
 
 Statements are in our words. Where one holds only in part, `limits` says what it holds for and what it fails for, with
-figures. Where a statement leaves a threshold open, the one that is taken here is named as ours.
+figures. Where a statement leaves a threshold open, the one that is taken here is named as such.
 """
 
 from collections.abc import Iterator
@@ -99,7 +99,7 @@ def _nearly_rigid() -> Claim:
         f"{gaps[2]:.2%} at 1e2, {gaps[7]:.0e} at 1e7.",
         _judge(falling and within > ratios[6], falling and gaps[7] < 0.01),
         f'Holds for the convergence; fails for the "only": in the free directions a ratio of {within:.4g} suffices to '
-        f"be within 1 % (a threshold of ours), and at 1e7 the excess is {gaps[7]:.0e}.",
+        f"be within 1 % (our threshold), and at 1e7 the excess is {gaps[7]:.0e}.",
     )
 
 
@@ -174,7 +174,7 @@ def _stiff_enough() -> Claim:
         f"{shares[100.0]:.2%} at 1e2.",
         _judge(enough and shares[1.0] < 0.5, enough),
         f'Holds for 1e2 being enough; fails for the "only": at equal stiffness the leg already gives {shares[1.0]:.1%} '
-        f"or more of both. The paper names no share; {NEARLY_ALL:.0%} (a threshold of ours) is passed between 10 and "
+        f"or more of both. The paper names no share; {NEARLY_ALL:.0%} (our threshold) is passed between 10 and "
         "1e2 times.",
     )
 
@@ -243,7 +243,7 @@ def _platform_size() -> Claim:
         f"{k[-1, 1]:.3g} N·m/rad; K_x {k[0, 3]:.4g} to {k[-1, 3]:.4g}, K_z {k[0, 5]:.4g} to "
         f"{k[-1, 5]:.4g} N/m, all without a turn.",
         _judge(up and down),
-        "Holds from 7 to 18 cm, a range of ours: below 7 cm K_z turns, above 19 cm K_x does.",
+        "Holds from 7 to 18 cm, our range: below 7 cm K_z turns, above 19 cm K_x does.",
     )
 
 

@@ -21,7 +21,7 @@ from kinetostat.studies.paper.comparison import Comparison, Verdict, equations_3
 from kinetostat.studies.paper.derivation import Check, derivation
 
 SECTION = ("pose.x=-2 cm:2 cm:81", "geometry.passive_leg_offset=-2 cm:2 cm:81")
-"""Fig. 5: x and y of the platform; y is no motion of the machine but a shift of its passive leg."""
+"""Fig. 5: x and y of the platform; y is not a motion of the machine but a shift of its passive leg."""
 LINK_STIFFNESS = ("stiffness.passive_links=1e3 N*m/rad:1e10 N*m/rad:71:log",)
 """Fig. 4: 1 to 1e7 times the actuator stiffness."""
 
