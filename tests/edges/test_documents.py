@@ -15,7 +15,7 @@ from kinetostat.cli import main
 from kinetostat.machine.loading import build, load
 from kinetostat.studies.optimisation.problem import load_problem
 from kinetostat.studio import serving
-from kinetostat.views import figures, saving
+from kinetostat.views import answers, figures
 from pages import KINDS, ROOT, blocks, commands, corrected, dialogues, missing, pages
 
 NOT_RUN = {
@@ -132,7 +132,7 @@ def placed(document, path, table):
 @pytest.fixture
 def reader(tmp_path, monkeypatch, request):
     """A reader in an empty folder. Figures are drawn once, reports have small pictures, a studio does not listen."""
-    assert saving.FORMATS is figures.FORMATS, "files that are named have any format"
+    assert answers.FORMATS is figures.FORMATS, "files that are named have any format"
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(figures, "FORMATS", DrawnOnce(figures.FORMATS))
     monkeypatch.setattr(serving, "serve", lambda *_: None)
