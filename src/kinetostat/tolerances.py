@@ -118,3 +118,47 @@ NEWTON_STATICS = 1e-9
 """Relative tolerance of Newton's method in the engine's nonlinear statics."""
 SAME_NODE = 1e-6
 """Share of the machine's length below which two points of a frame are one node."""
+
+# Algebra
+
+PARALLEL_SEGMENTS = 1e-14
+"""Square of the sine of the angle between two segments below which they count as parallel: 1e-7 of an angle, where the
+common perpendicular has lost half of its digits and any point serves."""
+ZERO_PIVOT = 1e-100
+"""Size below which a pivot counts as zero: the square of its inverse would overflow soon after."""
+DEPENDENT_COLUMN = 1e-24
+"""Square of 1e-12. Where less than this share of the square of a column is left once those before it are subtracted,
+the rest is round-off: cancellation leaves some hundred units of 1e-16, and the square of that."""
+
+# Statics of machines
+
+SINGULAR = 1e-6
+"""Singularity margin below which a pose counts as singular: results have then lost six of their digits. A leg exactly
+at its limit comes out at the square root of a few units of round-off, 1e-8 to 3e-7, not at zero."""
+UNREACHED_COMPONENT = 1e-26
+"""Square of 1e-13: share of the largest component of a screw, squared, below which a rigid or free spring does not
+reach the other one. Without it, round-off times infinity would make entries of K or C infinite."""
+DEPENDENT_LOADS = 1e-12
+"""Sine of the angle between the loads of a leg's springs below which they are dependent up to round-off."""
+DEPENDENT_WRENCHES = 1e-9
+"""Relative singular value below which wrenches of legs are dependent, where internal loads are counted."""
+RIGID_AGAINST_LOAD = 1e-12
+"""Share of the largest flexibility below which an internal load meets nothing that deflects."""
+ROUND_OFF_OF_ELEMENT = 1e-12
+"""Share of what an element adds to an entry of C below which what the other elements add is only round-off."""
+ROUND_OFF_OF_COMPLIANCE = 1e-24
+"""Square of 1e-12: share of the other diagonal entries of C, made comparable by the length of the machine, below which
+one of them is the square of a rounding error and stands for 0."""
+ROUND_OFF_OF_EIGENVALUE = 1e-14
+"""Share of the largest eigenvalue or singular value below which one stands for 0: some dozen units of round-off."""
+ROUND_OFF_OF_COMPLEMENT = 1e-12
+"""The same share after the subtraction in a Schur complement, which loses two more digits."""
+AT_RIGHT_ANGLES = 1e-9
+"""Cosine below which a direction is at right angles to a principal one. Without it, a direction that is rigid or free
+would decide the stiffness along all others."""
+NO_UNIQUE_CENTRE = 1e-12
+"""Ratio of eigenvalues below which the equation of a centre is singular, so that the centre is not unique."""
+ZERO_EIGENSCREW = 1e-12
+"""Share of the largest eigenvalue, in units of the matrix' own length, below which an eigenvalue stands for 0."""
+PURE_COUPLE = 1e-9
+"""Share of force in a wrench (rotation in a twist), in the same units, below which it is a couple (a translation)."""

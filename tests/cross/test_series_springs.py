@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from kinetostat.kinetostatics.attribution import compliance_shares, stiffness_shares
+from kinetostat.kinetostatics.assembly import compliance_shares, stiffness_shares
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
 

@@ -7,7 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kinetostat.algebra.screw import Twist, Wrench
-from kinetostat.kinetostatics.attribution import compliance_shares, stiffness_coefficients, stiffness_shares
+from kinetostat.kinetostatics.assembly import compliance_shares, stiffness_coefficients, stiffness_shares
 from kinetostat.machine.machine import springs
 from machines import CONTRASTING, decades, every_machine, few, regular
 from numeric import (

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.kinetostatics.attribution import stiffness_coefficients
+from kinetostat.kinetostatics.assembly import stiffness_coefficients
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import springs

@@ -6,10 +6,10 @@ import jax
 import numpy as np
 import pytest
 
-from kinetostat.algebra.column import column
+from kinetostat.algebra.lines import apex
 from kinetostat.algebra.solve import complement, conjugate, dual_basis
-from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import Vector, rotation_x, rotation_y
+from kinetostat.machine.column import column
 from numeric import U
 
 BATCH = 7

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.solve import complement, handedness
-from kinetostat.kinetostatics.aspect import aspect
+from kinetostat.kinetostatics.extremes import aspect
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import parameters, values, with_values

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from kinetostat.algebra.eigenvalues import greatest_eigenvalue
+from kinetostat.algebra.symmetric import greatest_eigenvalue
 from kinetostat.engine.gradient import gradient
 from kinetostat.engine.interpreter import Interpreted
 from kinetostat.engine.trace import Body, Graph

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinetostat.algebra.segment import squared_distance
+from kinetostat.algebra.lines import squared_distance
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import pose_status, respond

@@ -4,9 +4,10 @@ import pytest
 
 from kinetostat.kinematics.closing import clearance, why_out_of_reach, within_reach
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.response import SINGULAR, pose_status
+from kinetostat.kinetostatics.response import pose_status
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Closure, Configuration
+from kinetostat.tolerances import SINGULAR
 
 
 def spanning(*closures):

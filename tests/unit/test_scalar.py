@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinetostat.algebra.column import Column, column
 from kinetostat.algebra.scalar import (
     cos,
     is_one,
@@ -22,6 +21,7 @@ from kinetostat.algebra.scalar import (
 )
 from kinetostat.algebra.vector import Vector
 from kinetostat.engine.trace import Graph
+from kinetostat.machine.column import Column, column
 
 A = column(np.array([1.5, -2.0, 0.0]))
 

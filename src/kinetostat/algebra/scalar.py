@@ -1,8 +1,8 @@
-"""Scalars: one set of functions over floats, NumPy arrays and traced values.
+"""Scalars: one set of functions over floats, columns of numbers and traced values.
 
 No vectors, no matrices here. Everything in `algebra` is built from these scalars as a structure of arrays: a
-formula written once is a float computation at one pose, a NumPy computation (any precision) over many or, traced by
-the engine (or by JAX), one fused SIMD loop. A Python float that is exactly 0.0 is a structural zero: it drops out of
+formula written once is a float computation at one pose, a computation over columns (any precision) at many or, traced
+by the engine (or by JAX), one fused SIMD loop. A Python float that is exactly 0.0 is a structural zero: it drops out of
 products and sums while the formula is traced, so that sparse screws cost what their non-zeros cost.
 """
 
@@ -14,7 +14,7 @@ Scalar: TypeAlias = Any
 
 
 def is_zero(a: Scalar) -> bool:
-    """Whether `a` is a structural zero: the Python float 0.0 itself, never an array that happens to hold zeros."""
+    """Whether `a` is a structural zero: the Python float 0.0, never an array that happens to hold zeros."""
     return type(a) is float and a == 0.0
 
 

@@ -1,4 +1,4 @@
-"""Small dense factorisations, unrolled over scalars: dual basis and complement by Householder, modes by Gram-Schmidt.
+"""Solve small dense systems, unrolled over scalars: dual basis and complement by Householder, modes by Gram-Schmidt.
 
 Every loop runs over a size known while tracing, so that traced code has no loop and no LAPACK call. Structural
 zeros are used: sparse vectors are taken first and only their non-zero rows are touched.
@@ -11,14 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller, sqrt, total, weighted, where
+from kinetostat.tolerances import DEPENDENT_COLUMN, ZERO_PIVOT
 
 Row = list[Scalar]
-
-SMALLEST = 1e-100
-"""Size below which a pivot is zero: its inverse would have no square."""
-
-DEPENDENT = 1e-24
-"""Square of 1e-12: share of its square below which what is left of a column is the rounding of nothing."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +33,7 @@ class _Triangular:
     reflections: int
 
     def inverse(self) -> list[Row]:
-        """R^-T: row k holds what of each vector's coefficient is in the component along pivot k."""
+        """R^-T: row k gives the component along pivot k for each vector's coefficient."""
         size = range(len(self.order))
         steps: list[Row] = [[] for _ in size]
         for k in size:
@@ -52,7 +47,7 @@ class _Triangular:
 
 
 def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
-    """The n vectors xi_a with xi_a . w_b = 1 if a = b, else 0, for n vectors w_b of n components.
+    """Return the n vectors xi_a with xi_a . w_b = 1 if a = b, else 0, for n vectors w_b of n components.
 
     With the w_b as columns of W, the xi_a are the rows of W^-1.
 
@@ -77,7 +72,7 @@ def dual_basis(basis: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
 
 
 def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row], Scalar]:
-    """Solutions x of A x = b for n independent rows of m >= n components: x = A+ b + any mix of null vectors.
+    """Solve A x = b for n independent rows of m >= n components: x = A+ b plus any mix of null vectors.
 
     Returns:
         A+ as m rows of n scalars (the solution of least norm); the m - n orthonormal null vectors of m scalars; and the
@@ -94,7 +89,7 @@ def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row
 
 
 def complement(vectors: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
-    """An orthonormal basis of what is orthogonal to a independent vectors of n components, a < n.
+    """Return an orthonormal basis of the space orthogonal to a independent vectors of n components, a < n.
 
     Returns:
         The n - a basis vectors, and the singularity margin a / (|V| |V+|) of the given ones, as in `dual_basis`.
@@ -109,12 +104,12 @@ def _singularity_margin(
 ) -> Scalar:
     """n / (|V| |V+|) for n vectors and anything of the size of their inverse, at most 1; 0 where they are dependent."""
     squares = [total([c * c for row in rows for c in row]) for rows in (vectors, inverse)]
-    found = float(len(vectors)) * reciprocal(sqrt(squares[0] * squares[1]))
-    return where(least > SMALLEST, smaller(1.0, found), 0.0)
+    margin = float(len(vectors)) * reciprocal(sqrt(squares[0] * squares[1]))
+    return where(least > ZERO_PIVOT, smaller(1.0, margin), 0.0)
 
 
 def handedness(vectors: Sequence[Sequence[Scalar]]) -> Scalar:
-    """The sign, +1 or -1, of the determinant of a independent vectors of n components and their complement.
+    """Return the sign, +1 or -1, of the determinant of a independent vectors of n components and their complement.
 
     The complement is the basis that `complement` returns for a < n, whose vectors need not move continuously with the
     given ones; for a = n there is none.
@@ -140,6 +135,7 @@ def _triangularise(vectors: Sequence[Sequence[Scalar]]) -> _Triangular:
     least: Scalar = math.inf
     reflections = 0
     while waiting:
+        # The sparsest vector first: its few rows fill the others least, so that structural zeros last longest.
         here = min(waiting, key=lambda j: sum(not is_zero(reduced[j][i]) for i in free))
         waiting.remove(here)
         filled = [i for i in free if not is_zero(reduced[here][i])] or free[:1]
@@ -153,10 +149,11 @@ def _triangularise(vectors: Sequence[Sequence[Scalar]]) -> _Triangular:
 
 
 def _reflect(column: Row, others: list[Row], rows: list[int]) -> None:
-    """Reflect all in place such that of `rows` the `column` keeps only the first."""
+    """Reflect all in place so that `column` keeps, of `rows`, only the first."""
     if len(rows) == 1:
         return
     pivot = sqrt(total([column[i] * column[i] for i in rows]))
+    # The sign opposite to the first entry: the difference below then adds two sizes and loses no digits.
     pivot = where(column[rows[0]] < 0.0, pivot, -pivot)
     normal = [column[rows[0]] - pivot, *(column[i] for i in rows[1:])]
     weight = reciprocal(pivot * -normal[0])
@@ -170,10 +167,10 @@ def _reflect(column: Row, others: list[Row], rows: list[int]) -> None:
 
 
 def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar]) -> tuple[list[Row], list[Row], Row]:
-    """A', L and d with A = A' L^T and A'^T S A' = diag(d), L unit lower triangular, for A given by its columns.
+    """Find A', L and d with A = A' L^T and A'^T S A' = diag(d), L unit lower triangular, for A given by its columns.
 
-    A^T S A = L diag(d) L^T is never formed, so that half as many digits are lost where weights differ much. Where S
-    does not see how a column differs from those before it, up to rounding, its d is 0.
+    A^T S A = L diag(d) L^T is never formed, so that half as many digits are lost where weights differ much. If the part
+    of a column that is independent of those before it has no weight in S, up to round-off, its d is 0.
 
     Args:
         columns: of A; components beyond the weights have none and are carried along.
@@ -189,7 +186,7 @@ def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar]) ->
     for k, column in enumerate(left):
         felt = [weighted(w, c) for w, c in zip(weights, column, strict=False)]
         pivot = _product(felt, column)
-        alive = pivot > DEPENDENT * taken[k]
+        alive = pivot > DEPENDENT_COLUMN * taken[k]
         pivots.append(where(alive, pivot, 0.0))
         inverse = where(alive, reciprocal(where(alive, pivot, 1.0)), 0.0)
         for i in range(k + 1, len(left)):
@@ -204,9 +201,9 @@ def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar]) ->
 def least_energy(
     columns: Sequence[Sequence[Scalar]], internal: Sequence[Sequence[Scalar]], weights: Sequence[Scalar]
 ) -> list[Row]:
-    """Each column x less the mix of the internal ones that leaves x^T S x least; S as in `conjugate`.
+    """Subtract from each column x the mix of the internal ones that makes x^T S x least; S as in `conjugate`.
 
-    What S does not see of the internal columns is left as it is.
+    Mixes of internal columns that have no weight in S are left as they are.
     """
     modes, _, pivots = conjugate(internal, weights)
     left = [list(column) for column in columns]

@@ -1,14 +1,16 @@
-"""Symmetric 6x6 matrices held as their 21 upper entries: what K and C are.
+"""Symmetric matrices: K and C by their 21 upper entries, and the greatest eigenvalue of small ones, without branches.
 
-Only sums of weighted dyads and look-ups live here; factorisations are in `solve`.
+Factorisations are in `solve`. K and C are in the axes and at the point of the screws whose dyads add up to them.
 
-Source: theory (10), whose dyads they are sums of. In the axes and at the point of the screws that they are made of.
+Source: theory (10); for the eigenvalue, Jacobi's rotations in cyclic order, Golub and Van Loan, Matrix Computations,
+4th ed., section 8.5. The closed trigonometric form is shorter, but loses half of its digits where two eigenvalues are
+nearly equal, and needs an arc.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, total, weighted
+from kinetostat.algebra.scalar import Scalar, sqrt, total, weighted, where
 from kinetostat.algebra.screw import Screw
 
 SIZE = 6
@@ -50,3 +52,42 @@ class Symmetric6:
     def rows(self) -> list[list[Scalar]]:
         """The full matrix as nested lists [6][6]."""
         return [[self.entry(i, j) for j in range(SIZE)] for i in range(SIZE)]
+
+
+SWEEPS = 4
+"""Sweeps of three rotations each. Each sweep cubes the entries off the diagonal, so that four leave only round-off."""
+
+
+def greatest_eigenvalue(rows: Sequence[Sequence[Scalar]]) -> Scalar:
+    """Return the greatest eigenvalue of a symmetric positive semi-definite matrix [n x n], n = 1, 2 or 3.
+
+    Accurate to some units of round-off, also where eigenvalues are equal. NaN where an entry is infinite. Derivatives
+    are those of the eigenvalue that is chosen.
+    """
+    at = {(i, j): rows[i][j] for i in range(len(rows)) for j in range(i, len(rows))}
+    if len(rows) == 2:
+        _rotate(at, 0, 1, None)
+    if len(rows) == 3:
+        for _ in range(SWEEPS):
+            for p, q, other in ((0, 1, 2), (0, 2, 1), (1, 2, 0)):
+                _rotate(at, p, q, other)
+    greatest = at[0, 0]
+    for i in range(1, len(rows)):
+        greatest = where(at[i, i] > greatest, at[i, i], greatest)
+    return greatest
+
+
+def _rotate(at: dict[tuple[int, int], Scalar], p: int, q: int, other: int | None) -> None:
+    """Turn rows and columns p and q so that their common entry vanishes, by the smaller of the two angles."""
+    apart, coupling = at[q, q] - at[p, p], at[p, q]
+    square = apart * apart + 4.0 * (coupling * coupling)
+    turned = square > 0.0
+    size = abs(apart) + sqrt(where(turned, square, 1.0))
+    tangent = where(turned, where(apart < 0.0, -2.0, 2.0) * coupling / size, 0.0)
+    # Where both diagonal entries are equal and nothing couples them, there is nothing to turn: the angle is 0.
+    at[p, p], at[q, q], at[p, q] = at[p, p] - tangent * coupling, at[q, q] + tangent * coupling, 0.0
+    if other is not None:
+        cosine = 1.0 / sqrt(1.0 + tangent * tangent)
+        sine = tangent * cosine
+        first, second = (min(p, other), max(p, other)), (min(q, other), max(q, other))
+        at[first], at[second] = cosine * at[first] - sine * at[second], sine * at[first] + cosine * at[second]

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.column import column
 from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.kinematics.closing import (
     ANGLES,
@@ -29,6 +28,7 @@ from kinetostat.kinematics.closing import (
     units_of,
 )
 from kinetostat.kinematics.status import Status
+from kinetostat.machine.column import column
 from kinetostat.machine.leg import Turn
 from kinetostat.machine.machine import Chains, Machine
 from kinetostat.tolerances import (

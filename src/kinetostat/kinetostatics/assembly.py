@@ -1,8 +1,9 @@
-"""Legs to the platform: K and C from what the legs carry and how they yield (theory section 2).
+"""Assemble K and C of the platform, and the contribution of each spring, from the legs (theory section 2).
 
-One form serves rigid and flexible machines: springs enter by compliance, and a rigid or free one is exact.
+One form serves rigid and flexible machines: springs enter by their compliance, and a rigid or free one is exact. How a
+leg deflects is in `leg`.
 
-Source: theory (4)-(6) and (8)-(10). All screws, K and C are at one reference point, in the axes of the legs' screws.
+Source: theory (4)-(6) and (8)-(11). All screws, K and C are at one reference point, in the axes of the legs' screws.
 """
 
 from collections.abc import Sequence
@@ -15,10 +16,7 @@ from kinetostat.algebra.symmetric import POSITIONS, SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.kinetostatics.leg import INFINITE, Action, Modes, combine, leg_modes, leg_resistance, modes_of, relaxed
 from kinetostat.machine.leg import LegScrews
-
-ROUNDING = 1e-26
-"""Square of 1e-13: below this share of the largest, what a rigid or free spring does to a component is rounding."""
-
+from kinetostat.tolerances import UNREACHED_COMPONENT
 
 NO_MOTION = Twist(ZERO, ZERO)
 
@@ -29,7 +27,7 @@ Motion = tuple[Twist, Scalar]
 
 @dataclass(frozen=True)
 class Statics:
-    """How the springs of a machine share any load, and resist any motion.
+    """How the springs of a machine share any load and resist any motion.
 
     Attributes:
         wrenches: per leg, a basis of what it carries.
@@ -80,24 +78,25 @@ def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
     sharing: list[tuple[Twist, ...]] = []
     flexibility: list[Twist] = []
     motions: list[Motion] = []
-    for leg, own in zip(balanced, modes, strict=True):
-        taken = sum(len(one) for one in sharing)
-        shares = tuple(Twist(Vector(*row[:3]), Vector(*row[3:])) for row in rows[taken : taken + len(own.wrenches)])
-        felt = [combine(shares, row) if row else NO_MOTION for row in own.loads]
+    for leg, mode in zip(balanced, modes, strict=True):
+        taken = sum(len(shares) for shares in sharing)
+        shares = tuple(Twist(Vector(*row[:3]), Vector(*row[3:])) for row in rows[taken : taken + len(mode.wrenches)])
+        felt = [combine(shares, row) if row else NO_MOTION for row in mode.loads]
         sharing.append(shares)
         flexibility += felt
-        motions += zip(*((shares, own.compliance) if _in_series(leg) else (felt, leg.compliance)), strict=True)
+        # Springs in series: the fewest shares of C are those of the leg's modes; otherwise one per spring.
+        motions += zip(*((shares, mode.compliance) if _in_series(leg) else (felt, leg.compliance)), strict=True)
     resistances = [leg_resistance(leg) for leg in legs]
-    shares_of_k = [share for one in resistances for share in one.shares]
+    shares_of_k = [share for resistance in resistances for share in resistance.shares]
     return Statics(
-        tuple(own.wrenches for own in modes),
+        tuple(mode.wrenches for mode in modes),
         tuple(sharing),
         tuple(flexibility),
         tuple(s for leg in legs for s in leg.compliance),
         tuple(b for b, _ in shares_of_k),
         tuple(k for _, k in shares_of_k),
         tuple(motions),
-        tuple(mode for one in resistances for mode in one.modes),
+        tuple(mode for resistance in resistances for mode in resistance.modes),
         length,
         singularity_margin,
     )
@@ -110,18 +109,18 @@ def _in_series(leg: LegScrews) -> bool:
 
 
 def _unchanged(leg: LegScrews) -> Modes:
-    """The wrenches of a leg as they are: nothing is known of how it yields to each."""
+    """The wrenches of a leg as modes without compliances: with six wrenches in all, nothing else is needed."""
     return Modes(leg.wrenches, leg.loads, (), ())
 
 
 def in_modes(modes: Sequence[Modes], rows: Sequence[Sequence[Scalar]]) -> list[tuple[Scalar, ...]]:
-    """Amounts of the legs' modes, a row for each, from amounts of their wrenches; what follows is left as it is."""
-    found: list[tuple[Scalar, ...]] = []
-    for own in modes:
-        part = rows[len(found) : len(found) + len(own.wrenches)]
-        columns = [own.amounts(column) if own.shares else list(column) for column in zip(*part, strict=True)]
-        found += zip(*columns, strict=True)
-    return found + [tuple(row) for row in rows[len(found) :]]
+    """Convert amounts of the legs' wrenches to amounts of their modes, a row each; rows of a guide stay as they are."""
+    amounts: list[tuple[Scalar, ...]] = []
+    for leg in modes:
+        part = rows[len(amounts) : len(amounts) + len(leg.wrenches)]
+        columns = [leg.amounts(column) if leg.shares else list(column) for column in zip(*part, strict=True)]
+        amounts += zip(*columns, strict=True)
+    return amounts + [tuple(row) for row in rows[len(amounts) :]]
 
 
 def compliance_matrix(statics: Statics) -> Symmetric6:
@@ -141,7 +140,7 @@ def stiffness_matrix(statics: Statics) -> Symmetric6:
 
 
 def flexible_stiffness(legs: Sequence[LegScrews]) -> Symmetric6:
-    """K = sum_i W_i G_i^-1 W_i^T for legs that all yield (G_i > 0), however many; infinite if one does not.
+    """K = sum_i W_i G_i^-1 W_i^T for legs that all deflect (G_i > 0), however many; infinite if one does not.
 
     Source: theory (5), eq. 32. A second route to `stiffness_matrix`, and the only one for redundant legs.
     """
@@ -150,7 +149,7 @@ def flexible_stiffness(legs: Sequence[LegScrews]) -> Symmetric6:
 
 
 def dual_twists(wrenches: Sequence[Wrench], length: Scalar) -> tuple[list[Twist], Scalar]:
-    """Six twists, each worked on by one of six wrenches alone: rows of W^-1.
+    """Return six twists, each worked on by only one of six wrenches: the rows of W^-1.
 
     Args:
         wrenches: columns of W, at P in base axes.
@@ -168,14 +167,14 @@ def dual_twists(wrenches: Sequence[Wrench], length: Scalar) -> tuple[list[Twist]
 def least_energy_rows(
     modes: Sequence[Modes], wrenches: Sequence[Wrench], length: Scalar
 ) -> tuple[list[tuple[Scalar, ...]], Scalar]:
-    """How legs that carry more than six wrenches share a load: of all balances, the one of least elastic energy.
+    """Share a load among legs that carry more than six wrenches: of all balances, that of least elastic energy.
 
     lambda = W+ w + N z with W N = 0 and lambda^T G lambda least (force method). Where rigid parts leave z undecided, no
     displacement depends on it: the undecided internal load is left out.
 
     Args:
         modes: of the legs.
-        wrenches: of all legs in order, and of a guide, which does not yield: columns of W, at P in base axes.
+        wrenches: of all legs in order, and of a guide, which does not deflect: columns of W, at P in base axes.
         length: m, scales rows.
 
     Returns:
@@ -186,7 +185,7 @@ def least_energy_rows(
     if len(wrenches) < SIZE:
         return [NO_MOTION.components()] * len(wrenches), 0.0
     balance, internal, singularity_margin = right_inverse([list(row) for row in zip(*columns, strict=True)])
-    compliance = [d for own in modes for d in own.compliance]
+    compliance = [d for leg in modes for d in leg.compliance]
     every, null = (in_modes(modes, rows) for rows in (balance, [*zip(*internal, strict=True)]))
     weights = compliance + [0.0] * (len(wrenches) - len(compliance))
     shared = least_energy([*zip(*every, strict=True)], [*zip(*null, strict=True)], weights)
@@ -194,7 +193,7 @@ def least_energy_rows(
 
 
 def weighted_sum(shares: Sequence[tuple[Screw, Scalar]], length: Scalar) -> Symmetric6:
-    """sum w a a^T, where an infinite weight makes infinite just what its screw reaches beyond rounding.
+    """Sum w a a^T; an infinite weight makes infinite only those entries that its screw reaches beyond round-off.
 
     Args:
         shares: screws a and weights w >= 0, infinity included.
@@ -210,11 +209,31 @@ def weighted_sum(shares: Sequence[tuple[Screw, Scalar]], length: Scalar) -> Symm
 
 
 def _endless(weight: Scalar, screw: Screw, length: Scalar) -> list[Scalar]:
-    """1 for each component of the screw that an infinite weight reaches beyond rounding, else 0."""
+    """1 for each component of the screw that an infinite weight reaches beyond round-off, else 0."""
     sizes = [c * c * scale for c, scale in zip(screw.components(), _squares(length), strict=True)]
-    limit = ROUNDING * total(sizes)
+    limit = UNREACHED_COMPONENT * total(sizes)
     return [where(weight < INFINITE, 0.0, where(size > limit, 1.0, 0.0)) for size in sizes]
 
 
 def _squares(length: Scalar) -> list[Scalar]:
     return [1.0] * 3 + [length * length] * 3
+
+
+def compliance_shares(statics: Statics) -> list[Symmetric6]:
+    """Share of each spring in C, s_e xi_e xi_e^T: what C would lose if this spring became rigid (theory section 2)."""
+    pairs = zip(statics.flexibility, statics.compliance, strict=True)
+    return [weighted_sum([pair], reciprocal(statics.length)) for pair in pairs]
+
+
+def stiffness_shares(statics: Statics) -> list[Symmetric6]:
+    """Share of each spring in K, k_e b_e b_e^T: its share of the energy of any motion; eqs. 33-38 are its diagonal.
+
+    In a leg with as many springs as wrenches it is also what K would lose if this spring became free. Where something
+    is rigid whatever the springs, K is infinite and the shares do not add up to it.
+    """
+    return [weighted_sum([pair], statics.length) for pair in zip(statics.resistance, statics.stiffness, strict=True)]
+
+
+def stiffness_coefficients(statics: Statics) -> list[Symmetric6]:
+    """Coefficient b_e b_e^T of each spring, K = sum_e k_e b_e b_e^T: the numbers of eqs. 33-38, all entries."""
+    return [Symmetric6.dyad(wrench, wrench) for wrench in statics.resistance]

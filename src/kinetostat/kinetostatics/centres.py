@@ -14,9 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL, Array, Matrix, finite
-
-INDEFINITE = 1e-12
-"""Ratio of eigenvalues below which the equation of a centre is singular."""
+from kinetostat.tolerances import NO_UNIQUE_CENTRE
 
 Point: TypeAlias = list[float]
 """From the reference point P, base axes, m [3]."""
@@ -103,7 +101,7 @@ def _centre(block: Array, coupling: Array, components: Sequence[int]) -> Point |
     axes = [c - 3 for c in components if c >= 3]
     matrix = (np.trace(block) * np.eye(3) - block)[np.ix_(axes, axes)]
     values = np.linalg.eigvalsh(matrix)
-    if values[0] <= INDEFINITE * values[-1]:
+    if values[0] <= NO_UNIQUE_CENTRE * values[-1]:
         return None
     offset = np.zeros(3)
     offset[axes] = np.linalg.solve(matrix, _vee(coupling)[axes])
@@ -113,7 +111,7 @@ def _centre(block: Array, coupling: Array, components: Sequence[int]) -> Point |
 def _skew_part(coupling: Array, block: Array) -> Point | None:
     """d with [d x] the skew part of coupling block^-1."""
     values = np.linalg.eigvalsh(block)
-    if values[0] <= INDEFINITE * values[-1]:
+    if values[0] <= NO_UNIQUE_CENTRE * values[-1]:
         return None
     return [0.5 * float(c) for c in _vee(np.asarray(np.linalg.solve(block, coupling.T).T, dtype=float))]
 

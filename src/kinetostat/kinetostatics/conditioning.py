@@ -10,7 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.kinetostatics.indices import ROUNDING, SPATIAL, Array, Matrix, finite
+from kinetostat.kinetostatics.indices import SPATIAL, Array, Matrix, finite
+from kinetostat.tolerances import ROUND_OFF_OF_EIGENVALUE
 
 
 def stiffness_condition(
@@ -27,7 +28,7 @@ def stiffness_condition(
         components: rows of the matrices, increasing, of rx ry rz x y z = 0 ... 5.
 
     Returns:
-        1 (isotropic) to infinity (something is rigid or free while other things yield, or neither matrix is finite).
+        1 (isotropic) to infinity (something is rigid or free while other parts deflect, or neither matrix is finite).
 
     Raises:
         ValueError: if the length is not positive, or a matrix has another shape.
@@ -80,5 +81,5 @@ def _condition(screws: npt.ArrayLike, scale: Array) -> float:
 
 
 def _ratio(largest: float, smallest: float) -> float:
-    """The quotient; infinity where the smallest is the rounding of zero."""
-    return float(largest / smallest) if smallest > ROUNDING * largest else np.inf
+    """The quotient; infinity where the smallest is only round-off."""
+    return float(largest / smallest) if smallest > ROUND_OFF_OF_EIGENVALUE * largest else np.inf

@@ -1,4 +1,4 @@
-"""The deflected shape: where every joint and link of a loaded machine goes, to first order. One pose.
+"""The deflected shape: where every joint and link of a loaded machine moves, to first order. One pose.
 
 Source: theory (31) and (32).
 """
@@ -56,7 +56,7 @@ def deflected_links(response: Response, load: Wrench) -> list[DeflectedLink]:
     """
     platform = deflection(response.compliance, load)
     loads = iter(spring_loads(response, load))
-    found: list[DeflectedLink] = []
+    links: list[DeflectedLink] = []
     for leg, screws in zip(response.configuration.legs, response.legs, strict=True):
         pairs = [(twist, soft, next(loads)) for twist, soft in zip(screws.elastic, screws.compliance, strict=True)]
         elastic = [None if isinf(soft) else twist * (load * soft) for twist, soft, load in pairs]
@@ -66,12 +66,12 @@ def deflected_links(response: Response, load: Wrench) -> list[DeflectedLink]:
         turned = _following([*passive, *free], left, float(response.configuration.length))
         freed = iter(turned[len(passive) :])
         given = [next(freed) if twist is None else twist for twist in elastic]
-        found += _links(leg, response.reference, iter(turned[: len(passive)]), iter(given))
-    return found
+        links += _links(leg, response.reference, iter(turned[: len(passive)]), iter(given))
+    return links
 
 
 def _following(passive: Sequence[Twist], left: Twist, length: float) -> list[Twist]:
-    """What each passive joint contributes, rows made comparable by `length` (m)."""
+    """Motions of the passive joints that add up to `left`, by least squares; `length` (m) makes rows comparable."""
     if not passive:
         return []
     scale = np.repeat([length, 1.0], 3)

@@ -14,13 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinetostat.kinetostatics.indices import Array, Matrix, finite
+from kinetostat.tolerances import PURE_COUPLE, ZERO_EIGENSCREW
 
-INDEFINITE = 1e-12
-"""Share of the largest eigenvalue, in units of the matrix' own length, below which one is the rounding of zero."""
 ROTATION, TRANSLATION = slice(0, 3), slice(3, 6)
 MOMENT, FORCE = ROTATION, TRANSLATION
-PURE = 1e-9
-"""Share of force in a wrench (rotation in a twist), in the same units, below which it is a couple (translation)."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +62,13 @@ def eigenscrews(stiffness: Matrix) -> list[Eigenscrew]:
 
 
 def compliance_eigenscrews(compliance: Matrix) -> list[Eigenscrew]:
-    """The eigenscrews of C: the same screws as of K = C^-1, and those that yield where K is infinite.
+    """The eigenscrews of C: the same screws as of K = C^-1, and those that deflect where K is infinite.
 
     With C = F F^T they are the t = F y with F^T Delta F y = y / lambda. Arguments and results as for `eigenscrews`.
     """
     terms = _terms(_finite(compliance), line=ROTATION, moment=TRANSLATION)
-    found = [_eigenscrew(*term, 1.0 / term[0] if term[0] else math.inf) for term in terms]
-    return sorted(found, key=lambda screw: screw.eigenvalue)
+    screws = [_eigenscrew(*term, 1.0 / term[0] if term[0] else math.inf) for term in terms]
+    return sorted(screws, key=lambda screw: screw.eigenvalue)
 
 
 def _finite(matrix: Matrix) -> Array:
@@ -91,12 +88,12 @@ def _terms(matrix: Array, line: slice, moment: slice) -> list[tuple[float, Array
     scale = np.ones(6)
     scale[moment] = 1.0 / length
     values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
-    kept = values > INDEFINITE * values[-1]
+    kept = values > ZERO_EIGENSCREW * values[-1]
     factor = vectors[:, kept] * np.sqrt(values[kept])
     products, mixed = np.linalg.eigh(factor.T @ np.roll(factor, 3, axis=0))
-    products[np.abs(products) <= INDEFINITE * values[-1]] = 0.0
+    products[np.abs(products) <= ZERO_EIGENSCREW * values[-1]] = 0.0
     screws = (factor @ mixed).T
-    pure = np.linalg.norm(screws[:, line], axis=1) <= PURE * np.linalg.norm(screws, axis=1)
+    pure = np.linalg.norm(screws[:, line], axis=1) <= PURE_COUPLE * np.linalg.norm(screws, axis=1)
     screws[pure, line] = 0.0
     return [(float(p) * length, w[line], w[moment] * length) for p, w in zip(products, screws, strict=True)]
 

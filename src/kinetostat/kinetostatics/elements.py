@@ -14,20 +14,16 @@ import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.symmetric import SIZE, Symmetric6
-from kinetostat.kinetostatics.assembly import compliance_matrix, solve_statics, weighted_sum
-from kinetostat.kinetostatics.attribution import stiffness_coefficients
+from kinetostat.kinetostatics.assembly import compliance_matrix, solve_statics, stiffness_coefficients, weighted_sum
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Configuration
+from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, ROUND_OFF_OF_ELEMENT
 
 SOFTEST = 1e12
 """Factor on compliances beyond which an element counts as not there."""
 LINKS_TOGETHER = "links together"
 """Name of all elements but the actuators, as one."""
-ROUNDING = 1e-12
-"""Share of what an element adds to an entry of C below which all that is left of it is rounding."""
-UNSEEN = 1e-24
-"""Square of 1e-12: share of the largest entry below which a diagonal entry of C is rounding."""
 SECANTS = 12
 """Steps of the search for the limit of rigidity: they converge faster than by halving, six to eight are needed."""
 
@@ -75,21 +71,21 @@ def elements(configuration: Configuration) -> list[Element]:
             label = own[0][1].kind
             kind = (label, tuple(_unit(spring) for _, spring in own), own[0][1].actuated, alike)
             groups.setdefault(kind, {})[part] = own
-    found = [_element(str(kind[0]), parts) for kind, parts in groups.items()]
-    return sorted(found, key=lambda element: not element.actuated)
+    every = [_element(str(kind[0]), parts) for kind, parts in groups.items()]
+    return sorted(every, key=lambda element: not element.actuated)
 
 
-def with_links_together(found: Sequence[Element]) -> list[Element]:
+def with_links_together(alone: Sequence[Element]) -> list[Element]:
     """The elements, and all that are no actuators once more as one, where there are several of them."""
-    links = [element for element in found if not element.actuated]
-    if len(links) < 2 or len(links) == len(found):
-        return list(found)
+    links = [element for element in alone if not element.actuated]
+    if len(links) < 2 or len(links) == len(alone):
+        return list(alone)
     parts = tuple(part for element in links for part in element.parts)
     springs = tuple(place for element in links for place in element.springs)
     units, sizes = {element.unit for element in links}, {element.stiffness for element in links}
     alike = len(units) == len(sizes) == 1
     unit, stiffness = (units.pop(), sizes.pop()) if alike else ("", None)
-    return [*found, Element(LINKS_TOGETHER, parts, springs, False, unit, stiffness)]
+    return [*alone, Element(LINKS_TOGETHER, parts, springs, False, unit, stiffness)]
 
 
 def _element(label: str, parts: Mapping[str, Sequence[tuple[int, Spring]]]) -> Element:
@@ -135,8 +131,8 @@ def rigid_from(response: Response, element: Element, excess: float) -> Array:
     """By which factor the compliances of an element may be multiplied so that it only just counts as rigid.
 
     That is where an entry of the diagonal of C exceeds the one with the element rigid by the share `excess` of it. C is
-    affine in compliances where the machine is isostatic; otherwise it is solved for. 0 where nothing else yields,
-    infinity where no softness of it is felt as much.
+    affine in compliances where the machine is isostatic; otherwise it is solved for. 0 where nothing else deflects,
+    infinity where even the softest element adds less.
 
     Args:
         response: of the machine at one pose, or at several as arrays.
@@ -149,19 +145,19 @@ def rigid_from(response: Response, element: Element, excess: float) -> Array:
     with np.errstate(all="ignore"):
         rest = without_rounding(diagonal_with(response, element, 0.0), response)
         shares = without_rounding(element_share(response, element), response)
-        rest = np.where(rest > ROUNDING * shares, rest, 0.0)
+        rest = np.where(rest > ROUND_OFF_OF_ELEMENT * shares, rest, 0.0)
         if is_isostatic(response):
             return np.where(shares > 0.0, excess * rest / shares, math.inf)
         return _factor_for(response, element, rest, excess * rest)
 
 
 def without_rounding(entries: Sequence[Scalar], response: Response) -> Array:
-    """Diagonal entries of C at one pose or at many [6 x poses], 0 where they are but rounding beside the others."""
+    """Diagonal entries of C at one pose or at many [6 x poses], 0 where they are only round-off beside the others."""
     rows = np.stack(np.broadcast_arrays(*(np.atleast_1d(np.asarray(entry, dtype=float)) for entry in entries)))
     length = np.broadcast_to(np.asarray(response.statics.length, dtype=float), rows.shape[1:])
     sizes = rows / np.stack([np.ones_like(length)] * 3 + [length * length] * 3)
     largest = np.where(np.isfinite(sizes), sizes, 0.0).max(axis=0)
-    return np.where(sizes > UNSEEN * largest, rows, np.where(np.isnan(rows), math.nan, 0.0))
+    return np.where(sizes > ROUND_OFF_OF_COMPLIANCE * largest, rows, np.where(np.isnan(rows), math.nan, 0.0))
 
 
 def is_isostatic(response: Response) -> bool:
@@ -169,17 +165,17 @@ def is_isostatic(response: Response) -> bool:
     return sum(len(own) for own in response.statics.sharing) + len(response.guide) == SIZE
 
 
-def stiffness_equations(response: Response, found: Sequence[Element]) -> dict[str, Symmetric6] | None:
+def stiffness_equations(response: Response, parts: Sequence[Element]) -> dict[str, Symmetric6] | None:
     """K as a sum over elements of stiffness times a matrix that no stiffness is in: eqs. 33-38, all entries.
 
     None where there is no such sum: where springs of a leg work in a row, a part has several, or an element has several
     stiffnesses.
     """
     square = all(len(leg.loads) == len(leg.wrenches) for leg in response.legs)
-    if not square or any(element.stiffness is None for element in found):
+    if not square or any(element.stiffness is None for element in parts):
         return None
     dyads = stiffness_coefficients(response.statics)
-    return {element.name: Symmetric6.total([dyads[i] for i in element.springs]) for element in found}
+    return {element.name: Symmetric6.total([dyads[i] for i in element.springs]) for element in parts}
 
 
 def _weights(response: Response, element: Element) -> dict[int, Scalar]:

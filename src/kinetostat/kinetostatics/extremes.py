@@ -1,4 +1,4 @@
-"""Numbers of one pose that machines are designed by: softest and stiffest direction, condition, legs, actuators.
+"""Scalar figures of one pose for design: softest and stiffest direction, condition, aspect, legs, actuators.
 
 All over scalars, so that the engine evaluates them for whole populations. Directions and tables are in `indices`.
 
@@ -8,19 +8,17 @@ Source: theory section 10.
 import math
 from collections.abc import Sequence
 
-from kinetostat.algebra.eigenvalues import greatest_eigenvalue
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller, sqrt, total, where
-from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.algebra.screw import Wrench
+from kinetostat.algebra.solve import handedness
+from kinetostat.algebra.symmetric import SIZE, Symmetric6, greatest_eigenvalue
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
-from kinetostat.kinetostatics.overload import actuator_loads
-from kinetostat.kinetostatics.response import Response
+from kinetostat.kinetostatics.response import Response, actuator_loads
+from kinetostat.machine.leg import comparable
 from kinetostat.machine.rods import rods
+from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE
 
 ROTATIONS, TRANSLATIONS = range(3), range(3, 6)
-
-
-ROUNDED = 1e-24
-"""Share of all compliances of a pose below which one of them is the square of a rounding error, and 0 is meant."""
 
 
 def components(response: Response) -> tuple[int, ...]:
@@ -29,21 +27,21 @@ def components(response: Response) -> tuple[int, ...]:
 
 
 def free_stiffness(response: Response, row: int) -> Scalar:
-    """What a tool feels along one component, all else free to follow: 1 / C_ii, N/m or N·m/rad; at most K_ii.
+    """Free stiffness along one component, with all other motions free: 1 / C_ii, N/m or N·m/rad; at most K_ii.
 
     Args:
         response: of a pose; at T, base axes.
         row: of rx ry rz x y z = 0 ... 5.
 
     Returns:
-        0 where the direction is free, infinity where nothing in it gives, to rounding.
+        0 where the direction is free, infinity where nothing deflects in it, up to round-off.
     """
     soft, length = response.compliance.entry(row, row), response.configuration.length
     turns = total([response.compliance.entry(i, i) for i in ROTATIONS])
     moves = total([response.compliance.entry(i, i) for i in TRANSLATIONS])
     area = length * length
     size = turns + reciprocal(area) * moves if row in ROTATIONS else moves + area * turns
-    least = where(size < math.inf, ROUNDED * size, 0.0)
+    least = where(size < math.inf, ROUND_OFF_OF_COMPLIANCE * size, 0.0)
     return where(soft > least, reciprocal(soft), math.inf)
 
 
@@ -92,7 +90,7 @@ def frobenius_condition(response: Response) -> Scalar:
 def _squares(matrix: Symmetric6, arm: Scalar, there: Sequence[int]) -> Scalar:
     """Sum of the squares of a matrix whose rotational rows and columns are multiplied by a length or its reciprocal."""
     scaled = [[_scaled(matrix.entry(i, j), arm, (i < 3) + (j < 3)) for j in there] for i in there]
-    return total([one * one for row in scaled for one in row])
+    return total([entry * entry for row in scaled for entry in row])
 
 
 def _scaled(value: Scalar, arm: Scalar, power: int) -> Scalar:
@@ -125,3 +123,23 @@ def _least(values: Sequence[Scalar]) -> Scalar:
     for value in values[1:]:
         result = smaller(value, result)
     return result
+
+
+def aspect(response: Response) -> Scalar:
+    """Return +1 or -1, different on the two sides of every singular surface; 0 if no such surface divides poses.
+
+    The sign of det W, with the wrenches of each leg so oriented that they move continuously with its passive joints. It
+    changes where the platform becomes free with locked actuators and where passive joints lock up. Legs that carry more
+    than six wrenches lose rank on less than a surface, around which a machine can go.
+    """
+    wrenches = [wrench for leg in response.legs for wrench in leg.wrenches] + list(response.guide)
+    if len(wrenches) != SIZE:
+        return 0.0
+    shrink = reciprocal(response.configuration.length)
+    scaled = [Wrench(wrench.rotational * shrink, wrench.translational).components() for wrench in wrenches]
+    sign = handedness(scaled)
+    for leg, screws in zip(response.configuration.legs, response.legs, strict=True):
+        if not leg.lines:
+            needed = [twist for i, twist in enumerate(screws.passive) if i not in leg.idle]
+            sign = sign * handedness([comparable(twist, shrink) for twist in needed])
+    return sign

@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.tolerances import AT_RIGHT_ANGLES, ROUND_OFF_OF_COMPLEMENT, ROUND_OFF_OF_EIGENVALUE
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Matrix: TypeAlias = Symmetric6 | npt.ArrayLike
@@ -29,12 +30,6 @@ SPATIAL = (0, 1, 2, 3, 4, 5)
 """Components of a machine that moves in space: rx ry rz x y z."""
 PLANAR = (2, 3, 4)
 """Components of a machine that moves in the x-y plane: rz x y."""
-ROUNDING = 1e-14
-"""Share of the largest eigenvalue below which one is the rounding of zero: some dozen rounding units."""
-CANCELLED = 1e-12
-"""Likewise after the subtraction in a Schur complement."""
-ALIGNED = 1e-9
-"""Sine of an angle that is none: a direction so near to one without stiffness or compliance has no share in others."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +92,8 @@ def principal_compliances(compliance: Matrix, components: Sequence[int] = SPATIA
     if matrix is None:
         raise ValueError("principal compliances need a finite C: where a spring is free there is none")
     result: dict[str, Principal] = {}
-    for name, own, _, axes in _blocks(components):
-        values, vectors = np.linalg.eigh(matrix[np.ix_(own, own)])
+    for name, inside, _, axes in _blocks(components):
+        values, vectors = np.linalg.eigh(matrix[np.ix_(inside, inside)])
         result[name] = Principal(np.maximum(values, 0.0).tolist(), (vectors.T @ axes).tolist())
     return result
 
@@ -157,11 +152,11 @@ def free_stiffness_along(
     Raises:
         ValueError: if the direction is zero or leaves the space of the components, or a matrix has another shape.
     """
-    found = free_stiffnesses(stiffness, compliance, components)
-    shares = _shares(direction, block, components, found)
-    if found is None:
+    blocks = free_stiffnesses(stiffness, compliance, components)
+    shares = _shares(direction, block, components, blocks)
+    if blocks is None:
         return None
-    return reciprocal(math.fsum(s * reciprocal(k) for s, k in zip(shares, found[block].stiffnesses, strict=True) if s))
+    return reciprocal(math.fsum(s * reciprocal(k) for s, k in zip(shares, blocks[block].stiffnesses, strict=True) if s))
 
 
 def guided_stiffness_along(
@@ -172,20 +167,20 @@ def guided_stiffness_along(
     components: Sequence[int] = SPATIAL,
 ) -> float | None:
     """Force along n over a displacement along n, all else held at zero: n^T K_bb n. Arguments as for the free one."""
-    found = guided_stiffnesses(stiffness, compliance, components)
-    shares = _shares(direction, block, components, found)
-    if found is None:
+    blocks = guided_stiffnesses(stiffness, compliance, components)
+    shares = _shares(direction, block, components, blocks)
+    if blocks is None:
         return None
-    return math.fsum(s * k for s, k in zip(shares, found[block].stiffnesses, strict=True) if s)
+    return math.fsum(s * k for s, k in zip(shares, blocks[block].stiffnesses, strict=True) if s)
 
 
 def _blocks(components: Sequence[int]) -> list[tuple[Block, list[int], list[int], Array]]:
-    """Of each block that exists: name, own rows, the other's rows, and base axes of its rows [n x 3]."""
+    """Of each block that exists: name, its rows, the other block's rows, and base axes of its rows [n x 3]."""
     turns = [i for i, c in enumerate(components) if c < 3]
     moves = [i for i, c in enumerate(components) if c >= 3]
     axes = np.eye(3)[[c % 3 for c in components]]
     parts: list[tuple[Block, list[int], list[int]]] = [("rotation", turns, moves), ("translation", moves, turns)]
-    return [(name, own, other, axes[own]) for name, own, other in parts if own]
+    return [(name, inside, other, axes[inside]) for name, inside, other in parts if inside]
 
 
 def _ellipsoids(
@@ -196,32 +191,39 @@ def _ellipsoids(
     if matrix is None:
         return None
     result: dict[str, PrincipalStiffness] = {}
-    for name, own, other, axes in _blocks(components):
-        block = matrix[np.ix_(own, own)]
-        size, share = float(np.linalg.norm(block, 2)), ROUNDING
+    for name, inside, other, axes in _blocks(components):
+        block = matrix[np.ix_(inside, inside)]
+        size, share = float(np.linalg.norm(block, 2)), ROUND_OFF_OF_EIGENVALUE
         if direct is None and other:
-            coupling, share = matrix[np.ix_(own, other)], CANCELLED
+            coupling, share = matrix[np.ix_(inside, other)], ROUND_OFF_OF_COMPLEMENT
             block = (
-                block - coupling @ np.linalg.pinv(matrix[np.ix_(other, other)], CANCELLED, hermitian=True) @ coupling.T
+                block
+                - coupling
+                @ np.linalg.pinv(matrix[np.ix_(other, other)], ROUND_OFF_OF_COMPLEMENT, hermitian=True)
+                @ coupling.T
             )
         values, vectors = np.linalg.eigh(block)
         stiffnesses = [0.0 if value <= share * size else float(value) for value in values]
-        order = range(len(own))
+        order = range(len(inside))
         if inverse:
-            stiffnesses, order = [reciprocal(value) for value in stiffnesses], range(len(own) - 1, -1, -1)
+            stiffnesses, order = [reciprocal(value) for value in stiffnesses], range(len(inside) - 1, -1, -1)
         rows = (vectors.T @ axes).tolist()
         result[name] = PrincipalStiffness([stiffnesses[i] for i in order], [rows[i] for i in order])
     return result
 
 
 def _shares(
-    direction: Sequence[float], block: Block, components: Sequence[int], found: dict[str, PrincipalStiffness] | None
+    direction: Sequence[float], block: Block, components: Sequence[int], blocks: dict[str, PrincipalStiffness] | None
 ) -> list[float]:
     """Squares of the cosines between a direction and the principal ones; exactly zero where it is at right angles."""
     axes = {name: rows for name, _, _, rows in _blocks(components)}.get(block)
     vector = np.asarray(direction, dtype=float)
     size = float(np.linalg.norm(vector))
-    if axes is None or not size > 0.0 or float(np.linalg.norm(vector - axes.T @ (axes @ vector))) > ALIGNED * size:
+    if (
+        axes is None
+        or not size > 0.0
+        or float(np.linalg.norm(vector - axes.T @ (axes @ vector))) > AT_RIGHT_ANGLES * size
+    ):
         raise ValueError(f"direction {list(direction)} is zero or has no {block} component in this machine's space")
-    cosines = np.array(found[block].directions) @ (vector / size) if found else np.zeros(0)
-    return [float(c) ** 2 if abs(c) > ALIGNED else 0.0 for c in cosines]
+    cosines = np.array(blocks[block].directions) @ (vector / size) if blocks else np.zeros(0)
+    return [float(c) ** 2 if abs(c) > AT_RIGHT_ANGLES else 0.0 for c in cosines]

@@ -1,6 +1,6 @@
 """Internal loads: wrenches that legs exert on each other through the platform without any load on it. One pose.
 
-Elasticity decides them where something on their way yields; where all is rigid, statics leaves them undecided, and no
+Elasticity decides them where something on their way deflects; where all is rigid, statics leaves them undecided, and no
 motion of the platform depends on them.
 
 Source: theory (9) and theory section 7.
@@ -15,13 +15,9 @@ import numpy.typing as npt
 from kinetostat.algebra.screw import Wrench
 from kinetostat.kinetostatics.leg import leg_compliance, relaxed
 from kinetostat.machine.leg import LegScrews
+from kinetostat.tolerances import DEPENDENT_WRENCHES, RIGID_AGAINST_LOAD
 
 Array = npt.NDArray[np.float64]
-
-DEPENDENT = 1e-9
-"""Relative size of a singular value below which wrenches are dependent."""
-RIGID = 1e-12
-"""Share of the largest flexibility below which an internal load meets nothing that yields."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +57,11 @@ def internal_loads(
     matrix = np.array(columns, dtype=float).T / np.repeat([length, 1.0], 3)[:, None]
     sizes = np.linalg.norm(matrix, axis=0)
     _, values, rows = np.linalg.svd(matrix / sizes)
-    internal = (rows[int((values > DEPENDENT * values[0]).sum()) :] / sizes).T[: len(owners)]
+    internal = (rows[int((values > DEPENDENT_WRENCHES * values[0]).sum()) :] / sizes).T[: len(owners)]
     flexibility = _block_diagonal([np.array(leg_compliance(leg), dtype=float) for leg in balanced])
     energy = internal.T @ flexibility @ internal
     amounts, modes = np.linalg.eigh(energy) if internal.shape[1] else (np.zeros(0), np.zeros((0, 0)))
-    stiff = amounts <= RIGID * max(np.abs(flexibility).max(initial=0.0), 1e-300)
+    stiff = amounts <= RIGID_AGAINST_LOAD * max(np.abs(flexibility).max(initial=0.0), 1e-300)
     undecided = internal @ modes[:, stiff]
     return InternalLoads(
         internal.shape[1], int(stiff.sum()), _involved(names, owners, internal), _involved(names, owners, undecided)
@@ -86,5 +82,5 @@ def _involved(names: Sequence[str], owners: npt.NDArray[np.int64], loads: Array)
     """Names of the legs that carry a share of any of these loads."""
     if not loads.size:
         return ()
-    carried = np.abs(loads).max(axis=1) > DEPENDENT * np.abs(loads).max()
+    carried = np.abs(loads).max(axis=1) > DEPENDENT_WRENCHES * np.abs(loads).max()
     return tuple(name for i, name in enumerate(names) if carried[owners == i].any())

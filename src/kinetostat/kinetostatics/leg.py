@@ -1,4 +1,4 @@
-"""A leg as (W, G): how it yields when it carries a wrench. One leg at a time; the platform is `assembly`'s.
+"""A leg as (W, G): how it deflects when it carries a wrench. One leg at a time; the platform is in `assembly`.
 
 Source: theory (3), (7), (8) and (11). Screws are at one reference point, in base axes.
 """
@@ -13,11 +13,10 @@ from kinetostat.algebra.screw import Screw, Wrench
 from kinetostat.algebra.solve import complement, conjugate, dual_basis
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.machine.leg import LegScrews
+from kinetostat.tolerances import DEPENDENT_LOADS
 
 AnyScrew = TypeVar("AnyScrew", bound=Screw)
 
-UNSEEN = 1e-12
-"""Sine of the angle between the loads of a leg's springs below which they are dependent, up to rounding."""
 
 INFINITE = float("inf")
 
@@ -37,7 +36,7 @@ def leg_compliance(leg: LegScrews) -> list[list[Scalar]]:
 
 
 def relaxed(leg: LegScrews) -> LegScrews:
-    """The leg with its free springs turned into passive joints: it carries only what loads none of them.
+    """Turn the free springs of a leg into passive joints: it then carries only wrenches that load none of them.
 
     Only springs that are free by form, of stiffness 0.0 itself, are meant; the others are kept.
     """
@@ -65,7 +64,7 @@ def _independent(rows: Sequence[Sequence[Scalar]]) -> list[Sequence[Scalar]]:
     """The rows that do not repeat others, where they are numbers; all others."""
     kept: list[Sequence[Scalar]] = []
     for row in rows:
-        numbers = all(isinstance(c, float) for one in (row, *kept) for c in one)
+        numbers = all(isinstance(c, float) for loads in (row, *kept) for c in loads)
         if not numbers or _rank([*kept, row]) > len(kept):
             kept.append(row)
     return kept
@@ -75,16 +74,16 @@ def _rank(rows: Sequence[Sequence[float]]) -> int:
     """How many rows of numbers are independent, each taken at unit size."""
     sizes = [math.hypot(*row) for row in rows]
     left = [[c / size for c in row] for row, size in zip(rows, sizes, strict=True) if size > 0.0]
-    found = 0
+    rank = 0
     while left:
         axis = max(left, key=lambda row: math.hypot(*row))
         size = math.hypot(*axis)
-        if size <= UNSEEN:
+        if size <= DEPENDENT_LOADS:
             break
-        found += 1
+        rank += 1
         parts = [sum(c * d for c, d in zip(row, axis, strict=True)) / size**2 for row in left]
         left = [[c - part * d for c, d in zip(row, axis, strict=True)] for row, part in zip(left, parts, strict=True)]
-    return found
+    return rank
 
 
 def _unit(row: Sequence[Scalar]) -> list[Scalar]:
@@ -98,7 +97,7 @@ def _identity(size: int) -> list[list[Scalar]]:
 
 @dataclass(frozen=True)
 class Modes:
-    """A leg in wrenches to which it yields one by one: to the platform, as many springs that feel one wrench each.
+    """A leg in wrenches to which it deflects independently: for the platform, springs that feel one wrench each.
 
     Attributes:
         wrenches: W' with W = W' L^T.
@@ -113,7 +112,7 @@ class Modes:
     shares: tuple[tuple[Scalar, ...], ...]
 
     def amounts(self, amounts: Sequence[Scalar]) -> list[Scalar]:
-        """Of the modes, in a load that is given by amounts of the leg's own wrenches: L^T times these."""
+        """Return the amounts of the modes in a load given by amounts of the leg's wrenches: L^T times these."""
         size = range(len(amounts))
         return [amounts[k] + total([self.shares[j][k] * amounts[j] for j in size if j > k]) for k in size]
 
@@ -122,17 +121,17 @@ def modes_of(leg: LegScrews) -> Modes:
     """The modes of a leg; each is one of its wrenches less a mix of those before."""
     springs = len(leg.loads)
     columns = [(*(row[k] for row in leg.loads), *wrench.components()) for k, wrench in enumerate(leg.wrenches)]
-    found, shares, pivots = conjugate(columns, leg.compliance)
+    combined, shares, pivots = conjugate(columns, leg.compliance)
     return Modes(
-        tuple(Wrench(Vector(*column[springs : springs + 3]), Vector(*column[springs + 3 :])) for column in found),
-        tuple(tuple(column[e] for column in found) for e in range(springs)),
+        tuple(Wrench(Vector(*column[springs : springs + 3]), Vector(*column[springs + 3 :])) for column in combined),
+        tuple(tuple(column[e] for column in combined) for e in range(springs)),
         tuple(pivots),
         tuple(tuple(row) for row in shares),
     )
 
 
 def leg_modes(leg: LegScrews) -> list[Action]:
-    """The leg's stiffness W G^-1 W^T as m shares: wrenches for which G is diagonal, infinite where G vanishes.
+    """Split the leg's stiffness W G^-1 W^T into m shares: wrenches for which G is diagonal, infinite where G vanishes.
 
     Source: theory (8), eq. 32.
     """
@@ -154,7 +153,7 @@ class Resistance:
 
 
 def leg_resistance(leg: LegScrews) -> Resistance:
-    """The leg's stiffness spring by spring.
+    """Split the leg's stiffness spring by spring.
 
     With as many springs as wrenches, the share of spring e is k_e b_e b_e^T, where b_e loads e alone by one unit: exact
     for any k_e from free to rigid. With more (springs in series) or fewer, and where a load is felt by no spring, it is
@@ -171,23 +170,25 @@ def leg_resistance(leg: LegScrews) -> Resistance:
         alone = [(leg.wrenches[0], stiffness[0])]
         return Resistance(alone, alone)
     modes = modes_of(leg)
-    yielding = [reciprocal(where(d > 0.0, d, INFINITE)) for d in modes.compliance]
+    resisting = [reciprocal(where(d > 0.0, d, INFINITE)) for d in modes.compliance]
     in_modes = [
-        (combine(modes.wrenches, [f * y for f, y in zip(row, yielding, strict=True)]), s)
+        (combine(modes.wrenches, [f * k for f, k in zip(row, resisting, strict=True)]), s)
         for row, s in zip(modes.loads, leg.compliance, strict=True)
     ]
     pairs = list(zip(modes.wrenches, modes.compliance, strict=True))
     if len(leg.loads) != len(leg.wrenches):
         return Resistance(in_modes, [(wrench, reciprocal(d)) for wrench, d in pairs])
-    held = [(wrench, where(d > 0.0, 0.0, INFINITE)) for wrench, d in pairs]
+    rigid = [(wrench, where(d > 0.0, 0.0, INFINITE)) for wrench, d in pairs]
+    # As many springs as wrenches: where their loads are independent, b_e is exact even for rigid and free springs. A
+    # dependent set falls back on the modes, pose by pose, by a choice instead of a branch.
     sizes = [reciprocal(sqrt(total([c * c for c in row]))) for row in leg.loads]
     unload, sine = dual_basis([_unit(row) for row in leg.loads])
-    apart = sine > UNSEEN
+    apart = sine > DEPENDENT_LOADS
     springwise = [combine(leg.wrenches, row) * size for row, size in zip(unload, sizes, strict=True)]
     shares = [
         (_either(apart, b, c), where(apart, k, s)) for b, k, (c, s) in zip(springwise, stiffness, in_modes, strict=True)
     ]
-    return Resistance(shares, shares + [(_either(apart, NOTHING, w), where(apart, 0.0, k)) for w, k in held])
+    return Resistance(shares, shares + [(_either(apart, NOTHING, w), where(apart, 0.0, k)) for w, k in rigid])
 
 
 def combine(screws: Sequence[AnyScrew], weights: Sequence[Scalar]) -> AnyScrew:

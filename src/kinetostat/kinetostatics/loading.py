@@ -1,4 +1,4 @@
-"""A wrench on the platform: how far it moves, and what every leg, spring and joint carries. One pose.
+"""A wrench on the platform: how far it moves the tool point, and what every leg, spring and joint carries. One pose.
 
 Source: theory (28) and (29). Wrenches and twists are in base axes, at the point that each function names.
 """
@@ -65,14 +65,14 @@ def sum_of(wrenches: Sequence[Wrench]) -> Wrench:
 def joint_reactions(response: Response, load: Wrench) -> list[JointReaction]:
     """The wrench in every joint: that of its leg (links are without weight), referred to the joint's own point.
 
-    A joint that a servo or a flexure holds passes it on whole: along its freedom the load of that spring, and across it
-    what its bearings or its guide must carry.
+    A joint that an actuator or a flexure holds passes it on whole: along its freedom the load of that spring, and
+    across it what its bearings or its guide must carry.
     """
-    found = []
+    reactions = []
     for leg, wrench in zip(response.configuration.legs, leg_wrenches(response, load), strict=True):
         for name, point in joint_points(leg):
-            found.append(JointReaction(leg.name, name, point, wrench.moved(point - response.reference)))
-    return found
+            reactions.append(JointReaction(leg.name, name, point, wrench.moved(point - response.reference)))
+    return reactions
 
 
 def joint_points(leg: Leg) -> list[tuple[str, Vector]]:
@@ -91,5 +91,5 @@ def joint_points(leg: Leg) -> list[tuple[str, Vector]]:
 
 def _joints(element: Element) -> list[tuple[str, Joint]]:
     """The freedoms of an element, those that an actuator or a flexure holds among them, by the name of their joint."""
-    held = [s for s in element.springs if s.actuated or s.hinge]
-    return [(j.name, j) for j in element.freedoms] + [(s.joint.name or s.name, s.joint) for s in held]
+    springs = [s for s in element.springs if s.actuated or s.hinge]
+    return [(j.name, j) for j in element.freedoms] + [(s.joint.name or s.name, s.joint) for s in springs]

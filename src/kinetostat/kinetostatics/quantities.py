@@ -1,4 +1,4 @@
-"""The scalars of a response that maps, sweeps and tables may ask for, by name, with unit and label.
+"""The quantities of maps, sweeps, conditions and objectives: scalars of a response by name, with unit and label.
 
 Source: theory section 10. At the tool point, base axes.
 """
@@ -6,15 +6,16 @@ Source: theory section 10. At the tool point, base axes.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Literal, TypeAlias
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.symmetric import POSITIONS
-from kinetostat.kinetostatics.aspect import aspect
 from kinetostat.kinetostatics.extremes import (
     ROTATIONS,
     TRANSLATIONS,
     actuator_load,
+    aspect,
     free_stiffness,
     frobenius_condition,
     greatest_stiffness,
@@ -24,6 +25,8 @@ from kinetostat.kinetostatics.extremes import (
 )
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import LIMITS
+
+Better: TypeAlias = Literal["more", "less"] | None
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,8 @@ class MapQuantity:
         symbol: for axis labels (matplotlib mathematics).
         value: from a response; NaN where the machine lacks the part that it is about.
         components: names of those that it is about: the machine must have them.
+        better: whether more or less of it is better for a design; None where that depends on the machine.
+        needs: what a machine must have for it to mean something; empty if nothing. It is NaN where that is missing.
     """
 
     name: str
@@ -43,6 +48,8 @@ class MapQuantity:
     symbol: str
     value: Callable[[Response], Scalar]
     components: tuple[str, ...] = ()
+    better: Better = None
+    needs: str = ""
 
 
 def _compliance(response: Response, i: int, j: int) -> Scalar:
@@ -73,51 +80,71 @@ def _stiffness_unit(i: int, j: int) -> str:
 
 
 def _entries(
-    matrix: str, letter: str, unit: Callable[[int, int], str], value: Callable[..., Scalar]
+    matrix: str, letter: str, unit: Callable[[int, int], str], value: Callable[..., Scalar], better: Better
 ) -> list[MapQuantity]:
-    found = []
+    entries = []
     for i, j in POSITIONS:
         names = [COMPONENTS[i]] if i == j else [COMPONENTS[i], COMPONENTS[j]]
         symbol = rf"${letter}_{{\mathrm{{{','.join(names)}}}}}$"
         name = "_".join([matrix, *names])
-        found.append(MapQuantity(name, unit(i, j), symbol, partial(value, i=i, j=j), tuple(names)))
-    return found
+        # An entry that couples two components may have either sign: neither more nor less of it is better.
+        wanted = better if i == j else None
+        entries.append(MapQuantity(name, unit(i, j), symbol, partial(value, i=i, j=j), tuple(names), wanted))
+    return entries
 
 
 def _free_stiffnesses() -> list[MapQuantity]:
-    found = []
+    entries = []
     for i, name in enumerate(COMPONENTS):
         symbol = rf"$1/C_{{\mathrm{{{name}}}}}$"
         value = partial(free_stiffness, row=i)
-        found.append(MapQuantity(f"free_stiffness_{name}", _stiffness_unit(i, i), symbol, value, (name,)))
-    return found
+        entries.append(MapQuantity(f"free_stiffness_{name}", _stiffness_unit(i, i), symbol, value, (name,), "more"))
+    return entries
 
 
 def _extremes() -> list[MapQuantity]:
     blocks = (("translational", "N/m", "t", TRANSLATIONS), ("rotational", "N·m/rad", "r", ROTATIONS))
-    found = []
+    entries = []
     for word, unit, letter, block in blocks:
         least, greatest = partial(least_stiffness, block=block), partial(greatest_stiffness, block=block)
-        found.append(MapQuantity(f"least_{word}_stiffness", unit, rf"$k_{{\mathrm{{{letter},min}}}}$", least))
-        found.append(MapQuantity(f"greatest_{word}_stiffness", unit, rf"$k_{{\mathrm{{{letter},max}}}}$", greatest))
-    return found
+        entries.append(
+            MapQuantity(f"least_{word}_stiffness", unit, rf"$k_{{\mathrm{{{letter},min}}}}$", least, (), "more")
+        )
+        entries.append(
+            MapQuantity(f"greatest_{word}_stiffness", unit, rf"$k_{{\mathrm{{{letter},max}}}}$", greatest, (), "more")
+        )
+    return entries
 
 
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
-        *_entries("compliance", "C", _compliance_unit, _compliance),
-        *_entries("stiffness", "K", _stiffness_unit, _stiffness),
+        *_entries("compliance", "C", _compliance_unit, _compliance, "less"),
+        *_entries("stiffness", "K", _stiffness_unit, _stiffness, "more"),
         *_free_stiffnesses(),
-        MapQuantity("singularity_margin", "1", "singularity margin", _singularity_margin),
-        MapQuantity("mass", "kg", "moving mass", _mass),
+        MapQuantity("singularity_margin", "1", "singularity margin", _singularity_margin, better="more"),
+        MapQuantity("mass", "kg", "moving mass", _mass, better="less"),
         MapQuantity("aspect", "1", "aspect", aspect),
         *_extremes(),
-        MapQuantity("frobenius_condition", "1", "condition of K (Frobenius)", frobenius_condition),
-        MapQuantity("shortest_leg", "m", "shortest leg", shortest_leg),
-        MapQuantity("longest_leg", "m", "longest leg", longest_leg),
-        MapQuantity("actuator_force", "N", "greatest actuator force", partial(actuator_load, sliding=True)),
-        MapQuantity("actuator_moment", "N·m", "greatest actuator moment", partial(actuator_load, sliding=False)),
+        MapQuantity("frobenius_condition", "1", "condition of K (Frobenius)", frobenius_condition, better="less"),
+        MapQuantity("shortest_leg", "m", "shortest leg", shortest_leg, needs=LIMITS["shortest_leg"].needs),
+        MapQuantity("longest_leg", "m", "longest leg", longest_leg, better="less", needs=LIMITS["longest_leg"].needs),
+        MapQuantity(
+            "actuator_force",
+            "N",
+            "greatest actuator force",
+            partial(actuator_load, sliding=True),
+            better="less",
+            needs=LIMITS["actuator_force"].needs,
+        ),
+        MapQuantity(
+            "actuator_moment",
+            "N·m",
+            "greatest actuator moment",
+            partial(actuator_load, sliding=False),
+            better="less",
+            needs=LIMITS["actuator_moment"].needs,
+        ),
     )
 }
 """Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., singularity_margin, ..."""
@@ -128,6 +155,3 @@ GROUPS = {
     "free_stiffness": tuple(f"free_stiffness_{name}" for name in COMPONENTS),
 }
 """Names that stand for several quantities: the six diagonal entries of C and of K, and the six 1/C_ii."""
-
-PARTS = {name: LIMITS[name].needs for name in ("shortest_leg", "longest_leg", "actuator_force", "actuator_moment")}
-"""What a machine must have for a quantity to mean something; it is NaN where that is missing."""

@@ -1,42 +1,39 @@
-"""A machine at a pose to K, C and a status: the whole derivation in one function, for one pose.
+"""From a machine at a pose to K, C and a status: the whole derivation in one function.
 
-It holds for floats (one pose), for NumPy arrays and, traced by the engine, for millions; results where the status is
-not OK are meaningless and are masked by whoever collects them.
+It holds for floats (one pose), for columns of numbers (many) and, traced by the engine, for millions of poses. Where
+the status is not OK, results are meaningless; the engine and the studies mask them.
 
 Source: theory sections 2 to 9, in their order.
 """
 
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, smaller, where
+from kinetostat.algebra.scalar import Scalar, is_zero, smaller, where
 from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.closing import within_reach
 from kinetostat.kinematics.closure import Joints, solve_joints
-from kinetostat.kinematics.limits import Check, geometric_checks, within
+from kinetostat.kinematics.limits import Check, geometric_checks, load_checks, within
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_statics, stiffness_matrix
-from kinetostat.kinetostatics.overload import actuator_checks
-from kinetostat.machine.leg import Joint, LegScrews, reciprocal_wrenches
-from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.leg import Joint, LegScrews, Spring, reciprocal_wrenches
+from kinetostat.machine.limits import is_set
+from kinetostat.machine.machine import Configuration, Machine, springs
 from kinetostat.machine.mass import moving_mass
 from kinetostat.spec.renamed import renamed_property
-
-SINGULAR = 1e-6
-"""Singularity margin below which a pose counts as singular: results have then lost six of their digits. A leg
-exactly at its limit comes out at the square root of a few rounding units, 1e-8 to 3e-7, not at zero."""
+from kinetostat.tolerances import SINGULAR
 
 
 @dataclass(frozen=True)
 class Response:
-    """What a machine answers at a pose.
+    """Everything that is computed of a machine at a pose.
 
     Attributes:
         configuration: where everything is.
         reference: the tool point T (P itself unless the machine has a tool), in its plane if it has one, base frame, m.
         legs: screws of every leg at T, base axes.
-        guide: of a planar machine, the wrenches against twists that do not exist there; likewise.
+        guide: of a planar machine, the wrenches against twists that do not exist there; at T, base axes.
         statics: how the springs share loads.
         stiffness, compliance: K (N·m/rad, N/rad, N/m) and C (rad/(N·m), rad/N, m/N) at T, base axes; of a planar
             machine only rz, x, y have a meaning, and the other entries are 0.
@@ -66,7 +63,7 @@ class Response:
 
 
 def respond(machine: Machine, joints: Joints | None = None) -> Response:
-    """K, C and status of a machine at its pose.
+    """Compute K, C and the status of a machine at its pose.
 
     Args:
         machine: with its pose.
@@ -109,7 +106,7 @@ CLOSED_FORM = Joints((), int(Status.OK))
 
 
 def _out_of_plane(configuration: Configuration, reference: Vector) -> tuple[tuple[Joint, ...], tuple[Wrench, ...]]:
-    """What a planar machine does not have: freedoms, and the wrenches against them."""
+    """Freedoms that a planar machine does not have, and the wrenches against them."""
     if configuration.plane is None:
         return (), ()
     freedoms = [joint.twist(reference) for joint in configuration.plane.freedoms]
@@ -133,3 +130,31 @@ def pose_status(
     solvable = where(singularity_margin > SINGULAR, bearable, int(Status.SINGULAR))
     possible = where(allowed, solvable, int(Status.JOINT_LIMIT))
     return where(placed > Status.OK + 0.5, placed, where(reached, possible, int(Status.OUT_OF_REACH)))
+
+
+def actuator_loads(configuration: Configuration, statics: Statics, load: Wrench) -> list[tuple[Spring, Scalar]]:
+    """Return every actuator with the size of its force (N) or moment (N·m): |xi_e . w|.
+
+    Actuators that are free by form carry nothing and are left out.
+
+    Args:
+        configuration, statics: of a machine at its pose.
+        load: at the tool point, base axes.
+    """
+    pairs = zip(springs(configuration), statics.flexibility, strict=True)
+    driven = [(spring, twist) for spring, twist in pairs if spring.actuated and not is_zero(spring.stiffness)]
+    return [(spring, abs(load.work(twist))) for spring, twist in driven]
+
+
+def actuator_checks(machine: Machine, configuration: Configuration, statics: Statics) -> list[Check]:
+    """Compare the loads of the actuators with their limits; nothing to compare without a load or a limit.
+
+    Args:
+        machine: with [limits] and [load].
+        configuration, statics: of it at its pose.
+    """
+    limits = machine.tables["limits"]
+    limited = is_set(limits.actuator_force) or is_set(limits.actuator_moment)
+    if not limited or all(is_zero(component) for component in machine.load.components()):
+        return []
+    return load_checks(machine, configuration, actuator_loads(configuration, statics, machine.load))

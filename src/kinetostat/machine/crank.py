@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
+from kinetostat.algebra.lines import crank_end, crank_range
 from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin
-from kinetostat.algebra.triangle import crank_end, crank_range
 from kinetostat.algebra.vector import AXES, Z_AXIS, Vector, rotation_z
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, PartName, Spring, numbered, revolutes
 from kinetostat.machine.links import LinkKind, in_each_leg

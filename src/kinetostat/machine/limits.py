@@ -12,8 +12,8 @@ from enum import Enum
 from functools import cached_property, partial
 from itertools import combinations
 
+from kinetostat.algebra.lines import squared_distance
 from kinetostat.algebra.scalar import Scalar, cos
-from kinetostat.algebra.segment import squared_distance
 from kinetostat.algebra.vector import Z_AXIS, Vector
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.rods import Rod, rods

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from kinetostat.algebra.column import column
 from kinetostat.algebra.scalar import Scalar
+from kinetostat.machine.column import column
 from kinetostat.machine.machine import Family, Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Quantity, leaves, quantities

@@ -77,7 +77,7 @@ class ObjectiveTable(TermTable):
 
     goal: Literal["minimize", "maximize"] | None = Field(
         default=None,
-        description="stiffness and singularity margin are maximised unless this says otherwise, all else is minimised",
+        description="needed where neither is better for every design; otherwise more stiffness, less mass, ...",
     )
 
 

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kinetostat.algebra.symmetric import Symmetric6
-from kinetostat.kinetostatics.assembly import Statics
-from kinetostat.kinetostatics.attribution import compliance_shares, stiffness_shares
+from kinetostat.kinetostatics.assembly import Statics, compliance_shares, stiffness_shares
 from kinetostat.machine.leg import Spring
 from kinetostat.spec.renamed import former_names
 

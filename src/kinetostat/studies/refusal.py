@@ -9,9 +9,10 @@ from kinetostat.kinematics.limits import why_beyond
 from kinetostat.kinematics.mobility import Kind, Mobility, mobility
 from kinetostat.kinematics.singularity import describe, why_singular
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.response import SINGULAR, Response
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Configuration, Machine, springs
+from kinetostat.tolerances import SINGULAR
 
 
 def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration]) -> str:

@@ -13,12 +13,13 @@ from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Array, Axis, Grid
 from kinetostat.kinematics.singularity import free_twist
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.response import SINGULAR, Response, respond
+from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Load, Machine
 from kinetostat.machine.parameters import find, values
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.sensitivity import Sensitivity, sensitivity
+from kinetostat.tolerances import SINGULAR
 from kinetostat.views.scene import machine_scene as scenes
 from kinetostat.views.scene.analysis_overlays import overlays_of
 from kinetostat.views.scene.overlays import twist_solids

@@ -8,8 +8,8 @@ and symbols as in theory section 4. At the origin all bars point along their sli
 from dataclasses import replace
 from typing import Annotated
 
+from kinetostat.algebra.lines import slide_travel
 from kinetostat.algebra.scalar import Scalar
-from kinetostat.algebra.triangle import slide_travel
 from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring, numbered
 from kinetostat.machine.links import LinkKind, in_each_leg

@@ -6,8 +6,8 @@ elsewhere, as for any machine.
 
 from typing import Annotated
 
+from kinetostat.algebra.lines import apex
 from kinetostat.algebra.scalar import Scalar, cos, sin
-from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import Y_AXIS, Displacement, Rotation, Vector, rotation_x, rotation_y
 from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes
 from kinetostat.machine.links import LinkKind, listed

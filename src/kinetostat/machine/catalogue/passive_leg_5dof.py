@@ -6,8 +6,8 @@ The paper names the class of 5-dof machines but no leg; this leg is chosen here 
 from collections.abc import Sequence
 from typing import Annotated
 
+from kinetostat.algebra.lines import apex
 from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin, sqrt
-from kinetostat.algebra.triangle import apex
 from kinetostat.algebra.vector import X_AXIS, Y_AXIS, ZERO, Displacement, Rotation, Vector, rotation_x
 from kinetostat.machine.catalogue.passive_leg_4dof import (
     PASSIVE_LINKS,

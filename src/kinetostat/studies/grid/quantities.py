@@ -7,7 +7,7 @@ import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import GROUPS, PARTS, QUANTITIES
+from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import LIMITS, About
 from kinetostat.machine.machine import Machine
@@ -66,13 +66,14 @@ def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Param
     """
     if "mass" in names and not any(KINDS[parameter.quantity.kind].heavy for parameter in varied):
         _refuse_unknown_mass(machine)
-    wanted = [name for name in names if name in PARTS]
+    wanted = [name for name in names if QUANTITIES[name].needs]
     if not wanted:
         return
     response = respond(machine)
     for name in wanted:
         if np.isnan(QUANTITIES[name].value(response)) and response.status == Status.OK:
-            raise InputError(f'"{name}" has no meaning here: {machine.name} lacks {PARTS[name]}; leave it out.')
+            lacking = QUANTITIES[name].needs
+            raise InputError(f'"{name}" has no meaning here: {machine.name} lacks {lacking}; leave it out.')
     loaded = any(machine.load.components()) or any(parameter.path.startswith("load.") for parameter in varied)
     for name in UNDER_LOAD:
         if name in names and not loaded:

@@ -3,6 +3,7 @@
 import difflib
 import math
 from collections.abc import Mapping, Sequence
+from typing import Literal, TypeAlias
 
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.machine import Machine
@@ -25,6 +26,8 @@ ALONG = {
 STROKE, VOLUME = "leg_stroke", "workspace_volume"
 AXES = "xyz"
 
+Goal: TypeAlias = Literal["minimize", "maximize"]
+
 
 def known_terms(machine: Machine) -> list[str]:
     """Names of all terms that a machine of this kind may be asked for."""
@@ -35,9 +38,18 @@ def known_terms(machine: Machine) -> list[str]:
     return [*SUMS, *ALONG, STROKE, VOLUME, *of_poses]
 
 
-def more_is_better(name: str) -> bool:
-    """Whether a quantity is wanted large unless people say otherwise."""
-    return "stiffness" in name or name in ("singularity_margin", VOLUME)
+def usual_goal(name: str) -> Goal | None:
+    """Return which way an objective is better unless a study says otherwise; None where neither way is.
+
+    Args:
+        name: of a term of the catalogue.
+    """
+    if name == VOLUME or (name in {*SUMS, *ALONG} and name.startswith("stiffness")):
+        return "maximize"
+    if name not in QUANTITIES:
+        return "minimize"
+    better = QUANTITIES[name].better
+    return None if better is None else "maximize" if better == "more" else "minimize"
 
 
 def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: bool, where: str) -> Term:

@@ -11,9 +11,10 @@ from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.renamed import current_name
 from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, read_study
 from kinetostat.studies.bundled import bundled_studies, study_of
-from kinetostat.studies.optimisation.catalogue import more_is_better, read_term
+from kinetostat.studies.optimisation.catalogue import read_term, usual_goal
 from kinetostat.studies.optimisation.poses import PoseSet, read_poses
 from kinetostat.studies.optimisation.terms import Aggregate, Term, parse_aggregate
 from kinetostat.studies.optimisation.variables import Space, read_space
@@ -191,8 +192,13 @@ def settings_of(changes: Mapping[str, Any], above: str = "") -> Iterator[str]:
 
 
 def _objective(machine: Machine, table: ObjectiveTable, poses: PoseSet, where: str) -> Objective:
-    default = "maximize" if more_is_better(table.quantity) else "minimize"
-    small = (table.goal or default) == "minimize"
+    name = current_name(table.quantity, "quantity")
+    goal = table.goal or usual_goal(name)
+    if goal is None:
+        raise InputError(
+            f'{where}: neither a larger nor a smaller {name} is better in general; add goal = "minimize" or "maximize".'
+        )
+    small = goal == "minimize"
     return Objective(read_term(machine, table, poses, small, where), 1.0 if small else -1.0)
 
 

@@ -14,11 +14,12 @@ import numpy.typing as npt
 from kinetostat.engine.batch import first_limit_passed, limits_used
 from kinetostat.engine.points import Array
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.aspect import aspect
-from kinetostat.kinetostatics.response import SINGULAR, respond
+from kinetostat.kinetostatics.extremes import aspect
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import LIMITS, Limit, Limits, limits_set
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.workspace.conditions import Condition
+from kinetostat.tolerances import SINGULAR
 from kinetostat.units import as_read
 
 Mask = npt.NDArray[np.bool_]

@@ -14,7 +14,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find, values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.bundled import bundled_studies
-from kinetostat.studies.optimisation.catalogue import known_terms, more_is_better
+from kinetostat.studies.optimisation.catalogue import known_terms, usual_goal
 from kinetostat.studio.controls import Control, controls
 from kinetostat.studio.design.draft import (
     MOST_OBJECTIVES,
@@ -206,7 +206,9 @@ class StudyForm:
         name = str(table["quantity"])
         terms = known_terms(self._machine)
         with ui.element("div").classes("form-aim"):
-            usual = "maximize" if more_is_better(name) else "minimize"
+            usual = usual_goal(name)
+            if usual is None:  # a study must then say which: the form shows and writes the first
+                table.setdefault("goal", "minimize")
             goal = ui.select(GOALS, value=table.get("goal") or usual, on_change=partial(self._aim, table, "goal"))
             goal.props('dense options-dense outlined aria-label="goal"').classes("field").mark(
                 f"objective {place} goal"

@@ -7,7 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from geometry import displacements, vectors
-from kinetostat.algebra.triangle import apex, crank_end, crank_range, slide_travel
+from kinetostat.algebra.lines import apex, crank_end, crank_range, slide_travel
 from kinetostat.algebra.vector import Y_AXIS, Z_AXIS, ZERO, Vector
 from numeric import U
 

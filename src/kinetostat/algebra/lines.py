@@ -1,14 +1,15 @@
-"""Where two links meet, or a link and a rail: closed forms for legs with elbows and slides. Knows no machine.
+"""Lines and segments: where two links meet, or a link and a rail, and how near two links come. Knows no machine.
 
 Source: theory (13), (14) and (23). All points are in axes that the caller chooses.
 """
 
-from kinetostat.algebra.scalar import Scalar, reciprocal, sqrt
+from kinetostat.algebra.scalar import Scalar, reciprocal, smaller, sqrt, where
 from kinetostat.algebra.vector import Vector
+from kinetostat.tolerances import PARALLEL_SEGMENTS
 
 
 def apex(start: Vector, end: Vector, first: Scalar, second: Scalar) -> tuple[Vector, Scalar]:
-    """Apex of the triangle over the side start-end, in the plane y = constant, on the right of that side seen from -y.
+    """Return the apex of the triangle over start-end in the plane y = constant, on its right seen from -y.
 
     For an end above the start that is the apex on the +x side.
 
@@ -29,7 +30,7 @@ def apex(start: Vector, end: Vector, first: Scalar, second: Scalar) -> tuple[Vec
 
 
 def crank_end(start: Vector, end: Vector, axis: Vector, crank: Scalar, rod: Scalar) -> Vector:
-    """Where a crank that turns about an axis through `start` meets a rod that ends at `end`: a circle and a sphere.
+    """Intersect the circle of a crank about an axis through `start` with the sphere of a rod that ends at `end`.
 
     Of the two points the one that lies, seen along the axis, at +90 deg from the way from start to end. With `axis`
     along y and start and end in one plane y = constant, it is the `apex`.
@@ -53,7 +54,7 @@ def crank_end(start: Vector, end: Vector, axis: Vector, crank: Scalar, rod: Scal
 
 
 def crank_range(start: Vector, end: Vector, axis: Vector, crank: Scalar) -> tuple[Scalar, Scalar]:
-    """Least and greatest distance (m) of `end` from the circle of the crank's end: rods between them fit."""
+    """Least and greatest distance (m) of `end` from the circle of the crank's end: a rod must be between them."""
     span = end - start
     off = span.dot(axis)
     size = (span - axis * off).norm()
@@ -62,7 +63,7 @@ def crank_range(start: Vector, end: Vector, axis: Vector, crank: Scalar) -> tupl
 
 
 def slide_travel(start: Vector, end: Vector, direction: Vector, rod: Scalar) -> tuple[Scalar, Scalar]:
-    """How far a slide must go from `start` to meet a rod that ends at `end`: a line and a sphere.
+    """Return how far a slide must go from `start` to meet a rod that ends at `end`: a line and a sphere.
 
     Of the two positions the one behind `end`, from where the rod points forward.
 
@@ -80,3 +81,26 @@ def slide_travel(start: Vector, end: Vector, direction: Vector, rod: Scalar) -> 
     aside = span - direction * ahead
     square = aside.dot(aside)
     return ahead - sqrt(rod * rod - square), sqrt(square)
+
+
+def squared_distance(first: tuple[Vector, Vector], second: tuple[Vector, Vector]) -> Scalar:
+    """Return the square of the least distance of two line segments, each given by its ends, m².
+
+    Source: C. Ericson, Real-Time Collision Detection (2005), section 5.1.9, with choices in place of branches.
+    """
+    along, across, between = first[1] - first[0], second[1] - second[0], first[0] - second[0]
+    a, b, c = along.dot(along), along.dot(across), across.dot(across)
+    d, e = along.dot(between), across.dot(between)
+    crossed = a * c - b * b
+    apart = crossed > PARALLEL_SEGMENTS * (a * c)
+    s = where(apart, _clamped((b * e - c * d) * reciprocal(where(apart, crossed, 1.0))), 0.0)
+    t = (b * s + e) * reciprocal(c)
+    begin, end = _clamped(-d * reciprocal(a)), _clamped((b - d) * reciprocal(a))
+    s = where(t < 0.0, begin, where(t > 1.0, end, s))
+    gap = between + along * s - across * _clamped(t)
+    return gap.dot(gap)
+
+
+def _clamped(share: Scalar) -> Scalar:
+    """Limit a share to the range from 0 to 1."""
+    return where(share > 0.0, smaller(share, 1.0), 0.0)

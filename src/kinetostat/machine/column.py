@@ -1,6 +1,6 @@
 """Many numbers as one scalar: a NumPy array whose operators know structural zeros and ones. No formula lives here.
 
-It joins the other scalars (floats at one pose, traced values in the engine): with it a formula written once, such as
+It is what parameters become in a batch of machines or poses. With it a formula of `algebra`, such as
 `a * c - b * b`, runs over a whole batch and skips what is zero by form.
 """
 
