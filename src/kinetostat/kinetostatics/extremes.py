@@ -2,7 +2,7 @@
 
 All over scalars, so that the engine evaluates them for whole populations. Directions and tables are in `indices`.
 
-Source: theory section 10.
+Source: theory section 10; the aspect is theory (30).
 """
 
 import math
