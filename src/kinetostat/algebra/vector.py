@@ -101,7 +101,7 @@ def rotation_z(c: Scalar, s: Scalar) -> Rotation:
 def rotation_along(axis: Vector, c: Scalar, s: Scalar) -> Rotation:
     """Rotation about the unit vector `axis` by the angle whose cosine is c and sine s (Rodrigues).
 
-    What is 1 by form on the diagonal stays so: about a base axis, it is as sparse as `rotation_x` and the like.
+    What is 1 by form on the diagonal stays so: about a base axis, it is as sparse as `rotation_x`.
     """
     rest = 1.0 - c
     columns = []

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.column import column
 from kinetostat.algebra.scalar import Scalar, cos, sin, smaller, sqrt
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector, rotation_x, rotation_y, rotation_z
+from kinetostat.machine.column import column
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.machine import Chains, Closure, Configuration, Step
 from kinetostat.machine.written.family import place

@@ -1,6 +1,6 @@
 """Attribution: how much each spring contributes to the stiffness and the compliance of the platform at one pose.
 
-The formulas are in `kinetostatics.attribution`; tables and bars of the contributions are in `views` and `studio`.
+The formulas are in `kinetostatics.assembly`; tables and bars of the contributions are in `views` and `studio`.
 """
 
 import math
