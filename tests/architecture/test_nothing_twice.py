@@ -2,12 +2,13 @@
 
 import ast
 import copy
+import re
 from collections import defaultdict
 
 from source import modules
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
-SMALL = 22
+SMALL = 26
 """Nodes of a body up to which functions may be alike: a property that passes one thing on."""
 CALLED_FROM_OUTSIDE = {
     "WITH_CRANKS": "the catalogue takes every family that a module defines",
@@ -36,8 +37,12 @@ def taken_from_others():
                 imported |= {(node.module, alias.name) for alias in node.names}
             elif isinstance(node, ast.Attribute):
                 read.add(node.attr)
-            elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.isidentifier():
-                read.add(node.value)
+            elif (
+                isinstance(node, ast.Constant)
+                and isinstance(node.value, str)
+                and re.fullmatch(r"\w+(\.\w+)?", node.value)
+            ):
+                read |= set(node.value.split("."))
     return imported, read
 
 

@@ -18,7 +18,7 @@ WORDS = {
     r"anew": "again",
     r"rival": "second answer",
     r"(not|of) ours": "independent, of kinetostat",
-    r"is no (?!longer\b|more\b|less\b|better\b|worse\b|further\b|other\b)\w+": "is not a ..., there is no ...",
+    r"(?<!there )is no (?!longer\b|more\b|less\b|better\b|worse\b|other\b)\w+": "is not a ..., there is no ...",
     r"the like": "name them",
 }
 """Words that these texts do not use, and what to write instead."""
