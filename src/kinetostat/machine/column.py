@@ -50,7 +50,7 @@ class _Functions:
     @staticmethod
     def where(condition: Any, a: Scalar, b: Scalar) -> Column:
         """`a` where the condition holds, `b` elsewhere; NumPy's own function would forget that they are columns."""
-        return np.where(condition, a, b).view(Column)
+        return np.asarray(np.where(condition, a, b)).view(Column)
 
 
 def column(values: Any) -> Any:
