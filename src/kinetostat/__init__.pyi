@@ -15,7 +15,7 @@ from kinetostat.studies.comparison.designs import compare as compare
 from kinetostat.studies.grid.grid import evaluate_grid as evaluate_grid
 from kinetostat.studies.guidelines.guidelines import guidelines as guidelines
 from kinetostat.studies.optimisation.problem import load_problem as load_problem
-from kinetostat.studies.optimisation.result import optimize as optimize
+from kinetostat.studies.optimisation.search import optimize as optimize
 from kinetostat.studies.paper.reproduction import reproduce as reproduce
 from kinetostat.studies.sensitivity import sensitivity as sensitivity
 from kinetostat.studies.workspace.workspace import workspace as workspace

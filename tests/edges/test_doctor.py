@@ -23,14 +23,14 @@ def test_a_sound_installation(capsys):
     assert main(["doctor", "--json"]) == DONE
     found = json.loads(capsys.readouterr().out)
     assert found["healthy"] is True
-    assert found["software"]["numpy"]["said"] == np.__version__
+    assert found["software"]["numpy"]["detail"] == np.__version__
     assert set(found["extras"]) >= {"studio", "validate", "cluster"}
-    assert found["machine"]["vectors"]["said"][0] in "248"
-    assert "49 of 55" in found["self-test"]["paper"]["said"]
-    assert "1.017889" in found["self-test"]["search"]["said"]
+    assert found["machine"]["vectors"]["detail"][0] in "248"
+    assert "49 of 55" in found["self-test"]["paper"]["detail"]
+    assert "1.017889" in found["self-test"]["search"]["detail"]
     assert {check["state"] for check in found["self-test"].values()} == {"sound"}
     assert {"machine code", "throughput", "files", "pictures"} < set(found["self-test"])
-    assert "none" in found["places"]["cache"]["said"]
+    assert "none" in found["places"]["cache"]["detail"]
 
 
 def shown(*checks: Check) -> str:
@@ -79,7 +79,7 @@ def test_a_package_that_is_too_old(monkeypatch):
     monkeypatch.setattr(software, "version", installed_but(numpy="1.26.4"))
     numpy = next(check for check in software.checks() if check.name == "numpy")
     assert (numpy.state, numpy.fix) == (State.FAILED, "pip install 'numpy>=2.1'")
-    assert numpy.said == "1.26.4 is installed, but >=2.1 is needed"
+    assert numpy.detail == "1.26.4 is installed, but >=2.1 is needed"
 
 
 def test_every_package_of_the_core_is_loaded():
@@ -122,10 +122,10 @@ def test_wrong_numbers_are_found(monkeypatch):
     monkeypatch.setattr(printed, "OPTIMISED_SUM", "1.0178")
     monkeypatch.setattr(self_test, "write_dataset", lambda path, grid: (2.0 * grid).to_netcdf(path, engine="h5netcdf"))
     found = {check.name: check for check in self_test.checks()}
-    assert "Table III, row 1, rx: 0.5 for 0.52371" in found["paper"].said
-    assert "1.0e-06" in found["machine code"].said
-    assert "1.0178894" in found["search"].said
-    assert "not what is read" in found["files"].said
+    assert "Table III, row 1, rx: 0.5 for 0.52371" in found["paper"].detail
+    assert "1.0e-06" in found["machine code"].detail
+    assert "1.0178894" in found["search"].detail
+    assert "not what is read" in found["files"].detail
     failed = {name for name, check in found.items() if check.state is State.FAILED and check.fix}
     assert failed == {"paper", "machine code", "search", "files"}
 

@@ -269,5 +269,5 @@ def test_stiffness_is_bought_with_mass():
     assert (genes[:, 1] == 1.0).all(), "the stiffer drive always"
     diameter = log.problem.space.values(genes)[:, 0]
     np.testing.assert_allclose(objectives[:, 0] / diameter**2, objectives[0, 0] / diameter[0] ** 2, rtol=1e-9)
-    with pytest.raises(InputError, match="nothing says what"):
+    with pytest.raises(InputError, match="is not known"):
         written(SMALL, "objectives.0.quantity=mass")

@@ -38,17 +38,21 @@ def _doctor(options: argparse.Namespace) -> int:
 
 
 def _checks() -> "Iterator[Check]":
-    """Yield all findings, with those on pictures and the studio, which `studies.diagnosis` must not import."""
+    """Make all checks, also those of pictures and the studio, which `studies.diagnosis` must not import."""
     from kinetostat.studies.diagnosis.diagnosis import Check, State, diagnose, reinstall, tried
-    from kinetostat.studio.design.state_folder import usual_state
 
     yield from diagnose()
     yield tried("self-test", "pictures", _drawn, reinstall("matplotlib"))
     yield Check("places", "cache", State.ABSENT, "none: compiled programs live in memory only")
     yield Check("places", "configuration", State.ABSENT, "none: files and options say everything")
+    yield tried("places", "studio", _state_folder, reinstall("kinetostat"))
+
+
+def _state_folder() -> str:
+    from kinetostat.studio.design.state_folder import usual_state
+
     folder = usual_state()
-    meaning = f"{folder}: searches and favourites of the design tab"
-    yield Check("places", "studio", State.SOUND if folder.is_dir() else State.ABSENT, meaning)
+    return f"{folder}: searches and favourites of the design tab{'' if folder.is_dir() else ' (none yet)'}"
 
 
 def _drawn() -> str:

@@ -136,7 +136,7 @@ def _scaled(solid: TopoDS_Shape, scale: Point3) -> TopoDS_Shape:
 
 
 def pieces(points: Sequence[Point2]) -> Iterator[Piece]:
-    """Yield a path through points as lines and arcs: an arc where points follow each other evenly round a circle.
+    """Follow a path through points as lines and arcs: an arc where points follow each other evenly round a circle.
 
     An arc is at most half a circle, so that its three points lie well apart.
 

@@ -33,7 +33,7 @@ def centre_of_stiffness(stiffness: Matrix | None, components: Sequence[int] = SP
     Returns:
         d, from P to the centre in base axes, m [3]; None where K is missing or not finite, or where the point is not
         unique: K_tt of rank below 2 (planar: singular), as springs resist translation along one direction only. An
-        isotropic K_tt is no such case.
+        isotropic K_tt is not such a case.
 
     Raises:
         ValueError: for other components, or a matrix of another shape.

@@ -108,8 +108,8 @@ def _sentence(mistake: dict[str, Any], document: Document, tables: Mapping[str, 
 def _tables_in(within: str, tables: Mapping[str, type]) -> list[str]:
     """What a table of tables may hold."""
     start = f"{within}." if within else ""
-    tables = [path.removeprefix(start).partition(".")[0] for path in tables if path.startswith(start)]
-    return list(dict.fromkeys([*([] if within else ["schema", "name", "family"]), *tables]))
+    names = [path.removeprefix(start).partition(".")[0] for path in tables if path.startswith(start)]
+    return list(dict.fromkeys([*([] if within else ["schema", "name", "family"]), *names]))
 
 
 def _missing(within: str, name: str, last: str, known: Mapping[str, Quantity], family: object) -> str:

@@ -1,8 +1,8 @@
 """A NetCDF file larger than memory, filled run by run. Which runs are done is known elsewhere.
 
-Every variable is one contiguous block, reserved when the file is made; later only numbers are written into it. So there
-is no structure that an interruption could break, no second copy to assemble, and what runs were written, and in which
-order, leaves no trace.
+Every variable is one contiguous block, reserved when the file is made; later only numbers are written into it. An
+interruption therefore breaks no structure, no second copy has to be assembled, and the file does not depend on the runs
+that wrote it, nor on their order.
 """
 
 import os

@@ -47,7 +47,7 @@ def relative_sensitivity(slope: Array | float, size: Array | float, index: Array
     """Return the relative change of an index per relative change of a parameter: size * slope / index.
 
     All studies compare sensitivities by this rule. It is undefined (NaN) where the index is zero or infinite, and where
-    the size is zero: a percent of zero is no change.
+    the size is zero: a percent of zero changes nothing.
 
     Args:
         slope: derivative of the index by the parameter, SI.

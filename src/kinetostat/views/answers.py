@@ -29,6 +29,7 @@ from kinetostat.studies.sensitivity import Sensitivity
 from kinetostat.studies.storage import replacing, write_dataset, write_json, write_text
 from kinetostat.studies.workspace import workspace
 from kinetostat.studies.workspace.workspace import Workspace
+from kinetostat.tolerances import AGREED
 from kinetostat.validation import comparison as validation
 from kinetostat.validation.comparison import Validation
 from kinetostat.views import optimisation_figures, workspace_figures
@@ -110,7 +111,7 @@ KINDS = (
     Kind(Result, print_result, optimisation_figures.pictures, result_data.as_json),
     Kind(
         Validation,
-        lambda console, result: print_validation(console, result, validation.AGREED),
+        lambda console, result: print_validation(console, result, AGREED),
         data=validation.as_json,
     ),
 )

@@ -66,7 +66,7 @@ def _print_differences(console: Console, comparison: Comparison, letters: str) -
 
 
 def _abreast(console: Console, letters: str) -> Iterator[list[int]]:
-    """Yield the designs that fit side by side: always the first, and as many others as the terminal takes."""
+    """Choose the designs that fit side by side: always the first, and as many others as the terminal takes."""
     others = max((console.width - NAMED) // CELL, 2) - 1
     for start in range(1, len(letters), others):
         yield [0, *range(start, min(start + others, len(letters)))]

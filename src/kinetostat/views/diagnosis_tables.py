@@ -40,7 +40,7 @@ def _line(check: Check) -> Table:
     line.add_column(width=1)
     line.add_column(width=NAMES)
     line.add_column(overflow="fold")
-    line.add_row(Text(mark, style), check.name, Text(check.said, "" if check.state is State.SOUND else style))
+    line.add_row(Text(mark, style), check.name, Text(check.detail, "" if check.state is State.SOUND else style))
     if check.fix:
         line.add_row("", "", Text(f"→ {check.fix}", "cyan"))
     return line

@@ -208,7 +208,7 @@ def move_table(guidelines: Guidelines, count: int) -> Table:
 
 
 def left_out(guidelines: Guidelines, count: int) -> Iterator[str]:
-    """Yield sentences on the parameters that the table omits, and why."""
+    """Write sentences on the parameters that the table omits, and why."""
     hidden = len(guidelines.parameters) - count
     if hidden:
         yield f"{omitted(hidden)} (--full shows them)."

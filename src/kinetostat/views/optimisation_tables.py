@@ -179,7 +179,7 @@ def front_table(result: Result) -> Table:
 
 
 def remarks(result: Result) -> Iterator[str]:
-    """Yield what a designer should not overlook: variables at bounds, stiffness given up, ridges."""
+    """Say what a designer should not overlook: variables at bounds, stiffness given up, ridges."""
     bounded = [term for term in result.influences if term.bound]
     if bounded and len(result.problem.objectives) == 1:
         names = ", ".join(f"{term.name} ({term.bound})" for term in bounded)

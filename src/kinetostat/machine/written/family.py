@@ -10,7 +10,7 @@ from typing import Any
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.algebra.vector import AXES, IDENTITY, X_AXIS, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector
 from kinetostat.machine.cross_section import linear_density_of, rigidity_of
-from kinetostat.machine.leg import Element, Leg, PartName, Spring, Turn
+from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Turn
 from kinetostat.machine.link import Beam, lumped_springs, matrix_springs
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
 from kinetostat.machine.written.joints import JOINT_TYPES
@@ -102,7 +102,7 @@ def _elements(title: str, joint: JointPlan, data: Any) -> Sequence[Element]:
     elements = JOINT_TYPES[joint.kind].elements(title, data)
     if not joint.sprung:
         return elements
-    (freedom,) = elements
+    (freedom,) = (element for element in elements if isinstance(element, Joint))
     name = f"{title} actuator" if joint.actuated else f"{title} hinge"
     return (Spring(name, freedom, data.stiffness, title, joint.actuated, not joint.actuated),)
 

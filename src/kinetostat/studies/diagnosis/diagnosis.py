@@ -6,13 +6,15 @@ from enum import StrEnum
 from importlib import import_module
 from typing import Any
 
+from kinetostat.spec.renamed import with_former_keys
+
 
 class State(StrEnum):
-    """What became of a check."""
+    """Result of a check."""
 
     SOUND = "sound"
     ABSENT = "absent"
-    """Not there, and nothing that is needed."""
+    """Not installed, and not needed."""
     FAILED = "failed"
 
 
@@ -21,17 +23,17 @@ class Check:
     """A finding.
 
     Attributes:
-        group: what it belongs to, a heading.
-        name: what was looked at.
-        state: what became of it.
-        said: one sentence or number for people.
-        fix: what to do about it, where there is something to do.
+        group: heading under which it is listed.
+        name: of the part that was checked.
+        state: the result.
+        detail: one sentence or number.
+        fix: the remedy, where there is one.
     """
 
     group: str
     name: str
     state: State
-    said: str
+    detail: str
     fix: str = ""
 
 
@@ -78,6 +80,6 @@ def as_json(checks: Sequence[Check]) -> dict[str, Any]:
     """Write the verdict, then the finding of each check by group and name, as plain data."""
     groups: dict[str, Any] = {}
     for check in checks:
-        entry = {"state": check.state.value, "said": check.said} | ({"fix": check.fix} if check.fix else {})
+        entry = {"state": check.state.value, "detail": check.detail} | ({"fix": check.fix} if check.fix else {})
         groups.setdefault(check.group, {})[check.name] = entry
-    return {"healthy": healthy(checks), **groups}
+    return with_former_keys({"healthy": healthy(checks), **groups}, {"said": "detail"})

@@ -51,7 +51,7 @@ class Guidelines:
         compliance_diagonal: the diagonal of C.
         elements: the elastic elements, actuators first.
         here: their roles at the pose of the file.
-        stiffness_equations: per element, its coefficients in the diagonal of K; None where K is no such sum.
+        stiffness_equations: per element, its coefficients in the diagonal of K; None where K is not such a sum.
         meaning: of the percentages in `parameters`, one sentence.
         parameters: what the parameters of the design do, those with the largest effect first.
         without_influence: paths of parameters that change no direction, here or anywhere on the grid.

@@ -98,8 +98,9 @@ def _together(machine: Machine, path: str) -> str:
     field = path.rpartition(".")[0]
     whole = {p.path: p for p in parameters(machine.family)}.get(field)
     here = values(machine)
-    alike = whole is not None and whole.quantity.stiff and len({here[leaf] for leaf in whole.leaves}) == 1
-    return field if alike and whole.quantity.per_leg else path
+    if whole is None or not (whole.quantity.stiff and whole.quantity.per_leg):
+        return path
+    return field if len({here[leaf] for leaf in whole.leaves}) == 1 else path
 
 
 def with_signs(machine: Machine, grid: Points, moves: Sequence[Move]) -> list[Move]:

@@ -110,7 +110,7 @@ def stiffening(machine: Machine, element: Element, factors: Array) -> Array:
 def equations_of_k(
     response: Response, elements: Sequence[Element], kept: Sequence[int]
 ) -> dict[str, tuple[float, ...]] | None:
-    """Coefficients in the diagonal of K by element (eqs. 33-38), without round-off; None where K is no such sum.
+    """Coefficients in the diagonal of K by element (eqs. 33-38), without round-off; None where K is not such a sum.
 
     Arguments as for `roles_at`, at one pose.
     """
