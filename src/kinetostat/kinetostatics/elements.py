@@ -64,13 +64,13 @@ def elements(configuration: Configuration) -> list[Element]:
             if spring.stiffness != 0.0:
                 parts.setdefault(spring.of, []).append((number, spring))
             number += 1
-        alike = tuple((own[0][1].kind, len(own)) for own in parts.values())
-        for part, own in parts.items():
-            if len(own) > 1 and all(spring.stiffness == math.inf for _, spring in own):
+        alike = tuple((numbered[0][1].kind, len(numbered)) for numbered in parts.values())
+        for part, numbered in parts.items():
+            if len(numbered) > 1 and all(spring.stiffness == math.inf for _, spring in numbered):
                 continue
-            label = own[0][1].kind
-            kind = (label, tuple(_unit(spring) for _, spring in own), own[0][1].actuated, alike)
-            groups.setdefault(kind, {})[part] = own
+            label = numbered[0][1].kind
+            kind = (label, tuple(_unit(spring) for _, spring in numbered), numbered[0][1].actuated, alike)
+            groups.setdefault(kind, {})[part] = numbered
     every = [_element(str(kind[0]), parts) for kind, parts in groups.items()]
     return sorted(every, key=lambda element: not element.actuated)
 
@@ -89,15 +89,15 @@ def with_links_together(alone: Sequence[Element]) -> list[Element]:
 
 
 def _element(label: str, parts: Mapping[str, Sequence[tuple[int, Spring]]]) -> Element:
-    held = [spring for own in parts.values() for _, spring in own]
-    single = len(held) == len(parts)
-    sizes = {float(spring.stiffness) for spring in held}
+    springs = [spring for numbered in parts.values() for _, spring in numbered]
+    single = len(springs) == len(parts)
+    sizes = {float(spring.stiffness) for spring in springs}
     return Element(
         name=f"{label} ×{len(parts)}" if len(parts) > 1 else next(iter(parts)),
         parts=tuple(parts),
-        springs=tuple(number for own in parts.values() for number, _ in own),
-        actuated=held[0].actuated,
-        unit=_unit(held[0]) if single else "",
+        springs=tuple(number for numbered in parts.values() for number, _ in numbered),
+        actuated=springs[0].actuated,
+        unit=_unit(springs[0]) if single else "",
         stiffness=sizes.pop() if single and len(sizes) == 1 else None,
     )
 
@@ -121,8 +121,8 @@ def diagonal_with(response: Response, element: Element, factor: Scalar) -> list[
     chosen, number, legs = _weights(response, element), 0, []
     for leg in response.legs:
         places = range(number, number + len(leg.compliance))
-        own = [chosen[i] * factor if i in chosen else s for i, s in zip(places, leg.compliance, strict=True)]
-        legs.append(replace(leg, compliance=tuple(own)))
+        compliance = [chosen[i] * factor if i in chosen else s for i, s in zip(places, leg.compliance, strict=True)]
+        legs.append(replace(leg, compliance=tuple(compliance)))
         number += len(leg.compliance)
     return list(compliance_matrix(solve_statics(legs, response.statics.length, response.guide)).diagonal())
 
@@ -162,7 +162,7 @@ def without_rounding(entries: Sequence[Scalar], response: Response) -> Array:
 
 def is_isostatic(response: Response) -> bool:
     """Whether the legs carry six wrenches, so that statics alone says how they share a load."""
-    return sum(len(own) for own in response.statics.sharing) + len(response.guide) == SIZE
+    return sum(len(numbers) for numbers in response.statics.sharing) + len(response.guide) == SIZE
 
 
 def stiffness_equations(response: Response, parts: Sequence[Element]) -> dict[str, Symmetric6] | None:

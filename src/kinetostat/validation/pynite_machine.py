@@ -79,11 +79,11 @@ def extrapolate(steps: Sequence[float], values: Sequence[Array], length: float) 
 def _extremes(configuration: Configuration) -> tuple[float, float]:
     """Least and greatest stiffness of its parts, N/m; those in N·m/rad through the machine's length."""
     length = float(configuration.length)
-    found = []
+    stiffnesses: list[float] = []
     for leg in configuration.legs:
         for piece in pieces(leg, configuration.plane):
-            found += _stiffnesses(piece, length)
-    finite = [k for k in found if 0.0 < k < math.inf]
+            stiffnesses += _stiffnesses(piece, length)
+    finite = [k for k in stiffnesses if 0.0 < k < math.inf]
     return (min(finite), max(finite)) if finite else (1.0, 1.0)
 
 
@@ -91,9 +91,9 @@ def _stiffnesses(piece: Piece, length: float) -> list[float]:
     if isinstance(piece, Spring):
         return [float(piece.stiffness) / (1.0 if piece.joint.point is None else length**2)]
     if isinstance(piece, Beam):
-        own, size = piece.rigidity, section_axes(piece)[1]
-        turning = [float(k) / (size * length**2) for k in (own.torsion, own.bending_y, own.bending_z)]
-        return [float(own.axial) / size, *turning]
+        rigidity, size = piece.rigidity, section_axes(piece)[1]
+        turning = [float(k) / (size * length**2) for k in (rigidity.torsion, rigidity.bending_y, rigidity.bending_z)]
+        return [float(rigidity.axial) / size, *turning]
     if isinstance(piece, Joint):
         return []
     return [float(piece.stiffness if isinstance(piece, Strut) else piece.bar)]

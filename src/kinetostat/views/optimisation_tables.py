@@ -164,7 +164,7 @@ def front_table(result: Result) -> Table:
     """Designs of the front, the knee among them."""
     problem, outcome = result.problem, result.log.outcome(result.front)
     shown = {round(k * (len(result.front) - 1) / (MOST_ROWS - 1)) for k in range(MOST_ROWS)} | {result.knee}
-    names = [f"{one.term.label}\n{one.term.unit}".replace(" (", "\n(") for one in problem.objectives]
+    names = [f"{objective.term.label}\n{objective.term.unit}".replace(" (", "\n(") for objective in problem.objectives]
     variables = [variable.name.split(".", 1)[1].replace("_", "\n") for variable in problem.space.searched]
     title = f"Pareto front: {len(result.front)} designs" + (
         f", {len(shown)} shown" if len(result.front) > len(shown) else ""
@@ -173,7 +173,9 @@ def front_table(result: Result) -> Table:
     for k in sorted(k for k in shown if k < len(result.front)):
         genes = result.log.genes(result.front[k : k + 1])[0]
         values = zip(problem.space.searched, problem.space.values(genes), strict=True)
-        cells = [number(value) for value in outcome.objectives[k]] + [one.shown(value) for one, value in values]
+        cells = [number(value) for value in outcome.objectives[k]] + [
+            variable.shown(value) for variable, value in values
+        ]
         table.add_row("knee" if k == result.knee else "", *cells, style="bold" if k == result.knee else None)
     return table
 

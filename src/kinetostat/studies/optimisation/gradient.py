@@ -152,7 +152,7 @@ class _Descent:
         """One call of the solver; in the epigraph the last unknown is the bound t."""
         count = len(genes)
         sign = self.problem.objectives[0].sign
-        conditions = [self._condition(one.term, one.sign, one.bound, one.scale) for one in self.problem.constraints]
+        conditions = [self._condition(c.term, c.sign, c.bound, c.scale) for c in self.problem.constraints]
 
         def plain(x: Array) -> tuple[float, Array]:
             here = self._at(x)
