@@ -1,4 +1,7 @@
-"""The commands `sensitivity` and `guidelines`: which parameters decide the stiffness. No formula lives here."""
+"""The commands `sensitivity` and `guidelines`, which tell what parameters decide the stiffness. No formula lives here.
+
+Studies and views are imported when a command runs, so that `kinetostat --help` need not load NumPy.
+"""
 
 import argparse
 from pathlib import Path
@@ -23,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def add_influence_commands(commands: "Commands") -> None:
-    """Add `sensitivity` and `guidelines`."""
+    """Add the commands `sensitivity` and `guidelines` to the command line."""
     command = add_command(
         commands, "sensitivity", _sensitivity, "rank the parameters by their effect on the stiffness at a pose",
         "kinetostat sensitivity zhang-gosselin-4dof --quantity compliance_z -o sensitivity",
@@ -73,6 +76,7 @@ def _write_sensitivity(result: "Sensitivity", folder: Path) -> list[Path]:
 
     written = [folder / "sensitivity.json"]
     write_json(written[0], as_json(result))
+    # If no parameter has an influence, there is nothing to draw.
     return written + (save(sensitivity_figure(result), folder / "sensitivity") if result.parameters else [])
 
 

@@ -1,7 +1,8 @@
-"""Many points at once with exact derivatives: the engine chooses arithmetic and slab size. Holds no formula.
+"""Evaluate many points at once with exact derivatives. The formulas are traced elsewhere, in `form` and `gradient`.
 
-Few points go through NumPy and many through machine code, both from the same graph and by the same rules. Where the
-joints of a machine written leg by leg follow from equations, so do their derivatives, by linear systems pose by pose.
+Few points are evaluated by NumPy and many by compiled machine code, both from the same traced graph and by the same
+rules. The joints of a machine written leg by leg may have to be solved for; their derivatives then follow from the
+closing equations by a linear system at each pose.
 
 Source: theory (34).
 """
@@ -27,16 +28,16 @@ from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.tolerances import IDLE_COORDINATES, OPENING, ROUND_OFF_DERIVATIVE, SAME_DERIVATIVE
 
 MACHINE_CODE_FROM = 20_000
-"""Points from which compiling pays: NumPy differentiates some ten thousand poses/s."""
+"""Number of points from which on compiling pays: NumPy differentiates some ten thousand poses per second."""
 SMALL_SLAB = 512
-"""Points per slab of NumPy calls and of linear systems: some thousand arrays of it wait in memory at once."""
+"""Points in a slab for NumPy and for linear systems: some thousand arrays of this length are in memory at once."""
 KEPT = 32
-"""Programs kept in memory."""
+"""Number of programs that are kept in memory."""
 NEAR, TRIED = 0.03, 5
-"""How far from a machine's own numbers, as a share of them, and at how many points closed forms are tried."""
+"""Closed forms are tried at this share of the machine's numbers away from them, and at so many points."""
 
 Objective: TypeAlias = str | Mapping[str, float]
-"""A quantity by name, or a weighted sum of several: weights, in whatever unit, by name."""
+"""The name of a quantity, or a weighted sum of several: their weights, in any units, by name."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +46,10 @@ class Gradients:
 
     Attributes:
         values: of the objectives [objectives x points]; NaN where the status is not OK, infinite where rigid or free.
-        gradients: by the parameters, SI [objectives x paths x points]; NaN where the value is not finite, by a spring
-            that is free, and by a parameter that cannot change alone without the legs opening. By a rigid spring it
-            is 0.
-        status: `Status` codes.
+        gradients: derivatives by the parameters, SI [objectives x paths x points]. They are NaN where the value is not
+            finite, for the stiffness of a free spring, and for a parameter that cannot change alone without opening a
+            leg; they are 0 for the stiffness of a rigid spring.
+        status: `Status` codes [points].
     """
 
     values: Array
@@ -69,12 +70,12 @@ def evaluate_gradient(
 
     Args:
         machine: gives all parameters that do not vary.
-        points: where; leaf paths of the machine's family and their values, SI.
-        objectives: one or several; names are from `kinetostatics.quantities.QUANTITIES`.
+        points: leaf paths of the parameters that vary, and their values at each point, SI.
+        objectives: a single objective or several; names are from `kinetostatics.quantities.QUANTITIES`.
         paths: leaf paths of the parameters to differentiate by, whether they vary over the points or not.
         progress: called after each slab.
-        repeated: whether the same derivatives will be wanted again and again at other points, as by a search: then
-            compiling once pays for few points as well.
+        repeated: whether the same derivatives will be needed many times at other points, as in a search; compiling
+            then pays for few points too.
     """
     several = [objectives] if isinstance(objectives, str | Mapping) else list(objectives)
     weights = tuple(((entry, 1.0),) if isinstance(entry, str) else tuple(entry.items()) for entry in several)
@@ -97,13 +98,16 @@ def evaluate_gradient(
 def _fill(
     machine: Machine, varying: tuple[str, ...], weights: tuple[Weights, ...], paths: tuple[str, ...], native: bool
 ) -> Fill:
-    """Evaluates slabs of points of one machine: objectives, then their derivatives by each path."""
-    ways = _Ways(machine, varying, weights, paths, native)
+    """Return the fill for slabs of points of one machine: rows of objectives, then of their derivatives by each path.
+
+    Closed forms are faster than solving for the joints, but are used only where they still hold as parameters change.
+    """
+    routes = _Routes(machine, varying, weights, paths, native)
     if machine.family.chains is None:
-        return ways.direct()
+        return routes.direct()
     if native and _closed_forms_hold(Kind(machine), tuple(values(machine).items()), varying, weights, paths):
-        return falling_back(ways.direct(closed=True), lambda: ways.by_equations)
-    return ways.by_equations
+        return falling_back(routes.direct(closed=True), lambda: routes.by_equations)
+    return routes.by_equations
 
 
 @lru_cache(KEPT)
@@ -114,16 +118,19 @@ def _closed_forms_hold(
     weights: tuple[Weights, ...],
     paths: tuple[str, ...],
 ) -> bool:
-    """Whether closed forms hold while parameters change: near the machine's own pose both ways must agree.
+    """Tell whether closed forms still hold when parameters change.
 
-    They do not where a parameter changes what they take as given: that axes are parallel, say, or that the platform
-    keeps the coordinates that its pose does not give. (At the home pose itself legs close whatever their axes.)
+    A closed form assumes, say, that two axes are parallel, or that the platform keeps the coordinates that its pose
+    does not give. A parameter that upsets such an assumption makes its derivatives wrong without any error. Therefore
+    closed forms and closing equations are compared at random points near the machine's numbers, where both must agree.
+    (The home pose itself shows nothing: there the legs close whatever their axes are.)
 
-    The answer depends on the machine's numbers, not only on its kind and form, so that all of them are in the key.
+    The answer depends on all numbers of the machine, not only on its kind and form. They are arguments so that
+    they are part of the cache's key.
 
     Args:
-        kind: of the machine.
-        numbers: all its parameters, by leaf path.
+        kind: kind of the machine.
+        numbers: all parameters of the machine, by leaf path.
         varying: leaf paths of the parameters that vary.
         weights: the objectives.
         paths: leaf paths of the parameters to differentiate by.
@@ -131,12 +138,12 @@ def _closed_forms_hold(
     machine, centre = with_values(kind.machine, dict(numbers)), dict(numbers)
     if not closes_inside(machine):
         return False
-    ways = _Ways(machine, varying, weights, paths, native=False)
+    routes = _Routes(machine, varying, weights, paths, native=False)
     drawn = np.random.default_rng(0).uniform(-NEAR, NEAR, (len(varying), TRIED))
     columns = {path: centre[path] + (abs(centre[path]) or 1.0) * row for path, row in zip(varying, drawn, strict=True)}
     direct, expected = np.empty((2, len(weights) * (1 + len(paths)), TRIED))
     status = np.empty(TRIED, dtype=np.int8)
-    for fill, results in ((ways.direct(closed=True), direct), (ways.by_equations, expected)):
+    for fill, results in ((routes.direct(closed=True), direct), (routes.by_equations, expected)):
         fill(columns, results, status)
     direct, expected = direct[:, status == Status.OK], expected[:, status == Status.OK]
     round_off = ROUND_OFF_DERIVATIVE * np.nan_to_num(np.abs(expected)).max(initial=0.0)
@@ -144,8 +151,11 @@ def _closed_forms_hold(
     return bool((status == Status.OK).any()) and agree
 
 
-class _Ways:
-    """The ways to objectives and derivatives of one machine: from one program, or with the closing equations."""
+class _Routes:
+    """Two routes to the objectives and derivatives of one machine: a single program, or joints from closing equations.
+
+    Derivatives by springs that are rigid or free by form are known beforehand; a program computes only the others.
+    """
 
     def __init__(
         self,
@@ -157,17 +167,17 @@ class _Ways:
     ) -> None:
         known = {path: slope for path, slope in _at_ends(machine).items() if path in paths and path not in varying}
         self._machine, self._weights, self._paths, self._native = machine, weights, paths, native
-        self._known, self._by = known, tuple(path for path in paths if path not in known)
-        self._form, self._fixed = form_of(machine, varying, self._by)
+        self._known_slopes, self._differentiated = known, tuple(path for path in paths if path not in known)
+        self._form, self._fixed = form_of(machine, varying, self._differentiated)
         self._angles = angles(machine)
 
     def direct(self, closed: bool = False) -> Fill:
-        """All from one program: the family places the joints, or they are in `closed` form."""
+        """Return the fill by a single program, in which the family places the joints or `closed` forms give them."""
         program = self._program(self._weights, closed)
 
         def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
             given = program_columns(columns, self._form.varying, self._angles)
-            if self._known:
+            if self._known_slopes:
                 self._spread(*program.slopes(self._fixed, given, status), results)
             else:
                 program.runnable.run(self._fixed, given, results, status)
@@ -175,44 +185,53 @@ class _Ways:
         return fill
 
     def by_equations(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-        """Fill with joints found first, and with their slopes from the closing equations."""
+        """Fill by solving for the joints first; their derivatives follow from the closing equations."""
         given = program_columns(columns, self._form.varying, self._angles)
         given += joint_columns(self._machine, columns, len(status))
         rates = self._program(()).slopes(self._fixed, given, np.empty_like(status))[1]
         objectives, partial = self._program(self._weights).slopes(self._fixed, given, status)
-        self._spread(objectives, _following(partial, rates, len(self._by)), results)
+        self._spread(objectives, _following(partial, rates, len(self._differentiated)), results)
 
     def _spread(self, objectives: Array, slopes: Array, results: Array) -> None:
-        """Put objectives and slopes in their rows, and what is known by rigid and free springs."""
+        """Put objectives and slopes in their rows, with the known slopes by rigid and free springs among them."""
         count = len(self._weights)
         results[:count] = objectives
         rows = results[count:].reshape(count, len(self._paths), results.shape[1])
         for k, path in enumerate(self._paths):
-            rows[:, k] = self._known[path] if path in self._known else slopes[:, self._by.index(path)]
+            rows[:, k] = (
+                self._known_slopes[path] if path in self._known_slopes else slopes[:, self._differentiated.index(path)]
+            )
 
     def _program(self, weights: tuple[Weights, ...], closed: bool = False) -> "_Program":
-        return _program(Kind(self._machine), self._form, weights, self._by, self._native, closed)
+        return _program(Kind(self._machine), self._form, weights, self._differentiated, self._native, closed)
 
 
 def _at_ends(machine: Machine) -> dict[str, float]:
-    """Derivatives by the springs that are rigid or free by form: 0 and none."""
+    """Return the derivatives, by leaf path, by stiffnesses that are infinite or zero by form: 0 and NaN.
+
+    A spring without stiffness is a free joint, so that the machine differs from that with a weak spring there.
+    """
     stiff = {p.path for p in parameters(machine.family) if p.quantity.stiff}
     ends = {0.0: math.nan, math.inf: 0.0}
     return {path: ends[value] for path, value in values(machine).items() if path in stiff and value in ends}
 
 
 def _following(slopes: Array, rates: Array, count: int) -> Array:
-    """Derivatives of objectives by parameters with the joints following, from those by parameters and joints."""
+    """Return the derivatives of objectives by the first `count` inputs, the parameters, while the joints follow.
+
+    Both arrays have the parameters and then the joint coordinates as inputs [results x inputs x points].
+    """
+    # `total_slopes` solves a stack of linear systems, for which NumPy wants the points first.
     by_point = [np.moveaxis(part, 2, 0) for part in (slopes, rates)]
     (by_paths, by_joints), (path_rates, joint_rates) = (np.split(part, [count], axis=2) for part in by_point)
     return np.moveaxis(total_slopes(by_paths, by_joints, joint_rates, path_rates), 0, 2)
 
 
 def total_slopes(slopes: Array, by_joints: Array, joint_rates: Array, rates: Array) -> Array:
-    """Return derivatives with the joints following: J_p + J_q dq/dp, where F_q dq/dp = -F_p, of least norm.
+    """Return total derivatives J_p + J_q dq/dp, in which the joints follow: F_q dq/dp = -F_p, with least norm.
 
-    Joint coordinates q(p) satisfy F(p, q) = 0; there may be more equations than coordinates, and coordinates that no
-    equation needs.
+    Joint coordinates q(p) satisfy F(p, q) = 0. There may be more equations than coordinates, and coordinates on which
+    no equation depends: these stay where they are.
 
     Args:
         slopes: J_p, by parameters [n x results x parameters].
@@ -228,11 +247,13 @@ def total_slopes(slopes: Array, by_joints: Array, joint_rates: Array, rates: Arr
     sound = np.isfinite(joint_rates).all(axis=(1, 2)) & np.isfinite(by_joints).all(axis=(1, 2))
     if not sound.any():
         return result
+    # A pseudo-inverse by singular values; combinations of joints that change no equation are left out.
     left, sizes, right = np.linalg.svd(joint_rates[sound], full_matrices=False)
     kept = sizes > IDLE_COORDINATES * sizes[:, :1]
     inverse = np.divide(1.0, sizes, where=kept, out=np.zeros_like(sizes))
     work = np.swapaxes(left, 1, 2) @ rates[sound]
     motion = -np.swapaxes(right, 1, 2) @ (inverse[:, :, None] * work)
+    # What remains of an equation shows that the joints cannot follow this parameter: a leg would open.
     remaining = np.abs(rates[sound] + joint_rates[sound] @ motion).max(axis=1, initial=0.0)
     largest = np.abs(rates[sound]).max(axis=(1, 2), initial=0.0)
     follows = remaining <= OPENING * largest[:, None]
@@ -243,14 +264,20 @@ def total_slopes(slopes: Array, by_joints: Array, joint_rates: Array, rates: Arr
 
 @dataclass(frozen=True)
 class _Program:
-    """Results and their derivatives by some inputs, as something to run."""
+    """A program that computes results and their derivatives by its inputs.
+
+    Attributes:
+        runnable: the program.
+        results: number of results.
+        inputs: number of inputs to differentiate by.
+    """
 
     runnable: Runnable
     results: int
     inputs: int
 
     def slopes(self, fixed: Array, columns: Sequence[Array], codes: Codes) -> tuple[Array, Array]:
-        """Results [results x points] and their derivatives [results x inputs x points]; codes in place."""
+        """Return results [results x points] and derivatives [results x inputs x points]; codes are filled in place."""
         rows = np.empty((self.results * (1 + self.inputs), len(codes)))
         self.runnable.run(fixed, columns, rows, codes)
         return rows[: self.results], rows[self.results :].reshape(self.results, self.inputs, len(codes))
@@ -260,11 +287,11 @@ class _Program:
 def _program(
     kind: Kind, form: Form, weights: tuple[Weights, ...], paths: tuple[str, ...], native: bool, closed: bool
 ) -> _Program:
-    """The program of objectives and their derivatives; without weights, that of the closing equations."""
+    """Return the program of the objectives and their derivatives, or without weights that of the closing equations."""
     formula = objectives_of(kind, form, weights, paths, closed) if weights else equations_of(kind, form, paths)
     count, inputs = len(formula.body.results), len(formula.inputs)
     if not native:
         return _Program(Interpreted(formula.body, formula.inputs), count, inputs)
-    from kinetostat.engine.native import Program  # LLVM takes 0.1 s to load: only where it pays
+    from kinetostat.engine.native import Program  # here because LLVM takes 0.1 s to load
 
     return _Program(Program(with_gradients(formula.body, formula.inputs)), count, inputs)

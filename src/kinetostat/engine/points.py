@@ -1,6 +1,6 @@
-"""Points of parameter space that a batch visits: a grid, a table or random samples, served slab by slab.
+"""Points of parameter space that a batch visits: a grid, a table or random samples, given slab by slab.
 
-Nothing is evaluated here.
+Nothing is evaluated here. Points are computed from their numbers, so that a large grid is never in memory at once.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ class Points(Protocol):
 
     @property
     def size(self) -> int:
-        """How many."""
+        """Number of points."""
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -31,7 +31,7 @@ class Points(Protocol):
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of a grid: its values, and the leaf paths that all take them together."""
+    """One axis of a grid: its values, and the leaf paths of the parameters that all take the same value."""
 
     paths: tuple[str, ...]
     values: Array
@@ -50,7 +50,7 @@ class Grid:
 
     @property
     def size(self) -> int:
-        """How many."""
+        """Number of points."""
         return prod(self.shape)
 
     @property
@@ -60,31 +60,34 @@ class Grid:
 
     def columns(self, start: int, stop: int) -> dict[str, Array]:
         """Values of each varying parameter at points `start` to `stop` - 1, SI."""
-        served: dict[str, Array] = {}
+        result: dict[str, Array] = {}
+        # The value of an axis stays the same while all later axes run through theirs.
         run = self.size
         for axis in self.axes:
             run //= len(axis.values)
-            served.update(dict.fromkeys(axis.paths, _in_runs(axis.values, run, start, stop)))
-        return served
+            result.update(dict.fromkeys(axis.paths, _in_runs(axis.values, run, start, stop)))
+        return result
 
 
 def _in_runs(values: Array, run: int, start: int, stop: int) -> Array:
-    """Entries `start` to `stop` - 1 of the endless repetition of values, each of which stands `run` times in a row.
+    """Return entries `start` to `stop` - 1 of the values in turn, each `run` times in a row, over and over again.
 
-    Eight times as fast as indices from `numpy.unravel_index`, which take longer than machine code does.
+    This is eight times as fast as indices from `numpy.unravel_index`, which take longer than the machine code that
+    evaluates the points.
     """
     first, last = start // run, -(-stop // run)
-    met = _repeated(values, first % len(values), last - first)
+    entries = _repeated(values, first % len(values), last - first)
     if run <= stop - start:
-        return np.repeat(met, run)[start - first * run : stop - first * run]
+        return np.repeat(entries, run)[start - first * run : stop - first * run]
+    # Runs longer than the slab: whole runs would be far larger than what is needed, so that both ends are cut first.
     lengths = np.full(last - first, run)
     lengths[0] -= start - first * run
     lengths[-1] -= last * run - stop
-    return np.repeat(met, lengths)
+    return np.repeat(entries, lengths)
 
 
 def _repeated(values: Array, first: int, count: int) -> Array:
-    """Entries of the endless repetition of values."""
+    """Return `count` entries of the values in turn, over and over again, beginning with entry `first`."""
     if count < len(values):
         return values.take(np.arange(first, first + count), mode="wrap")
     return np.tile(np.roll(values, -first), -(-count // len(values)))[:count]
@@ -92,13 +95,13 @@ def _repeated(values: Array, first: int, count: int) -> Array:
 
 @dataclass(frozen=True)
 class Table:
-    """Any points: one column of values for each varying parameter."""
+    """Points in any order, given by one column of values for each varying parameter."""
 
     values: Mapping[str, Array]
 
     @property
     def size(self) -> int:
-        """How many."""
+        """Number of points."""
         return len(next(iter(self.values.values())))
 
     @property
@@ -113,7 +116,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Part:
-    """A run of consecutive points of others."""
+    """Consecutive points, `start` to `stop` - 1, of a larger set."""
 
     whole: Points
     start: int
@@ -121,7 +124,7 @@ class Part:
 
     @property
     def size(self) -> int:
-        """How many."""
+        """Number of points."""
         return self.stop - self.start
 
     @property
@@ -135,20 +138,20 @@ class Part:
 
 
 PER_CELL = 2
-"""Points of a cell: the fewest whose difference tells how uncertain their mean is."""
+"""Points in each cell: two are the fewest whose difference tells how uncertain their mean is."""
 WORDS = 4
-"""Numbers that the generator makes at a time."""
+"""Random numbers that Philox makes for each step of its counter."""
 
 
 @dataclass(frozen=True)
 class Cells:
     """The cells between the nodes of a grid, each with two random points in a row; the last axis runs fastest.
 
-    The points depend on the seed, the axis and their number alone, so that any run of them can be served apart.
+    A point depends only on the seed, the axis and its number, so that any slab of points can be computed by itself.
 
     Attributes:
-        axes: of the grid, each with two nodes or more.
-        seed: of the random numbers.
+        axes: axes of the grid, each with two nodes or more.
+        seed: seed of the random numbers.
     """
 
     axes: Sequence[Axis]
@@ -156,7 +159,7 @@ class Cells:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Cells along each axis."""
+        """Number of cells along each axis."""
         return tuple(len(axis.values) - 1 for axis in self.axes)
 
     @property
@@ -172,15 +175,16 @@ class Cells:
     def columns(self, start: int, stop: int) -> dict[str, Array]:
         """Values of each varying parameter at points `start` to `stop` - 1, SI."""
         indices = np.unravel_index(np.arange(start, stop) // PER_CELL, self.shape)
-        served: dict[str, Array] = {}
+        result: dict[str, Array] = {}
         for number, (axis, index) in enumerate(zip(self.axes, indices, strict=True)):
             lower, upper = axis.values[index], axis.values[index + 1]
-            taken = lower + (upper - lower) * self._shares(number, start, stop)
-            served.update(dict.fromkeys(axis.paths, taken))
-        return served
+            values = lower + (upper - lower) * self._shares(number, start, stop)
+            result.update(dict.fromkeys(axis.paths, values))
+        return result
 
     def _shares(self, axis: int, start: int, stop: int) -> Array:
-        """Uniform between 0 and 1, by the points' numbers."""
+        """Random numbers, uniform from 0 to 1: where in its cell each point lies along an axis."""
+        # Philox can start anywhere in its sequence; each axis has a key, and so a sequence, of its own.
         block = start // WORDS
         source = np.random.Philox(key=self.seed * 64 + axis, counter=block)
         return np.random.Generator(source).random(stop - block * WORDS)[start - block * WORDS :]

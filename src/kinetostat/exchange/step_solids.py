@@ -1,7 +1,7 @@
-"""The shapes of a scene as exact solids of Open CASCADE, mm, without place, material or file.
+"""The shapes of a scene as exact solids of Open CASCADE, in mm. Places, materials and files are not dealt with here.
 
-Where a mesh has facets these are round: cylinders, cones, spheres and tori, and wires along smooth curves. For that,
-the lines and arcs of which an outline consists are recovered from its points.
+A mesh has facets; these solids are round: cylinders, cones, spheres and tori, and wires along smooth curves. A scene
+gives outlines as points, so that the lines and arcs of an outline are first recovered from its points.
 """
 
 import cmath
@@ -33,12 +33,12 @@ from kinetostat.tolerances import EVEN_CHORDS, NO_CIRCLE, OPEN_CASCADE_POINT
 from kinetostat.views.scene.solids import Extruded, Point2, Point3, Shape, Swept, Turned
 
 Piece: TypeAlias = tuple[Point2, Point2] | tuple[Point2, Point2, Point2]
-"""The ends of a line; or those of an arc, with a point of it between them."""
+"""A line by its two ends, or an arc by its start, a point in between, and its end."""
 
 CORNER = math.radians(30)
-"""Turn from one chord to the next, rad, from which on it is a corner: a scene rounds in finer steps."""
+"""Smallest turn from one chord to the next that is a corner, rad: a scene draws roundings in finer steps."""
 FEWEST = 3
-"""Least number of chords of an arc: fewer do not show that they belong to a circle."""
+"""Least number of chords that are taken for an arc: any two chords of equal length fit some circle."""
 MILLIMETRES = 1e3
 """Millimetres in a metre. CAD programs work in mm, and Open CASCADE's tolerances are made for them."""
 UNSCALED = (1.0, 1.0, 1.0)
@@ -63,6 +63,7 @@ def point_of(x: float, y: float, z: float) -> gp_Pnt:
 
 
 def _turned(shape: Turned) -> TopoDS_Shape:
+    # A radius that is only round-off is set to 0, so that the profile meets the axis and the solid has no hole in it.
     least = NO_CIRCLE * max(radius for radius, _ in shape.profile)
     profile = [(radius if radius > least else 0.0, height) for radius, height in shape.profile]
     return BRepPrimAPI_MakeRevol(_face(profile, lambda x, z: point_of(x, 0.0, z)), gp.OZ_s()).Shape()
@@ -76,11 +77,12 @@ def _extruded(shape: Extruded) -> TopoDS_Shape:
 
 
 def _rounded(prism: BRepPrimAPI_MakePrism, radius: float) -> TopoDS_Shape | None:
-    """A prism with rounded edges at both ends (radius in mm); None where there is no room for that."""
+    """Return a prism with rounded edges at both ends (radius in mm), or None if the radius does not fit."""
     fillet = BRepFilletAPI_MakeFillet(prism.Shape())
     for end in (prism.FirstShape(), prism.LastShape()):
         for edge in _within(end, TopAbs_EDGE):
             fillet.Add(radius, TopoDS.Edge(edge))
+    # Open CASCADE reports a radius that does not fit in two ways: by an error, or by a solid that is not valid.
     try:
         shape = fillet.Shape()
     except Standard_Failure:
@@ -94,6 +96,8 @@ def _swept(shape: Swept) -> TopoDS_Shape:
         points.SetValue(number, point_of(*corner))
     smooth = GeomAPI_Interpolate(points, shape.closed, OPEN_CASCADE_POINT)
     smooth.Perform()
+    # The wire is a disc, set at right angles to the start of the curve and pulled along it; D1 fills in `start` and
+    # `along`, the tangent there.
     curve, start, along = smooth.Curve(), gp_Pnt(), gp_Vec()
     curve.D1(curve.FirstParameter(), start, along)
     rim = gp_Circ(gp_Ax2(start, gp_Dir(along)), shape.radius * MILLIMETRES)
@@ -102,18 +106,20 @@ def _swept(shape: Swept) -> TopoDS_Shape:
 
 
 def _face(outline: Sequence[Point2], placed: Callable[[float, float], gp_Pnt]) -> TopoDS_Face:
-    """The plane face within a closed outline; `placed` gives the points of the plane."""
+    """Return the plane face within a closed outline; `placed` maps a corner of the outline to its point in space."""
     corners = [corner for corner, following in pairwise([*outline, outline[0]]) if corner != following]
+    # Beginning with the last corner closes the outline.
     return _bounded([_edge([placed(*corner) for corner in piece]) for piece in pieces([corners[-1], *corners])])
 
 
 def _edge(points: Sequence[gp_Pnt]) -> TopoDS_Edge:
-    """A line between two points, or an arc through three."""
+    """Return the line between two points, or the arc through three."""
     curve = points if len(points) == 2 else [GC_MakeArcOfCircle(*points).Value()]
     return BRepBuilderAPI_MakeEdge(*curve).Edge()
 
 
 def _bounded(edges: Sequence[TopoDS_Edge]) -> TopoDS_Face:
+    """Return the plane face that edges enclose."""
     rim = BRepBuilderAPI_MakeWire()
     for edge in edges:
         rim.Add(edge)
@@ -121,7 +127,7 @@ def _bounded(edges: Sequence[TopoDS_Edge]) -> TopoDS_Face:
 
 
 def _within(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
-    """The parts of one kind of a shape."""
+    """Go through the parts of a shape that are of one kind, such as its solids or edges."""
     explorer = TopExp_Explorer(shape, kind)
     while explorer.More():
         yield explorer.Current()
@@ -136,29 +142,30 @@ def _scaled(solid: TopoDS_Shape, scale: Point3) -> TopoDS_Shape:
 
 
 def pieces(points: Sequence[Point2]) -> Iterator[Piece]:
-    """Follow a path through points as lines and arcs: an arc where points follow each other evenly round a circle.
+    """Split a path through points into lines and arcs; points at even distances round a circle become an arc.
 
-    An arc is at most half a circle, so that its three points lie well apart.
+    An arc is at most half a circle, so that the three points by which it is given lie well apart.
 
     Args:
-        points: of the path, m; no two in a row coincide.
+        points: points of the path, m; no two in a row coincide.
     """
     chords = [complex(x2 - x1, y2 - y1) for (x1, y1), (x2, y2) in pairwise(points)]
-    at = 0
-    while at < len(chords):
-        count = _chords_of_arc(chords, at)
+    start = 0
+    while start < len(chords):
+        count = _chords_of_arc(chords, start)
         if count < FEWEST:
-            yield points[at], points[at + 1]
-            at += 1
+            yield points[start], points[start + 1]
+            start += 1
         else:
-            yield points[at], points[at + count // 2], points[at + count]
-            at += count
+            yield points[start], points[start + count // 2], points[start + count]
+            start += count
 
 
 def _chords_of_arc(chords: Sequence[complex], start: int) -> int:
-    """Count the chords from `start` on that have one length and turn by one angle, up to half a circle.
+    """Count the chords from `start` on that have equal lengths and turn by equal angles, up to half a circle.
 
-    As complex numbers, the ratio of a chord to the one before it holds both: its size and its phase.
+    Chords are complex numbers. The ratio of a chord to the one before it gives both: its modulus is the ratio of the
+    lengths, and its phase is the turn.
     """
     if start + 1 == len(chords):
         return 1
@@ -166,6 +173,7 @@ def _chords_of_arc(chords: Sequence[complex], start: int) -> int:
     angle = abs(cmath.phase(turn))
     if abs(abs(turn) - 1.0) > EVEN_CHORDS or not EVEN_CHORDS < angle < CORNER:
         return 1
+    # The tolerance keeps an exact half circle from losing its last chord to round-off.
     end = min(len(chords), start + math.floor(math.pi / angle + EVEN_CHORDS))
     following = range(start + 1, end)
     return next((i for i in following if abs(chords[i] / chords[i - 1] - turn) > EVEN_CHORDS), end) - start

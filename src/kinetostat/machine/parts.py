@@ -1,7 +1,8 @@
-"""Parts that families are built from: joints that a servo holds, links that are flexible where the file says so, bars.
+"""Parts from which families are built: joints with a servo, links that may be flexible, pairs of bars.
 
-A stiffness that is infinite by form (the float itself, as a default is) leaves no spring behind, one that is zero by
-form leaves a free joint; arrays and traced values always leave a spring, whatever they hold.
+This file knows no family. A stiffness is "rigid by form" if it is the Python float infinity, as many defaults are, and
+"zero by form" if it is the float 0.0. A part that is rigid by form has no spring, and a joint whose stiffness is zero
+by form is free. Arrays and traced values always give a spring, whatever numbers they contain.
 
 Points and axes are in the base frame.
 """
@@ -27,44 +28,47 @@ class Translations:
 
 
 def is_rigid(stiffness: Scalar) -> bool:
-    """Whether a stiffness or rigidity is infinite by form: the float itself."""
+    """Tell whether a stiffness or rigidity is rigid by form: the Python float infinity, not an array."""
     return type(stiffness) is float and stiffness == RIGID
 
 
 def if_elastic(*springs: Spring) -> tuple[Spring, ...]:
-    """Those springs that are not rigid by form."""
+    """Return the springs that are not rigid by form."""
     return tuple(spring for spring in springs if not is_rigid(spring.stiffness))
 
 
 def per_length(rigidity: Scalar, length: Scalar, factor: float = 1.0) -> Scalar:
-    """Stiffness of a whole link: factor x rigidity / length (SI), rigid by form where the rigidity is."""
+    """Return the stiffness of a whole link, factor x rigidity / length (SI); it is rigid by form if the rigidity is."""
     return rigidity if is_rigid(rigidity) else factor * rigidity * reciprocal(length)
 
 
 def in_series(stiffness: Scalar, rigidity: Scalar, length: Scalar, factor: float = 1.0) -> Scalar:
-    """A joint's own stiffness and that of the link built into it, factor x rigidity / length, in a row (SI)."""
+    """Return the stiffness of a joint in series with the link built into it: factor x rigidity / length (SI)."""
     return stiffness if is_rigid(rigidity) else series(stiffness, per_length(rigidity, length, factor))
 
 
 def bent_links(lengths: Sequence[Scalar], stiffness: Sequence[Scalar], bending: Sequence[Scalar]) -> list[Scalar]:
-    """Torsional springs (N·m/rad) for links built in at their lower ends: k52, k54 in a row with 3 EI / length."""
+    """Return the rotational stiffness, N·m/rad, of each joint in series with the link that is clamped to it.
+
+    Under a force at its end, a cantilever deflects there like a rigid link on a rotational spring of 3 EI / length.
+    """
     return [in_series(k, rigidity, size, 3.0) for k, rigidity, size in zip(stiffness, bending, lengths, strict=True)]
 
 
 def servo(joint: Joint, name: str, stiffness: Scalar) -> Joint | Spring:
-    """A joint that is passive where the stiffness is zero by form, and otherwise an actuator of that name."""
+    """Return the joint itself, passive, if the stiffness is zero by form, and otherwise an actuator with a name."""
     return joint if is_zero(stiffness) else Spring(name, joint, stiffness, actuated=True)
 
 
 @dataclass(frozen=True)
 class Arm:
-    """A link that resists tension, but bends and twists where it is not rigid by form: a beam (theory section 5).
+    """A link that is rigid in tension, and bends or twists unless it is rigid by form: a beam (theory section 5).
 
     Attributes:
-        start, end: of its axis, base frame, m.
+        start, end: ends of its axis, base frame, m.
         name: of the link.
-        up: unit vector, not along the link.
-        bending, torsion: E I about both axes of its cross-section, and G J, N·m².
+        up: unit vector that fixes the y and z axes of the cross-section; not along the link.
+        bending, torsion: E I, the same about both axes of the cross-section, and G J, N·m².
     """
 
     start: Vector
@@ -76,12 +80,16 @@ class Arm:
 
     @property
     def freedoms(self) -> tuple[Joint, ...]:
-        """None."""
+        """No joints: an arm only deflects."""
         return ()
 
     @property
     def springs(self) -> tuple[Spring, ...]:
-        """Those of a `Beam` that are not rigid by form, at its middle: GJ/L, EI/L twice, and 12EI/L^3 twice."""
+        """The springs of a `Beam` that are not rigid by form.
+
+        They are torsion GJ/L, bending EI/L twice and shear 12EI/L^3 twice, and act at the middle of the beam, where
+        bending and shear are not coupled.
+        """
         if is_rigid(self.bending) and is_rigid(self.torsion):
             return ()
         axes, length = link_axes(self.start, self.end, self.up)
@@ -108,11 +116,11 @@ class Arm:
 
 @dataclass(frozen=True)
 class BarPair:
-    """Two parallel bars on spherical joints, between a link of a leg and the platform, as in a Delta (theory (16)).
+    """Two parallel bars with spherical joints between a link of a leg and the platform, as in a Delta (theory (16)).
 
     Attributes:
         name: of the leg it belongs to.
-        near, far: middles between the two bars at the leg and at the platform, base frame, m.
+        near, far: midpoints between the two bars at the leg and at the platform, base frame, m.
         side: unit vector from one bar to the other; not along the bars.
         length, spacing: of the bars and between them, m.
         axial: E A of each bar, N.
@@ -133,9 +141,9 @@ class BarPair:
 
     @property
     def chain(self) -> tuple[Element, ...]:
-        """The same freedoms as a chain: R about the side, R about the bars, parallelogram, R about the side.
+        """A serial chain with the same freedoms: R about the side, R about the bars, parallelogram, R about the side.
 
-        They span what does no work with a force along either bar, and no more (theory section 4).
+        These four span exactly the motions on which a force along either bar does no work (theory section 4).
         """
         bar = per_length(self.axial, self.length)
         return (
@@ -147,6 +155,6 @@ class BarPair:
 
     @property
     def lines(self) -> tuple[Line, Line]:
-        """The lines of both bars: all that they carry."""
+        """The lines of both bars. The bars carry forces along these lines and nothing else."""
         half = self.side * (0.5 * self.spacing)
         return Line(self.far + half, self.along), Line(self.far - half, self.along)

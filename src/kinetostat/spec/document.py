@@ -1,4 +1,4 @@
-"""Machine and study files as text: read safely, override, write. Nothing is interpreted here; see `validation`."""
+"""Read machine and study files safely as text, and override values in them. `validation` interprets the values."""
 
 import copy
 import json
@@ -11,21 +11,21 @@ from typing import Any
 from kinetostat.spec.errors import InputError, several, shorten
 
 LARGEST_FILE = 1 << 20
-"""Bytes. A machine file has a few hundred; a megabyte is a mistake or an attack."""
+"""Largest file that is read, bytes. A machine file has a few hundred; a megabyte is a mistake or an attack."""
 
 DEEPEST = 8
-"""Levels of tables and lists; a machine file has three or four."""
+"""Most levels of nested tables and lists; a machine file has three or four."""
 
 Document = dict[str, Any]
 
 
 def is_study(document: Document) -> bool:
-    """Whether a document is meant as a study, not as a machine."""
+    """Tell whether a document is meant as a study, not as a machine."""
     return "family" not in document and bool({"machine", "variables", "objectives"} & document.keys())
 
 
 def exists(path: Path) -> bool:
-    """Whether there is a file or folder of that name; not where no file can have it."""
+    """Tell whether there is a file or folder at a path; False where the name is not possible on this system."""
     try:
         return path.exists()
     except (OSError, ValueError):
@@ -33,13 +33,14 @@ def exists(path: Path) -> bool:
 
 
 def read(path: Path) -> Document:
-    """The TOML document in a file.
+    """Read the TOML document in a file.
 
     Raises:
-        InputError: no such file, not a file, too large, not text, or not TOML.
+        InputError: if there is no such file, or if it is a folder, too large, not text, or not TOML.
     """
     try:
         with path.open("rb") as stream:
+            # A pipe or device has no size to ask for: one byte more than allowed shows that it is too large.
             data = stream.read(LARGEST_FILE + 1)
     except IsADirectoryError:
         raise InputError(f'"{path}" is a folder; give the machine file in it.') from None
@@ -57,16 +58,16 @@ def read(path: Path) -> Document:
 
 
 def parse(text: str, origin: str) -> Document:
-    """The TOML document in a text; `origin` names it in messages.
+    """Read the TOML document in a text; `origin` names it in messages.
 
     Raises:
-        InputError: not TOML; the message gives line and column.
+        InputError: if it is not TOML (the message gives line and column) or nested too deeply.
     """
     try:
         document = tomllib.loads(text)
     except ValueError as error:
         raise InputError(f'"{origin}" is not valid TOML: {error}. Text values need quotes, e.g. x = "2 cm".') from None
-    except RecursionError:
+    except RecursionError:  # nested deeper than Python's own limit, and so far beyond ours
         document = None
     if document is None or _deeper_than(document, DEEPEST):
         raise InputError(f'"{origin}" is nested too deeply; it should have tables of values and lists.')
@@ -74,25 +75,27 @@ def parse(text: str, origin: str) -> Document:
 
 
 def _deeper_than(document: Any, levels: int) -> bool:
-    """Whether tables and lists are nested in more than so many levels."""
-    at = [document]
+    """Tell whether tables and lists are nested in more than so many levels."""
+    level = [document]
     for _ in range(levels):
-        nested = [part for part in at if isinstance(part, dict | list)]
-        at = [child for part in nested for child in (part.values() if isinstance(part, dict) else part)]
-    return any(isinstance(part, dict | list) for part in at)
+        nested = [part for part in level if isinstance(part, dict | list)]
+        level = [child for part in nested for child in (part.values() if isinstance(part, dict) else part)]
+    return any(isinstance(part, dict | list) for part in level)
 
 
 def override(document: Document, settings: Sequence[str], counts: Mapping[str, int]) -> Document:
-    """A copy of the document with each "path=value" put in; the value is TOML, and what is not TOML is text.
+    """Return a copy of a document in which each setting "path=value" has replaced or added a value.
+
+    A value is read as TOML, and taken as text if it is not TOML: quotes may be left out.
 
     Args:
-        document: what was written.
-        settings: the overrides, in order, or one of them.
-        counts: entries of each field that holds a list; where one value was written for all and an override names
-            an entry, the value is first repeated.
+        document: the document as it was read.
+        settings: the overrides, in order; a single one may be given without a list.
+        counts: number of entries of each field that is a list. If the document has a single value for all entries and
+            an override changes one entry, the value is first written out for each entry.
 
     Raises:
-        InputError: no "=", an empty path, or a path that leads through something that is not a table or list.
+        InputError: if a setting has no "=", an empty path, or a path through something that is not a table or list.
     """
     result = copy.deepcopy(document)
     for setting in several(settings):
@@ -105,6 +108,7 @@ def override(document: Document, settings: Sequence[str], counts: Mapping[str, i
 
 
 def _repeat(document: Document, path: str, counts: Mapping[str, int]) -> None:
+    """Write a single value out for every entry of a list if `path` names an entry, such as `stiffness.legs.2`."""
     field, _, entry = path.rpartition(".")
     *tables, name = field.split(".")
     table: Any = document
@@ -117,35 +121,41 @@ def _repeat(document: Document, path: str, counts: Mapping[str, int]) -> None:
 
 
 def _value(text: str) -> object:
+    """Read a value as TOML, or else as text."""
     try:
         parsed = tomllib.loads(f"value = {text}\n")
     except (ValueError, RecursionError):
         return text
+    # A line break in the text could begin a second key: then it is not a value.
     return parsed["value"] if len(parsed) == 1 else text
 
 
 def _put(document: Document, path: str, value: object) -> None:
-    at: Any = document
+    """Put a value at a path, and make the tables on the way that do not exist yet."""
+    parent: Any = document
     *parents, last = path.split(".")
     for key in parents:
-        at = _child(at, key, path)
-    if isinstance(at, list):
-        at[_index(at, last, path)] = value
-    elif isinstance(at, dict):
-        at[last] = value
+        parent = _child(parent, key, path)
+    if isinstance(parent, list):
+        parent[_index(parent, last, path)] = value
+    elif isinstance(parent, dict):
+        parent[last] = value
     else:
-        raise InputError(f"--set {shorten(path)}: nothing can be set inside {shorten(at)}; give a shorter path.")
+        raise InputError(f"--set {shorten(path)}: nothing can be set inside {shorten(parent)}; give a shorter path.")
 
 
-def _child(at: Any, key: str, path: str) -> Any:
-    if isinstance(at, dict):
-        return at.setdefault(key, {})
-    if isinstance(at, list):
-        return at[_index(at, key, path)]
-    raise InputError(f"--set {shorten(path)}: {shorten(at)} has no part called {shorten(key)}; give a shorter path.")
+def _child(parent: Any, key: str, path: str) -> Any:
+    if isinstance(parent, dict):
+        return parent.setdefault(key, {})
+    if isinstance(parent, list):
+        return parent[_index(parent, key, path)]
+    raise InputError(
+        f"--set {shorten(path)}: {shorten(parent)} has no part called {shorten(key)}; give a shorter path."
+    )
 
 
 def _index(entries: list[Any], key: str, path: str) -> int:
+    # Nine digits are more than any list has entries; Python refuses to convert thousands of digits.
     if not key.isdecimal() or len(key) > 9 or int(key) >= len(entries):
         known = f"the list has entries 0 to {len(entries) - 1}"
         raise InputError(f"--set {shorten(path)}: {shorten(key)} is not an entry; {known}.")
@@ -153,5 +163,5 @@ def _index(entries: list[Any], key: str, path: str) -> int:
 
 
 def toml_key(name: str) -> str:
-    """A name as TOML takes it in a table's header."""
+    """Return a name as it must stand in the header of a TOML table: in quotes unless it is a plain word."""
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)

@@ -1,6 +1,7 @@
-"""Analysis of a machine at one pose: how stiff it is, and why. Nothing is compiled for a single pose.
+"""Analysis of a machine at one pose: how stiff it is, and why. Its tables are in `views.analysis_tables`.
 
-Plain data of it is at the end of this file; tables are in `views.analysis_tables`.
+Numbers are computed directly, without the engine: compiling would take longer than a single pose does. `as_json` at the
+end of the file gives the analysis as plain data.
 """
 
 import math
@@ -38,7 +39,7 @@ Rows = list[list[float]]
 AXES = ("base", "platform")
 """Axes in which results are given."""
 NEARBY = 0.03
-"""How far poses for the general mobility lie from the pose: in units of the machine's length, and in rad."""
+"""How far from the pose general mobility is looked for: share of the characteristic length; in angles, rad."""
 
 
 @former_names(shares="attribution", internal="internal_loads", length="characteristic_length", mass="moving_mass")
@@ -48,11 +49,11 @@ class Analysis:
 
     Attributes:
         machine: the machine, with its pose.
-        status: of the pose; all that follows is None or empty unless it is OK.
-        message: one readable paragraph.
+        status: of the pose. Unless it is OK, only `machine`, `message`, `components` and `axes` have a content.
+        message: what is special about the pose, or why it has no answer; one paragraph.
         components: names of the rows and columns of K and C: rx ry rz x y z, or rz x y of a planar machine.
-        axes: "base" or "platform", in which everything is given.
-        platform: position of P (m) and rotation (rows) in the base frame.
+        axes: "base" or "platform": the axes of K, C, the attribution, the indices and the load.
+        platform: position of P, m, and rows of the rotation matrix of the platform, both in the base frame.
         stiffness: K [n x n], None where a direction is rigid (K has no finite value there).
         compliance: C [n x n], None where a direction is free.
         stiffness_diagonal, compliance_diagonal: their diagonals, infinity where rigid or free.
@@ -63,11 +64,11 @@ class Analysis:
         mobility: what can move, and the kind of pose.
         internal_loads: statically indeterminate loads.
         load: effects of the machine's [load], None where it has none.
-        masses: of what moves, part by part.
+        masses: mass of each moving part.
         wrench_condition: ratio of the extreme singular values of W, moments divided by the characteristic length.
-        jacobian_condition: of the actuators' Jacobian, angles multiplied by that length; None where actuators are of
-            two kinds, or there is none.
-        characteristic_length: that length, m.
+        jacobian_condition: condition number of the actuators' Jacobian, angles multiplied by the characteristic length;
+            None where some actuators are rotary and others linear, or where there is no actuator.
+        characteristic_length: in m; it makes rotations comparable with translations.
     """
 
     machine: Machine
@@ -106,7 +107,7 @@ class Analysis:
         """Stiffness along and about a direction, in the axes of K and C.
 
         Raises:
-            InputError: if the machine has no such direction, or the pose no answer.
+            InputError: if the machine has no such direction, or the pose has no answer.
         """
         if self.status is not Status.OK:
             raise InputError(f"There is no stiffness along any direction here. {self.message}")
@@ -116,14 +117,14 @@ class Analysis:
 def analyze(machine: Machine, axes: str = "base") -> Analysis:
     """Analyse a machine at its pose: K, C, attribution, indices, mobility and loads.
 
-    A pose that cannot be reached or is singular is an answer too: see `status` and `message`.
+    A pose that is singular or cannot be reached raises no error: `status` and `message` say what is the case.
 
     Args:
-        machine: with its pose, tool and load.
+        machine: the machine, with its pose, tool and load.
         axes: "base", or "platform" for results in platform axes.
 
     Raises:
-        InputError: other axes, or no machine.
+        InputError: if `axes` is neither "base" nor "platform", or `machine` is not a machine.
     """
     need_machine(machine)
     choice(axes, AXES, "axes")
@@ -140,27 +141,27 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     statics = clean_statics(_turned(response.statics, turn))
     stiffness, compliance = stiffness_matrix(statics), compliance_matrix(statics)
     kept = machine.family.components
-    soft, stiff = _rows(compliance, kept), _rows(stiffness, kept)
-    every, length = springs(configuration), float(configuration.length)
-    rigid = tuple(spring.name for spring in every if math.isinf(spring.stiffness))
-    free = tuple(spring.name for spring in every if spring.stiffness == 0.0)
+    compliance_rows, stiffness_rows = _rows(compliance, kept), _rows(stiffness, kept)
+    all_springs, length = springs(configuration), float(configuration.length)
+    rigid = tuple(spring.name for spring in all_springs if math.isinf(spring.stiffness))
+    free = tuple(spring.name for spring in all_springs if spring.stiffness == 0.0)
     extremes = conditioning(response.legs, length, response.guide)
     return Analysis(
         machine,
         status,
-        _message(response, rigid, free, stiff is not None),
+        _message(response, rigid, free, stiffness_rows is not None),
         components=machine.family.component_names,
         axes=axes,
         platform=_placement(configuration),
-        stiffness=stiff,
-        compliance=soft,
+        stiffness=stiffness_rows,
+        compliance=compliance_rows,
         stiffness_diagonal=tuple(stiffness.entry(i, i) for i in kept),
         compliance_diagonal=tuple(compliance.entry(i, i) for i in kept),
-        rank=_rank(statics, soft is None),
+        rank=_rank(statics, compliance_rows is None),
         rigid=rigid,
         free=free,
-        attribution=contributions(every, statics, stiffness, compliance, kept),
-        indices=indices_of(stiff, soft, length, kept),
+        attribution=contributions(all_springs, statics, stiffness, compliance, kept),
+        indices=indices_of(stiffness_rows, compliance_rows, length, kept),
         mobility=mobility(configuration, nearby, response.reference),
         internal_loads=internal_loads([leg.name for leg in configuration.legs], response.legs, length, response.guide),
         load=load_case(response, compliance, turn),
@@ -172,8 +173,13 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
 
 
 def _jacobian_condition(response: Response, length: float) -> float | None:
-    """Of the actuators' Jacobian in the components that they move."""
+    """Condition number of the actuators' Jacobian in the components that the actuators move, or None.
+
+    Rows of rotary actuators are in rad and those of linear ones in m. Their ratio means nothing, so that machines with
+    both kinds have no such number.
+    """
     groups = [leg.springs for leg in response.configuration.legs]
+    # A joint without a point is a translation.
     kinds = {s.joint.point is None for group in groups for s in group if s.actuated and float(s.stiffness) > 0.0}
     if len(kinds) != 1:
         return None
@@ -181,7 +187,7 @@ def _jacobian_condition(response: Response, length: float) -> float | None:
 
 
 def _rows(matrix: Symmetric6, kept: tuple[int, ...]) -> Rows | None:
-    """The rows and columns that exist, without round-off, or None where an entry is infinite."""
+    """Return the rows and columns of the machine's components, without round-off, or None if an entry is not finite."""
     rows = [[float(matrix.entry(i, j)) for j in kept] for i in kept]
     return clean_matrix(rows) if all(math.isfinite(entry) for row in rows for entry in row) else None
 
@@ -193,10 +199,11 @@ def _placement(configuration: Configuration) -> tuple[tuple[float, ...], Rows]:
 
 
 def _nearby(machine: Machine, length: float) -> list[Configuration]:
-    """The machine at three poses near its pose, as far as it can reach them; `length` is its characteristic length.
+    """Return the machine at up to three poses near its pose: those that it can reach, of three that are tried.
 
-    Mobility is a rank, and ranks drop at special poses: only the poses around tell what holds in general. They are
-    random, so that none lies on a symmetry of the machine, but the same every time.
+    Mobility is a rank, and a rank can drop at a special pose, so that other poses must show what holds in general. They
+    are random, so that none lies on a symmetry of the machine, but the seed is fixed, so that they never change.
+    `length` is the characteristic length.
     """
     kinds = {p.path: p.quantity.kind for p in parameters(machine.family) if p.path.startswith("pose.")}
     reach = {path: NEARBY * (length if kind == "length" else 1.0) for path, kind in kinds.items()}
@@ -207,7 +214,7 @@ def _nearby(machine: Machine, length: float) -> list[Configuration]:
 
 
 def _turned(statics: Statics, turn: Rotation) -> Statics:
-    """The statics with all that K, C and their attribution are made of in axes turned back by `turn`."""
+    """Return the statics with `turn` applied to every screw from which K, C and their attribution are computed."""
     return replace(
         statics,
         flexibility=tuple(twist.rotated(turn) for twist in statics.flexibility),
@@ -217,9 +224,13 @@ def _turned(statics: Statics, turn: Rotation) -> Statics:
     )
 
 
-def _rank(statics: Statics, endless: bool) -> int:
-    """Rank of C, or of K where C is not finite; independent of how much the springs differ."""
-    if endless:
+def _rank(statics: Statics, compliance_infinite: bool) -> int:
+    """Rank of C, or of K where C is not finite.
+
+    The rank of a sum over springs is the number of their independent screws. These are counted at unit size, so that a
+    spring that is much softer than another cannot hide it.
+    """
+    if compliance_infinite:
         wrenches: list[Screw] = [wrench for wrench, k in statics.actions if k > 0.0]
         return independent(wrenches, statics.length, DEPENDENT_MOTIONS)
     twists: list[Screw] = [twist for twist, s in statics.motions if s > 0.0]
@@ -227,14 +238,14 @@ def _rank(statics: Statics, endless: bool) -> int:
 
 
 def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...], finite: bool) -> str:
-    """What is special about a pose with an answer; `finite` says whether K is."""
+    """Say what is special about a pose that has been analysed; `finite` tells whether K is finite."""
     sentences = []
     if not finite and not rigid:
         sentences.append("At this pose one leg is rigid against some load: K is infinite against it, C is exact.")
     if rigid:
         sentences.append(f"Rigid: {', '.join(rigid)}; K is infinite in the directions that they hold, C is exact.")
-    every = springs(response.configuration)
-    for spring, twist in zip(every, response.statics.flexibility, strict=True):
+    all_springs = springs(response.configuration)
+    for spring, twist in zip(all_springs, response.statics.flexibility, strict=True):
         if spring.name in free:
             per = "m" if spring.joint.point is None else "rad"
             motion = describe([float(c) for c in twist.components()], (f"rad/{per}", f"m/{per}"))
@@ -244,7 +255,7 @@ def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...], 
 
 
 def as_json(analysis: Analysis, along: Sequence[Along] = ()) -> dict[str, Any]:
-    """The analysis, and stiffnesses along directions, as plain data."""
+    """Return the analysis, with stiffnesses along chosen directions, as plain data."""
     machine = analysis.machine
     pose = {path.removeprefix("pose."): value for path, value in values(machine).items() if path.startswith("pose.")}
     position, rotation = analysis.platform or (None, None)

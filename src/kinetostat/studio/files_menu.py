@@ -1,6 +1,6 @@
 """The menu that writes the machine as a report or in the format of another program, and sends it to the browser.
 
-The commands `report` and `export` do the work, in another process, so that the page answers meanwhile.
+The commands `report` and `export` do the work, in another process, so that the page stays responsive meanwhile.
 """
 
 import asyncio
@@ -26,10 +26,10 @@ BUSY = "Another file is being written; wait until it is done."
 
 
 class FilesMenu:
-    """A button with a menu; a file that is chosen is written and sent to the browser."""
+    """A button with a menu of file formats; choosing one writes the file and sends it to the browser."""
 
     def __init__(self, session: Session) -> None:
-        """Build the button; the machine is written as it is when a file is chosen."""
+        """Build the button; a file gets the machine as it is at the moment of choosing."""
         self._session = session
         self._process: asyncio.subprocess.Process | None = None
         self._busy = False
@@ -38,8 +38,9 @@ class FilesMenu:
             for name, suffix, summary in REPORTS:
                 self._item(name, suffix, summary, ["report"])
             ui.separator()
-            for known in KNOWN:
-                self._item(known.name, known.suffix, known.summary, ["export", "--to", known.name])
+            for known_format in KNOWN:
+                words = ["export", "--to", known_format.name]
+                self._item(known_format.name, known_format.suffix, known_format.summary, words)
 
     def _item(self, name: str, suffix: str, summary: str, words: Sequence[str]) -> None:
         item = ui.menu_item(on_click=lambda: self._choose(words, suffix)).props("dense").mark(f"file-{name}")
@@ -55,29 +56,31 @@ class FilesMenu:
         background_tasks.create(self._send(words, suffix), name="studio file")
 
     async def _send(self, words: Sequence[str], suffix: str) -> None:
+        """Write the file by the command of these words and send it; a format of several files is sent as a ZIP."""
         name, machine = self._session.as_file()
-        wanted = f"{Path(name).stem}{suffix}"
+        target = f"{Path(name).stem}{suffix}"
+        # NiceGUI does not know in a background task to which page a message belongs; the button tells it.
         with self._button:
-            waiting = ui.notification(f"Writing {wanted} …", spinner=True, timeout=None, position="top")
+            waiting = ui.notification(f"Writing {target} …", spinner=True, timeout=None, position="top")
         try:
             with TemporaryDirectory() as folder:
                 (Path(folder) / name).write_bytes(machine)
-                reason = await self._run(Path(folder), [words[0], name, *words[1:], "-o", wanted])
-                (Path(folder) / name).unlink()
-                data = [(path.name, path.read_bytes()) for path in sorted(Path(folder).iterdir())]
+                reason = await self._run(Path(folder), [words[0], name, *words[1:], "-o", target])
+                (Path(folder) / name).unlink()  # so that only files that the command has written remain
+                files = [(path.name, path.read_bytes()) for path in sorted(Path(folder).iterdir())]
         finally:
             self._busy = False
             waiting.dismiss()
         with self._button:
-            if not data:
+            if not files:
                 refuse(reason)
-            elif len(data) == 1:
-                ui.download(data[0][1], data[0][0])
+            elif len(files) == 1:
+                ui.download(files[0][1], files[0][0])
             else:
-                ui.download(_packed(data), f"{Path(name).stem}.zip")
+                ui.download(_packed(files), f"{Path(name).stem}.zip")
 
     async def _run(self, folder: Path, words: Sequence[str]) -> str:
-        """Run a command in a folder; returns its message, which is the reason if it has written nothing."""
+        """Run a command in a folder and return its message: if it has written no file, the message says why."""
         self._process = await asyncio.create_subprocess_exec(
             sys.executable, "-m", "kinetostat", *words, cwd=folder,
             stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.PIPE,

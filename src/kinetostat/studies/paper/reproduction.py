@@ -1,4 +1,7 @@
-"""The whole paper in one call: numbers, equations, statements, its optimisation and the data of its figures."""
+"""Reproduce the whole paper in one call: numbers, equations, statements, the optimisation and the data of the figures.
+
+Each kind of result is computed in a file of its own beside this one; only the optimisation is judged here.
+"""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
@@ -26,17 +29,18 @@ LINK_STIFFNESS = ("stiffness.passive_links=1e3 N*m/rad:1e10 N*m/rad:71:log",)
 """Fig. 4: 1 to 1e7 times the actuator stiffness."""
 
 STAGES = 3
-"""Figures and search, beside the parts."""
+"""Steps of progress after the parts: the data of Fig. 4, that of Fig. 5, and the optimisation."""
 STUDY = "zhang-gosselin-2002"
+"""Name of the bundled study with the optimisation of section 4.3."""
 AT_REST = 60
-"""Generation by which the paper's population has converged."""
+"""Generation by which, according to the paper, the population has converged."""
 CONVERGED = 1e-4
-"""Relative distance of its mean from the end that no eye tells apart in Fig. 6."""
+"""Distance of the population's mean from the final optimum, relative to it, that cannot be seen in Fig. 6."""
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """Everything the paper says, beside what this program finds.
+    """The statements of the paper, each compared with the result of this program.
 
     Attributes:
         machine: the paper's machine at its reference pose.
@@ -45,7 +49,7 @@ class Reproduction:
         claims: guidelines and further facts.
         curves, maps: the data of Fig. 4 and of Fig. 5.
         search: the optimisation of section 4.3, run again, with the data of Fig. 6.
-        search_claims: what the paper says of it.
+        search_claims: statements of the paper about the optimisation, tested.
     """
 
     machine: Machine
@@ -62,7 +66,7 @@ class Reproduction:
 
     @property
     def explained(self) -> bool:
-        """Whether nothing differs without an explanation."""
+        """Whether every difference from the paper has an explanation."""
         return (
             all(comparison.verdict is not Verdict.DIFFERS for comparison in self.comparisons)
             and all(check.holds for check in self.checks)
@@ -83,7 +87,7 @@ class Reproduction:
 
 
 def reproduce(progress: Progress = silent) -> Reproduction:
-    """Compute everything; `progress` is told after each part."""
+    """Reproduce the whole paper; `progress` gets the number of steps done and of all steps, after each."""
     machine = load(printed.MACHINE)
     parts: dict[str, Callable[[], Iterable[Any]]] = {
         "table_3": table_3,
@@ -108,33 +112,38 @@ def reproduce(progress: Progress = silent) -> Reproduction:
 
 
 def search_again() -> tuple[Result, tuple[Claim, ...]]:
-    """The paper's search with our means, and what becomes of its statements."""
+    """Repeat the optimisation of the paper by a genetic algorithm, and test what the paper states about it.
+
+    A gradient search, which converges far more exactly, shows how close the genetic algorithm comes to the minimum.
+    """
     genetic = optimize(load_problem(STUDY))
     gradient = optimize(load_problem(STUDY, ["optimizer.method=gradient"]))
     return genetic, (*_statements(genetic, gradient),)
 
 
 def _statements(genetic: Result, gradient: Result) -> Iterator[Claim]:
-    reached, smooth = (float(search.outcome.objectives[0, 0]) for search in (genetic, gradient))
+    """Test the statements about the optimum and about convergence (Fig. 6)."""
+    reached, reached_by_gradient = (float(search.outcome.objectives[0, 0]) for search in (genetic, gradient))
     target, study = float(printed.OPTIMISED_SUM), genetic.problem.study.optimizer
     ridges = " ".join(ridge_sentences(genetic.ridges, genetic.problem))
-    agree = abs(reached / smooth - 1.0) < 1e-6
+    agree = abs(reached / reached_by_gradient - 1.0) < 1e-6
     yield Claim(
         "Section 4.3, optimum",
         f"A genetic algorithm with {study.population} designs and {study.generations} generations lowers the sum of "
         f"compliances to {printed.OPTIMISED_SUM}.",
         f"Ours finds {reached:.9g} in {genetic.log.count:,} evaluations, a gradient search from {study.starts} starts "
-        f"{smooth:.9g} in {gradient.log.count:,}.",
+        f"{reached_by_gradient:.9g} in {gradient.log.count:,}.",
         Finding.HOLDS if agree and reached <= target else Finding.FAILS,
-        f"The printed design is {target / smooth - 1.0:.0e} above the minimum. {ridges}",
+        f"The printed design is {target / reached_by_gradient - 1.0:.0e} above the minimum. {ridges}",
     )
     best, mean = (np.array([step[key] for step in genetic.log.steps]) for key in ("best", "mean"))
-    away = [float(values[AT_REST - 1] / best[-1] - 1.0) for values in (best, mean)]
+    # Generations are counted from 1, and the last best design is the end to which all is compared.
+    above = [float(values[AT_REST - 1] / best[-1] - 1.0) for values in (best, mean)]
     first = int(np.argmax(mean / best[-1] - 1.0 < CONVERGED)) + 1
     yield Claim(
         "Section 4.3, Fig. 6",
         f"After around {AT_REST} generations the best design and the mean of the population have converged.",
-        f"At generation {AT_REST} the best is {away[0]:.0e} and the mean {away[1]:.0e} above the last best; the mean "
+        f"At generation {AT_REST} the best is {above[0]:.0e} and the mean {above[1]:.0e} above the last best; the mean "
         f"comes within {CONVERGED:.0e} at generation {first}.",
-        Finding.HOLDS if max(away) < CONVERGED else Finding.FAILS,
+        Finding.HOLDS if max(above) < CONVERGED else Finding.FAILS,
     )

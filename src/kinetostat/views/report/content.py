@@ -1,7 +1,7 @@
 """Content of a report as plain data: sections of paragraphs, lists, tables, figures, formulas and listings.
 
-All texts are plain: no writer reads markup in them. The writers (`html_page`, `pdf`) number sections, figures and
-tables, and only they know a format.
+All texts are plain: writers do not interpret markup in them. The writers (`html_page`, `pdf`) number sections, figures
+and tables; file formats are known only to them.
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Sentences, with the words of `lead` in bold before them."""
+    """A paragraph of sentences, which begins with the words of `lead` in bold."""
 
     text: str
     lead: str = ""
@@ -30,10 +30,11 @@ class Table:
 
     Attributes:
         caption: a phrase or a sentence.
-        heads: of the columns.
-        rows: as many texts each.
-        numeric: whether a column holds numbers; of the other columns all but the first may be broken into lines.
-        split: number of rows, and of columns after the first, after which a rule is drawn; 0 for none.
+        heads: headings of the columns.
+        rows: texts of each row, one for each column.
+        numeric: whether each column contains numbers. Of the other columns, all but the first may be broken into lines.
+        split: number of rows above the horizontal rule and of columns, besides the first, left of the vertical rule, as
+            between rotations and translations of a matrix; 0 for no rules.
     """
 
     caption: str
@@ -50,8 +51,9 @@ class Figure:
     Attributes:
         caption: a phrase or a sentence.
         picture: an SVG element as text, or the bytes of a PNG.
-        width: share of the width of the text.
-        live: a scene of solids that a page may show in place of the picture, as `views.scene` gives it.
+        width: as a share of the width of the text.
+        live: a scene of solids, in the form of `views.scene`, that a page may show in three dimensions in place of the
+            picture.
     """
 
     caption: str
@@ -62,7 +64,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Formula:
-    """A displayed formula in both notations: MathML for pages, Typst's mathematics for PDF."""
+    """A displayed formula in two notations: MathML for HTML pages, and that of Typst for PDF."""
 
     mathml: str
     typst: str
@@ -70,7 +72,7 @@ class Formula:
 
 @dataclass(frozen=True)
 class Listing:
-    """A text that keeps its lines as they are: a file, a command."""
+    """A text whose lines are kept as they are, such as a file or a command."""
 
     caption: str
     text: str
@@ -92,11 +94,11 @@ class Report:
     """A whole report.
 
     Attributes:
-        kind: of report, printed above the title.
+        kind: kind of the report, printed above the title.
         title: name of the machine or the study.
         facts: name and text of each line of the title block.
-        sections: in order.
-        attachments: texts that the file carries along, by file name.
+        sections: the sections, in order.
+        attachments: files embedded in the report: their texts by file name.
     """
 
     kind: str
