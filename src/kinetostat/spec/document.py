@@ -1,4 +1,4 @@
-"""Read machine and study files safely as text, and override values in them. `validation` interprets the values."""
+"""Read machine and study files safely as text, and override values in them. `spec.validation` interprets them."""
 
 import copy
 import json
