@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, Phase, settings
 MARKERS = {
     "documents": ("test_documents", "test_recipes"),
     "notebooks": ("test_notebooks",),
-    "browser": ("test_studio_browser", "test_report_browser"),
-    "workers": ("test_workers", "test_large_sweeps"),
+    "browser": ("test_studio_browser", "test_studio_reach", "test_report_browser"),
+    "workers": ("test_workers", "test_large_sweeps", "test_studio_runs", "test_studio_search"),
     "packaging": ("test_packaging",),
     "step": ("test_step_file", "test_step_outlines", "test_step_solids"),
 }

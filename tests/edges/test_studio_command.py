@@ -47,8 +47,8 @@ def test_a_changed_machine_is_no_longer_the_bundled_one(served):
     ("words", "said"),
     [
         (["nonesuch"], "neither a file nor a bundled machine"),
-        (["--port", "0"], "no port"),
-        (["--port", "http"], "no port"),
+        (["--port", "0"], "not a port"),
+        (["--port", "http"], "not a port"),
     ],
 )
 def test_bad_input_is_one_paragraph(words, said, capsys):

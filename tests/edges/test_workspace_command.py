@@ -94,7 +94,7 @@ REFUSED = [
     (["workspace", "hexapod"], ["--over"]),
     ([*PLANE, "--where", "stiffness_z > 3 N/m"], ['"stiffness_z" is not a quantity', "stiffness_rz"]),
     ([*PLANE, "--where", "singularity_margin"], ["is not a condition", "stiffness_z > 20 N/um"]),
-    ([*PLANE, "--over", "geometry.base_radius=1:2:3"], ["is no coordinate of the pose"]),
+    ([*PLANE, "--over", "geometry.base_radius=1:2:3"], ["is not a coordinate of the pose"]),
     ([*PLANE, "--seed", "x"], ["x is not a seed"]),
     ([*PLANE, "--set", "limits.longest=1"], ["limits.longest is not known", "longest_leg"]),
 ]

@@ -203,7 +203,7 @@ REFUSED = [
     (
         ["x=0:1:3", "geometry.base_radius=1:2:3"],
         (),
-        ["geometry.base_radius is no coordinate", "pose.x", "kinetostat map"],
+        ["geometry.base_radius is not a coordinate", "pose.x", "kinetostat map"],
     ),
     (["x=0:1:3", "x=0:1:3"], (), ["varied twice"]),
     (["x=1:0:3", "y=0:1:3"], (), ["pose.x", "upwards"]),

@@ -62,7 +62,7 @@ def _print_differences(console: Console, comparison: Comparison, letters: str) -
     if not rows:
         console.print("The files have equal values.")
     if len(set(families)) > 1:
-        console.print("Fields that only difference design has are omitted.", style="dim")
+        console.print("Fields that only one design has are omitted.", style="dim")
 
 
 def _abreast(console: Console, letters: str) -> Iterator[list[int]]:

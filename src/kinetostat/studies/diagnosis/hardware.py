@@ -5,7 +5,6 @@ import platform
 from collections.abc import Iterator
 from pathlib import Path
 
-from kinetostat.engine.batch import available_cores
 from kinetostat.studies.diagnosis.diagnosis import Check, State, reinstall, tried
 
 GROUP = "machine"
@@ -14,7 +13,7 @@ GROUP = "machine"
 def checks() -> Iterator[Check]:
     """System, processor, vectors and memory."""
     yield Check(GROUP, "system", State.SOUND, f"{platform.system()} {platform.release()}, {platform.machine()}")
-    yield Check(GROUP, "processor", State.SOUND, f"{processor()}, {available_cores()} cores for this process")
+    yield tried(GROUP, "processor", cores, reinstall("numpy"))
     yield tried(GROUP, "vectors", vectors, reinstall("llvmlite"))
     memory = memory_size()
     if memory is not None:
@@ -28,6 +27,13 @@ def processor() -> str:
     except OSError:
         return platform.processor() or platform.machine()
     return next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+def cores() -> str:
+    """The processor, and how many of its cores this process may use."""
+    from kinetostat.engine.batch import available_cores
+
+    return f"{processor()}, {available_cores()} cores for this process"
 
 
 def vectors() -> str:

@@ -14,7 +14,7 @@ from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.renamed import current_name
 from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, read_study
 from kinetostat.studies.bundled import bundled_studies, study_of
-from kinetostat.studies.optimisation.catalogue import read_term, usual_goal
+from kinetostat.studies.optimisation.catalogue import known_terms, read_term, usual_goal
 from kinetostat.studies.optimisation.poses import PoseSet, read_poses
 from kinetostat.studies.optimisation.terms import Aggregate, Term, parse_aggregate
 from kinetostat.studies.optimisation.variables import Space, read_space
@@ -194,7 +194,7 @@ def settings_of(changes: Mapping[str, Any], above: str = "") -> Iterator[str]:
 def _objective(machine: Machine, table: ObjectiveTable, poses: PoseSet, where: str) -> Objective:
     name = current_name(table.quantity, "quantity")
     goal = table.goal or usual_goal(name)
-    if goal is None:
+    if goal is None and name in known_terms(machine):
         raise InputError(
             f'{where}: neither a larger nor a smaller {name} is better in general; add goal = "minimize" or "maximize".'
         )

@@ -228,6 +228,6 @@ def as_json(workspace: Workspace) -> dict[str, Any]:
             "nodes": workspace.nodes,
             "connected": workspace.connected,
             "singularities_divide": workspace.singularities_divide,
-            "demands": workspace.verdicts,
+            "demands": workspace.demands,
         }
     )
