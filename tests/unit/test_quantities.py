@@ -2,6 +2,7 @@
 
 import pytest
 
+from kinetostat.machine.loading import load
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.study import ObjectiveTable
 from kinetostat.studies.optimisation import problem
@@ -28,4 +29,4 @@ def test_the_usual_goal_is_what_is_better_for_a_design(name, goal):
 
 def test_an_objective_that_is_better_neither_way_needs_a_goal():
     with pytest.raises(InputError, match=r"objectives\.0: neither a larger nor a smaller stiffness_x_z .*add goal"):
-        problem._objective(None, ObjectiveTable(quantity="stiffness_x_z"), None, "objectives.0")
+        problem._objective(load("delta"), ObjectiveTable(quantity="stiffness_x_z"), None, "objectives.0")

@@ -3,11 +3,13 @@
 A panel shows results of `answers`; it holds no formula and knows nothing of the page around it.
 """
 
+from abc import ABC, abstractmethod
+
 from kinetostat.studio.answers import Report
 from kinetostat.studio.session import Session
 
 
-class Panel:
+class Panel(ABC):
     """A linked view of the analysis, in a tab of its own.
 
     The page makes one of each class, calls `build` once inside the tab, `show` after every new analysis while the
@@ -19,10 +21,11 @@ class Panel:
 
     name = ""
 
+    @abstractmethod
     def build(self) -> None:
         """Create the elements of the panel, still empty, where the page is being built."""
-        raise NotImplementedError
 
+    @abstractmethod
     def show(self, report: Report, session: Session) -> None:
         """Show a new analysis of a pose that has an answer.
 
@@ -30,7 +33,6 @@ class Panel:
             report: the analysis and what is drawn of it.
             session: the machine with its controls, for panels that compute more.
         """
-        raise NotImplementedError
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027 - most panels compute nothing, and need no `close`
         """Stop what is being computed; a panel that only shows the report has nothing to stop."""
