@@ -88,8 +88,11 @@ BAD_FILES = [
     ("list of tables", "[pose]", "[[pose]]", ["pose is [", "must be a table, written as [pose]"]),
     ("deep list", '"22 cm"', "[" * 5000 + "]" * 5000, ["nested too deeply"]),
     ("list in list", '"22 cm"', "[[[0.22]]]", ["geometry.base_radius is [[[0.22]]]", *LENGTH]),
-    ("deep table", '"22 cm"', '"22 cm"\n' + "a." * 3000 + "b = 1", ["test.toml"]),
-    ("deep table header", "[pose]", f"[{'a.' * 3000}b]\n[pose]", ["test.toml"]),
+    ("deep table", '"22 cm"', '"22 cm"\n' + "a." * 500_000 + "b = 1", ["nested too deeply", "8 parts"]),
+    ("deep quoted table", '"22 cm"', '"22 cm"\n' + '"a".' * 200_000 + "b = 1", ["nested too deeply"]),
+    ("deep table header", "[pose]", f"[{'a . ' * 200_000}b]\n[pose]", ["nested too deeply"]),
+    ("many keys", "[pose]", "".join(f"a{i}=1\n" for i in range(90_000)), ["more than 30,000 keys and values"]),
+    ("dots in texts", '"22 cm"', f'"22 cm" # {"a." * 1000}\n"{"b." * 1000}" = 1', ["b…", "is not known"]),
     ("null character", "test machine", "a\0b", ["not valid TOML"]),
     ("no text at all", GOOD, "", ["family is missing"]),
 ]

@@ -84,8 +84,9 @@ REFUSED = [
     (f"geometry.base_radius=0x{'f' * 5000}", ["geometry.base_radius"]),
     (f"geometry.base_radius={'[' * 5000}", ["geometry.base_radius", "…"]),
     ("geometry.base_radius=1\nbase_angle=2", ["geometry.base_radius"]),
-    ("geometry." + "a." * 3000 + "b=1", ["not known"]),
-    ("a." * 3000 + "b=1", ["a is not known"]),
+    ("geometry." + "a." * 6 + "b=1", ["not known"]),
+    ("a." * 7 + "b=1", ["a is not known"]),
+    ("a." * 3000 + "b=1", ["more than 8 parts"]),
 ]
 
 

@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from kinetostat.spec.errors import InputError, several, shorten
+from kinetostat.spec.text_bounds import DEEPEST, check_bounds
 
 LARGEST_FILE = 1 << 20
 """Largest file that is read, bytes. A machine file has a few hundred; a megabyte is a mistake or an attack."""
-
-DEEPEST = 8
-"""Most levels of nested tables and lists; a machine file has three or four."""
 
 Document = dict[str, Any]
 
@@ -61,15 +59,14 @@ def parse(text: str, origin: str) -> Document:
     """Read the TOML document in a text; `origin` names it in messages.
 
     Raises:
-        InputError: if it is not TOML (the message gives line and column) or nested too deeply.
+        InputError: if it is not TOML (the message gives line and column), nested too deeply, or has too many entries.
     """
+    check_bounds(text, origin)
     try:
         document = tomllib.loads(text)
     except ValueError as error:
         raise InputError(f'"{origin}" is not valid TOML: {error}. Text values need quotes, e.g. x = "2 cm".') from None
-    except RecursionError:  # nested deeper than Python's own limit, and so far beyond ours
-        document = None
-    if document is None or _deeper_than(document, DEEPEST):
+    if _deeper_than(document, DEEPEST):
         raise InputError(f'"{origin}" is nested too deeply; it should have tables of values and lists.')
     return document
 
@@ -102,6 +99,8 @@ def override(document: Document, settings: Sequence[str], counts: Mapping[str, i
         path, equals, text = setting.partition("=")
         if not equals or not path.strip():
             raise InputError(f'--set {shorten(setting)} must be path=value, e.g. --set geometry.base_radius="26 cm".')
+        if path.count(".") >= DEEPEST:
+            raise InputError(f"--set {shorten(path)} has more than {DEEPEST} parts; no field is nested so deeply.")
         _repeat(result, path.strip(), counts)
         _put(result, path.strip(), _value(text.strip()))
     return result
@@ -123,8 +122,9 @@ def _repeat(document: Document, path: str, counts: Mapping[str, int]) -> None:
 def _value(text: str) -> object:
     """Read a value as TOML, or else as text."""
     try:
+        check_bounds(text, "--set")
         parsed = tomllib.loads(f"value = {text}\n")
-    except (ValueError, RecursionError):
+    except ValueError:  # InputError is one: what is too deep or too long for a value is text
         return text
     # A line break in the text could begin a second key: then it is not a value.
     return parsed["value"] if len(parsed) == 1 else text

@@ -1,7 +1,11 @@
 """What can be wrong with what people give us. Each message is one readable paragraph that says how to mend it."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+SHOWN, WORDED = 5, 100
+"""Mistakes of a file that a message shows, and those that are put into words at all: a hostile file has thousands."""
 
 
 class InputError(ValueError):
@@ -20,6 +24,11 @@ def shorten(value: object, longest: int = 60) -> str:
         text = f'"{value}"' if isinstance(value, str) else repr(value)
     except ValueError:  # Python refuses to write integers of thousands of digits
         return "a number of thousands of digits"
+    return cut(text, longest)
+
+
+def cut(text: str, longest: int = 60) -> str:
+    """A text, with an ellipsis in the place of what exceeds a length."""
     return text if len(text) <= longest else f"{text[: longest - 1]}…"
 
 
@@ -40,3 +49,10 @@ def choice(value: object, known: Iterable[str], what: str) -> str:
     near = difflib.get_close_matches(value, names, 1) if isinstance(value, str) else []
     hint = f'did you mean "{near[0]}"?' if near else f"choose from {', '.join(names) or 'none: nothing is defined'}."
     raise InputError(f"{what} is {'missing' if value is None else shorten(value)}; {hint}")
+
+
+def first_mistakes(mistakes: Sequence[Any], sentence: Callable[[dict[str, Any]], str]) -> str:
+    """Return a sentence for each of the first different mistakes of a file, and how many more there are."""
+    sentences = list(dict.fromkeys(sentence(dict(mistake)) for mistake in mistakes[:WORDED]))
+    left = len(sentences) - SHOWN + max(len(mistakes) - WORDED, 0)
+    return " ".join(sentences[:SHOWN]) + (f" (and {left} more)" if left > 0 else "")

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from kinetostat.spec.document import Document, override
-from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.errors import InputError, cut, first_mistakes, shorten
 
 MOST_POPULATION = 100_000
 MOST_GENERATIONS = 100_000
@@ -167,9 +167,8 @@ def read_study(document: Document, origin: str, settings: Sequence[str] = ()) ->
     try:
         return StudyFile.model_validate(changed)
     except ValidationError as error:
-        sentences = list(dict.fromkeys(_sentence(dict(mistake), changed) for mistake in error.errors()))
-        more = f" (and {len(sentences) - 5} more)" if len(sentences) > 5 else ""
-        raise InputError(f'"{origin}": {" ".join(sentences[:5])}{more}') from None
+        mistakes = first_mistakes(error.errors(), lambda mistake: _sentence(mistake, changed))
+        raise InputError(f'"{origin}": {mistakes}') from None
 
 
 def study_schema() -> dict[str, Any]:
@@ -180,7 +179,7 @@ def study_schema() -> dict[str, Any]:
 
 def _sentence(mistake: dict[str, Any], document: Document) -> str:
     path, value = _place(mistake["loc"], document)
-    name = ".".join(path)
+    name = ".".join(cut(part) for part in path)
     if mistake["type"] == "missing":
         return f"{name} is missing ({_field(path)}); `kinetostat new study` prints a complete file."
     if mistake["type"] == "extra_forbidden":

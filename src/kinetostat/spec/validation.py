@@ -11,7 +11,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from kinetostat.spec.document import Document
-from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.errors import InputError, cut, first_mistakes, shorten
 from kinetostat.spec.fields import Quantity, optional, quantities
 from kinetostat.units import KINDS
 
@@ -78,14 +78,13 @@ def validate(document: Document, origin: str, model: type[BaseModel], tables: Ma
     try:
         return model.model_validate(document)
     except ValidationError as error:
-        sentences = [_sentence(dict(mistake), document, tables) for mistake in error.errors()]
-        more = f" (and {len(sentences) - 5} more)" if len(sentences) > 5 else ""
-        raise InputError(f'"{origin}": {" ".join(sentences[:5])}{more}') from None
+        mistakes = first_mistakes(error.errors(), lambda mistake: _sentence(mistake, document, tables))
+        raise InputError(f'"{origin}": {mistakes}') from None
 
 
 def _sentence(mistake: dict[str, Any], document: Document, tables: Mapping[str, type]) -> str:
     path = [str(part) for part in mistake["loc"]]
-    name, last = ".".join(path), path[-1]
+    name, last = ".".join(cut(part) for part in path), cut(path[-1])
     within = ".".join(path[:-1])
     known = quantities(tables[within]) if within in tables else {}
     if mistake["type"] in ("missing", "missing_argument"):
