@@ -5,6 +5,9 @@ first one it meets. CI runs the property tests with `--hypothesis-profile=fresh`
 time; `--hypothesis-profile=explore` looks long for new counter-examples, and for the least of them.
 """
 
+import os
+import sysconfig
+
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
@@ -17,6 +20,10 @@ MARKERS = {
     "step": ("test_step_file", "test_step_outlines", "test_step_solids"),
 }
 """Files of tests that plain `pytest` leaves out, because they take long; CI runs them with `-m`."""
+
+os.environ.pop("UV_RUN_RECURSION_DEPTH", None)
+os.environ["PATH"] = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", os.defpath)])
+"""Messages quote commands as they are typed in the shell: in tests `kinetostat` is on the path, as in the docs."""
 
 QUIET = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large]
 """Poses are filtered by singularity margin and each costs a statics solve; neither is a fault of a test."""

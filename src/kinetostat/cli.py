@@ -12,6 +12,7 @@ from pathlib import Path
 from kinetostat.commands.common import (
     BAD_INPUT,
     DONE,
+    Help,
     Parser,
     add_command,
     give,
@@ -29,6 +30,7 @@ from kinetostat.commands.influence import add_influence_commands
 from kinetostat.commands.optimize import add_optimize_commands
 from kinetostat.commands.report import add_report_commands
 from kinetostat.commands.studio import add_studio_command
+from kinetostat.spec.installation import as_typed
 
 EXAMPLES = """examples:
   kinetostat list
@@ -59,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return int(options.run(options))
     except InputError as error:
-        print(f"kinetostat: {error}", file=sys.stderr)
+        print(f"kinetostat: {as_typed(str(error))}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
         return stopped("files that had been written are complete.")
@@ -73,7 +75,7 @@ def _parser() -> Parser:
         prog="kinetostat",
         description="Compute how stiff a parallel kinematic machine is, where it is weak, and why.",
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=Help,
     )
     parser.add_argument("--version", action="store_true", help="print the version and stop")
     parser.set_defaults(run=_version_or_help, parser=parser)

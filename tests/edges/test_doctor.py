@@ -12,6 +12,7 @@ from rich.console import Console
 
 from kinetostat.cli import main
 from kinetostat.commands.common import DONE, NO_ANSWER
+from kinetostat.spec.installation import adding, installing
 from kinetostat.studies.diagnosis import diagnosis, self_test, software
 from kinetostat.studies.diagnosis.diagnosis import Check, State
 from kinetostat.studies.paper import printed
@@ -71,14 +72,14 @@ def test_a_package_that_is_missing(monkeypatch, capsys):
     assert main(["doctor"]) == NO_ANSWER
     text = capsys.readouterr().out
     assert "✗  scipy           is not installed" in text
-    assert "→ pip install 'scipy>=1.15'" in text
+    assert f"→ {installing(['scipy>=1.15'])}" in " ".join(text.split())
     assert "To repair: scipy." in text
 
 
 def test_a_package_that_is_too_old(monkeypatch):
     monkeypatch.setattr(software, "version", installed_but(numpy="1.26.4"))
     numpy = next(check for check in software.checks() if check.name == "numpy")
-    assert (numpy.state, numpy.fix) == (State.FAILED, "pip install 'numpy>=2.1'")
+    assert (numpy.state, numpy.fix) == (State.FAILED, installing(["numpy>=2.1"]))
     assert numpy.detail == "1.26.4 is installed, but >=2.1 is needed"
 
 
@@ -90,7 +91,7 @@ def test_an_extra_that_is_missing_is_no_failure(monkeypatch):
     monkeypatch.setattr(software, "version", installed_but(nicegui=None))
     found = list(software.checks())
     studio = next(check for check in found if check.name == "studio")
-    assert (studio.state, studio.fix) == (State.ABSENT, "pip install 'kinetostat[studio]'")
+    assert (studio.state, studio.fix) == (State.ABSENT, adding("studio"))
     assert diagnosis.healthy(found)
 
 
@@ -98,7 +99,7 @@ def test_not_installed_at_all(monkeypatch):
     monkeypatch.setattr(software, "version", installed_but(kinetostat=None))
     (only,) = software.checks()
     assert only.state is State.FAILED
-    assert "pip install ." in only.fix
+    assert only.fix == installing(["kinetostat"])
 
 
 def one_digit_off():
@@ -142,5 +143,5 @@ def test_a_broken_library_hides_nothing_else(tmp_path):
     assert "✓ packaging" in said
     assert "✗  vectors         ImportError: wrong processor" in done.stdout
     assert "✗  self-test       cannot be looked at, ImportError: wrong processor" in done.stdout
-    assert "pip install --force-reinstall kinetostat" in done.stdout
+    assert installing(["kinetostat"], again=True) in said
     assert "none: compiled programs" in done.stdout

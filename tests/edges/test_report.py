@@ -14,6 +14,7 @@ from kinetostat.commands.common import STOPPED
 from kinetostat.commands.report import WITHOUT
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values
+from kinetostat.spec.installation import adding
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.report import answers
 from kinetostat.studies.report.answers import usual_ranges
@@ -231,7 +232,7 @@ def test_bad_input_is_refused_with_its_reason(words, reason, tmp_path, capsys, m
 def test_without_typst_a_pdf_is_refused_at_once(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(pdf, "find_spec", lambda _: None)
     assert main(["report", MACHINE, "-o", str(tmp_path / "r.pdf")]) == 2
-    assert "pip install 'kinetostat[report]'" in capsys.readouterr().err
+    assert adding("report") in capsys.readouterr().err
 
 
 def test_without_the_renderer_a_page_shows_the_picture_and_says_so(monkeypatch):
@@ -239,7 +240,7 @@ def test_without_the_renderer_a_page_shows_the_picture_and_says_so(monkeypatch):
     page = Page(quick(load(MACHINE)))
     assert "live-data" not in page.attached
     assert "img" in page.tags
-    assert "make the report after pip install 'kinetostat[report]'" in page.text
+    assert f"make the report after: {adding('report')}" in page.text
 
 
 def test_a_report_that_is_stopped_leaves_the_old_file(tmp_path, capsys, monkeypatch):

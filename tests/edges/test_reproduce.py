@@ -78,7 +78,9 @@ def test_a_misprint_is_excused_only_if_the_correction_is_reached():
 def test_the_command_writes_tables_figures_and_one_page_that_stands_alone(tmp_path, capsys):
     folder = tmp_path / "reproduce"
     assert main(["reproduce", "-o", str(folder)]) == DONE
-    assert "82 equal to print, 6 known misprints, 0 differ" in " ".join(capsys.readouterr().out.split())
+    printed_text = capsys.readouterr().out
+    assert "82 equal to print, 6 known misprints, 0 differ" in " ".join(printed_text.split())
+    assert printed_text.endswith("next:\n  kinetostat analyze tripteron\n  kinetostat studio\n")
     names = {path.name for path in folder.iterdir()}
     assert {"index.html", "reproduction.json", "numbers.csv", "equations.csv", "statements.csv"} <= names
     assert {

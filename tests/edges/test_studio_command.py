@@ -8,6 +8,7 @@ import pytest
 
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE
+from kinetostat.spec.installation import adding
 
 
 @pytest.fixture
@@ -72,4 +73,4 @@ def test_a_port_in_use_is_bad_input(capsys):
 def test_without_the_extra_it_says_how_to_install_it(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "nicegui", None)
     assert main(["studio", "hexapod"]) == BAD_INPUT
-    assert "pip install 'kinetostat[studio]'" in capsys.readouterr().err
+    assert f"install it with `{adding('studio')}`" in capsys.readouterr().err

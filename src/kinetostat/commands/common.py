@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
+from kinetostat.spec.installation import as_typed
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from typing import TypeAlias
@@ -39,12 +41,22 @@ MEMORY = 600.0
 """Seconds of progress from which the remaining time is estimated: several chunks, even where each takes minutes."""
 
 
+class Help(argparse.RawDescriptionHelpFormatter):
+    """Help whose examples and quoted commands can be typed as they stand."""
+
+    def _expand_help(self, action: argparse.Action) -> str:
+        return as_typed(super()._expand_help(action))
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return as_typed(super()._fill_text(text, width, indent))
+
+
 class Parser(argparse.ArgumentParser):
     """An argument parser that reports mistakes in one readable paragraph."""
 
     def error(self, message: str) -> NoReturn:
         """Print what is wrong and where the help is; exit with code 2."""
-        self.exit(BAD_INPUT, f"{self.prog}: {message}. Help: {self.prog} --help\n")
+        self.exit(BAD_INPUT, as_typed(f"{self.prog}: {message}. Help: `{self.prog} --help`\n"))
 
 
 def add_command(commands: "Commands", name: str, run: object, text: str, example: str) -> Parser:
@@ -54,7 +66,7 @@ def add_command(commands: "Commands", name: str, run: object, text: str, example
         help=text,
         description=f"{text[0].upper()}{text[1:]}.",
         epilog=f"example:\n  {example}\n",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=Help,
     )
     command.set_defaults(run=run)
     return command
@@ -179,7 +191,7 @@ def search_bar(what: str) -> "Iterator[Callable[[int, int, str], None]]":
 
 def no_answer(message: str) -> int:
     """Print why there is no result; return the exit code."""
-    print(f"kinetostat: {message}", file=sys.stderr)
+    print(f"kinetostat: {as_typed(message)}", file=sys.stderr)
     return NO_ANSWER
 
 

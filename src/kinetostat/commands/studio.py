@@ -51,10 +51,11 @@ def _port(text: str) -> int:
 def _studio(options: argparse.Namespace) -> int:
     from kinetostat.machine.loading import bundled
     from kinetostat.spec.errors import InputError
+    from kinetostat.spec.installation import adding
 
     machine = load_machine(options)
     if find_spec(EXTRA) is None:
-        raise InputError("the studio is not installed; install it with `pip install 'kinetostat[studio]'`.")
+        raise InputError(f"the studio is not installed; install it with `{adding('studio')}`.")
     from kinetostat.studio.design.state_folder import usual_state
     from kinetostat.studio.serving import serve
 

@@ -20,6 +20,7 @@ from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.installation import adding
 
 CHUNK_NUMBERS = 1 << 20
 """Results of one chunk, 8 MB: at least a tenth of a second of work, and little to lose or to keep in memory."""
@@ -72,9 +73,7 @@ def here(work: Work, numbers: Sequence[int]) -> Iterator[tuple[int, Evaluation]]
         yield number, work.compute(number)
 
 
-MISSING = (
-    "--workers and --cluster need Dask, which is not installed; install it with `pip install 'kinetostat[cluster]'`."
-)
+MISSING = "--workers and --cluster need Dask, which is not installed; install it with `{}`."
 AHEAD = 2
 """Chunks handed out per thread of the cluster: one in hand and one waiting."""
 GO_ON = "What was written is kept: the same command goes on from there."
@@ -108,7 +107,7 @@ def hired(crew: Crew) -> Iterator[Compute]:
     try:
         import distributed
     except ModuleNotFoundError:
-        raise InputError(MISSING) from None
+        raise InputError(MISSING.format(adding("cluster"))) from None
     with _client(distributed, crew) as client:
         _check_versions(client)
 

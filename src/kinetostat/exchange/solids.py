@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.installation import adding
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import replacing
 from kinetostat.views.scene.glb import glb
 from kinetostat.views.scene.machine_scene import scene_of
 
 NEEDED = "STEP needs Open CASCADE, which "
-MISSING = "is not installed; install it with: pip install 'kinetostat[cad]'."
+MISSING = "is not installed; install it with `{}`."
 BROKEN = "does not start: {reason}. On Debian and Ubuntu: apt-get install libgl1 libx11-6."
 
 
@@ -41,7 +42,7 @@ def _write(content: bytes, path: Path) -> list[Path]:
 
 def _step_writer() -> Any:
     if find_spec("OCP") is None:
-        raise InputError(NEEDED + MISSING)
+        raise InputError(NEEDED + MISSING.format(adding("cad")))
     try:
         return import_module("kinetostat.exchange.step_file")
     except ImportError as error:

@@ -21,6 +21,7 @@ from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Configuration, Machine, need_machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.installation import adding
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.rounding import clean_matrix
 from kinetostat.tolerances import AGREED, ROUND_OFF_OF_ENTRY
@@ -28,7 +29,7 @@ from kinetostat.validation.answer import Answer, block_differences, difference
 
 Array = npt.NDArray[np.float64]
 
-INSTALL = "Install it with: pip install 'kinetostat[validate]'"
+INSTALL = "Install it with `{}`."
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class Engine:
             InputError: if the engine is not installed, has no counterpart of a part of the machine, or fails.
         """
         if self.version is None:
-            raise InputError(f"The engine {self.name} is not installed. {INSTALL}")
+            raise InputError(f"The engine {self.name} is not installed. {INSTALL.format(adding('validate'))}")
         solve: Callable[[Configuration, Vector], Answer] = import_module(self.builder).solve
         try:
             return solve(configuration, reference)
@@ -167,7 +168,9 @@ def choose(name: str | None) -> Engine:
         installed = [engine for engine in KNOWN if engine.version is not None]
         if not installed:
             names = " or ".join(engine.package for engine in KNOWN)
-            raise InputError(f"No independent engine is installed; {names} can be used. {INSTALL}")
+            raise InputError(
+                f"No independent engine is installed; {names} can be used. {INSTALL.format(adding('validate'))}"
+            )
         return installed[0]
     named = [engine for engine in KNOWN if engine.name == name]
     if not named:

@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.text import Text
 
 from kinetostat.kinetostatics.quantities import GROUPS
+from kinetostat.spec.installation import command, starting
 from kinetostat.studies.optimisation.result_data import as_dataset
 from kinetostat.studies.paper.claims import Claim
 from kinetostat.studies.paper.comparison import Comparison, Verdict
@@ -92,6 +93,9 @@ def print_summary(console: Console, reproduction: Reproduction, written: Sequenc
     console.print()
     console.print(verdict(reproduction), style="bold green" if reproduction.explained else "bold red", highlight=False)
     console.print(f"wrote {written[0]} and {len(written) - 1} more files beside it", highlight=False)
+    console.print("next:", highlight=False)
+    for line in (f"{command()} analyze tripteron", starting("studio", "studio")):
+        console.print(f"  {line}", highlight=False, soft_wrap=True)
 
 
 def verdict(reproduction: Reproduction) -> str:

@@ -6,6 +6,7 @@ from enum import StrEnum
 from importlib import import_module
 from typing import Any
 
+from kinetostat.spec.installation import installing
 from kinetostat.spec.renamed import with_former_keys
 
 
@@ -54,7 +55,7 @@ def tried(group: str, name: str, question: Callable[[], str], fix: str) -> Check
 
 def reinstall(packages: str) -> str:
     """The command that mends packages."""
-    return f"pip install --force-reinstall {packages}"
+    return installing(packages.split(), again=True)
 
 
 PARTS = {"software": "software", "machine": "hardware", "self-test": "self_test"}

@@ -7,6 +7,7 @@ from importlib.metadata import PackageNotFoundError, metadata, requires, version
 
 from packaging.requirements import Requirement
 
+from kinetostat.spec.installation import adding, installing
 from kinetostat.studies.diagnosis.diagnosis import Check, State, reinstall
 
 PACKAGE = "kinetostat"
@@ -35,7 +36,7 @@ def checks() -> Iterator[Check]:
         yield Check(CORE, PACKAGE, State.SOUND, version(PACKAGE))
     except PackageNotFoundError:
         text = "runs from its source files and is not installed: what it needs cannot be looked up"
-        yield Check(CORE, PACKAGE, State.FAILED, text, "pip install . (in the folder with pyproject.toml)")
+        yield Check(CORE, PACKAGE, State.FAILED, text, installing([PACKAGE]))
         return
     yield Check(CORE, "python", State.SOUND, f"{platform.python_version()} ({platform.python_implementation()})")
     for requirement in requirements():
@@ -64,10 +65,10 @@ def suited(requirement: Requirement) -> Check:
     wanted = f"{requirement.name}{requirement.specifier}"
     present = installed(requirement)
     if present is None:
-        return Check(CORE, requirement.name, State.FAILED, "is not installed", f"pip install '{wanted}'")
+        return Check(CORE, requirement.name, State.FAILED, "is not installed", installing([wanted]))
     if not requirement.specifier.contains(present, prereleases=True):
         text = f"{present} is installed, but {requirement.specifier} is needed"
-        return Check(CORE, requirement.name, State.FAILED, text, f"pip install '{wanted}'")
+        return Check(CORE, requirement.name, State.FAILED, text, installing([wanted]))
     try:
         import_module(USED[requirement.name.lower()])
     except Exception as trouble:
@@ -82,7 +83,7 @@ def extra_of(extra: str) -> Check:
     missing = [name for name, present in known.items() if present is None]
     if missing:
         text = f"not installed ({', '.join(missing)})"
-        return Check(EXTRAS, extra, State.ABSENT, text, f"pip install 'kinetostat[{extra}]'")
+        return Check(EXTRAS, extra, State.ABSENT, text, adding(extra))
     return Check(EXTRAS, extra, State.SOUND, ", ".join(f"{name} {present}" for name, present in known.items()))
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from kinetostat.kinematics.mobility import Kind, Mobility
 from kinetostat.spec.fields import NO_LIMIT
+from kinetostat.spec.installation import adding
 from kinetostat.studies.analysis import Analysis
 from kinetostat.views.analysis_tables import margins
 from kinetostat.views.drawing import three_views
@@ -27,7 +28,7 @@ def machine_section(analysis: Analysis, pictures: Shown, live: bool) -> Section:
     machine, turning = analysis.machine, live and can_be_live()
     caption = f"{machine.name} at its pose: actuated legs blue, passive ones orange."
     if live and not turning:
-        caption += WITHOUT
+        caption += WITHOUT.format(adding("report"))
     if turning and pictures.factor is not None:
         caption += f" Deflections are drawn {pictures.factor:,.6g} times as large as they are."
     blocks: list[Block] = [

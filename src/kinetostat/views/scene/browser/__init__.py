@@ -8,7 +8,6 @@ RENDERER = Path(__file__).parent
 OURS = ("machine_view.js", "solid_geometry.js", "theme.js")
 BROUGHT = {"nicegui-scene": "elements/scene/dist/index.js", "vue": "static/vue.esm-browser.prod.js"}
 """three.js with its controls, and Vue, as files of the package nicegui, by the name under which they are imported."""
-INSTALL = "pip install 'kinetostat[report]'"
 
 
 def modules() -> dict[str, str] | None:
