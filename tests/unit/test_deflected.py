@@ -19,7 +19,7 @@ def test_the_legs_follow_the_platform(case):
     response = respond(case.machine)
     wrench = PLANE_LOAD if response.configuration.plane else LOAD
     links = deflected_links(response, wrench)
-    platform = deflection(response.compliance, wrench)
+    platform = deflection(response.statics, wrench)
     for leg in response.configuration.legs:
         last = [link for link in links if link.leg == leg.name][-1]
         expected = platform.moved(last.end - response.reference).translational.components()

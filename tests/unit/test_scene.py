@@ -179,7 +179,7 @@ def test_the_ghost_is_exaggerated_by_a_round_factor_and_moves_with_the_tool():
     response = respond(machine)
     sizes = proportions_of(machine, response.configuration)
     wrench = Wrench(ZERO, Vector(0.0, 0.0, -500.0))
-    motion = deflection(response.compliance, wrench)
+    motion = deflection(response.statics, wrench)
     moved = Deflection(wrench, motion, tuple(deflected_links(response, wrench)))
     solids, factor = deflection_overlays(machine, response.configuration, sizes, moved)
     assert f"{factor:.0e}"[0] in "125"

@@ -54,7 +54,7 @@ def deflected_links(response: Response, load: Wrench) -> list[DeflectedLink]:
     Springs give as they are loaded; passive joints and free springs move so that each leg's end follows the platform
     (least squares of J_p q = t - J_e d, which has a solution because the statics hold).
     """
-    platform = deflection(response.compliance, load)
+    platform = deflection(response.statics, load)
     loads = iter(spring_loads(response, load))
     links: list[DeflectedLink] = []
     for leg, screws in zip(response.configuration.legs, response.legs, strict=True):

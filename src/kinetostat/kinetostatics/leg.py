@@ -51,7 +51,9 @@ def relaxed(leg: LegScrews) -> LegScrews:
         singularity_margin = smaller(singularity_margin, apart)
     weights = [0.0 if type(s) is float and s == INFINITE else s for s in leg.compliance]
     rows = [
-        tuple(0.0 if row in free else total([c * b for c, b in zip(row, column, strict=True)]) for column in basis)
+        tuple(
+            0.0 if _repeats(row, free) else total([c * b for c, b in zip(row, column, strict=True)]) for column in basis
+        )
         for row in leg.loads
     ]
     wrenches = tuple(combine(leg.wrenches, column) for column in basis)
@@ -68,6 +70,15 @@ def _independent(rows: Sequence[Sequence[Scalar]]) -> list[Sequence[Scalar]]:
         if not numbers or _rank([*kept, row]) > len(kept):
             kept.append(row)
     return kept
+
+
+def _repeats(row: Sequence[Scalar], others: Sequence[Sequence[Scalar]]) -> bool:
+    """Whether a row is one of the others by form: entry by entry the same scalar, or the same float."""
+    alike = [
+        [c is d or (isinstance(c, float) and isinstance(d, float) and c == d) for c, d in zip(row, other, strict=True)]
+        for other in others
+    ]
+    return any(map(all, alike))
 
 
 def _rank(rows: Sequence[Sequence[float]]) -> int:

@@ -4,14 +4,16 @@ Source: theory (28) and (29). Wrenches and twists are in base axes, at the point
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from kinetostat.algebra.scalar import Scalar, total, weighted
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.symmetric import SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.kinetostatics.assembly import Statics, compliance_matrix
+from kinetostat.kinetostatics.leg import INFINITE
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.leg import Element, Joint, Leg
+from kinetostat.machine.leg import Element, Joint, Leg, felt
 
 
 @dataclass(frozen=True)
@@ -30,16 +32,36 @@ class JointReaction:
     wrench: Wrench
 
 
-def deflection(compliance: Symmetric6, load: Wrench) -> Twist:
-    """t = C w: small rotation (rad) and displacement (m) of the tool point under a wrench there, base axes."""
-    w = load.components()
+def deflection(statics: Statics, load: Wrench) -> Twist:
+    """Compute t = C w: small rotation (rad) and displacement (m) of the tool point under a wrench there.
+
+    A free spring that the load drives moves without end, so that the components which it moves are infinite; the others
+    are exact. A free spring that the load does not drive stays where it is.
+
+    Args:
+        statics: of the machine.
+        load: at the tool point, in the axes of the statics.
+    """
+    compliance, w = held_compliance(statics), load.components()
     rows = [total([weighted(compliance.entry(i, j), w[j]) for j in range(SIZE)]) for i in range(SIZE)]
-    return Twist(Vector(*rows[:3]), Vector(*rows[3:]))
+    endless = [twist.components() for twist, s in statics.motions if s == INFINITE and felt(load, twist)]
+    reached = [any(twist[i] for twist in endless) for i in range(SIZE)]
+    moved = [INFINITE if free else row for row, free in zip(rows, reached, strict=True)]
+    return Twist(Vector(*moved[:3]), Vector(*moved[3:]))
+
+
+def held_compliance(statics: Statics) -> Symmetric6:
+    """C of the machine with its free springs held, in the axes of the statics; C itself where no spring is free."""
+    return compliance_matrix(replace(statics, motions=tuple((xi, s) for xi, s in statics.motions if s < INFINITE)))
 
 
 def spring_loads(response: Response, load: Wrench) -> list[Scalar]:
-    """N or N·m that each spring carries under a wrench at the tool point: xi_e times w (virtual work)."""
-    return [load.work(twist) for twist in response.statics.flexibility]
+    """N or N·m that each spring carries under a wrench at the tool point: xi_e times w (virtual work).
+
+    For a free spring it is what would hold it: exactly 0 where the load does not drive it.
+    """
+    pairs = zip(response.statics.flexibility, response.statics.compliance, strict=True)
+    return [felt(load, twist) if s == INFINITE else load.work(twist) for twist, s in pairs]
 
 
 def leg_wrenches(response: Response, load: Wrench) -> list[Wrench]:

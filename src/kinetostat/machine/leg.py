@@ -319,12 +319,18 @@ class Leg:
         if any(along):
             return tuple(1.0 if same else wrench.work(twist) for same, wrench in zip(along, wrenches, strict=True))
         if is_zero(spring.stiffness):
-            return tuple(_felt(wrench, twist) for wrench in wrenches)
+            return tuple(felt(wrench, twist) for wrench in wrenches)
         return tuple(wrench.work(twist) for wrench in wrenches)
 
 
-def _felt(wrench: Wrench, twist: Twist) -> Scalar:
-    """The load of a free spring, or nothing where it is but rounding: that must not move the platform."""
+def felt(wrench: Wrench, twist: Twist) -> Scalar:
+    """The work of a wrench on the twist of a free spring, exactly 0 where it is only round-off.
+
+    A free spring gives way to any load at all, so that round-off would move it without end.
+
+    Args:
+        wrench, twist: at one point, in the same axes.
+    """
     turning = wrench.rotational.norm() * twist.rotational.norm()
     size = turning + wrench.translational.norm() * twist.translational.norm()
     load = wrench.work(twist)

@@ -146,10 +146,11 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     rigid = tuple(spring.name for spring in all_springs if math.isinf(spring.stiffness))
     free = tuple(spring.name for spring in all_springs if spring.stiffness == 0.0)
     extremes = conditioning(response.legs, length, response.guide)
+    load = load_case(response, statics, turn)
     return Analysis(
         machine,
         status,
-        _message(response, rigid, free, stiffness_rows is not None),
+        _message(response, rigid, free, stiffness_rows is not None, load),
         components=machine.family.component_names,
         axes=axes,
         platform=_placement(configuration),
@@ -164,7 +165,7 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
         indices=indices_of(stiffness_rows, compliance_rows, length, kept),
         mobility=mobility(configuration, nearby, response.reference),
         internal_loads=internal_loads([leg.name for leg in configuration.legs], response.legs, length, response.guide),
-        load=load_case(response, compliance, turn),
+        load=load,
         masses=tuple(moving_masses(machine, configuration)),
         wrench_condition=float(extremes[0] / extremes[-1]),
         jacobian_condition=_jacobian_condition(response, length),
@@ -237,7 +238,9 @@ def _rank(statics: Statics, compliance_infinite: bool) -> int:
     return independent(twists, 1.0 / statics.length, DEPENDENT_MOTIONS)
 
 
-def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...], finite: bool) -> str:
+def _message(
+    response: Response, rigid: tuple[str, ...], free: tuple[str, ...], finite: bool, load: LoadCase | None
+) -> str:
     """Say what is special about a pose that has been analysed; `finite` tells whether K is finite."""
     sentences = []
     if not finite and not rigid:
@@ -251,6 +254,8 @@ def _message(response: Response, rigid: tuple[str, ...], free: tuple[str, ...], 
             motion = describe([float(c) for c in twist.components()], (f"rad/{per}", f"m/{per}"))
             moves = f"so that the platform moves freely by {motion}" if motion else "and carries nothing"
             sentences.append(f"Free: {spring.name} has no stiffness, {moves}.")
+    if load and load.unheld:
+        sentences.append(load.unheld)
     return " ".join(sentences) or Status.OK.sentence
 
 

@@ -6,14 +6,15 @@ The formulas are in `kinetostatics.loading`.
 import math
 from dataclasses import dataclass, replace
 
-from kinetostat.algebra.screw import Wrench
-from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.algebra.screw import COMPONENTS, Wrench
 from kinetostat.algebra.vector import Rotation
-from kinetostat.kinetostatics.loading import JointReaction, deflection, joint_reactions, spring_loads
+from kinetostat.kinetostatics.assembly import Statics
+from kinetostat.kinetostatics.loading import JointReaction, deflection, held_compliance, joint_reactions, spring_loads
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import springs
 from kinetostat.studies.rounding import clean_screw
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
+from kinetostat.units import show
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class SpringLoad:
         name: of the spring.
         actuated: whether it is an actuator.
         turning: whether it is a rotation: N·m and rad, otherwise N and m.
-        load, deformation: N·m and rad, or N and m.
+        load, deformation: N·m and rad, or N and m; the deformation of a free spring that is loaded is infinite.
     """
 
     name: str
@@ -40,9 +41,13 @@ class LoadCase:
 
     Attributes:
         wrench: moment (N·m) and force (N) [6].
-        deflection: rotation (rad) and displacement (m) of the tool point [6]; infinite where it is free.
+        deflection: rotation (rad) and displacement (m) of the tool point [6]; infinite where the load drives a free
+            spring that moves it.
         springs: loads in all springs.
         reactions: wrenches in all joints of the legs, actuated ones among them.
+
+    Where the load drives a free spring, there is no equilibrium: loads and reactions are then those with the free
+    springs held, and the load of a free spring is what would have to hold it.
     """
 
     wrench: tuple[float, ...]
@@ -50,13 +55,27 @@ class LoadCase:
     springs: tuple[SpringLoad, ...]
     reactions: tuple[JointReaction, ...]
 
+    @property
+    def unheld(self) -> str:
+        """Which free springs the load drives, and what is still known, in words; empty where it drives none."""
+        driven = [spring for spring in self.springs if math.isinf(spring.deformation)]
+        if not driven:
+            return ""
+        needed = ", ".join(f"{spring.name} {show(spring.load, 'N·m' if spring.turning else 'N')}" for spring in driven)
+        free = [name for name, motion in zip(COMPONENTS, self.deflection, strict=True) if math.isinf(motion)]
+        exact = "; the deflection is exact in all other components" if any(map(math.isfinite, self.deflection)) else ""
+        return (
+            f"Nothing holds the load: it moves the platform without end in {', '.join(free)}, because springs without "
+            f"stiffness would have to bear it ({needed}). Loads and reactions are those with these springs held{exact}."
+        )
 
-def load_case(response: Response, compliance: Symmetric6, turn: Rotation) -> LoadCase | None:
+
+def load_case(response: Response, statics: Statics, turn: Rotation) -> LoadCase | None:
     """Compute the effects of a machine's load; None where its file gives none.
 
     Args:
         response: of the machine, its load included; base axes.
-        compliance: C in the axes of the results.
+        statics: of the machine, in the axes of the results.
         turn: from base axes to those.
     """
     wrench = response.load
@@ -68,7 +87,7 @@ def load_case(response: Response, compliance: Symmetric6, turn: Rotation) -> Loa
     loads = zip(springs(response.configuration), spring_loads(response, wrench), strict=True)
     return LoadCase(
         seen.components(),
-        _deflection(compliance, seen),
+        _deflection(statics, seen),
         tuple(
             SpringLoad(
                 s.name,
@@ -86,15 +105,14 @@ def load_case(response: Response, compliance: Symmetric6, turn: Rotation) -> Loa
     )
 
 
-def _deflection(compliance: Symmetric6, load: Wrench) -> tuple[float, ...]:
+def _deflection(statics: Statics, load: Wrench) -> tuple[float, ...]:
     """C w without round-off: no component i can exceed sqrt(C_ii w C w), because C is positive semidefinite."""
-    twist = deflection(compliance, load)
-    energy = float(load.work(twist))
-    moved = zip(twist.components(), compliance.diagonal(), strict=True)
+    energy = sum(float(s) * float(load.work(twist)) ** 2 for twist, s in statics.motions if s < math.inf)
+    moved = zip(deflection(statics, load).components(), held_compliance(statics).diagonal(), strict=True)
     bounds = [(float(c), math.sqrt(max(energy * float(entry), 0.0)) if entry else 0.0) for c, entry in moved]
     return tuple(0.0 if abs(c) < ROUND_OFF_OF_ENTRY * bound < math.inf else c for c, bound in bounds)
 
 
 def _deformation(load: float, stiffness: float) -> float:
-    """Deformation of a spring; without a load it has none, even where it is free."""
-    return load / stiffness if load else 0.0
+    """Deformation of a spring; a free one has none without a load, and no end to it under one."""
+    return load / stiffness if stiffness else math.copysign(math.inf, load) if load else 0.0

@@ -163,7 +163,7 @@ def actuator_table(load: LoadCase) -> Table:
     for spring in load.springs:
         if spring.actuated:
             units = ("N·m", "rad") if spring.turning else ("N", "m")
-            table.add_row(spring.name, number(spring.load), units[0], number(spring.deformation), units[1])
+            table.add_row(spring.name, number(spring.load), units[0], number(spring.deformation, "free"), units[1])
     return table
 
 

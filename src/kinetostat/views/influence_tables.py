@@ -89,9 +89,10 @@ def print_guidelines(console: Console, guidelines: Guidelines, full: bool = Fals
         return
     _print_sentences(console, guidelines, full)
     _print_equations(console, guidelines)
-    console.print(element_table(guidelines, guidelines.here))
-    console.print(limit_table(guidelines, guidelines.here))
-    console.print(f"{LEGEND}\n", style="dim")
+    if guidelines.elements:
+        console.print(element_table(guidelines, guidelines.here))
+        console.print(limit_table(guidelines, guidelines.here))
+        console.print(f"{LEGEND}\n", style="dim")
     _print_moves(console, guidelines, full)
 
 

@@ -66,7 +66,8 @@ def roles_at(response: Response, elements: Sequence[Element], kept: Sequence[int
             here = 0.0 if element.stiffness == math.inf else part / whole
             shares.append(np.where(here > NO_ROLE, here, whole * 0.0))
             gains.append(1.0 - without_rounding(diagonal_with(response, element, 0.5), response)[kept] / whole)
-    return Roles(*(np.stack(np.broadcast_arrays(*rows)) for rows in (shares, rigid, gains)))
+    none = np.zeros((0, *np.shape(whole)))
+    return Roles(*(np.stack(np.broadcast_arrays(*rows)) if rows else none for rows in (shares, rigid, gains)))
 
 
 def roles_over(

@@ -87,6 +87,8 @@ def _sources_of_compliance(answer: Guidelines, here: Roles) -> Iterator[Statemen
 def _weakest(answer: Guidelines, here: Roles) -> Iterator[Statement]:
     """The element whose doubling gains most, direction by direction."""
     single, over = _single(answer), _over(answer)
+    if not single:
+        return
     best, gains = _first(here.gains[single])[:, 0], here.gains[single, :, 0]
     for k in dict.fromkeys(best[_compliant(here)].tolist()):
         directions = [i for i in _compliant(here) if best[i] == k]
@@ -187,8 +189,8 @@ def _single(answer: Guidelines) -> list[int]:
 
 
 def _compliant(roles: Roles) -> list[int]:
-    """Places of the directions that are neither rigid nor free."""
-    return [i for i in range(roles.shares.shape[1]) if np.isfinite(roles.shares[:, i, 0]).all()]
+    """Places of the directions that are neither rigid nor free; none where the machine has no elements."""
+    return [i for i in range(roles.shares.shape[1]) if len(roles.shares) and np.isfinite(roles.shares[:, i, 0]).all()]
 
 
 def _over(answer: Guidelines) -> Roles | None:

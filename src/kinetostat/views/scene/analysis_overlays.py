@@ -68,7 +68,7 @@ def overlays_of(
     if analysis.load is None:
         return solids, None
     load = Wrench(Vector(*analysis.load.wrench[:3]), Vector(*analysis.load.wrench[3:]))
-    moved = Deflection(load, deflection(response.compliance, load), tuple(deflected_links(response, load)))
+    moved = Deflection(load, deflection(response.statics, load), tuple(deflected_links(response, load)))
     ghost, chosen = deflection_overlays(machine, configuration, sizes, moved, factor)
     return solids + ghost, chosen
 
