@@ -4,6 +4,7 @@ The convention, for every fenced block of README.md, CONTRIBUTING.md and docs/:
 
     ```toml NAME          a file of this name in the page's folder; machine and study files are read as such
     ```toml NAME PATH     what stands at PATH of that file instead; `.` is what is written below its end
+    ```csv NAME           a file of this name in the page's folder
     ```sh                 commands, run in order in the page's folder; each must succeed
     ```console            `$ command` and what it says, whatever its exit code
     ```python             run, all blocks of a page in one namespace
@@ -25,7 +26,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 FENCE = re.compile(r"^(?P<indent> *)```(?P<info>[^\n`]*)\n(?P<text>.*?)^(?P=indent)```$", re.MULTILINE | re.DOTALL)
-KINDS = ("toml", "sh", "console", "python", "text", "xml", "")
+KINDS = ("toml", "csv", "sh", "console", "python", "text", "xml", "")
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ PAGES = {
         "how-to-choose-a-link-model",
         "guidelines",
         "workspace",
+        "poses",
         "design",
         "report",
         "export",

@@ -16,6 +16,7 @@ _HOMES = {
     "bundled": "kinetostat.machine.loading",
     "changed": "kinetostat.machine.changing",
     "analyze": "kinetostat.studies.analysis",
+    "evaluate": "kinetostat.studies.evaluation.dataset",
     "evaluate_grid": "kinetostat.studies.grid.grid",
     "workspace": "kinetostat.studies.workspace.workspace",
     "sensitivity": "kinetostat.studies.sensitivity",
@@ -47,9 +48,9 @@ _SHOWN = {
 """Classes that notebooks show as HTML, with their modules: IPython gets names only, so that nothing is imported."""
 
 __all__ = [
-    "InputError", "Machine", "Status", "analyze", "build", "bundled", "changed", "compare", "evaluate_grid", "export",
-    "guidelines", "load", "load_problem", "machine_picture", "optimize", "plot", "report", "reproduce", "save",
-    "sensitivity", "validate", "workspace",
+    "InputError", "Machine", "Status", "analyze", "build", "bundled", "changed", "compare", "evaluate", "evaluate_grid",
+    "export", "guidelines", "load", "load_problem", "machine_picture", "optimize", "plot", "report", "reproduce",
+    "save", "sensitivity", "validate", "workspace",
 ]  # fmt: skip
 
 

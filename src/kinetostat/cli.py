@@ -28,6 +28,7 @@ from kinetostat.commands.doctor import add_doctor_command
 from kinetostat.commands.grid import add_grid_commands
 from kinetostat.commands.influence import add_influence_commands
 from kinetostat.commands.optimize import add_optimize_commands
+from kinetostat.commands.path import add_path_command
 from kinetostat.commands.report import add_report_commands
 from kinetostat.commands.studio import add_studio_command
 from kinetostat.spec.installation import as_typed
@@ -36,6 +37,7 @@ EXAMPLES = """examples:
   kinetostat list
   kinetostat analyze zhang-gosselin-4dof
   kinetostat analyze zhang-gosselin-4dof --set stiffness.passive_links=rigid --json
+  kinetostat path    hexapod poses.csv -o stiffness.csv -o stiffness.png
   kinetostat sweep   zhang-gosselin-4dof --vary "stiffness.passive_links=1e3:1e10:8:log"
   kinetostat map     zhang-gosselin-4dof --over "x=-2 cm:2 cm:41" --over "z=66 cm:70 cm:41" -o maps
   kinetostat optimize zhang-gosselin-2002 -o better
@@ -127,6 +129,7 @@ def _parser() -> Parser:
     )  # fmt: skip
     analyze.add_argument("--full", action="store_true", help="also show eigenscrews and every single spring")
     takes_json(analyze)
+    add_path_command(commands)
     add_grid_commands(commands)
     add_influence_commands(commands)
     add_compare_commands(commands)

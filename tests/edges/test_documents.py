@@ -65,6 +65,9 @@ class Reader:
         read = load_problem if "objectives" in tomllib.loads(block.text) else load
         read(name)
 
+    def do_csv(self, block):
+        (self.folder / block.words[0]).write_text(block.text, "utf-8")
+
     def do_sh(self, block):
         self.said = ""
         for words in commands(block.text):

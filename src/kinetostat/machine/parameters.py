@@ -14,6 +14,7 @@ from kinetostat.machine.column import column
 from kinetostat.machine.machine import Family, Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Quantity, leaves, quantities
+from kinetostat.units import KINDS
 
 FULL_TURN = 2.0 * math.pi
 BEYOND = 100.0
@@ -36,6 +37,29 @@ class Parameter:
     quantity: Quantity
     leaves: tuple[str, ...]
 
+    @property
+    def shown(self) -> str:
+        """Its name for people; see `shown`."""
+        return shown(self.path)
+
+    @property
+    def unit(self) -> str:
+        """The SI unit of its values, as people read it."""
+        return KINDS[self.quantity.kind].unit
+
+    @property
+    def dimension(self) -> str:
+        """Its name in datasets, without dots, so that it can be written as an attribute: x, geometry_base_angles_1."""
+        return self.shown.replace(".", "_")
+
+
+POSE = "pose."
+
+
+def shown(path: str) -> str:
+    """Return a path as people read it: coordinates of the pose by their names alone (x), all others in full."""
+    return path.removeprefix(POSE)
+
 
 def parameters(family: Family) -> Iterator[Parameter]:
     """All parameters of a family: every field, and every entry of fields that hold several."""
@@ -48,7 +72,11 @@ def parameters(family: Family) -> Iterator[Parameter]:
 
 
 def find(family: Family, text: str) -> Parameter:
-    """The parameter people mean: its path, or the end of its path where only one parameter ends so.
+    """The parameter people mean: its path, its name in tables or datasets, or the end of its path if no other ends so.
+
+    Args:
+        family: of the machine.
+        text: "x", "pose.x", "geometry.base_angles.1", "geometry_base_angles_1" or "base_angles.1".
 
     Raises:
         InputError: none, several, or several numbers that are never alike; the message lists what is near.
@@ -63,9 +91,10 @@ def find(family: Family, text: str) -> Parameter:
 
 def _find(family: Family, text: str) -> Parameter:
     known = {parameter.path: parameter for parameter in parameters(family)}
-    if text in known:
-        return known[text]
-    ends = [path for path in known if path.endswith(f".{text}")]
+    for exact in (text, f"{POSE}{text}"):
+        if exact in known:
+            return known[exact]
+    ends = [path for path in known if path.endswith(f".{text}") or known[path].dimension == text]
     if len(ends) == 1:
         return known[ends[0]]
     if ends:

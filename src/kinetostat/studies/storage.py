@@ -6,10 +6,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import mkstemp
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from kinetostat.spec.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @contextmanager
@@ -45,7 +47,7 @@ def write_json(path: Path, data: object) -> None:
     write_text(path, f"{json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1)}\n")
 
 
-def write_dataset(path: Path, dataset: xr.Dataset) -> None:
+def write_dataset(path: Path, dataset: "xr.Dataset") -> None:
     """Write a labelled dataset as NetCDF-4."""
     with replacing(path) as temporary:
         dataset.to_netcdf(temporary, engine="h5netcdf")

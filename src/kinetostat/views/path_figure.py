@@ -1,0 +1,75 @@
+"""The picture along a path: quantities, and below them the coordinates that vary, over the numbers of the poses."""
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from kinetostat.engine.points import Array
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.studies.evaluation.evaluation import PoseAnswers
+from kinetostat.studies.setting import setting_of
+from kinetostat.views.display import coordinate_scale, family_of_names, prefixed_scale, spoken
+from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting
+
+ABSENT = "#dddddd"
+"""Behind poses that have no result."""
+FEW = 60
+"""Poses up to which each is marked with a dot."""
+
+
+def path_figure(answers: PoseAnswers) -> Figure:
+    """Draw quantities along a path, a panel for each unit; poses without a result are grey.
+
+    Args:
+        answers: at the poses, which are taken as neighbours in the order in which they are given.
+    """
+    names = list(answers.values)
+    groups = {unit: [n for n in names if QUANTITIES[n].unit == unit] for unit in (QUANTITIES[n].unit for n in names)}
+    fields = [pair for pair in zip(answers.poses.fields, answers.poses.values, strict=True) if np.ptp(pair[1]) > 0.0]
+    kinds = list(dict.fromkeys(field.quantity.kind for field, _ in fields))
+    with mpl.rc_context(STYLE):
+        rows = len(groups) + len(kinds)
+        figure = Figure(figsize=(6.6, 0.7 + 1.9 * len(groups) + 1.25 * len(kinds)), layout="constrained")
+        ratios = [1.9] * len(groups) + [1.25] * len(kinds)
+        panels = list(figure.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=ratios).flat)
+        for panel, (unit, members) in zip(panels, groups.items(), strict=False):
+            scale = prefixed_scale(unit, np.concatenate([answers.values[name] for name in members]))
+            curves = {QUANTITIES[name].symbol: answers.values[name] * scale.factor for name in members}
+            _panel(panel, answers, curves, scale.label(spoken(family_of_names(members) or members[0])))
+        for panel, kind in zip(panels[len(groups) :], kinds, strict=True):
+            shown = [(field, values) for field, values in fields if field.quantity.kind == kind]
+            scale = coordinate_scale(kind, shown[0][0].unit, np.concatenate([values for _, values in shown]))
+            _panel(panel, answers, {f.shown: values * scale.factor for f, values in shown}, scale.label(kind))
+        panels[-1].set_xlabel("pose")
+        figure.suptitle(answers.machine.name, fontsize=10)
+        note_setting(figure, *_notes(answers))
+        fix_layout(figure)
+    return figure
+
+
+def _panel(panel: Axes, answers: PoseAnswers, curves: dict[str, Array], label: str) -> None:
+    numbers = np.arange(1, answers.poses.count + 1)
+    _shade(panel, np.flatnonzero(answers.status != Status.OK) + 1)
+    marker = "." if len(numbers) <= FEW else ""
+    for (name, values), colour, dash in zip(curves.items(), COLOURS, DASHES, strict=False):
+        finite = np.where(np.isfinite(values), values, np.nan)
+        panel.plot(numbers, finite, linestyle=dash, marker=marker, color=colour, label=name)
+    panel.set_ylabel(label)
+    panel.margins(x=0.0)
+    panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _shade(panel: Axes, numbers: npt.NDArray[np.int64]) -> None:
+    """Shade runs of poses."""
+    for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
+        if len(run):
+            panel.axvspan(run[0] - 0.5, run[-1] + 0.5, color=ABSENT, linewidth=0.0)
+
+
+def _notes(answers: PoseAnswers) -> tuple[str, str]:
+    counts = [f"{status.word.replace('_', ' ')}: {len(numbers):,}" for status, numbers in answers.failures.items()]
+    missing = f"no result (grey) at {', '.join(counts)} of {answers.poses.count:,} poses" if counts else ""
+    return setting_of(answers.machine, list(answers.poses.leaves)), missing
