@@ -158,7 +158,7 @@ def as_toml(machine: Machine) -> str:
     ]
     literals = machine.family.literals
     lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get("", {}).items()]
-    for name in [*machine.tables, *(literals.keys() - machine.tables.keys() - {""})]:
+    for name in [*machine.tables, *(name for name in literals if name and name not in machine.tables)]:
         table = machine.tables.get(name)
         if table is not None and _left_out(machine.family.every_table[name], table):
             continue
