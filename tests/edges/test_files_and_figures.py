@@ -2,10 +2,12 @@
 
 import math
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.text import Text
 
 from kinetostat.cli import main
 from kinetostat.machine.loading import as_toml, build, load
@@ -14,9 +16,14 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.grid.grid import evaluate_grid, failures
 from kinetostat.studies.grid.quantities import resolve_quantities
+from kinetostat.studies.guidelines.guidelines import guidelines
+from kinetostat.studies.sensitivity import sensitivity
 from kinetostat.studies.storage import replacing, write_dataset, write_text
 from kinetostat.views.display import coordinate_scale, prefixed_scale
+from kinetostat.views.drawing import three_views
 from kinetostat.views.figures import contour_maps, curves
+from kinetostat.views.influence_figures import guideline_figures, sensitivity_figure
+from kinetostat.views.levels import levels_of
 
 MACHINE = "zhang-gosselin-4dof"
 
@@ -72,7 +79,7 @@ def test_commands_write_data_and_figures(command, tmp_path, capsys):
     ranges = ["--vary", "x=-1 cm:1 cm:5"]
     if command == "map":
         ranges = ["--over", "x=-1 cm:1 cm:5", "--over", "theta5=-70 deg:-50 deg:4"]
-    assert main([command, MACHINE, *ranges, "-o", str(tmp_path / "out")]) == 0
+    assert main([command, MACHINE, *ranges, "-o", str(tmp_path / "out"), "--formats", "png,svg,PDF"]) == 0
     written = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert written == [f"{command}.nc", f"{command}.pdf", f"{command}.png", f"{command}.svg"]
     assert (tmp_path / "out" / f"{command}.png").read_bytes().startswith(b"\x89PNG")
@@ -80,6 +87,73 @@ def test_commands_write_data_and_figures(command, tmp_path, capsys):
     ElementTree.parse(tmp_path / "out" / f"{command}.svg")
     with xr.open_dataset(tmp_path / "out" / f"{command}.nc", engine="h5netcdf") as dataset:
         assert dataset["status"].size == (20 if command == "map" else 5)
+
+
+def test_figures_come_only_in_the_formats_asked_for(tmp_path, capsys):
+    words = ["sweep", MACHINE, "--vary", "x=-1 cm:1 cm:3", "--quantity", "compliance_x", "-o", str(tmp_path)]
+    assert main(words) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["sweep.nc", "sweep.png"]
+    with pytest.raises(SystemExit):
+        main([*words, "--formats", "png,bmp"])
+    assert "give some of png,svg,pdf" in capsys.readouterr().err
+
+
+def test_a_singular_neighbourhood_does_not_drown_a_map():
+    """One pose in 41 x 41 next to a singularity: the bands still resolve all others, and the bar has an arrow."""
+    x, y = np.meshgrid(np.linspace(-1.0, 1.0, 41), np.linspace(-1.0, 1.0, 41))
+    smooth = 1.0 + 0.1 * x + 0.05 * y
+    spoilt = smooth.copy()
+    spoilt[20, 20] = 1e9
+    levels = levels_of(spoilt)
+    assert levels.extend == "max"
+    assert not levels.logarithmic
+    assert len(np.unique(np.digitize(smooth, levels.bounds))) > 8
+    assert levels_of(smooth).extend == "neither"
+
+
+def test_values_over_decades_have_logarithmic_levels():
+    levels = levels_of(np.geomspace(3e-7, 0.4, 500))
+    assert levels.logarithmic
+    assert 4 <= len(levels.bounds) <= 14
+    assert levels.bounds[0] <= 3e-7 <= 0.4 <= levels.bounds[-1]
+    ratios = levels.bounds[1:] / levels.bounds[:-1]
+    assert ratios.max() < 11.0
+
+
+def test_no_text_of_a_figure_is_clipped(section):
+    """Titles, labels, numbers at axes and bars lie within the figure, the values of contours within their panel."""
+    machine = load("tricept")
+    long_name = replace(machine, name="A machine with a name that is longer than any figure of it is wide " * 2)
+    figures = [
+        contour_maps(section, ["compliance_rx", "compliance_z", "singularity_margin"], "title"),
+        sensitivity_figure(sensitivity(long_name, ["compliance_x"])),
+        three_views(long_name, long_name.name),
+        *(draw() for draw in guideline_figures(guidelines(load("planar-3rpr"))).values()),
+    ]
+    for figure in figures:
+        frame = figure.bbox.padded(0.5)
+        for text in figure.findobj(Text):
+            box = text.get_window_extent()
+            if text.get_visible() and text.get_text().strip() and box.width and not outside_axis(text, figure):
+                assert frame.contains(box.x0, box.y0), text.get_text()
+                assert frame.contains(box.x1, box.y1), text.get_text()
+    for panel in figures[0].axes:
+        for text in panel.texts:
+            assert panel.bbox.padded(0.5).contains(*text.get_window_extent().min), text.get_text()
+            assert panel.bbox.padded(0.5).contains(*text.get_window_extent().max), text.get_text()
+
+
+def outside_axis(text, figure):
+    """Whether a text is a tick label beyond the ends of its axis, which is never drawn."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            ends = sorted(axis.get_view_interval())
+            for tick in axis.get_major_ticks():
+                if text in (tick.label1, tick.label2):
+                    return not (ends[0] - 1e-9 <= tick.get_loc() <= ends[1] + 1e-9)
+            if any(text in (tick.label1, tick.label2) for tick in axis.get_minor_ticks()):
+                return True
+    return False
 
 
 def test_every_axis_of_a_map_has_its_unit(section):

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from kinetostat.engine.batch import Progress
     from kinetostat.machine.machine import Machine
+    from kinetostat.views.figures import Drawings
 
     Commands: TypeAlias = argparse._SubParsersAction["Parser"]
 
@@ -101,6 +102,38 @@ def takes_quantities(command: Parser, default: str) -> None:
 def takes_output(command: Parser, what: str) -> None:
     """Give a command `--output`, a folder."""
     command.add_argument("-o", "--output", type=Path, help=f"folder for {what}")
+
+
+def takes_figures(command: Parser, what: str) -> None:
+    """Give a command `--output` and `--formats`."""
+    takes_output(command, what)
+    command.add_argument(
+        "--formats", metavar="LIST", type=_formats, default=("png",),
+        help="formats of the figures, separated by commas: png, svg, pdf (default: png)",
+    )  # fmt: skip
+
+
+def _formats(text: str) -> tuple[str, ...]:
+    formats = tuple(dict.fromkeys(part.strip().lower().removeprefix(".") for part in text.split(",")))
+    if not set(formats) <= {"png", "svg", "pdf"}:
+        raise argparse.ArgumentTypeError(f"{text} is not a list of formats; give some of png,svg,pdf")
+    return formats
+
+
+def write_figures(options: argparse.Namespace, drawings: "Drawings") -> list[Path]:
+    """Draw figures and write them in the formats asked for; a bar says which one is being drawn.
+
+    Args:
+        options: of the command, with `--output` and `--formats`.
+        drawings: functions that draw them, by the name of the file without its suffix.
+
+    Returns:
+        The files.
+    """
+    from kinetostat.views.figures import save
+
+    with search_bar("drawing") as update:
+        return save(drawings, options.output, options.formats, update)
 
 
 def takes_json(command: Parser) -> None:

@@ -13,11 +13,12 @@ from kinetostat.commands.common import (
     load_machine,
     no_answer,
     progress_bar,
+    takes_figures,
     takes_json,
     takes_machine,
-    takes_output,
     takes_ranges,
     takes_settings,
+    write_figures,
 )
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def add_compare_commands(commands: "Commands") -> None:
         compare,
         "a coordinate of the pose and its range: compare worst, 95 percent and mean over it as well; repeatable",
     )
-    takes_output(compare, "the figure (PNG, SVG, PDF) and JSON")
+    takes_figures(compare, "the figure and JSON")
     takes_json(compare)
     validate = add_command(
         commands, "validate", _validate, "compare the machine with an independent engine",
@@ -65,20 +66,19 @@ def _compare(options: argparse.Namespace) -> int:
     designs = [read_design(text, options.settings) for text in options.designs]
     with progress_bar("computing") as progress:
         result = compare(designs, options.ranges, progress)
-    written = _write(result, options.output) if options.output else []
+    written = _write(options, result) if options.output else []
     answered = all(design.answered for design in designs)
     return give(options, answered, lambda: as_json(result), lambda console: print_comparison(console, result), written)
 
 
-def _write(result: "Comparison", folder: Path) -> list[Path]:
+def _write(options: argparse.Namespace, result: "Comparison") -> list[Path]:
     from kinetostat.studies.comparison.designs import as_json
     from kinetostat.studies.storage import write_json
     from kinetostat.views.comparison_figure import comparison_figure
-    from kinetostat.views.figures import save
 
-    written = [folder / "compare.json"]
+    written = [options.output / "compare.json"]
     write_json(written[0], as_json(result))
-    return written + save(comparison_figure(result), folder / "compare")
+    return written + write_figures(options, {"compare": lambda: comparison_figure(result)})
 
 
 def _validate(options: argparse.Namespace) -> int:

@@ -13,11 +13,12 @@ from kinetostat.commands.common import (
     load_machine,
     progress_bar,
     stopped,
+    takes_figures,
     takes_json,
     takes_machine,
-    takes_output,
     takes_quantities,
     takes_ranges,
+    write_figures,
 )
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def add_grid_commands(commands: "Commands") -> None:
     for command in (sweep, mapping):
         takes_machine(command)
         takes_quantities(command, command.get_default("default_quantity"))
-        takes_output(command, "NetCDF and figures (PNG, SVG, PDF)")
+        takes_figures(command, "NetCDF and figures")
         command.add_argument(
             "--resume", action="store_true",
             help="continue the grid in the folder, and refuse if there is none; without this option, the same command "
@@ -77,7 +78,7 @@ def _add_workspace_command(commands: "Commands") -> None:
         help='a condition that a pose must meet, e.g. "free_stiffness_z > 20 N/um"; repeatable, all must be met',
     )  # fmt: skip
     command.add_argument("--seed", type=_seed, default=0, help="seed of the random points for the volume (default: 0)")
-    takes_output(command, "NetCDF and pictures (PNG, SVG, PDF)")
+    takes_figures(command, "NetCDF and pictures")
     takes_json(command)
 
 
@@ -126,7 +127,7 @@ def _in_memory(options: argparse.Namespace, question: "GridQuestion", stem: str)
         _check_folder(options.output, options.resume)
     with hired(_crew(options)) as compute, progress_bar("computing") as progress:
         dataset = answer(question, progress, compute)
-    written = _write(dataset, options.output, stem) if options.output else []
+    written = _write(options, dataset, stem) if options.output else []
 
     from kinetostat.studies.grid.grid import as_json
     from kinetostat.views.grid_tables import print_dataset
@@ -153,23 +154,23 @@ def _check_folder(folder: Path, resume: bool) -> None:
         raise InputError("a grid that is kept in memory is computed at once and cannot be resumed; leave out --resume.")
 
 
-def _write(dataset: "xr.Dataset", folder: Path, stem: str) -> list[Path]:
+def _write(options: argparse.Namespace, dataset: "xr.Dataset", stem: str) -> list[Path]:
     from kinetostat.studies.storage import write_dataset
 
-    written = [folder / f"{stem}.nc"]
+    written = [options.output / f"{stem}.nc"]
     write_dataset(written[0], dataset)
-    return written + _draw(dataset, folder / stem, dataset.attrs["machine"])
+    return written + _draw(options, dataset, stem, dataset.attrs["machine"])
 
 
-def _draw(dataset: "xr.Dataset", stem: Path, title: str) -> list[Path]:
+def _draw(options: argparse.Namespace, dataset: "xr.Dataset", stem: str, title: str) -> list[Path]:
     """Draw a grid of one or two dimensions; return the files."""
     dims = len(dataset["status"].dims)
     if dims > 2:
         return []
-    from kinetostat.views.figures import contour_maps, curves, save
+    from kinetostat.views.figures import contour_maps, curves
 
-    draw = curves if dims == 1 else contour_maps
-    return save(draw(dataset, [str(name) for name in dataset.data_vars if name != "status"], title), stem)
+    draw, names = curves if dims == 1 else contour_maps, [str(name) for name in dataset.data_vars if name != "status"]
+    return write_figures(options, {stem: lambda: draw(dataset, names, title)})
 
 
 def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
@@ -184,7 +185,7 @@ def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) ->
     from kinetostat.studies.grid.stored_grid import summary_json
     from kinetostat.views.grid_tables import print_stored
 
-    drawn = [] if options.json or len(question.dims) > 2 else _draw_thinned(stored.path)
+    drawn = [] if options.json or len(question.dims) > 2 else _draw_thinned(options, stored.path)
     return give(
         options,
         bool(stored.tally.answered),
@@ -194,12 +195,12 @@ def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) ->
     )
 
 
-def _draw_thinned(path: Path) -> list[Path]:
+def _draw_thinned(options: argparse.Namespace, path: Path) -> list[Path]:
     """Draw a large grid of one or two dimensions, thinned to as many points as paper can show."""
     from kinetostat.studies.result_file import thinned
 
     dataset = thinned(path)
-    return _draw(dataset, path.with_suffix(""), f"{dataset.attrs['machine']} (thinned)")
+    return _draw(options, dataset, path.stem, f"{dataset.attrs['machine']} (thinned)")
 
 
 def _seed(text: str) -> int:
@@ -215,7 +216,7 @@ def _workspace(options: argparse.Namespace) -> int:
     machine = load_machine(options)
     with progress_bar("computing") as progress:
         result = workspace(machine, options.ranges, options.conditions, progress, options.seed)
-    written = _write_workspace(result, options.output) if options.output else []
+    written = _write_workspace(options, result) if options.output else []
     return give(
         options,
         bool(result.exists),
@@ -225,12 +226,11 @@ def _workspace(options: argparse.Namespace) -> int:
     )
 
 
-def _write_workspace(result: "Workspace", folder: Path) -> list[Path]:
+def _write_workspace(options: argparse.Namespace, result: "Workspace") -> list[Path]:
     from kinetostat.studies.storage import write_dataset
-    from kinetostat.views.figures import save
     from kinetostat.views.workspace_figures import pictures
 
-    written = [folder / "workspace.nc"]
+    written = [options.output / "workspace.nc"]
     write_dataset(written[0], result.dataset)
     drawn = pictures(result.dataset, result.verdicts, result.conditions, result.dataset.attrs["machine"])
-    return written + [path for name, figure in drawn.items() for path in save(figure, folder / f"workspace{name}")]
+    return written + write_figures(options, {f"workspace{name}": draw for name, draw in drawn.items()})

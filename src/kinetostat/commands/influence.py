@@ -12,17 +12,19 @@ from kinetostat.commands.common import (
     give,
     load_machine,
     progress_bar,
+    takes_figures,
     takes_json,
     takes_machine,
-    takes_output,
     takes_quantities,
     takes_ranges,
+    write_figures,
 )
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
     from kinetostat.studies.guidelines.guidelines import Guidelines
     from kinetostat.studies.sensitivity import Sensitivity
+    from kinetostat.views.figures import Drawings
 
 
 def add_influence_commands(commands: "Commands") -> None:
@@ -33,7 +35,7 @@ def add_influence_commands(commands: "Commands") -> None:
     )  # fmt: skip
     takes_machine(command)
     takes_quantities(command, "compliance")
-    takes_output(command, "the figure (PNG, SVG, PDF) and JSON")
+    takes_figures(command, "the figure and JSON")
     takes_json(command)
     command = add_command(
         commands, "guidelines", _guidelines, "show what stiffness depends on, what counts as rigid, what to change",
@@ -46,7 +48,7 @@ def add_influence_commands(commands: "Commands") -> None:
     command.add_argument(
         "--full", action="store_true", help="show every parameter, and sentences about the most important ones"
     )
-    takes_output(command, "the figures (PNG, SVG, PDF) and JSON")
+    takes_figures(command, "the figures and JSON")
     takes_json(command)
 
 
@@ -57,7 +59,7 @@ def _sensitivity(options: argparse.Namespace) -> int:
 
     result = sensitivity(load_machine(options), options.quantities or ["compliance"])
     answered = result.status is Status.OK
-    written = _write_sensitivity(result, options.output) if options.output and answered else []
+    written = _write_sensitivity(options, result) if options.output and answered else []
     return give(
         options,
         answered,
@@ -68,16 +70,16 @@ def _sensitivity(options: argparse.Namespace) -> int:
     )
 
 
-def _write_sensitivity(result: "Sensitivity", folder: Path) -> list[Path]:
+def _write_sensitivity(options: argparse.Namespace, result: "Sensitivity") -> list[Path]:
     from kinetostat.studies.sensitivity import as_json
     from kinetostat.studies.storage import write_json
-    from kinetostat.views.figures import save
     from kinetostat.views.influence_figures import sensitivity_figure
 
-    written = [folder / "sensitivity.json"]
+    written = [options.output / "sensitivity.json"]
     write_json(written[0], as_json(result))
     # If no parameter has an influence, there is nothing to draw.
-    return written + (save(sensitivity_figure(result), folder / "sensitivity") if result.parameters else [])
+    drawings: Drawings = {"sensitivity": lambda: sensitivity_figure(result)} if result.parameters else {}
+    return written + write_figures(options, drawings)
 
 
 def _guidelines(options: argparse.Namespace) -> int:
@@ -90,7 +92,7 @@ def _guidelines(options: argparse.Namespace) -> int:
     with progress_bar("computing") as progress:
         result = guidelines(machine, options.ranges, progress)
     answered = result.status is Status.OK
-    written = _write_guidelines(result, options.output) if options.output and answered else []
+    written = _write_guidelines(options, result) if options.output and answered else []
     return give(
         options,
         answered,
@@ -101,13 +103,12 @@ def _guidelines(options: argparse.Namespace) -> int:
     )
 
 
-def _write_guidelines(result: "Guidelines", folder: Path) -> list[Path]:
+def _write_guidelines(options: argparse.Namespace, result: "Guidelines") -> list[Path]:
     from kinetostat.studies.guidelines.sentences import as_json
     from kinetostat.studies.storage import write_json
-    from kinetostat.views.figures import save
     from kinetostat.views.influence_figures import guideline_figures
 
-    written = [folder / "guidelines.json"]
+    written = [options.output / "guidelines.json"]
     write_json(written[0], as_json(result))
-    drawn = guideline_figures(result)
-    return written + [path for name, figure in drawn.items() for path in save(figure, folder / f"guidelines-{name}")]
+    drawings = {f"guidelines-{name}": draw for name, draw in guideline_figures(result).items()}
+    return written + write_figures(options, drawings)

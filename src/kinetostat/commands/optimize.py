@@ -11,9 +11,10 @@ from kinetostat.commands.common import (
     no_answer,
     print_json,
     search_bar,
+    takes_figures,
     takes_json,
-    takes_output,
     takes_settings,
+    write_figures,
 )
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def add_optimize_commands(commands: "Commands") -> None:
             command,
             'override a field of the study, e.g. --set optimizer.seed=3, --set variables.0.to="15 cm"; repeatable',
         )
-        takes_output(command, "the result, its figures and all designs; a stopped search continues there")
+        takes_figures(command, "the result, its figures and all designs; a stopped search continues there")
         command.add_argument(
             "--resume", action="store_true", help="continue the search in the folder, and refuse if there is none"
         )
@@ -99,11 +100,9 @@ def _report(options: argparse.Namespace, result: "Result") -> int:
 
     written = write_result(result, options.output) if options.output else []
     if result.solved and options.output:
-        from kinetostat.views.figures import save
         from kinetostat.views.optimisation_figures import pictures
 
-        for name, figure in pictures(result).items():
-            written += save(figure, options.output / name)
+        written += write_figures(options, pictures(result))
     if not result.solved:
         return NO_ANSWER if options.json else no_answer(message(result))
     if not options.json:

@@ -13,6 +13,7 @@ from kinetostat.commands.common import (
     no_answer,
     progress_bar,
     search_bar,
+    takes_figures,
     takes_json,
     takes_machine,
     takes_ranges,
@@ -36,7 +37,8 @@ def add_report_commands(commands: "Commands") -> None:
         commands, "reproduce", _reproduce, "recompute every table, equation and figure of the paper and compare",
         "kinetostat reproduce -o reproduce",
     )  # fmt: skip
-    reproduce.add_argument("-o", "--output", type=Path, default=Path("reproduce"), help="folder (default: reproduce)")
+    takes_figures(reproduce, "the page, tables and figures (default: reproduce)")
+    reproduce.set_defaults(output=Path("reproduce"))
     takes_json(reproduce)
 
 
@@ -144,7 +146,8 @@ def _reproduce(options: argparse.Namespace) -> int:
 
     with progress_bar("reproducing") as progress:
         reproduction = reproduce(progress)
-        written = write_all(reproduction, options.output)
+    with search_bar("drawing") as drawing:
+        written = write_all(reproduction, options.output, options.formats, drawing)
     return give(
         options,
         reproduction.explained,

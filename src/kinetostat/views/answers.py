@@ -5,6 +5,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,7 @@ from kinetostat.views.analysis_tables import print_analysis
 from kinetostat.views.comparison_figure import comparison_figure
 from kinetostat.views.comparison_tables import print_comparison, print_validation
 from kinetostat.views.drawing import three_views
-from kinetostat.views.figures import FORMATS, contour_maps, curves, save_figure
+from kinetostat.views.figures import FORMATS, Drawings, contour_maps, curves, save_figure
 from kinetostat.views.grid_tables import print_dataset, print_workspace
 from kinetostat.views.influence_figures import guideline_figures, sensitivity_figure
 from kinetostat.views.influence_tables import print_guidelines, print_sensitivity
@@ -55,39 +56,39 @@ class Kind:
     Attributes:
         type: class of the results.
         tell: prints a result of this kind on a console.
-        figures: draws them, by name; the most telling one first.
+        figures: gives the functions that draw them, by name; the most telling one first.
         data: gives a result as plain data; None where it is kept in another way.
     """
 
     type: type
     tell: Callable[[Console, Any], None]
-    figures: Callable[[Any], dict[str, Figure]] = lambda _: {}
+    figures: Callable[[Any], Drawings] = lambda _: {}
     data: Callable[[Any], dict[str, Any]] | None = None
 
 
-def _views(machine: Machine) -> dict[str, Figure]:
-    return {"views": three_views(machine, machine.name)}
+def _views(machine: Machine) -> Drawings:
+    return {"views": partial(three_views, machine, machine.name)}
 
 
 def _names(dataset: xr.Dataset) -> list[str]:
     return [str(name) for name in dataset.data_vars if name in QUANTITIES]
 
 
-def _grid_figures(dataset: xr.Dataset) -> dict[str, Figure]:
-    """Draw curves over one field, or contours over two; a grid of more fields has no picture."""
+def _grid_figures(dataset: xr.Dataset) -> Drawings:
+    """Return curves over one field, or contours over two; a grid of more fields has no picture."""
     draw = {1: curves, 2: contour_maps}.get(dataset["status"].ndim)
-    return {"map": draw(dataset, _names(dataset), dataset.attrs["machine"])} if draw else {}
+    return {"map": partial(draw, dataset, _names(dataset), dataset.attrs["machine"])} if draw else {}
 
 
-def _workspace_figures(workspace: Workspace) -> dict[str, Figure]:
+def _workspace_figures(workspace: Workspace) -> Drawings:
     drawn = workspace_figures.pictures(
         workspace.dataset, workspace.verdicts, workspace.conditions, workspace.dataset.attrs["machine"]
     )
     return {name.removeprefix("-") or "region": figure for name, figure in drawn.items()}
 
 
-def _sensitivity_figures(sensitivity: Sensitivity) -> dict[str, Figure]:
-    return {"influences": sensitivity_figure(sensitivity)} if sensitivity.parameters else {}
+def _sensitivity_figures(sensitivity: Sensitivity) -> Drawings:
+    return {"influences": partial(sensitivity_figure, sensitivity)} if sensitivity.parameters else {}
 
 
 KINDS = (
@@ -105,7 +106,7 @@ KINDS = (
     Kind(
         Comparison,
         print_comparison,
-        lambda comparison: {"comparison": comparison_figure(comparison)},
+        lambda comparison: {"comparison": partial(comparison_figure, comparison)},
         designs.as_json,
     ),
     Kind(Result, print_result, optimisation_figures.pictures, result_data.as_json),
@@ -149,7 +150,7 @@ def plot(answer: object, which: str | None = None) -> Figure:
         raise InputError(
             f"There is no figure for a result of type {type(answer).__name__}; use its tables and its data instead."
         )
-    return figures[next(iter(figures)) if which is None else choice(which, figures, "which")]
+    return figures[next(iter(figures)) if which is None else choice(which, figures, "which")]()
 
 
 Writer = Callable[[Path], None]

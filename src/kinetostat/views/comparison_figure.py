@@ -14,7 +14,7 @@ from kinetostat.studies.comparison.design_rows import Row
 from kinetostat.studies.comparison.designs import Comparison
 from kinetostat.studies.setting import frame_of
 from kinetostat.views.display import prefixed_scale
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout, set_title
 
 WIDE = 30.0
 """Ratio of the largest to the least bar from which an axis is logarithmic."""
@@ -51,7 +51,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
             if grid
             else "at the pose of each design"
         )
-        figure.suptitle(f"Designs compared, {over}", fontsize=10)
+        set_title(figure, f"Designs compared, {over}")
         fix_layout(figure)
     return figure
 

@@ -12,7 +12,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.tolerances import SAME_TO_THE_EYE
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout, set_title
 
 VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
 MILLIMETRES = 1e3
@@ -39,7 +39,7 @@ def three_views(machine: Machine, title: str) -> Figure:
             _draw_view(panel, configuration, tool, across, up)
             panel.set(title=name, xlabel=f"{across} (mm)", ylabel=f"{up} (mm)", aspect="equal")
             panel.margins(0.12)
-        figure.suptitle(title, fontsize=10)
+        set_title(figure, title)
         fix_layout(figure)
     return figure
 

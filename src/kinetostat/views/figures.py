@@ -2,20 +2,25 @@
 
 import io
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colorbar import Colorbar
+from matplotlib.colors import LogNorm
+from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 
 from kinetostat.studies.grid.grid import failures
 from kinetostat.studies.storage import replacing
 from kinetostat.views.display import Scale, coordinate_scale, family_of_names, prefixed_scale, spoken
+from kinetostat.views.levels import levels_of, usual_range
 
 STYLE: Any = {
     "font.family": "DejaVu Sans",
@@ -42,15 +47,20 @@ FORMATS: dict[str, Any] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDa
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito: distinct for colour-blind readers and in grey."""
 DASHES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
-LEVELS = 12
 CHARACTERS = 19
 """Of the small line below a figure, per inch."""
+TITLE_CHARACTERS = 12
+"""Of the title over a figure, per inch."""
 MARGIN = 0.04
 """Inches around a figure that stands in a page."""
 FLAT = 1e-9
 """Relative spread below which a map is constant and has no contours."""
 
 Array = npt.NDArray[np.float64]
+Drawings: TypeAlias = dict[str, Callable[[], Figure]]
+"""Functions that draw a figure, by its name: a figure that nobody asks for is never drawn."""
+Tell: TypeAlias = Callable[[int, int, str], None]
+"""Called with how many figures are done, how many there are, and which one comes next."""
 
 
 def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
@@ -69,15 +79,18 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
         panels = figure.subplots(rows, columns, squeeze=False).flat
         x, x_label = axis_values(dataset, str(across))
         y, y_label = axis_values(dataset, str(up))
+        lines = []
         for panel, name in zip(panels, names, strict=False):
-            _contour_panel(panel, x, y, dataset[name].transpose(up, across))
+            lines += _contour_panel(panel, x, y, dataset[name].transpose(up, across))
             panel.set(xlabel=x_label, ylabel=y_label)
             set_axis_scales(panel, dataset, str(across), str(up))
         for unused in list(figure.axes)[len(names) : rows * columns]:
             unused.remove()
-        figure.suptitle(title, fontsize=10)
+        set_title(figure, title)
         note_setting(figure, *_setting(dataset))
         fix_layout(figure)
+        for contours in lines:
+            _write_levels(contours)
     return figure
 
 
@@ -96,18 +109,33 @@ def curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
         for panel, unit in zip(figure.subplots(1, len(units), squeeze=False).flat, units, strict=True):
             shown = [name for name in names if dataset[name].attrs["units"] == unit]
             _curve_panel(panel, dataset, str(across), shown)
-        figure.suptitle(title, fontsize=10)
+        set_title(figure, title)
         note_setting(figure, *_setting(dataset))
         fix_layout(figure)
     return figure
 
 
-def save(figure: Figure, stem: Path) -> list[Path]:
-    """Write a figure as PNG (200 dpi), SVG and PDF beside each other; returns the paths."""
-    paths = [stem.with_name(f"{stem.name}.{suffix}") for suffix in FORMATS]
-    for path in paths:
-        save_figure(figure, path)
-    return paths
+def save(drawings: Drawings, folder: Path, formats: Sequence[str] = ("png",), tell: Tell | None = None) -> list[Path]:
+    """Draw figures and write them into a folder.
+
+    Args:
+        drawings: functions that draw them, by the name of the file without its suffix.
+        folder: for the files.
+        formats: of `FORMATS`.
+        tell: called before each figure with how many are done, how many there are, and which one comes next.
+
+    Returns:
+        The paths.
+    """
+    written = []
+    for done, (name, draw) in enumerate(drawings.items()):
+        if tell:
+            tell(done, len(drawings), f"figure {done + 1} of {len(drawings)}: {name}")
+        figure = draw()
+        for suffix in formats:
+            written.append(folder / f"{name}.{suffix}")
+            save_figure(figure, written[-1])
+    return written
 
 
 def save_figure(figure: Figure, path: Path) -> None:
@@ -126,8 +154,14 @@ def as_svg(figure: Figure) -> str:
 
 def fix_layout(figure: Figure) -> None:
     """Lay out once, not again for each file format."""
+    FigureCanvasAgg(figure)  # without it, each size of a text would be measured by a renderer of its own
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
+
+
+def set_title(figure: Figure, title: str) -> None:
+    """Write the title over a figure, in as many lines as its width asks for."""
+    figure.suptitle("\n".join(textwrap.wrap(title, int(TITLE_CHARACTERS * figure.get_figwidth()))), fontsize=10)
 
 
 def note_setting(figure: Figure, *lines: str) -> None:
@@ -171,8 +205,10 @@ def set_axis_scales(panel: Axes, dataset: xr.Dataset, across: str, up: str) -> N
         panel.set_yscale("log")
 
 
-def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray) -> None:
-    scale = prefixed_scale(data.attrs["units"], data.values)
+def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray) -> list[QuadContourSet]:
+    """Fill a panel with bands of colour; return its lines, whose values can be written once the layout is fixed."""
+    finite = data.values[np.isfinite(data.values)]
+    scale = prefixed_scale(data.attrs["units"], np.array(usual_range(finite) if finite.size else [0.0]))
     values = np.ma.masked_invalid(data.values * scale.factor)
     panel.set_title(scale.label(data.attrs["symbol"]))
     panel.set_facecolor("#eeeeee")
@@ -180,16 +216,40 @@ def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray) -> None:
     panel.set(xlim=(x.min(), x.max()), ylim=(y.min(), y.max()))
     if values.count() == 0:
         _note(panel, "no result")
-    elif np.ptp(values.compressed()) <= FLAT * np.abs(values).max():
+        return []
+    if np.ptp(values.compressed()) <= FLAT * np.abs(values).max():
         panel.set_facecolor("#b5dbe3")
         _note(panel, f"constant: {values.compressed()[0]:.6g} {scale.unit}")
-    else:
-        filled = panel.contourf(x, y, values, LEVELS, cmap="viridis")
-        lines = panel.contour(filled, levels=np.asarray(filled.levels)[::2], colors="white", linewidths=0.5)
-        panel.clabel(lines, fontsize=6, fmt="%.6g")
-        colour_bar = panel.figure.colorbar(filled, ax=panel, shrink=0.85, pad=0.03)
-        colour_bar.outline.set_linewidth(0.4)
-        colour_bar.ax.tick_params(labelsize=6.5, width=0.4)
+        return []
+    levels = levels_of(values.compressed())
+    norm = LogNorm(levels.bounds[0], levels.bounds[-1]) if levels.logarithmic else None
+    filled = panel.contourf(x, y, values, levels.bounds, cmap="viridis", norm=norm, extend=levels.extend)
+    bar = panel.figure.colorbar(filled, ax=panel, shrink=0.85, pad=0.03)
+    if levels.logarithmic:
+        bar.set_ticks(levels.bounds.tolist(), labels=[f"{bound:g}" for bound in levels.bounds])
+    slim_bar(bar)
+    return [panel.contour(filled, levels=levels.bounds[::2], colors="white", linewidths=0.5)]
+
+
+def slim_bar(bar: Colorbar) -> None:
+    """Give a colour bar thin lines, small numbers, and ticks at its numbers alone."""
+    bar.outline.set_linewidth(0.4)
+    bar.ax.tick_params(labelsize=6.5, width=0.4)
+    bar.minorticks_off()
+
+
+def _write_levels(lines: QuadContourSet) -> None:
+    """Write the values of lines where they fit into the panel; the layout of the figure must be fixed."""
+    frame = lines.axes.get_window_extent()
+    trial = lines.clabel(fontsize=6, fmt="%.6g", inline=False)
+    fitting = []
+    for text in trial:
+        box = text.get_window_extent()
+        if frame.contains(box.x0, box.y0) and frame.contains(box.x1, box.y1):
+            fitting.append(text.get_position())
+        text.remove()
+    if fitting:
+        lines.clabel(fontsize=6, fmt="%.6g", manual=fitting)
 
 
 def _note(panel: Axes, text: str) -> None:

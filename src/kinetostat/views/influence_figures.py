@@ -4,13 +4,15 @@ The curves come from `studies.guidelines`; only scales and colours are chosen he
 """
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
-from matplotlib.colors import SymLogNorm
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -22,13 +24,18 @@ from kinetostat.studies.guidelines.roles import EXCESS, stiffening
 from kinetostat.studies.guidelines.sentences import limit_of
 from kinetostat.studies.sensitivity import PER, Sensitivity
 from kinetostat.studies.setting import setting_of
-from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting
+from kinetostat.views.figures import COLOURS, DASHES, STYLE, Drawings, fix_layout, note_setting, set_title, slim_bar
 from kinetostat.views.influence_tables import NEGLIGIBLE
+from kinetostat.views.levels import usual_range
 
 MOST_LINES = 30
 """Parameters that are shown."""
-LINEAR = 0.01
-"""Percent per percent up to which colours grow in proportion, and from where on with the logarithm."""
+LEAST_SCALE = 0.1
+"""Percent per percent at the end of the colour scale, at least: what is small everywhere stays pale."""
+LETTERS = 12
+"""Characters of the label of a colour bar, per inch of its height."""
+BAR_SHARE = 0.75
+"""Height of a colour bar as a share of the figure's, about."""
 DARK = 0.6
 """Share of the colour scale beyond which text on it is white."""
 
@@ -57,18 +64,20 @@ def coloured_table(
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(2.6 + 0.7 * len(heads), 1.1 + 0.2 * len(shown)), layout="constrained")
         panel = figure.subplots()
-        _draw_cells(panel, cells, colours, label)
+        room = int(LETTERS * BAR_SHARE * figure.get_figheight())
+        _draw_cells(panel, cells, colours, "\n".join(textwrap.wrap(label, room)))
         panel.set_yticks(range(len(shown)), shown)
         panel.set_xticks(range(len(heads)), heads)
-        figure.suptitle(titles[0], fontsize=10)
+        set_title(figure, titles[0])
         note_setting(figure, titles[1])
         fix_layout(figure)
     return figure
 
 
 def _draw_cells(panel: Axes, cells: npt.NDArray[np.float64], colours: str, label: str) -> None:
-    most = max(float(np.nanmax(np.abs(cells), initial=0.0)), 10.0 * LINEAR)
-    scale = SymLogNorm(LINEAR, vmin=-most, vmax=most)
+    sizes = np.abs(cells[np.isfinite(cells)])
+    most = max(usual_range(sizes)[1] if sizes.size else 0.0, LEAST_SCALE)
+    scale = Normalize(-most, most)
     image = panel.imshow(np.ma.masked_invalid(cells), cmap=colours, norm=scale, aspect="auto")
     panel.set_facecolor("#eeeeee")
     panel.grid(visible=False)
@@ -78,9 +87,11 @@ def _draw_cells(panel: Axes, cells: npt.NDArray[np.float64], colours: str, label
             dark = abs(float(scale(value)) - 0.5) > 0.5 * DARK
             text = f"{value:.2g}" if abs(value) >= NEGLIGIBLE else "0"
             panel.text(column, row, text, ha="center", va="center", fontsize=6, color="white" if dark else "black")
-    bar = panel.figure.colorbar(image, ax=panel, pad=0.02, label=label)
-    bar.outline.set_linewidth(0.4)
-    bar.ax.tick_params(labelsize=6.5, width=0.4)
+    ends = [(cells < -most).any(), (cells > most).any()]
+    extend = ("neither", "min", "max", "both")[int(ends[0]) + 2 * int(ends[1])]
+    bar = panel.figure.colorbar(image, ax=panel, pad=0.02, extend=extend)
+    slim_bar(bar)
+    bar.set_label(label)
 
 
 MOST_PANELS = 6
@@ -91,26 +102,32 @@ DECADES = 1.0
 """How far curves go beyond the limits of rigidity and the present stiffness, in powers of ten."""
 
 
-def guideline_figures(guidelines: Guidelines) -> dict[str, Figure]:
-    """Draw the figures by name: "design", and "rigid" where elements have a limit of rigidity."""
+def guideline_figures(guidelines: Guidelines) -> Drawings:
+    """Return the figures by name: "design", and "rigid" where elements have a limit of rigidity."""
     if guidelines.here is None:
         return {}
-    drawn = {"design": design_figure(guidelines)} if guidelines.parameters else {}
-    rigid = limit_figure(guidelines)
-    return {**drawn, "rigid": rigid} if rigid else drawn
+    drawings: Drawings = {"design": partial(design_figure, guidelines)} if guidelines.parameters else {}
+    limited = _limited(guidelines)
+    return {**drawings, "rigid": partial(rigid_figure, guidelines, limited)} if limited else drawings
 
 
 def limit_figure(guidelines: Guidelines) -> Figure | None:
     """Draw the stiffness of each direction against that of elements; None if no element has a limit of rigidity."""
+    limited = _limited(guidelines)
+    return rigid_figure(guidelines, limited) if limited else None
+
+
+def _limited(guidelines: Guidelines) -> list[tuple[Element, np.ndarray]]:
+    """Return the elements that have a limit of rigidity, with its multiples of the present stiffness; the last ones."""
     if guidelines.here is None:
-        return None
+        return []
     limits = [
         (element, guidelines.here.rigid[k, :, 0])
         for k, element in enumerate(guidelines.elements)
         if not element.actuated
     ]
     shown = [(element, row) for element, row in limits if (np.isfinite(row) & (row > 0.0)).any()]
-    return rigid_figure(guidelines, shown[-MOST_PANELS:]) if shown else None
+    return shown[-MOST_PANELS:]
 
 
 def design_figure(guidelines: Guidelines) -> Figure:
@@ -136,7 +153,7 @@ def rigid_figure(guidelines: Guidelines, shown: list[tuple[Element, np.ndarray]]
         lines = [Line2D([], [], color=colour, linestyle=dash, label=name) for name, colour, dash in styles]
         dot = Line2D([], [], color="#444444", marker="o", markersize=4, linestyle="", label="within 1 %")
         figure.legend(handles=[*lines, dot], loc="outside right center", title="direction")
-        figure.suptitle(f"{guidelines.machine.name}: stiffness from which an element counts as rigid", fontsize=10)
+        set_title(figure, f"{guidelines.machine.name}: stiffness from which an element counts as rigid")
         note_setting(figure, setting_of(guidelines.machine))
         fix_layout(figure)
     return figure

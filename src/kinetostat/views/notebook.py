@@ -74,7 +74,7 @@ def png_of(figure: Figure) -> bytes:
 
 def _figures(answer: object) -> str:
     drawn = kind_of(answer).figures(answer)
-    return "".join(_image(png_of(figure), name, "figure") for name, figure in drawn.items())
+    return "".join(_image(png_of(draw()), name, "figure") for name, draw in drawn.items())
 
 
 def _picture(machine: Machine, kind: str = "machine") -> str:

@@ -1,5 +1,7 @@
 """Figures of a study for print: convergence, what each direction gains, the Pareto front, and scatter by tolerances."""
 
+from functools import partial
+
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,23 +13,23 @@ from kinetostat.studies.optimisation.problem import Objective
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.robustness import Scatter
 from kinetostat.views.display import Scale, prefixed_scale, spoken
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout
+from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, set_title
 
 BINS = 40
 CEILING = 99.0
 """Percentile of all designs up to which a front is drawn: far ones would squeeze it."""
 
 
-def pictures(result: Result) -> dict[str, Figure]:
-    """Draw the figures of a solved study, by file name."""
-    drawn = {"comparison": comparison(result)}
+def pictures(result: Result) -> Drawings:
+    """Return the figures of a solved study, by file name."""
+    drawings: Drawings = {"comparison": partial(comparison, result)}
     if len(result.problem.objectives) == 1:
-        drawn["convergence"] = convergence(result.log, result.problem.study.name)
+        drawings["convergence"] = partial(convergence, result.log, result.problem.study.name)
     else:
-        drawn["front"] = front(result)
+        drawings["front"] = partial(front, result)
     if result.robustness:
-        drawn["tolerances"] = tolerances(result)
-    return drawn
+        drawings["tolerances"] = partial(tolerances, result)
+    return drawings
 
 
 def convergence(log: Log, title: str) -> Figure:
@@ -51,7 +53,7 @@ def convergence(log: Log, title: str) -> Figure:
         right.set(xlabel=across, ylabel="relative distance to the last best", yscale="log")
         for panel in (left, right):
             panel.margins(x=0.02)
-        figure.suptitle(title, fontsize=10)
+        set_title(figure, title)
         fix_layout(figure)
     return figure
 
@@ -63,7 +65,7 @@ def comparison(result: Result) -> Figure:
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
         _gains(left, result)
         _places(right, result)
-        figure.suptitle(f"{result.problem.study.name}: {result.problem.machine.name}", fontsize=10)
+        set_title(figure, f"{result.problem.study.name}: {result.problem.machine.name}")
         fix_layout(figure)
     return figure
 
@@ -145,7 +147,7 @@ def front(result: Result) -> Figure:
             panel.set_xlim(*_limits(best[:, i] * x.factor, feasible[:, i] * x.factor))
             panel.set_ylim(*_limits(best[:, j] * y.factor, feasible[:, j] * y.factor))
         figure.axes[0].legend(loc="best")
-        figure.suptitle(problem.study.name, fontsize=10)
+        set_title(figure, problem.study.name)
         fix_layout(figure)
     return figure
 
@@ -157,7 +159,7 @@ def tolerances(result: Result) -> Figure:
         figure = Figure(figsize=(3.6 * len(scatters) + 0.6, 2.9), layout="constrained")
         for panel, scatter in zip(figure.subplots(1, len(scatters), squeeze=False).flat, scatters, strict=True):
             _histogram(panel, scatter)
-        figure.suptitle(f"{result.problem.study.name}: under the tolerances", fontsize=10)
+        set_title(figure, f"{result.problem.study.name}: under the tolerances")
         fix_layout(figure)
     return figure
 

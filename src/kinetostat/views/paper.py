@@ -8,6 +8,7 @@ import io
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import astuple, fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from kinetostat.studies.paper.derivation import Check
 from kinetostat.studies.paper.reproduction import Reproduction
 from kinetostat.studies.storage import write_dataset, write_json, write_text
 from kinetostat.views.drawing import three_views
-from kinetostat.views.figures import contour_maps, curves, save
+from kinetostat.views.figures import Tell, contour_maps, curves, save
 from kinetostat.views.optimisation_figures import convergence
 from kinetostat.views.paper_page import page
 from kinetostat.views.tables import text_table
@@ -35,8 +36,16 @@ FIGURE_6 = "Fig. 6: the best design and the mean of the population"
 MACHINE = "The machine at its reference pose"
 
 
-def write_all(reproduction: Reproduction, folder: Path) -> list[Path]:
+def write_all(
+    reproduction: Reproduction, folder: Path, formats: Sequence[str] = ("png",), tell: Tell | None = None
+) -> list[Path]:
     """Write tables, data, figures and the page into a folder.
+
+    Args:
+        reproduction: what was recomputed.
+        folder: for the files.
+        formats: of the figures, of `views.figures.FORMATS`.
+        tell: called before each figure with how many are done, how many there are, and which one comes next.
 
     Returns:
         What was written, the page first.
@@ -59,9 +68,7 @@ def write_all(reproduction: Reproduction, folder: Path) -> list[Path]:
     for name, dataset in (("figure-4", reproduction.curves), ("figure-5", reproduction.maps)):
         written.append(folder / f"{name}.nc")
         write_dataset(written[-1], dataset)
-    for name, figure in drawn.items():
-        written += save(figure, folder / name)
-    return written
+    return written + save({name: partial(drawn.__getitem__, name) for name in drawn}, folder, formats, tell)
 
 
 def figures(reproduction: Reproduction) -> dict[str, Figure]:

@@ -4,6 +4,7 @@ Verdicts come from `studies.workspace`; nothing is judged here.
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 import matplotlib as mpl
 import numpy as np
@@ -19,7 +20,16 @@ from kinetostat.studies.workspace.conditions import Condition
 from kinetostat.studies.workspace.region import surface
 from kinetostat.studies.workspace.verdicts import BEYOND, FAILS, INSIDE, LIMIT, PLAIN, phrase
 from kinetostat.views.display import coordinate_scale
-from kinetostat.views.figures import COLOURS, STYLE, Array, axis_values, fix_layout, set_axis_scales
+from kinetostat.views.figures import (
+    COLOURS,
+    STYLE,
+    Array,
+    Drawings,
+    axis_values,
+    fix_layout,
+    set_axis_scales,
+    set_title,
+)
 
 KNOWN = dict(zip([*PLAIN.values(), BEYOND], ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#e3bcd1"), strict=True))
 """Colours of verdicts that need no limit and no condition."""
@@ -34,10 +44,8 @@ LIGHT = np.array([-0.45, -0.7, 0.55])
 """Where the light comes from."""
 
 
-def pictures(
-    dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[Condition], title: str
-) -> dict[str, Figure]:
-    """The pictures of a workspace by what is added to the file's name.
+def pictures(dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[Condition], title: str) -> Drawings:
+    """Return the pictures of a workspace by what is added to the file's name.
 
     Over two coordinates there is a map of the region; over three, cuts along the third coordinate and the solid. With
     more coordinates, the others stay at the values of the pose in the file.
@@ -55,9 +63,12 @@ def pictures(
         shown = ", ".join(_at(dataset, dim) for dim in fixed)
         title = f"{title}, {shown}"
     if len(dims) == 2:
-        return {"": _sections([dataset], labels, conditions, title)}
+        return {"": partial(_sections, [dataset], labels, conditions, title)}
     cuts = [dataset.isel({dims[2]: int(i)}) for i in _shown(dataset, dims)]
-    return {"-sections": _sections(cuts, labels, conditions, title), "-solid": _solid(dataset, dims[:3], title)}
+    return {
+        "-sections": partial(_sections, cuts, labels, conditions, title),
+        "-solid": partial(_solid, dataset, dims[:3], title),
+    }
 
 
 def _shown(dataset: xr.Dataset, dims: Sequence[str]) -> Array:
@@ -104,7 +115,7 @@ def _sections(cuts: Sequence[xr.Dataset], labels: Sequence[str], conditions: Seq
             handles=[*_patches(cuts, labels), *_lines(conditions, edges)],
             loc="outside lower center", ncols=min(3, 1 + columns), title=frame, title_fontsize=6.5,
         )  # fmt: skip
-        figure.suptitle(title, fontsize=10)
+        set_title(figure, title)
         fix_layout(figure)
     return figure
 
@@ -178,7 +189,7 @@ def _solid(dataset: xr.Dataset, dims: Sequence[str], title: str) -> Figure:
         panel.set(xlim=_ends(ends[0]), ylim=_ends(ends[1]), zlim=_ends(ends[2]))
         lengths = all(dataset[dim].attrs["kind"] == "length" for dim in dims)
         panel.set_box_aspect([float(np.ptp(dataset[dim].values)) for dim in dims] if lengths else None, zoom=0.9)
-        figure.suptitle(title, fontsize=10)
+        set_title(figure, title)
         fix_layout(figure)
     return figure
 

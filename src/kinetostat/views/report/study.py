@@ -78,7 +78,7 @@ def _search(result: Result) -> tuple[Block, ...]:
     settings = problem.study.optimizer
     about = f"Method {problem.method}: {METHODS[problem.method]}; seed {settings.seed}. {message(result)}"
     shown = (name for name in ("convergence", "front") if name in figures)
-    return (Paragraph(typeset(about)), *(drawn(figures[name], CAPTIONS[name]) for name in shown))
+    return (Paragraph(typeset(about)), *(drawn(figures[name](), CAPTIONS[name]) for name in shown))
 
 
 def _answer(result: Result) -> tuple[Block, ...]:
@@ -91,13 +91,13 @@ def _answer(result: Result) -> tuple[Block, ...]:
             f"Variables of {best}, and the effect of 1 % of each on the objectives, of an angle of 0.01 rad.",
         ),
         printed(direction_table(result), "Compliance before and after, at the worst of all poses."),
-        drawn(figures["comparison"], CAPTIONS["comparison"]),
+        drawn(figures["comparison"](), CAPTIONS["comparison"]),
     ]
     if several:
         blocks.append(printed(front_table(result), "Designs of the front."))
     if result.robustness:
         blocks.append(printed(scatter_table(result.robustness), "Objectives under the tolerances."))
-        blocks.append(drawn(figures["tolerances"], CAPTIONS["tolerances"]))
+        blocks.append(drawn(figures["tolerances"](), CAPTIONS["tolerances"]))
         if result.robustness.failing:
             blocks.append(Paragraph(failing(result.robustness)))
     items = tuple((typeset(line), "") for line in remarks(result))

@@ -1,0 +1,92 @@
+"""Levels of a contour map that a few extreme poses cannot spoil: next to a singularity, compliance has no bound.
+
+Colours are chosen in `figures`; here are only numbers.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.ticker import MaxNLocator
+
+Array = npt.NDArray[np.float64]
+
+LEVELS = 12
+"""Bands of a map, about."""
+USUAL = (2.0, 98.0)
+"""Percentiles between which values are usual."""
+FAR = 1.0
+"""How far an extreme may lie from the usual values, in units of their range, before the map leaves it out."""
+SAME = 1e-9
+"""Share of the range of levels within which a level and an extreme are the same."""
+WIDE = 30.0
+"""Ratio of the usual values, if all are positive, from which levels follow the logarithm."""
+STEPS = ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,))
+"""Levels within a decade, from few decades to many."""
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Levels of a map.
+
+    Attributes:
+        bounds: of the bands, increasing.
+        logarithmic: whether they follow the logarithm.
+        extend: at which ends values lie beyond the bounds, as matplotlib calls it.
+    """
+
+    bounds: Array
+    logarithmic: bool
+    extend: Literal["neither", "min", "max", "both"]
+
+
+def usual_range(values: Array) -> tuple[float, float]:
+    """Return the ends between which a map should resolve values: extremes only where they lie near all others.
+
+    A map of 41 x 41 poses with a single pose next to a singularity would otherwise be of one colour.
+
+    Args:
+        values: of any shape; those that are not finite are ignored, at least one must be finite.
+    """
+    finite = values[np.isfinite(values)]
+    least, low, high, greatest = np.percentile(finite, [0.0, *USUAL, 100.0])
+    far = FAR * (high - low)
+    return float(low if low - least > far else least), float(high if greatest - high > far else greatest)
+
+
+def levels_of(values: Array) -> Levels:
+    """Choose about `LEVELS` round levels over the usual range, by the logarithm where that is wide.
+
+    Args:
+        values: of any shape; two finite ones must differ.
+    """
+    finite = values[np.isfinite(values)]
+    low, high = usual_range(finite)
+    if low == high:  # nearly all values are equal, and only the extremes say something
+        low, high = float(finite.min()), float(finite.max())
+    logarithmic = low > 0.0 and high > WIDE * low
+    linear = MaxNLocator(LEVELS + 1, min_n_ticks=1).tick_values
+    bounds = np.asarray(_round_powers(low, high) if logarithmic else linear(low, high))
+    for end, extreme in ((0, finite.min()), (-1, finite.max())):
+        if abs(bounds[end] - extreme) <= SAME * (bounds[-1] - bounds[0]):
+            bounds[end] = extreme  # a level that misses an extreme by round-off would leave a hole there
+    return Levels(bounds, logarithmic, _ends(bounds, finite))
+
+
+def _ends(bounds: Array, finite: Array) -> Literal["neither", "min", "max", "both"]:
+    below, above = bool(finite.min() < bounds[0]), bool(finite.max() > bounds[-1])
+    return "both" if below and above else "min" if below else "max" if above else "neither"
+
+
+def _round_powers(low: float, high: float) -> Array:
+    """Return 1, 2, 5 (1, 3; 1) times powers of ten from at most `low` to at least `high`: as many as a bar can show."""
+    first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
+    for steps in STEPS:
+        every = [step * 10.0**power for power in range(first, last + 1) for step in steps]
+        inner = [n for n, value in enumerate(every) if low < value < high]
+        chosen = every[inner[0] - 1 : inner[-1] + 2]
+        if len(chosen) <= LEVELS + 2:
+            return np.array(chosen)
+    return np.array(chosen[:: -(-len(chosen) // LEVELS)])
