@@ -55,9 +55,7 @@ def test_a_folder_gets_everything_a_designer_needs(tmp_path, capsys):
     assert "geometry.platform_radius" in printed
     assert "times stiffer" in printed
     assert "Under the tolerances" in printed
-    figures = {
-        f"{name}.{kind}" for name in ("comparison", "convergence", "tolerances") for kind in ("png",)
-    }
+    figures = {f"{name}.{kind}" for name in ("comparison", "convergence", "tolerances") for kind in ("png",)}
     written_files = {path.name for path in folder.iterdir()}
     assert written_files == figures | {
         "best.toml", "result.json", "designs.nc", "designs.bin", "study.json", "history.jsonl"

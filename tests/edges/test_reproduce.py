@@ -84,9 +84,7 @@ def test_the_command_writes_tables_figures_and_one_page_that_stands_alone(tmp_pa
     names = {path.name for path in folder.iterdir()}
     assert {"index.html", "reproduction.json", "numbers.csv", "equations.csv", "statements.csv"} <= names
     assert {
-        f"{figure}.{kind}"
-        for figure in ("machine", "figure-4", "figure-5", "figure-6")
-        for kind in ("png",)
+        f"{figure}.{kind}" for figure in ("machine", "figure-4", "figure-5", "figure-6") for kind in ("png",)
     } <= names
     page = (folder / "index.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 4
