@@ -5,7 +5,7 @@ A bare number is SI. What a number may mean (its kind) is fixed by the field tha
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -14,11 +14,15 @@ import pint
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of quantity: its SI unit, as people read it, and an example of how to write it."""
+    """A kind of quantity: its SI unit, as people read it, and an example of how to write it.
+
+    `bare` is the unit of a number without one, where that is not the SI unit.
+    """
 
     name: str
     unit: str
     example: str
+    bare: str = ""
 
     @property
     def stiff(self) -> bool:
@@ -65,7 +69,8 @@ RIGID = "rigid"
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _NAME = r"[A-Za-zµμ°]+(?:\s*(?:\*\*|\^)\s*[1-4])?"
 _UNDER = rf"/\s*\({_NAME}(?:\s*[*·]\s*{_NAME})*\)"
-_UNIT = re.compile(rf"{_NAME}(?:\s*[*/·]\s*{_NAME}|\s*{_UNDER})*")
+UNIT = re.compile(rf"{_NAME}(?:\s*[*/·]\s*{_NAME}|\s*{_UNDER})*")
+"""How the text of a unit looks, e.g. "N/um"."""
 _LONGEST = 64
 
 
@@ -73,17 +78,18 @@ class UnitError(ValueError):
     """A value that is not a quantity of the wanted kind; the message says what is wrong with it and what is allowed."""
 
 
-def parse(value: object, kind: str) -> float:
+def parse(value: object, kind: str, bare: str = "") -> float:
     """SI value of a number or of text such as "12 cm".
 
     Args:
         value: a finite number (SI), or text: a number and a unit.
         kind: a key of `KINDS`; for a stiffness or rigidity, the text "rigid" gives infinity.
+        bare: unit of a text without one; that of SI if empty.
 
     Raises:
         UnitError: it is not a number, the unit is unknown, or the unit is of another kind.
     """
-    wanted = KINDS[kind]
+    wanted = replace(KINDS[kind], bare=bare)
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise UnitError(f"it must be {_allowed(wanted)}")
     if isinstance(value, str):
@@ -122,7 +128,7 @@ def _parse_text(text: str, wanted: Kind) -> float:
     match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
     if match is None:
         raise UnitError(f"it must be {_allowed(wanted)}")
-    number, unit = float(match[1]), match[2]
+    number, unit = float(match[1]), match[2] or wanted.bare
     return _finite(number * _factor(unit, wanted) if unit else number, wanted)
 
 
@@ -135,7 +141,8 @@ def _finite(number: float, wanted: Kind) -> float:
 def _allowed(wanted: Kind) -> str:
     rigid = f', or "{RIGID}"' if wanted.stiff else ""
     article = "an" if wanted.name[0] in "aeiou" else "a"
-    return f'{article} {wanted.name} with its unit, e.g. "{wanted.example}"{rigid}, or a bare number in {wanted.unit}'
+    bare = f"a bare number in {wanted.bare or wanted.unit}"
+    return f'{article} {wanted.name} with its unit, e.g. "{wanted.example}"{rigid}, or {bare}'
 
 
 @cache
@@ -146,7 +153,7 @@ def _registry() -> "pint.UnitRegistry[float]":
 @cache
 def _factor(unit: str, wanted: Kind) -> float:
     """SI value of one `unit`."""
-    if _UNIT.fullmatch(unit) is None:
+    if UNIT.fullmatch(unit) is None:
         raise UnitError(f'"{unit}" is not a unit; write {_allowed(wanted)}')
     try:
         given = _registry().Quantity(1.0, unit.replace("·", "*")).to_root_units()

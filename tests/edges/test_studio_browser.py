@@ -1,6 +1,8 @@
 """The studio in a real browser: a machine is drawn, sliders and map move it, numbers agree, nothing is fetched."""
 
 import io
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Thread
 
 import httpx
 import pytest
@@ -21,12 +23,17 @@ def address():
 
 
 @pytest.fixture(scope="module")
-def page(address):
-    with browser() as new_tab:
-        watched = new_tab()
-        watched.open(address)
-        yield watched
-        watched.blameless(address)
+def new_tab():
+    with browser() as opening:
+        yield opening
+
+
+@pytest.fixture(scope="module")
+def page(address, new_tab):
+    watched = new_tab()
+    watched.open(address)
+    yield watched
+    watched.blameless(address)
 
 
 def coloured(page):
@@ -95,6 +102,31 @@ def shown(entry):
     return f"{digits}e{int(power)}".replace("-", "\u2212")
 
 
+def test_ctrl_z_takes_back_text_while_it_is_typed_and_then_the_machine(page):
+    box = page.tab.locator(".quantity-text").nth(0)
+    before = box.input_value()
+    headline = page.text(".headline")
+    box.fill("10+5 mm")
+    box.press("Enter")
+    page.tab.wait_for_function("document.querySelector('.quantity-text').value === '15 mm'")
+    page.until_changed(".headline", headline)
+    box.press_sequentially("7")
+    box.press("Control+z")
+    assert box.input_value() == "15 mm"
+    box.press("Control+z")
+    page.tab.wait_for_function("before => document.querySelector('.quantity-text').value === before", arg=before)
+    box.fill("20")
+    box.press("Enter")
+    page.tab.wait_for_function("document.querySelector('.quantity-text').value === '20 mm'")
+    slider = page.tab.get_by_role("slider", name="x", exact=True)
+    slider.press("ArrowRight")
+    page.tab.wait_for_function("document.querySelector('.quantity-text').value !== '20 mm'")
+    slider.press("Control+z")
+    page.tab.wait_for_function("document.querySelector('.quantity-text').value === '20 mm'")
+    slider.press("Control+z")
+    page.tab.wait_for_function("before => document.querySelector('.quantity-text').value === before", arg=before)
+
+
 def test_an_impossible_pose_keeps_the_picture(page):
     box = page.tab.locator(".quantity-text").nth(1)
     box.fill("2 m")
@@ -126,3 +158,49 @@ def test_under_another_name_there_is_no_page(address):
     """A site whose name is made to point to this computer gets nothing from it."""
     assert httpx.get(address).status_code == 200
     assert httpx.get(address, headers={"Host": "evil.example"}).status_code == 400
+
+
+FOREIGN = """<!doctype html><title>foreign</title><iframe src="{studio}"></iframe><script>
+  const socket = new WebSocket("{socket}_nicegui_ws/socket.io/?EIO=4&transport=websocket");
+  const said = (text) => {{ document.title += " " + text; }};
+  socket.onopen = () => said("socket-open");
+  socket.onerror = () => said("socket-refused");
+  fetch("{studio}", {{mode: "no-cors"}}).then(() => said("page-read"), () => said("page-refused"));
+  document.querySelector("iframe").onload = () => said("frame-ended");
+</script>"""
+
+
+class Elsewhere(BaseHTTPRequestHandler):
+    """A page of another site."""
+
+    page = b""
+
+    def do_GET(self):
+        self.send_response(200)
+        self.send_header("content-type", "text/html")
+        self.end_headers()
+        self.wfile.write(self.page)
+
+    def log_message(self, *_):
+        pass
+
+
+def test_a_foreign_page_gets_no_socket_no_frame_and_no_answer(address, new_tab):
+    """Of another site by its name, and of another port of this computer."""
+    Elsewhere.page = FOREIGN.format(studio=address, socket=address.replace("http", "ws")).encode()
+    with ThreadingHTTPServer(("127.0.0.1", 0), Elsewhere) as other:
+        Thread(target=other.serve_forever, daemon=True).start()
+        for name in ("localhost", "127.0.0.1"):
+            tab = new_tab().tab
+            tab.goto(f"http://{name}:{other.server_port}/")
+            tab.wait_for_function("['socket', 'page', 'frame'].every((word) => document.title.includes(word))")
+            assert {word for word in tab.title().split() if "-" in word} == {
+                "socket-refused", "page-refused", "frame-ended",
+            }  # fmt: skip
+            assert "kinetostat" not in tab.frames[1].content()
+            tab.goto("about:blank")
+        # The same page may lead to the studio by a link.
+        tab.set_content(f'<a href="{address}">studio</a>')
+        tab.click("a")
+        tab.wait_for_function("document.querySelector('.machine-view')?.dataset.solids > 10")
+        other.shutdown()

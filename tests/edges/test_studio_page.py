@@ -18,8 +18,9 @@ from kinetostat import export
 from kinetostat.cli import main
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studies.analysis import analyze
+from kinetostat.studio.admission import BoundedBody
 from kinetostat.studio.panels.tables import matrix_text
-from kinetostat.studio.serving import LOOPBACK, BoundedBody
+from kinetostat.studio.serving import LOOPBACK
 from machines import KINDS
 
 MACHINE = "zhang-gosselin-4dof"

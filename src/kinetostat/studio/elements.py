@@ -44,6 +44,10 @@ class MachineView(Labelled, component=RENDERER / "machine_view.js", esm=MODULES)
         self.update()
 
 
+class BrowserLink(Element, component=COMPONENTS / "browser_link.js"):
+    """What the page and the browser around it have in common; events `undo` and `redo` by the keyboard."""
+
+
 class MapView(Labelled, component=COMPONENTS / "map_view.js"):
     """A map with a mark; methods `show`, `mark`; events `pick` with x and y, and `settle`."""
 
@@ -77,7 +81,11 @@ class QuantityRow(Labelled, component=COMPONENTS / "quantity_row.js"):
     def __init__(self, label: str, meaning: str, steps: int, slides: bool) -> None:
         """A row without a value yet; `steps` positions of its slider, if it has one."""
         super().__init__(label)
-        self._props.update(meaning=meaning, steps=steps, slides=slides, text="", position=0, problem="")
+        self._props.update(meaning=meaning, steps=steps, slides=slides, text="", position=0, problem="", taken=0)
+
+    def take(self) -> None:
+        """Show the present value in the place of what was typed, which may have meant the same."""
+        self._set(taken=self._props["taken"] + 1)
 
     def put(self, text: str, position: int) -> None:
         """Show a value and the position of its slider, and clear an earlier complaint."""

@@ -9,14 +9,17 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import Generic, TypeVar
+from weakref import WeakKeyDictionary
 
-from nicegui import background_tasks
+from nicegui import Client, background_tasks, context
 
 Request = TypeVar("Request")
 Result = TypeVar("Result")
 
-WORKERS = 2
+WORKERS = 4
 """Threads for all pages: Python computes one thing at a time, so more of them would only delay the event loop."""
+SHARE = 2
+"""Threads that one page may use at a time, so that a page with a slow machine leaves some to the others."""
 
 log = logging.getLogger("kinetostat")
 
@@ -24,14 +27,22 @@ log = logging.getLogger("kinetostat")
 class Lane(Generic[Request, Result]):
     """One kind of work of one page: at most one request in progress, at most one waiting."""
 
-    def __init__(self, work: Callable[[Request], Result], deliver: Callable[[Request, Result], None]) -> None:
-        """Create an idle lane.
+    def __init__(
+        self,
+        work: Callable[[Request], Result],
+        deliver: Callable[[Request, Result], None],
+        failed: Callable[[Exception], None] | None = None,
+    ) -> None:
+        """Create an idle lane of the page that is being built.
 
         Args:
             work: computes the result of a request, in a thread; it must not touch the page.
             deliver: shows the result, on the event loop.
+            failed: says on the page that `work` has raised an exception; None for the page's own way to say it.
         """
         self._work, self._deliver = work, deliver
+        self._failed = failed or context.client.handle_exception
+        self._share = _share(context.client)
         self._waiting: list[Request] = []
         self.busy = False
         self._open = True
@@ -51,15 +62,38 @@ class Lane(Generic[Request, Result]):
     async def _run(self) -> None:
         try:
             while self._waiting:
-                request = self._waiting.pop()
+                await self._next()
+        finally:
+            self.busy = False
+
+    async def _next(self) -> None:
+        async with self._share:
+            if not self._waiting:
+                return
+            request = self._waiting.pop()
+            try:
                 result = await asyncio.get_running_loop().run_in_executor(_workers(), self._work, request)
                 if self._open and result is not None:
                     self._deliver(request, result)
-        except Exception:
-            log.exception("the studio could not compute or show something")
-            raise
-        finally:
-            self.busy = False
+            except Exception as error:
+                log.exception("the studio could not compute or show something")
+                if self._open:
+                    self._failed(error)
+
+
+def as_sentence(error: Exception) -> str:
+    """Return what a page says about an error that nobody foresaw."""
+    return f"This is a mistake of the program, please report it ({type(error).__name__}: {error})."
+
+
+@cache
+def _shares() -> "WeakKeyDictionary[Client, asyncio.Semaphore]":
+    return WeakKeyDictionary()
+
+
+def _share(page: Client) -> asyncio.Semaphore:
+    """Return what limits the threads of a page."""
+    return _shares().setdefault(page, asyncio.Semaphore(SHARE))
 
 
 @cache

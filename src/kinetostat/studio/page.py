@@ -15,9 +15,9 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, PictureRequest, Report, ReportRequest, picture, report
 from kinetostat.studio.design.design_tab import DesignTab, Workshop
-from kinetostat.studio.elements import icon_button, refuse, toggle, upload_field
+from kinetostat.studio.elements import BrowserLink, icon_button, refuse, toggle, upload_field
 from kinetostat.studio.files_menu import FilesMenu
-from kinetostat.studio.lanes import Lane
+from kinetostat.studio.lanes import Lane, as_sentence
 from kinetostat.studio.map_panel import MapPanel
 from kinetostat.studio.panels import Panel
 from kinetostat.studio.panels.contributions import ContributionsPanel, SensitivityPanel
@@ -52,8 +52,8 @@ class StudioPage:
             workshop: searches and favourites of the server.
         """
         self.session, self._remember = Session(memory), remember
-        self._pictures = Lane(picture, self._show_picture)
-        self._reports = Lane(report, self._show_report)
+        self._pictures = Lane(picture, self._show_picture, self._unanswered)
+        self._reports = Lane(report, self._show_report, self._unanswered)
         self._latest: Report | None = None
         self.dark = ui.dark_mode(value=False)
         ui.colors(primary=ACCENT)
@@ -70,7 +70,8 @@ class StudioPage:
                     self._views()
             self.design = DesignTab(self.session, workshop, self._take)
         ui.context.client.on_delete(self._close)
-        ui.keyboard(on_key=self._key, ignore=["input", "select", "textarea"])
+        ui.on_exception(lambda error: refuse(f"Something could not be done or shown. {as_sentence(error)}"))
+        BrowserLink().on("undo", self._undo).on("redo", self._redo).mark("browser")
         self._loaded()
 
     def _header(self) -> None:
@@ -137,6 +138,11 @@ class StudioPage:
         self.parameters.go_on()
         self._report()
 
+    def _unanswered(self, error: Exception) -> None:
+        """Say that the machine could not be drawn or analysed, and let a waiting slider go on."""
+        self.scene.fail(error)
+        self.parameters.go_on()
+
     def _report(self) -> None:
         self._reports.ask(ReportRequest(self.session.machine, self._sizes, self.session.exaggeration))
 
@@ -202,13 +208,6 @@ class StudioPage:
     def _reset(self) -> None:
         self.session.reset()
         self.changed()
-
-    def _key(self, event: events.KeyEventArguments) -> None:
-        if event.action.keydown and event.modifiers.ctrl:
-            if event.key.name.lower() == "z" and not event.modifiers.shift:
-                self._undo()
-            elif event.key.name.lower() in ("y", "z"):
-                self._redo()
 
     def _close(self) -> None:
         for part in (self._pictures, self._reports, self.map, self.files, self.design):

@@ -111,7 +111,11 @@ class ParametersPanel:
         self._try(path, self._session.settle)
 
     def _write(self, path: str, event: GenericEventArguments) -> None:
-        self._try(path, lambda: self._session.write(path, str(event.args)))
+        def write() -> None:
+            self._session.write(path, str(event.args))
+            self._rows[path].take()
+
+        self._try(path, write)
 
     def _try(self, path: str, change: Callable[[], Any]) -> None:
         try:

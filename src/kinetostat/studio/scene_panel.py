@@ -14,6 +14,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, Report
 from kinetostat.studio.controls import FACTOR_STEPS, factor_at, factor_position, factor_text, read_factor
 from kinetostat.studio.elements import THROTTLE, MachineView, QuantityRow
+from kinetostat.studio.lanes import as_sentence
 from kinetostat.studio.wording import engineering
 
 LAYERS = {
@@ -26,6 +27,7 @@ LAYERS = {
 }
 """Layers of the picture that can be hidden, and their names on the page."""
 EXAGGERATION = "factor by which the deflected shape is drawn larger than it is: a number, or auto"
+KEPT = "The picture and the figures still show the last good pose."
 VIEWS = {"iso": "view from the corner", "front": "front view", "side": "side view", "top": "view from above"}
 
 
@@ -92,10 +94,7 @@ class ScenePanel:
         """
         analysis = report.analysis
         answered = analysis.status is Status.OK
-        self.line.classes(replace="pose-line" if answered else "pose-line refused")
-        self.status.set_text(analysis.status.word.replace("_", " "))
-        note = "" if answered else " The picture and the figures still show the last good pose."
-        self.message.set_text(analysis.message + note)
+        self._tell(answered, analysis.status.word.replace("_", " "), analysis.message)
         if not answered:
             return
         self.view.run_method("overlay", report.solids, [])
@@ -104,6 +103,15 @@ class ScenePanel:
         if report.exaggeration is not None:
             self.scale.put(factor_text(report.exaggeration, automatic), factor_position(report.exaggeration))
         self.figures.set_content(headline(report))
+
+    def fail(self, error: Exception) -> None:
+        """Say that the machine could not be drawn or analysed because of a mistake of the program."""
+        self._tell(False, "no answer", as_sentence(error))
+
+    def _tell(self, answered: bool, status: str, message: str) -> None:
+        self.line.classes(replace="pose-line" if answered else "pose-line refused")
+        self.status.set_text(status)
+        self.message.set_text(message if answered else f"{message} {KEPT}")
 
 
 def scene_key(report: Report) -> str:

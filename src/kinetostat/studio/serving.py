@@ -9,14 +9,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from nicegui import app, background_tasks, ui
+from nicegui import app, background_tasks, core, ui
+from nicegui.client import ClientConnectionTimeout
 from nicegui.server import Server
 from starlette.middleware.trustedhost import TrustedHostMiddleware
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from kinetostat.machine.machine import Machine
-from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError
+from kinetostat.studio.admission import LARGEST_BODY, BoundedBody, OwnOrigin, Paced, timed
 from kinetostat.studio.design.design_tab import Workshop
 from kinetostat.studio.page import StudioPage
 from kinetostat.studio.session import Memory
@@ -29,42 +29,14 @@ SWITCH = 0.0005
 would otherwise pile up until browsers take the silence for a lost connection."""
 MEMORY = "machine"
 """Key under which the work of a tab is remembered while the server runs."""
-LARGEST_BODY = LARGEST_FILE + (64 << 10)
-"""Bytes of a request: a machine file and what a form adds to it."""
+PATIENCE = 30.0
+"""Seconds within which a page that has been loaded must open its socket."""
 MARK = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 32"><rect width="32" height="32" rx="7" fill="#0b5ea8"/>'
     '<path d="M7 25h18M10 25l3-14h6l3 14M11 9h10" stroke="#fff" stroke-width="2.4" fill="none" stroke-linecap="round"/>'
     "</svg>"
 )
 """The icon of the page."""
-
-
-class BoundedBody:
-    """Middleware that cuts off requests larger than a machine file can be, while they arrive."""
-
-    def __init__(self, served: ASGIApp, largest: int = LARGEST_BODY) -> None:
-        """Pass requests of up to `largest` bytes on to `served`."""
-        self._served, self._largest = served, largest
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, or refuse it: by its announced length at once, otherwise once too much has arrived."""
-        if scope["type"] != "http":
-            await self._served(scope, receive, send)
-            return
-        announced = next((value for name, value in scope["headers"] if name == b"content-length"), b"0")
-        if announced.isdigit() and int(announced) > self._largest:
-            await send({"type": "http.response.start", "status": 413, "headers": [(b"content-length", b"0")]})
-            await send({"type": "http.response.body", "body": b""})
-            return
-        seen = 0
-
-        async def counted() -> Message:
-            nonlocal seen
-            message = await receive()
-            seen += len(message.get("body", b""))
-            return message if seen <= self._largest else {"type": "http.disconnect"}
-
-        await self._served(scope, counted, send)
 
 
 def serve(machine: Machine, name: str, host: str, port: int, browser: bool, state: Path) -> None:
@@ -85,9 +57,12 @@ def serve(machine: Machine, name: str, host: str, port: int, browser: bool, stat
     sys.setswitchinterval(SWITCH)
     app.on_startup(lambda: background_tasks.create(_announce(host, port)))
     prepare(machine, name, Workshop(state), LOOPBACK if host in LOOPBACK else ())
+    # Sockets only: what a tab sends by requests could not be slowed down without the others noticing.
+    core.sio.eio.transports = app.config.socket_io_js_transports = ["websocket"]
     ui.run(
         host=host, port=port, title="kinetostat studio", favicon=MARK, show=browser, reload=False, tailwind=False,
         show_welcome_message=False, reconnect_timeout=30.0, message_history_length=200,
+        ws_max_size=LARGEST_BODY,
     )  # fmt: skip
 
 
@@ -123,7 +98,10 @@ def prepare(machine: Machine, name: str, workshop: Workshop, hosts: Sequence[str
         hosts: names by which a browser may address this server; any name if empty. The check stops pages of other
             sites, whose own names could be made to point here.
     """
-    app.add_middleware(BoundedBody)
+    handlers = core.sio.handlers["/"]
+    handlers["event"] = timed(handlers["event"], lambda tab: core.sio.get_environ(tab)["asgi.scope"])
+    for middleware in (BoundedBody, Paced, OwnOrigin):
+        app.add_middleware(middleware)
     app.on_shutdown(workshop.close)
     if hosts:
         app.add_middleware(TrustedHostMiddleware, allowed_hosts=[*hosts, "[::1]"])
@@ -142,7 +120,13 @@ async def show(machine: Machine, name: str, workshop: Workshop) -> None:
         workshop: searches and favourites of all pages.
     """
     ui.add_css(STYLE)
-    await ui.context.client.connected()
+    client = ui.context.client
+    try:
+        await client.connected(timeout=PATIENCE)
+    except ClientConnectionTimeout:
+        client.delete()
+    if client.is_deleted:
+        return  # loaded by something that is not a browser, or left at once
     remembered = app.storage.tab
     memory = remembered.get(MEMORY) or Memory(machine, name)
     StudioPage(memory, lambda changed: remembered.update({MEMORY: changed}), workshop)

@@ -7,13 +7,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.changing import changed, read_value, rebuilt, related
+from kinetostat.machine.changing import changed, rebuilt, related
 from kinetostat.machine.loading import as_toml, build, bundled, load
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import values
+from kinetostat.machine.parameters import Parameter, values
 from kinetostat.spec.document import LARGEST_FILE, parse
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studio.controls import Control, controls
+from kinetostat.studio.typed_value import typed_value
+from kinetostat.studio.wording import unit_shown
+from kinetostat.units import UnitError
 
 REMEMBERED = 200
 """Steps that can be undone."""
@@ -134,14 +137,18 @@ class Session:
                 raise
 
     def write(self, path: str, text: str) -> None:
-        """Set a number from text with a unit.
+        """Set a number from what was typed: `typed_value` in the unit that its field shows, or a word such as "rigid".
 
         Raises:
             InputError: the text is not such a number, or the machine cannot have it.
         """
         self.settle()
-        self._change({path: read_value(self.machine, path, text)})
-        self.settle()
+        parameter = self.controls[path].parameter
+        value = read_typed(parameter, text, unit_shown(parameter.quantity, self.value(path)))
+        present = values(self.machine)
+        if any(present[leaf] != value for leaf in parameter.leaves):
+            self._change({path: value})
+            self.settle()
 
     def move(self, where: Mapping[str, float]) -> None:
         """Set several numbers at once, in SI, as a click on the map does; repeated moves of the same are one step.
@@ -195,6 +202,21 @@ class Session:
         """A file name and the machine as TOML."""
         name = "".join(c if c.isalnum() and c.isascii() else "-" for c in self.machine.name.lower()).strip("-")
         return f"{name or 'machine'}.toml", as_toml(self.machine).encode()
+
+
+def read_typed(parameter: Parameter, text: str, shown_unit: str) -> float:
+    """Return the SI value that was typed into the field of a parameter, which shows numbers in `shown_unit`.
+
+    Raises:
+        InputError: the text is not such a number.
+    """
+    quantity = parameter.quantity
+    if quantity.unset is not None and text.strip().lower() == quantity.show(quantity.unset):
+        return quantity.unset
+    try:
+        return typed_value(text, quantity.kind, shown_unit)
+    except UnitError as error:
+        raise InputError(f"{parameter.path} is {shorten(text)}: {error}.") from None
 
 
 def sent_text(data: bytes, name: str) -> str:

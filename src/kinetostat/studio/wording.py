@@ -44,6 +44,12 @@ def shown(quantity: Quantity, value: float) -> str:
     return show(factor * value, unit, DIGITS).replace("e+0", "e").replace("e+", "e")
 
 
+def unit_shown(quantity: Quantity, value: float) -> str:
+    """Return the unit that a field shows beside a value; empty for "rigid", "no limit" and numbers without a unit."""
+    text = shown(quantity, value)
+    return text.partition(" ")[2] if text[-1:] and text[0] in "+-.0123456789" else ""
+
+
 def engineering(value: float | None, unit: str = "1", digits: int = 4) -> str:
     """Return a result with an SI prefix, e.g. "3.628 kN/m"; "∞" if it is infinite, a dash if there is none."""
     if value is None or math.isnan(value):

@@ -4,6 +4,7 @@ A draft becomes a `StudyFile` by the same reader as a file does, so that the for
 """
 
 import math
+import re
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +13,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.spec.document import Document, parse
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.fields import Quantity
 from kinetostat.spec.study import OptimizerTable, StudyFile, read_study
 from kinetostat.spec.study_text import study_toml
 from kinetostat.studies.bundled import study_of
@@ -20,7 +22,9 @@ from kinetostat.studies.optimisation.problem import Problem, problem_of, setting
 from kinetostat.studio.controls import USUAL_STIFFNESS, Control
 from kinetostat.studio.design.state_folder import slug
 from kinetostat.studio.session import sent_text
+from kinetostat.studio.typed_value import typed_value
 from kinetostat.studio.wording import shown
+from kinetostat.units import UNIT, UnitError
 
 AROUND = 0.2
 """Bounds of a new variable, as a share of its present value."""
@@ -28,6 +32,7 @@ FORM = "the study"
 """Name of a draft in messages, where a file would have its path."""
 MOST_OBJECTIVES = 4
 """Objectives that the form offers; a file may have more."""
+_NUMBER_AND_UNIT = re.compile(rf"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*{UNIT.pattern}\s*")
 SEARCH = OptimizerTable()
 """The search that is offered first."""
 
@@ -162,6 +167,21 @@ def usual_bounds(control: Control, value: float) -> tuple[str, str]:
     around = AROUND * abs(middle) if middle else AROUND * max(control.high, 1e-9)
     low, high = middle - around, min(middle + around, quantity.most)
     return shown(quantity, low), shown(quantity, high)
+
+
+def bound_text(quantity: Quantity, typed: str, shown_unit: str) -> str:
+    """Return a bound that was typed as a study file may hold it; what cannot be read stays for the reader to refuse.
+
+    Args:
+        quantity: of the variable.
+        typed: a quantity, a bare number in the unit that the field showed first, or arithmetic.
+        shown_unit: that unit; empty where the field showed none.
+    """
+    try:
+        value = typed_value(typed, quantity.kind, shown_unit)
+    except UnitError:
+        return typed
+    return typed if _NUMBER_AND_UNIT.fullmatch(typed) else quantity.show(value)
 
 
 def needs_direction(quantity: str) -> bool:

@@ -13,12 +13,13 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studio.design.front_panel import FrontPanel, axis_label
 from kinetostat.studio.design.progress import Follower, Progress, failure
 from kinetostat.studio.design.result_text import result_text
-from kinetostat.studio.design.runs import Run, Runs, Stage
+from kinetostat.studio.design.runs import UNREADABLE, Run, Runs, Stage
 from kinetostat.studio.elements import MAIN_BUTTON, CurveView, choice, confirm, icon_button, refuse
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.wording import paragraph
 
 NOTHING = "No search has been started yet. Choose variables and objectives on the left, then start one."
+DAMAGED = 'Search {} cannot be shown, because its folder "{}" is damaged: {}. The other searches are not affected.'
 INTERVAL = 0.5
 """Seconds between two looks at a search."""
 
@@ -96,7 +97,10 @@ class RunPanel:
         self._lane.close()
 
     def _look(self, request: ProgressRequest) -> Searches:
-        runs = self._runs.every()
+        try:
+            runs = self._runs.every()
+        except InputError as error:
+            return Searches([], problem=str(error))
         number = request.number or (runs[0].number if runs else 0)
         run = next((listed for listed in runs if listed.number == number), None)
         if run is None:
@@ -107,8 +111,10 @@ class RunPanel:
             return Searches(runs, follower, follower.progress(run), failure(run))
         except InputError as error:
             return Searches(runs, problem=str(error))
-        except OSError:
-            return Searches(runs)  # deleted while it was read
+        except UNREADABLE as error:
+            if not run.folder.exists():
+                return Searches(runs)  # deleted while it was read
+            return Searches(runs, problem=DAMAGED.format(run.number, run.folder, error))
 
     def _deliver(self, request: ProgressRequest, searches: Searches) -> None:
         if request.number != int(self.choice.value or 0):

@@ -32,6 +32,10 @@ FAILURE = "failed.txt"
 """File in the folder of a search that could not go on, with the reason."""
 
 
+UNREADABLE = (OSError, ValueError, KeyError, IndexError, TypeError, AttributeError)
+"""What reading a damaged folder of a search may raise."""
+
+
 class Stage(StrEnum):
     """The stage of a search."""
 
@@ -40,6 +44,7 @@ class Stage(StrEnum):
     STOPPED = "stopped"
     DONE = "done"
     FAILED = "failed"
+    DAMAGED = "damaged"
 
     @property
     def active(self) -> bool:
@@ -75,9 +80,17 @@ class Runs:
         self._lock = threading.Lock()
 
     def every(self) -> list[Run]:
-        """All searches, the latest first."""
-        folders = numbered(self._folder).items()
-        return [Run(n, path, self._name(path), self._stage(path)) for n, path in folders if (path / QUESTION).exists()]
+        """All searches, the latest first.
+
+        Raises:
+            InputError: the folder of all searches cannot be read.
+        """
+        try:
+            folders = numbered(self._folder)
+        except OSError as error:
+            raise InputError(f'the searches in "{self._folder}" cannot be read: {error.strerror}.') from None
+        listed = (self._listed(number, path) for number, path in folders.items())
+        return [run for run in listed if run is not None]
 
     def of(self, number: int) -> Run:
         """The search of this number.
@@ -86,9 +99,17 @@ class Runs:
             InputError: it has been deleted.
         """
         path = numbered(self._folder).get(number)
-        if path is None or not (path / QUESTION).exists():
+        run = None if path is None else self._listed(number, path)
+        if run is None:
             raise InputError(f"search {number} has been deleted; choose another one.")
-        return Run(number, path, self._name(path), self._stage(path))
+        return run
+
+    def _listed(self, number: int, path: Path) -> Run | None:
+        """Return what the list shows of a folder, which may be damaged; None if no search has begun in it."""
+        try:
+            return Run(number, path, self._name(path), self._stage(path)) if (path / QUESTION).exists() else None
+        except UNREADABLE:
+            return Run(number, path, path.name, Stage.DAMAGED)
 
     def start(self, problem: Problem) -> Run:
         """Begin a search in a new process, and return at once.

@@ -13,12 +13,14 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find, values
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.fields import Quantity
 from kinetostat.studies.bundled import bundled_studies
 from kinetostat.studies.optimisation.catalogue import known_terms, usual_goal
 from kinetostat.studio.controls import Control, controls
 from kinetostat.studio.design.draft import (
     MOST_OBJECTIVES,
     Draft,
+    bound_text,
     bundled_draft,
     needs_direction,
     sent_draft,
@@ -156,7 +158,8 @@ class StudyForm:
 
     def _variable(self, place: int, table: dict[str, Any], known: dict[str, Control]) -> None:
         paths = [str(path) for path in table.get("paths") or [table["path"]]]
-        control = known.get(find(self._machine.family, paths[0]).path)
+        parameter = find(self._machine.family, paths[0])
+        control = known.get(parameter.path)
         title = (brief(control) if control else paths[0]) + (" and others" if paths[1:] else "")
         with ui.element("div").classes("form-row"):
             ui.label(title).classes("form-name").tooltip(", ".join(paths))
@@ -166,15 +169,17 @@ class StudyForm:
                 ui.label("fixed, with a tolerance").classes("form-fixed")
             else:
                 for key in ("from", "to"):
-                    self._text(table, key, f"{title}, {key}", f"variable {place} {key}")
+                    self._bound(table, key, parameter.quantity, f"{title}, {key}", f"variable {place} {key}")
             drop = partial(self._drop, self.draft.variables, place)
             self._remove(drop, f"Remove {title}", f"variable {place} remove")
 
-    def _text(self, table: dict[str, Any], key: str, label: str, mark: str) -> None:
-        def write(event: Change) -> None:
-            table[key] = event.value
+    def _bound(self, table: dict[str, Any], key: str, quantity: Quantity, label: str, mark: str) -> None:
+        first = str(table.get(key, ""))
 
-        box = ui.input(value=str(table.get(key, "")), on_change=write).props(f'dense borderless aria-label="{label}"')
+        def write(event: Change) -> None:
+            table[key] = bound_text(quantity, str(event.value), first.partition(" ")[2])
+
+        box = ui.input(value=first, on_change=write).props(f'dense borderless aria-label="{label}"')
         box.classes("form-text").mark(mark)
 
     def _remove(self, action: Callable[[], None], text: str, mark: str) -> None:
