@@ -18,6 +18,7 @@ from kinetostat import export
 from kinetostat.cli import main
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studies.analysis import analyze
+from kinetostat.studio import answers
 from kinetostat.studio.admission import BoundedBody
 from kinetostat.studio.panels.tables import matrix_text
 from kinetostat.studio.serving import LOOPBACK
@@ -81,6 +82,10 @@ def test_values_can_be_typed_in_any_unit():
     async def steps(page):
         await page.send("control pose.x", "write", "1.5 cm")
         assert page.one("control pose.x")._props["text"] == "15 mm"
+        await page.send("control pose.x", "write", "20")
+        assert page.one("control pose.x")._props["text"] == "20 mm"
+        await page.send("control pose.x", "write", "10+5 mm")
+        assert page.one("control pose.x")._props["text"] == "15 mm"
         await page.send("control stiffness.passive_links.0", "write", "rigid")
         assert page.one("control stiffness.passive_links.0")._props["text"] == "rigid"
         await page.send("control stiffness.actuator", "write", "3 N/mm")
@@ -115,6 +120,38 @@ def test_an_impossible_pose_says_why_and_keeps_the_last_picture():
         assert page.one("status").text == "ok"
 
     on_page(steps)
+
+
+def test_an_analysis_that_fails_is_said_and_the_next_answer_takes_its_place(monkeypatch):
+    async def steps(page):
+        original = answers.analyze
+
+        def failing(machine):
+            raise ZeroDivisionError("division by zero")
+
+        monkeypatch.setattr(answers, "analyze", failing)
+        figures = page.one("headline").content
+        await page.send("control pose.x", "write", "2 cm")
+        assert page.one("status").text == "no answer"
+        assert "ZeroDivisionError: division by zero" in page.one("message").text
+        assert "still show the last good pose" in page.one("message").text
+        assert page.one("headline").content == figures
+        monkeypatch.setattr(answers, "analyze", original)
+        await page.send("control pose.x", "write", "1 cm")
+        assert page.one("status").text == "ok"
+
+    with pytest.raises(AssertionError, match="raise ZeroDivisionError"):  # it is logged as well
+        on_page(steps)
+
+
+def test_a_mistake_while_something_is_done_is_said(monkeypatch):
+    async def steps(page):
+        monkeypatch.setattr(page.one("scene-key"), "set_content", None)
+        await page.send("control pose.x", "write", "2 cm")
+        assert "TypeError" in page.one("message").text
+
+    with pytest.raises(AssertionError, match="in _show_report"):
+        on_page(steps)
 
 
 def test_a_singular_pose_is_drawn_with_the_motion_it_leaves_free():

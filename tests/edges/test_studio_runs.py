@@ -12,11 +12,11 @@ from kinetostat.commands.common import DONE
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.study_folder import study_folder
+from kinetostat.studies.study_folder import HISTORY, QUESTION, study_folder
 from kinetostat.studio.controls import controls
 from kinetostat.studio.design.draft import Draft, bundled_draft, sent_draft, usual_bounds
 from kinetostat.studio.design.progress import Follower, failure
-from kinetostat.studio.design.runs import MOST_RUNNING, Runs, Stage
+from kinetostat.studio.design.runs import MOST_RUNNING, UNREADABLE, Runs, Stage
 from kinetostat.studio.design.state_folder import Favourites
 from studies import PAPER, SMALL, problem, written
 
@@ -85,6 +85,26 @@ def test_a_search_ends_as_the_command_does(runs, capsys, tmp_path):
     assert found.mean == told["convergence"]["mean"]
     assert found.objectives == [[told["objective"]]]
     assert as_toml(found.design(0)) == (run.folder / "best.toml").read_text("utf-8")
+
+
+@pytest.mark.parametrize("damage", ["history", "question", "folder"])
+def test_a_damaged_search_does_not_hide_the_others(kept, tmp_path, damage):
+    there, sound = kept
+    folder = tmp_path / "runs" / "0002-damaged"
+    shutil.copytree(sound.folder, folder)
+    if damage == "history":
+        (folder / HISTORY).write_bytes(b'{"step": 1\n\xff}\n')
+    elif damage == "question":
+        (folder / QUESTION).write_text('["neither", "machine", "nor", "study"]')
+    else:
+        (folder / HISTORY).unlink()
+        (folder / HISTORY).mkdir()
+    assert [run.number for run in there.every()] == [2, 1]
+    assert there.every()[1].stage is Stage.DONE
+    with pytest.raises(UNREADABLE):
+        followed(there, 2)
+    there.delete(2) if not there.of(2).stage.active else shutil.rmtree(folder)
+    assert [run.number for run in there.every()] == [1]
 
 
 def test_a_front_is_known_while_it_grows_and_ends_as_the_command_says(runs):
