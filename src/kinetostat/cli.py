@@ -4,6 +4,7 @@ Imports are late on purpose: `kinetostat --help` must not wait for libraries tha
 """
 
 import argparse
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -33,6 +34,9 @@ from kinetostat.commands.report import add_report_commands
 from kinetostat.commands.studio import add_studio_command
 from kinetostat.spec.installation import as_typed
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""Errors of the system where standard output is a file on a full or failing disk; other files say it by themselves."""
+
 EXAMPLES = """examples:
   kinetostat list
   kinetostat analyze zhang-gosselin-4dof
@@ -57,19 +61,44 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 done; 1 the question has no answer (infeasible pose, singular, a figure that differs); 2 bad input; 130
         stopped by Ctrl-C.
     """
-    options = _parser().parse_args(arguments)
     from kinetostat.spec.errors import InputError
 
     try:
-        return int(options.run(options))
+        code = _run(arguments)
+        sys.stdout.flush()
+        return code
     except InputError as error:
         print(f"kinetostat: {as_typed(str(error))}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
         return stopped("files that had been written are complete.")
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _forget_output()
         return DONE
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        _forget_output()
+        print(
+            f"kinetostat: standard output cannot be written: {error.strerror}; make room, or send it elsewhere.",
+            file=sys.stderr,
+        )
+        return BAD_INPUT
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    """Run one command; where only the help was wanted, print it, whole, and stop."""
+    try:
+        options = _parser().parse_args(arguments)
+    except SystemExit:
+        sys.stdout.flush()
+        raise
+    return int(options.run(options))
+
+
+def _forget_output() -> None:
+    """Drop what could not be written, so that Python does not try again when it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> Parser:

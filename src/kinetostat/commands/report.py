@@ -128,9 +128,12 @@ def _export(options: argparse.Namespace) -> int:
     from kinetostat.exchange.formats import choose
     from kinetostat.kinematics.status import Status
     from kinetostat.studies.analysis import analyze
+    from kinetostat.studies.storage import place_of
     from kinetostat.views.tables import print_written, terminal
 
     chosen = choose(options.to, options.output)
+    if options.output:
+        place_of(options.output)
     analysis = analyze(load_machine(options))
     if analysis.status is not Status.OK:
         return no_answer(analysis.message)

@@ -11,7 +11,7 @@ from typing import Any
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.installation import adding
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.storage import replacing
+from kinetostat.studies.storage import write_bytes
 from kinetostat.views.scene.glb import glb
 from kinetostat.views.scene.machine_scene import scene_of
 
@@ -35,8 +35,7 @@ def write_step(analysis: Analysis, path: Path) -> list[Path]:
 
 
 def _write(content: bytes, path: Path) -> list[Path]:
-    with replacing(path) as temporary:
-        temporary.write_bytes(content)
+    write_bytes(path, content)
     return [path]
 
 

@@ -31,7 +31,7 @@ from kinetostat.machine.machine import Configuration
 from kinetostat.machine.written.plan import BASE, PLATFORM
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.storage import write_text
+from kinetostat.studies.storage import replacing
 from kinetostat.validation.pieces import array
 
 Array = npt.NDArray[np.float64]
@@ -194,8 +194,9 @@ def write(analysis: Analysis, path: Path) -> list[Path]:
     loops_path = path.with_suffix(".yaml")
     if loops_path == path:
         raise InputError(f'"{path}" is where the closed loops go; give the URDF another suffix, e.g. .urdf.')
-    write_text(path, text)
-    write_text(loops_path, loops)
+    with replacing(path) as first, replacing(loops_path) as second:
+        first.write_text(text, encoding="utf-8")
+        second.write_text(loops, encoding="utf-8")
     return [path, loops_path]
 
 

@@ -8,8 +8,7 @@ that wrote it, nor on their order.
 import os
 import shutil
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from math import prod
 from pathlib import Path
 from types import TracebackType
@@ -22,6 +21,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from kinetostat.spec.errors import InputError
+from kinetostat.studies.storage import KEPT, settle, writing
 
 KIND = np.dtype("<f8")
 """Numbers in a file of rows: float64, little-endian."""
@@ -65,7 +65,9 @@ def create(path: Path, labels: xr.Dataset, dims: Sequence[str], variables: Mappi
     Raises:
         InputError: the folder cannot be written, or the disk is full.
     """
+    points = prod(labels.sizes[dim] for dim in dims)
     with writing(path):
+        _try_space(path, points * (8 * len(variables) - 7) + labels.nbytes + STEP)
         labels.to_netcdf(path, engine="h5netcdf")
         with h5netcdf.File(path, "a") as file:
             for name, attributes in variables.items():
@@ -76,8 +78,16 @@ def create(path: Path, labels: xr.Dataset, dims: Sequence[str], variables: Mappi
         with path.open("r+b") as stream:
             if sys.platform == "linux":
                 os.posix_fallocate(stream.fileno(), 0, path.stat().st_size)
-            _fill_status(stream, _offsets(path)[STATUS], prod(labels.sizes[dim] for dim in dims))
+            _fill_status(stream, _offsets(path)[STATUS], points)
             settle(stream)
+
+
+def _try_space(path: Path, size: int) -> None:
+    """Fail where no file of this size can be made, because the HDF5 library would end the process there."""
+    with path.open("wb") as stream:
+        if sys.platform == "linux":
+            os.posix_fallocate(stream.fileno(), 0, size)
+        stream.truncate(size)
 
 
 def _reserved() -> Any:
@@ -124,7 +134,7 @@ class ResultFile:
         Raises:
             InputError: the disk is full or failing.
         """
-        with writing(self._path):
+        with writing(self._path, KEPT):
             for name, data in (*values.items(), (STATUS, status)):
                 self._stream.seek(self._offsets[name] + start * data.itemsize)
                 self._stream.write(np.ascontiguousarray(data).data)
@@ -133,28 +143,6 @@ class ResultFile:
     def close(self) -> None:
         """Close the file."""
         self._stream.close()
-
-
-def settle(stream: BinaryIO) -> None:
-    """Write what the system still buffers to the disk."""
-    stream.flush()
-    os.fsync(stream.fileno())
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Turn failures to write into messages.
-
-    Raises:
-        InputError: the disk is full or failing.
-    """
-    try:
-        yield
-    except OSError as error:
-        raise InputError(
-            f'"{path}" cannot be written: {error.strerror or error}; what was written before is kept: make room or '
-            "repair it, then give the same command again."
-        ) from None
 
 
 def thinned(path: Path) -> xr.Dataset:
@@ -169,7 +157,7 @@ class RowFile:
 
     def __init__(self, path: Path, width: int) -> None:
         self._path, self._width = path, width
-        with writing(path):
+        with writing(path, KEPT):
             path.touch()
             self._stream = path.open("r+b")
 
@@ -200,7 +188,7 @@ class RowFile:
         Raises:
             InputError: the disk is full or failing.
         """
-        with writing(self._path):
+        with writing(self._path, KEPT):
             self._stream.seek(start * self._width * KIND.itemsize)
             self._stream.write(np.ascontiguousarray(rows, dtype=KIND).data)
             settle(self._stream)

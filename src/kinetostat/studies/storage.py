@@ -1,53 +1,214 @@
-"""Files written whole or not at all: into a temporary neighbour first, then renamed. Nothing is computed here."""
+"""The one place through which files are written: whole or not at all, and never over what is not a plain file.
 
+A file is written in a temporary folder beside its place, `.kinetostat-...`, and then moved there. The process holds the
+lock of that folder, so that the next writer knows a folder whose process was killed, and removes it.
+"""
+
+import errno
 import json
 import os
+import shutil
+import stat
+import sys
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import mkstemp
-from typing import TYPE_CHECKING
+from tempfile import mkdtemp
+from typing import TYPE_CHECKING, BinaryIO
 
 from kinetostat.spec.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
 
+PREFIX = ".kinetostat-"
+"""How the names of temporary folders begin."""
+ABANDONED = 24 * 3600.0
+"""Age, s, from which a temporary folder is abandoned where folders have no locks."""
+UNLOCKED = -1
+"""In the place of a handle where folders have no locks."""
+KEPT = "what was written before is kept, and the same command goes on from there"
+"""What is there after a failure to write into the file of a long study."""
+REASONS = {
+    errno.ENOSPC: "the disk is full; make room, or choose another place",
+    errno.EDQUOT: "your share of the disk is used up; make room, or choose another place",
+    errno.EFBIG: "it would exceed the largest size of a file that is allowed here; raise that limit (ulimit -f)",
+    errno.EEXIST: "a file is there, and a folder is needed; choose another place",
+    errno.ENOTDIR: "a part of its path is a file, and a folder is needed; choose another place",
+    errno.EROFS: "the disk can only be read; choose another place",
+    errno.ELOOP: "it is a link that leads back to itself; choose another place",
+    errno.ENAMETOOLONG: "its name is too long; choose a shorter one",
+}
+"""What is wrong, and the way out, for errors of the system that people can do something about."""
+
+
+@contextmanager
+def writing(path: Path, remains: str = "nothing of it was written") -> Iterator[None]:
+    """Turn failures of the system to write into one sentence.
+
+    Args:
+        path: named in the sentence.
+        remains: what is there after the failure.
+
+    Raises:
+        InputError: the disk is full or failing, or may not be written.
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = REASONS.get(error.errno or 0, f"{error.strerror or error}; choose another place")
+        raise InputError(f'"{path}" cannot be written: {reason}; {remains}.') from None
+
+
+def place_of(path: Path) -> Path:
+    """Return where a file is written: the path itself, or the file that it links to.
+
+    Raises:
+        InputError: a folder, a device or another special file is there, or a file that may only be read.
+    """
+    if "\0" in str(path):
+        raise InputError(f'"{path}" cannot be the name of a file: it has a null character; choose another name.')
+    with writing(path):
+        place = Path(os.path.realpath(path))  # unlike resolve(), it also returns for a link that leads to itself
+        mode = os.stat(path).st_mode if os.path.lexists(place) else stat.S_IFREG | stat.S_IWUSR
+    if stat.S_ISDIR(mode):
+        raise InputError(f'"{path}" is a folder, and a file is to be written; give the file a name of its own.')
+    if not stat.S_ISREG(mode):
+        raise InputError(f'"{path}" is a device or another special file, which is never replaced; name a plain file.')
+    if not mode & 0o222 or (place.exists() and not os.access(place, os.W_OK)):
+        raise InputError(f'"{path}" may only be read; choose another name, or make it writable (chmod u+w).')
+    return place
+
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary path beside `path`, with the same suffix, that becomes `path` when the block ends without error.
+    """A temporary path of the same name that takes the place of `path` when the block ends without error.
+
+    A link stays, and the file that it leads to is replaced. Folders that had to be made are removed after a failure.
 
     Raises:
-        InputError: the folder cannot be made or written.
+        InputError: what is there is not replaced (see `place_of`), or the disk is full or may not be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
-    except OSError as error:
-        raise InputError(f'"{path}" cannot be written: {error.strerror}; choose another place with -o.') from None
-    os.close(handle)
-    temporary = Path(name)
-    try:
+    place = place_of(path)
+    with _folders(place.parent, path), writing(path), scratch(place.parent) as folder:
+        temporary = folder / place.name
         yield temporary
-        temporary.chmod(0o644)
-        temporary.replace(path)
+        temporary.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o644)
+        with temporary.open("rb") as stream:
+            os.fsync(stream.fileno())
+        temporary.replace(place)
+
+
+@contextmanager
+def _folders(folder: Path, path: Path) -> Iterator[None]:
+    """Make a folder and those above it; remove those that were made if the block fails."""
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        with writing(path):
+            folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        for place in missing:
+            with suppress(OSError):
+                place.rmdir()
+        raise
+
+
+@contextmanager
+def scratch(parent: Path) -> Iterator[Path]:
+    """A temporary folder in `parent`, removed at the end; so are those of processes that were killed."""
+    for abandoned in parent.glob(f"{PREFIX}*"):
+        _remove_abandoned(abandoned)
+    while True:
+        folder = Path(mkdtemp(dir=parent, prefix=PREFIX))
+        handle = _lock_folder(folder)
+        if handle is not None:
+            break
+    try:
+        yield folder
     finally:
-        temporary.unlink(missing_ok=True)
+        shutil.rmtree(folder, ignore_errors=True)
+        if handle != UNLOCKED:
+            os.close(handle)
+
+
+def _remove_abandoned(folder: Path) -> None:
+    if sys.platform == "win32":
+        with suppress(OSError):
+            if time.time() - folder.stat().st_mtime > ABANDONED:
+                shutil.rmtree(folder, ignore_errors=True)
+        return
+    handle = _lock_folder(folder)
+    if handle not in (None, UNLOCKED):
+        shutil.rmtree(folder, ignore_errors=True)
+        os.close(handle)
+
+
+def _lock_folder(folder: Path) -> int | None:
+    """Take the lock of a temporary folder: a handle, `UNLOCKED`, or None if it is taken or gone."""
+    if sys.platform == "win32":
+        return UNLOCKED
+    import fcntl
+
+    try:
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if os.path.samestat(os.fstat(handle), os.stat(folder)):
+            return handle
+    except BlockingIOError:
+        pass
+    except OSError as error:
+        if error.errno in (errno.ENOLCK, errno.EOPNOTSUPP, errno.EBADF):  # some network disks
+            os.close(handle)
+            return UNLOCKED
+    os.close(handle)
+    return None
+
+
+def settle(stream: BinaryIO) -> None:
+    """Write what the system still buffers to the disk."""
+    stream.flush()
+    os.fsync(stream.fileno())
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file of bytes.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    with replacing(path) as temporary:
+        temporary.write_bytes(data)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a UTF-8 text file."""
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    """Write a UTF-8 text file.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    write_bytes(path, text.encode())
 
 
 def write_json(path: Path, data: object) -> None:
-    """Write plain data as a JSON file."""
+    """Write plain data as a JSON file.
+
+    Raises:
+        InputError: it cannot be written.
+    """
     write_text(path, f"{json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1)}\n")
 
 
 def write_dataset(path: Path, dataset: "xr.Dataset") -> None:
-    """Write a labelled dataset as NetCDF-4."""
-    with replacing(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
+    """Write a labelled dataset as NetCDF-4.
+
+    The bytes are made in memory, because the HDF5 library ends the process where it meets a full disk.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    write_bytes(path, bytes(dataset.to_netcdf(engine="h5netcdf")))

@@ -5,7 +5,6 @@ the history belongs to the process and ends with it, however it ends.
 """
 
 import json
-import os
 import sys
 import time
 from collections.abc import Iterator
@@ -14,7 +13,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.storage import write_text
+from kinetostat.studies.storage import KEPT, settle, write_text, writing
 
 QUESTION, HISTORY = "study.json", "history.jsonl"
 
@@ -102,9 +101,9 @@ class StudyFolder:
 
     def note(self, record: Record) -> None:
         """Add a chunk that is done; when this returns it is on the disk."""
-        self._history.write(json.dumps(record).encode() + b"\n")
-        self._history.flush()
-        os.fsync(self._history.fileno())
+        with writing(self.path / HISTORY, KEPT):
+            self._history.write(json.dumps(record).encode() + b"\n")
+            settle(self._history)
 
 
 @contextmanager
@@ -114,11 +113,9 @@ def study_folder(path: Path) -> Iterator[StudyFolder]:
     Raises:
         InputError: another process is at work in it, or it cannot be written.
     """
-    try:
+    with writing(path):
         path.mkdir(parents=True, exist_ok=True)
         stream = (path / HISTORY).open("a+b")
-    except OSError as error:
-        raise InputError(f'"{path}" cannot be written: {error.strerror}; choose another place with -o.') from None
     with stream:
         try:
             _lock_soon(stream)

@@ -27,7 +27,7 @@ from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.optimisation import result_data
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.sensitivity import Sensitivity
-from kinetostat.studies.storage import replacing, write_dataset, write_json, write_text
+from kinetostat.studies.storage import write_bytes, write_dataset, write_json, write_text
 from kinetostat.studies.workspace import workspace
 from kinetostat.studies.workspace.workspace import Workspace
 from kinetostat.tolerances import AGREED
@@ -182,12 +182,12 @@ def _writers(what: object) -> dict[str, Writer]:
         case Figure():
             return dict.fromkeys((f".{name}" for name in FORMATS), lambda path: save_figure(what, path))
         case Picture():
-            return {".png": lambda path: _write_bytes(path, what)}
+            return {".png": lambda path: write_bytes(path, what)}
         case Machine():
             return {
                 ".toml": lambda path: write_text(path, as_toml(what)),
-                ".png": lambda path: _write_bytes(path, machine_picture(what)),
-                ".glb": lambda path: _write_bytes(path, glb(scene_of(what))),
+                ".png": lambda path: write_bytes(path, machine_picture(what)),
+                ".glb": lambda path: write_bytes(path, glb(scene_of(what))),
             }
     data = kind_of(what).data
     if data is None:
@@ -199,8 +199,3 @@ def _writers(what: object) -> dict[str, Writer]:
         case Workspace():
             written[".nc"] = lambda path: write_dataset(path, what.dataset)
     return written
-
-
-def _write_bytes(path: Path, data: bytes) -> None:
-    with replacing(path) as temporary:
-        temporary.write_bytes(data)

@@ -19,7 +19,7 @@ from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.result_data import message
 from kinetostat.studies.report.answers import STEPS, Answers, gather
 from kinetostat.studies.report.subject import Texts, texts_of
-from kinetostat.studies.storage import replacing
+from kinetostat.studies.storage import place_of, write_bytes
 from kinetostat.validation.comparison import Validation, choose, validate
 from kinetostat.views.report.assembly import report_of
 from kinetostat.views.report.html_page import html_page
@@ -100,11 +100,13 @@ def report_path(path: str | Path) -> Path:
     """Check the path of a report before the work begins.
 
     Raises:
-        InputError: the suffix is neither .html nor .pdf, or the library for PDF is not installed.
+        InputError: the suffix is neither .html nor .pdf, what is there is not replaced, or the library for PDF is not
+            installed.
     """
     place = Path(path)
     if place.suffix not in SUFFIXES:
         raise InputError(f'a report is {" or ".join(SUFFIXES)}, not "{place}"; write e.g. -o report.html.')
+    place_of(place)
     if place.suffix == ".pdf":
         check_typst()
     return place
@@ -135,8 +137,7 @@ def write_report(
     progress(STEPS - 1, STEPS)
     whole = report_of(answers, validation, origin, about, page)
     data = html_page(whole).encode() if page else pdf_bytes(whole)
-    with replacing(path) as temporary:
-        temporary.write_bytes(data)
+    write_bytes(path, data)
     progress(STEPS, STEPS)
 
 

@@ -1,0 +1,185 @@
+"""Files are written whole or not at all: on a full disk, over what is not a plain file, and after kill -9."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from kinetostat.cli import main
+from kinetostat.commands.common import BAD_INPUT, DONE
+from kinetostat.commands.report import WITHOUT
+from kinetostat.exchange.formats import KNOWN, export
+from kinetostat.machine.loading import load
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.storage import PREFIX, scratch, write_text
+from studies import SMALL
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no limits, links and devices of this kind")
+MACHINE = "delta"
+
+
+@contextlib.contextmanager
+def files_of_at_most(size):
+    """Writing behind byte `size` of any file fails, as on a full disk."""
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def tree(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+
+@pytest.mark.parametrize("suffix", [form.suffix for form in KNOWN if form.name != "step"])
+def test_an_export_to_a_full_disk_is_one_sentence_and_leaves_nothing(suffix, tmp_path):
+    with files_of_at_most(500), pytest.raises(InputError, match="cannot be written: it would exceed"):
+        export(load(MACHINE), tmp_path / "new" / f"file{suffix}")
+    assert tree(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["sweep", MACHINE, "--vary", "x=-1 cm:1 cm:5"],
+        ["map", MACHINE, "--over", "x=-1 cm:1 cm:2", "--over", "y=-1 cm:1 cm:2"],
+        ["workspace", MACHINE, "--over", "x=-1 cm:1 cm:3", "--over", "y=-1 cm:1 cm:3"],
+        ["optimize", "STUDY"],
+        ["report", MACHINE, *(word for part in WITHOUT for word in ("--without", part))],
+    ],
+    ids=lambda words: words[0],
+)
+def test_a_command_on_a_full_disk_is_one_sentence(command, tmp_path, capsys):
+    (tmp_path / "study.toml").write_text(SMALL)
+    words = [str(tmp_path / "study.toml") if word == "STUDY" else word for word in command]
+    with files_of_at_most(600):
+        assert main([*words, "-o", str(tmp_path / ("out.html" if command[0] == "report" else "out"))]) == BAD_INPUT
+    captured = capsys.readouterr()
+    assert captured.err.count("cannot be written: it would exceed the largest size") == 1
+    assert not [name for name in tree(tmp_path) if PREFIX in name]
+
+
+def test_a_large_grid_on_a_full_disk_is_one_sentence(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("kinetostat.studies.grid.grid.IN_MEMORY", 2)
+    words = ["map", MACHINE, "--over", "x=-1 cm:1 cm:2", "--over", "y=-1 cm:1 cm:2", "-o", str(tmp_path / "out")]
+    with files_of_at_most(100_000):
+        assert main(words) == BAD_INPUT
+    assert "cannot be written: it would exceed" in capsys.readouterr().err
+    assert main(words) == DONE
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
+@pytest.mark.parametrize("words", [["analyze", "delta"], ["schema", "machine"]])
+def test_a_full_standard_output_is_one_sentence(words):
+    with open("/dev/full", "wb") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "kinetostat", *words], stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert done.returncode == BAD_INPUT
+    assert done.stderr.startswith("kinetostat: standard output cannot be written")
+    assert done.stderr.count("\n") == 1
+
+
+def occupied(folder, kind):
+    """A path at which something stands that is not to be replaced."""
+    path = folder / "file.csv"
+    match kind:
+        case "folder":
+            path.mkdir()
+        case "fifo":
+            os.mkfifo(path)
+        case "link to a device":
+            path.symlink_to("/dev/null")
+        case "link to a folder":
+            path.symlink_to(folder)
+        case "link to itself":
+            path.symlink_to(path)
+        case "read-only":
+            path.write_text("mine")
+            path.chmod(0o444)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("folder", "is a folder"),
+        ("fifo", "another special file"),
+        ("link to a device", "another special file"),
+        ("link to a folder", "is a folder"),
+        ("link to itself", "leads back to itself"),
+        ("read-only", "may only be read"),
+    ],
+)
+def test_only_plain_files_are_replaced(kind, words, tmp_path, capsys):
+    path = occupied(tmp_path, kind)
+    before = path.lstat()
+    assert main(["export", MACHINE, "-o", str(path)]) == BAD_INPUT
+    assert words in capsys.readouterr().err
+    assert (path.lstat().st_ino, path.lstat().st_mode) == (before.st_ino, before.st_mode)
+    assert tree(tmp_path) == ["file.csv"]
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_link_stays_and_its_file_is_replaced(there, tmp_path):
+    link, file = tmp_path / "link.txt", tmp_path / "deep" / "file.txt"
+    link.symlink_to(file)
+    if there:
+        file.parent.mkdir()
+        file.write_text("old")
+        file.chmod(0o600)
+    write_text(link, "new")
+    assert link.is_symlink()
+    assert file.read_text() == "new"
+    assert file.stat().st_mode & 0o777 == (0o600 if there else 0o644)
+    assert tree(tmp_path) == ["deep", "deep/file.txt", "link.txt"]
+
+
+def test_two_files_that_belong_together_are_both_written_or_none(tmp_path):
+    (tmp_path / "machine.yaml").mkdir()
+    with pytest.raises(InputError, match=r"machine\.yaml\" is a folder"):
+        export(load(MACHINE), tmp_path / "machine.urdf")
+    assert tree(tmp_path) == ["machine.yaml"]
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from kinetostat.studies.storage import replacing
+with replacing(Path(sys.argv[1])) as temporary:
+    temporary.write_text("half")
+    if sys.argv[2] == "killed":
+        os.kill(os.getpid(), signal.SIGKILL)
+    print("at work", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_what_kill_9_leaves_is_removed_by_the_next_run_and_a_living_process_is_left_alone(tmp_path):
+    words = [sys.executable, "-c", KILLED, str(tmp_path / "file.txt")]
+    assert subprocess.run([*words, "killed"]).returncode == -signal.SIGKILL
+    (litter,) = tmp_path.iterdir()
+    assert litter.name.startswith(PREFIX)
+    with subprocess.Popen([*words, "alive"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout.readline() == "at work\n"
+        assert not litter.exists()
+        write_text(tmp_path / "file.txt", "mine")
+        assert len(list(tmp_path.glob(f"{PREFIX}*"))) == 1
+        other.communicate()
+    assert (tmp_path / "file.txt").read_text() == "half"
+    assert tree(tmp_path) == ["file.txt"]
+
+
+def test_scratch_folders_of_one_process_do_not_disturb_each_other(tmp_path):
+    with scratch(tmp_path) as first, scratch(tmp_path) as second:
+        write_text(tmp_path / "file", "text")
+        assert first.is_dir()
+        assert second.is_dir()
+    assert tree(tmp_path) == ["file"]
