@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-TUTORIALS = ("paper-machine", "own-machine", "read-a-map", "optimise", "jupyter")
+TUTORIALS = ("paper-machine", "own-machine", "real-hexapod", "read-a-map", "optimise", "jupyter")
 PAGES = {
     "Start": ["start", "install"],
     "Tutorials": [f"tutorials/{name}" for name in TUTORIALS],

@@ -120,7 +120,7 @@ def _parser() -> Parser:
         "family",
         metavar="FAMILY",
         nargs="?",
-        help="a family (see `kinetostat list`), or the word study for a study file",
+        help="a family or a bundled machine (see `kinetostat list`), or the word study for a study file",
     )
     source.add_argument(
         "--from",

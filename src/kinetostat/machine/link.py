@@ -5,14 +5,25 @@ What a cross-section and a material make of a link is `cross_section`'s; where l
 Source: theory (17) and (18); Tables I and II of the paper for lumped joints. Points and axes are in the base frame.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin
-from kinetostat.algebra.vector import IDENTITY, Displacement, Rotation, Vector, rotation_along
+from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin, where
+from kinetostat.algebra.vector import (
+    AXES,
+    IDENTITY,
+    X_AXIS,
+    Y_AXIS,
+    Z_AXIS,
+    ZERO,
+    Displacement,
+    Rotation,
+    Vector,
+    rotation_along,
+)
 from kinetostat.machine.leg import RIGID, Joint, Spring
 
 NEGLIGIBLE = 1e-14
@@ -48,6 +59,20 @@ def link_axes(start: Vector, end: Vector, up: Vector) -> tuple[Rotation, Scalar]
     side = up.cross(along)
     side = side * reciprocal(side.norm())
     return Rotation(along, side, along.cross(side)), length
+
+
+def any_up(along: Vector) -> Vector:
+    """The base axis that is furthest from a direction: z of a cross-section that looks alike from all directions."""
+    sizes = [c * c for c in along.components()]
+    across = [axis for axis, size in zip(AXES, sizes, strict=True) if is_zero(size)]
+    if across:
+        return across[0]
+    best, least = X_AXIS, sizes[0]
+    for axis, size in ((Y_AXIS, sizes[1]), (Z_AXIS, sizes[2])):
+        nearer = size < least
+        chosen = [where(nearer, a, b) for a, b in zip(axis.components(), best.components(), strict=True)]
+        best, least = Vector(*chosen), where(nearer, size, least)
+    return best
 
 
 @dataclass(frozen=True)
@@ -213,6 +238,30 @@ class Parallelogram:
         turn = rotation_along(self.normal, cos(angle), sin(angle))
         far = self.near + turn.apply(self.far - self.near)
         return replace(self, far=far), Displacement(IDENTITY, far - self.far)
+
+
+def seat_springs(name: str, axis: Vector, point: Vector, stiffness: Mapping[str, Scalar]) -> tuple[Spring, ...]:
+    """Springs of a joint's bearings in the joint's own frame, as data sheets give their stiffness.
+
+    Args:
+        name: of the part that the springs stand for.
+        axis: of the joint, of any length, base frame.
+        point: centre of the bearings, base frame, m.
+        stiffness: "radial" in any direction across the axis and "axial" along it, N/m; "tilt" about any axis across it
+            and "torsion" about it, N·m/rad. What is not given is rigid.
+    """
+    axes, _ = link_axes(ZERO, axis, any_up(axis))
+    freedoms = {
+        "radial": (Joint(axes.y), Joint(axes.z)),
+        "axial": (Joint(axes.x),),
+        "tilt": (Joint(axes.y, point), Joint(axes.z, point)),
+        "torsion": (Joint(axes.x, point),),
+    }
+    return tuple(
+        Spring(f"{name} {way}{f' {i}' if len(freedoms[way]) > 1 else ''}", joint, k, part=name)
+        for way, k in stiffness.items()
+        for i, joint in enumerate(freedoms[way], 1)
+    )
 
 
 def matrix_springs(name: str, compliance: npt.ArrayLike, point: Vector) -> tuple[Spring, ...]:

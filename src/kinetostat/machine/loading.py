@@ -183,11 +183,13 @@ def _quantity_lines(fields: type, table: Any) -> Iterator[str]:
 
 
 def template(family: str) -> str:
-    """The text of a commented machine file of a family: a bundled machine to start from.
+    """The text of a commented machine file to start from: a bundled machine by its name, or one of a family.
 
     Raises:
-        InputError: no such family.
+        InputError: no such machine and no such family.
     """
+    if family in bundled() and family not in families():
+        return bundled()[family]
     wanted = family if family == NAME else _family(family, "kinetostat new").name
     simplest = sorted(bundled().items(), key=lambda item: len(item[0]))
     return next(text for _, text in simplest if documents.parse(text, "")["family"] == wanted)

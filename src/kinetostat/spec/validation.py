@@ -6,7 +6,7 @@ The model of a file is made by pydantic from the family's own dataclasses; this 
 import difflib
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Any, Literal, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
@@ -44,24 +44,40 @@ def _table_model(title: str, tables: Mapping[str, type], content: dict[str, Any]
     """Make the model of a table from the tables in it by dotted name; tables in tables become models in models."""
     for i, name in enumerate(dict.fromkeys(path.partition(".")[0] for path in tables)):
         inner = {path.partition(".")[2]: kind for path, kind in tables.items() if path.partition(".")[0] == name}
-        model = inner[""] if "" in inner else _table_model(name, inner, {})
-        may_miss = "" in inner and set(quantities(model)) == optional(model)
+        alone = inner.pop("", None)
+        model = alone if alone and not inner else _table_model(name, inner, _fields(alone) if alone else {})
+        may_miss = model is alone and set(quantities(model)) == optional(model)
         default: Any = {"default_factory": model} if may_miss else {}
         about: Any = Field(alias=name, description=f"the machine's {name}", **default)
         content[f"table_{i}"] = (model, about)
     return create_model(title, __config__=ConfigDict(extra="forbid"), **content)
 
 
+def _fields(table: type) -> dict[str, Any]:
+    """The fields of a table that holds tables as well, for the model of both."""
+    hints = get_type_hints(table, include_extras=True)
+    return {
+        f"field_{name}": (hints[name], Field(alias=name, **({"default": getattr(table, name)} if may_miss else {})))
+        for name, may_miss in ((name, name in optional(table)) for name in quantities(table))
+    }
+
+
 def tables_in(data: BaseModel, tables: Mapping[str, type]) -> dict[str, Any]:
     """Return one instance per table, by dotted name, from a validated document."""
     instances = {}
-    for path in tables:
+    for path, table in tables.items():
         at: Any = data
         for key in path.split("."):
-            names = {field.alias or name: name for name, field in type(at).model_fields.items()}
-            at = getattr(at, names[key])
-        instances[path] = at
+            at = _entries(at)[key]
+        fields = quantities(table)
+        within = {} if isinstance(at, table) else {k: v for k, v in _entries(at).items() if k in fields}
+        instances[path] = table(**within) if within else at
     return instances
+
+
+def _entries(model: BaseModel) -> dict[str, Any]:
+    """What a model holds, under the names that files have for it."""
+    return {field.alias or name: getattr(model, name) for name, field in type(model).model_fields.items()}
 
 
 def validate(document: Document, origin: str, model: type[BaseModel], tables: Mapping[str, type]) -> BaseModel:

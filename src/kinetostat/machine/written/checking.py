@@ -38,10 +38,10 @@ def check_numbers(plan: Plan, tables: Mapping[str, Any], origin: str) -> None:
                 f'"{origin}": cross-section "{name}": inner_diameter is {data.inner_diameter:g} m; it must be at '
                 f"least 0 and less than outer_diameter, {data.outer_diameter:g} m."
             )
-    for leg in plan.legs:
+    for leg in plan.written:
         for i, joint in enumerate(leg.joints):
-            where = f'"{origin}": leg "{leg.name}", joint "{joint.name}"'
-            data = tables[f"legs.{leg.name}.{joint.name}"]
+            where = f'"{origin}": leg "{leg.written or leg.name}", joint "{joint.name}"'
+            data = tables[leg.table(joint.name)]
             _check_axes(data, where)
             if plan.planar:
                 _check_plane(joint, data, where)
@@ -77,8 +77,8 @@ def _check_plane(joint: JointPlan, data: Any, where: str) -> None:
 def _check_link(
     leg: LegPlan, near: JointPlan, far: JointPlan, link: LinkPlan, tables: Mapping[str, Any], shape: str, origin: str
 ) -> None:
-    where = f'"{origin}": leg "{leg.name}", link "{link.name}"'
-    ends = [np.array(tables[f"legs.{leg.name}.{joint.name}"].point) for joint in (near, far)]
+    where = f'"{origin}": leg "{leg.written or leg.name}", link "{link.name}"'
+    ends = [np.array(tables[leg.table(joint.name)].point) for joint in (near, far)]
     span = ends[1] - ends[0]
     if np.linalg.norm(span) < LEAST_AXIS:
         raise InputError(

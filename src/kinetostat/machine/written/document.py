@@ -10,7 +10,10 @@ from typing import Any
 import numpy as np
 
 from kinetostat.machine.cross_section import MATERIALS, SHAPES
-from kinetostat.machine.written.joints import JOINT_TYPES, ONE_FREEDOM
+from kinetostat.machine.series import is_series, parts
+from kinetostat.machine.written.copies import KEYS, copied, copies_in
+from kinetostat.machine.written.directions import directed
+from kinetostat.machine.written.joints import JOINT_TYPES, ONE_FREEDOM, SEAT, needs_axis
 from kinetostat.machine.written.plan import (
     BASE,
     LINK_MODELS,
@@ -51,6 +54,9 @@ def by_name(document: Document, origin: str) -> Document:
             raise InputError(f"{where} is {shorten(leg)}; it must be a table with name, joints and links.")
         if "joints" in leg:
             legs[name] = _merged(leg, where)
+        for key, part in legs[name].items():
+            if isinstance(part, dict) and is_series(part.get("stiffness")):
+                part["stiffness"] = parts(part["stiffness"], f'{where}, joint "{key}": stiffness')
     return result
 
 
@@ -71,7 +77,7 @@ def _merged(leg: dict[str, Any], where: str) -> dict[str, Any]:
 
 
 def _named(entries: list[Any], where: str, what: str) -> dict[str, Any]:
-    parts: dict[str, Any] = {}
+    by_key: dict[str, Any] = {}
     for i, entry in enumerate(entries, 1):
         name = entry.get("name") if isinstance(entry, dict) else None
         if not isinstance(name, str) or not name.strip() or "." in name or len(name) > 40 or not name.isprintable():
@@ -79,10 +85,10 @@ def _named(entries: list[Any], where: str, what: str) -> dict[str, Any]:
                 f"{where}: the name of {what} {i} is {shorten(name)}; give each a short name without dots, "
                 f'e.g. name = "{what} {i}".'
             )
-        if name in parts:
+        if name in by_key:
             raise InputError(f'{where}: two {what}s are called "{name}"; give each a name of its own.')
-        parts[name] = {key: value for key, value in entry.items() if key != "name"}
-    return parts
+        by_key[name] = {key: value for key, value in entry.items() if key != "name"}
+    return by_key
 
 
 def check_paths(document: Document, settings: Iterable[str]) -> None:
@@ -95,7 +101,7 @@ def check_paths(document: Document, settings: Iterable[str]) -> None:
         table, *names = setting.partition("=")[0].strip().split(".")
         at: Any = document.get(table)
         for name in names[:2] if table == "legs" else ():
-            if isinstance(at, dict) and name not in at:
+            if isinstance(at, dict) and name not in at and not (name in KEYS and name == names[1]):
                 choice(name, at, f"--set {shorten(setting)}: the name after {table}")
             at = at.get(name) if isinstance(at, dict) else None
             table = f"{table}.{name}"
@@ -115,7 +121,7 @@ def separate(document: Document, origin: str) -> tuple[Plan, Document]:
     if space not in ("spatial", "planar"):
         raise InputError(f'"{origin}": space is {shorten(space)}; it must be "spatial" or "planar" (the x-y plane).')
     shapes, materials = _cross_sections(rest, origin)
-    legs = tuple(_leg(name, leg, f'"{origin}": leg "{name}"', shapes) for name, leg in rest["legs"].items())
+    legs = _legs(rest["legs"], origin, shapes)
     coordinates = PLANAR_POSE if space == "planar" else SPATIAL_POSE
     pose = rest.get("pose", {})
     for name in pose if isinstance(pose, dict) else ():
@@ -140,6 +146,22 @@ def _cross_sections(rest: Document, origin: str) -> tuple[dict[str, str], dict[s
     return shapes, materials
 
 
+def _legs(written: dict[str, Any], origin: str, shapes: Mapping[str, str]) -> tuple[LegPlan, ...]:
+    """The legs of a machine with all copies."""
+    legs: list[LegPlan] = []
+    for name, leg in written.items():
+        where = f'"{origin}": leg "{name}"'
+        copies = copies_in(leg, where)
+        legs += copied(_leg(name, leg, where, shapes), copies, where)
+    names = [leg.name for leg in legs]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f'"{origin}": a leg and a copy of another are both called "{name}"; rename one of them.')
+    if len(legs) > MOST_LEGS:
+        raise InputError(f'"{origin}": it has {len(legs)} legs with all copies; at most {MOST_LEGS} are allowed.')
+    return tuple(legs)
+
+
 def _leg(name: str, leg: dict[str, Any], where: str, shapes: Mapping[str, str]) -> LegPlan:
     joints = {key: part for key, part in leg.items() if isinstance(part, dict) and "model" not in part}
     links = {key: part for key, part in leg.items() if isinstance(part, dict) and "model" in part}
@@ -147,13 +169,14 @@ def _leg(name: str, leg: dict[str, Any], where: str, shapes: Mapping[str, str]) 
         raise InputError(f"{where}: {key} is {shorten(leg[key])}; a leg holds joints and links, each a table.")
     if not 1 <= len(joints) <= MOST_JOINTS:
         raise InputError(f"{where} has {len(joints)} joints; it needs 1 to {MOST_JOINTS}, from base to platform.")
+    directed(joints, where)
     plans = tuple(_joint(key, part, f'{where}, joint "{key}"') for key, part in joints.items())
     _check_chain(plans, where)
     bodies = {plan.joins[1] for plan in plans[:-1]}
     for key in links:
         choice(key, bodies, f"{where}: links name")
-    parts = {key: _link(key, leg.pop(key), f'{where}, link "{key}"', shapes) for key in links}
-    return LegPlan(name, plans, parts)
+    flexible = {key: _link(key, leg.pop(key), f'{where}, link "{key}"', shapes) for key in links}
+    return LegPlan(name, plans, flexible)
 
 
 def _joint(name: str, part: dict[str, Any], where: str) -> JointPlan:
@@ -174,7 +197,27 @@ def _joint(name: str, part: dict[str, Any], where: str) -> JointPlan:
         raise InputError(
             f'{where} is actuated but has no stiffness; add stiffness = "{example}", or "rigid" if its servo is ideal.'
         )
-    return JointPlan(name, kind, (joins[0], joins[1]), actuated, sprung, _matrix(part.pop("compliance", []), where))
+    series = tuple(part["stiffness"]) if isinstance(part.get("stiffness"), dict) else ()
+    compliance = _matrix(part.pop("compliance", []), where)
+    seat = _seat(kind, part, bool(compliance), where)
+    return JointPlan(name, kind, (joins[0], joins[1]), actuated, sprung, compliance, series, seat)
+
+
+def _seat(kind: str, part: dict[str, Any], has_matrix: bool, where: str) -> tuple[str, ...]:
+    """Directions in which the bearings of a joint have a stiffness."""
+    seat = tuple(way for way in SEAT if f"stiffness_{way}" in part)
+    allowed = JOINT_TYPES[kind].seat
+    for way in seat:
+        if way not in allowed:
+            fields = ", ".join(f"stiffness_{each}" for each in allowed) or "none of these fields"
+            raise InputError(f"{where}: a {kind} joint has no stiffness_{way}, as it moves so; it may have {fields}.")
+    if seat and has_matrix:
+        raise InputError(f"{where}: compliance and stiffness_{seat[0]} are both of its bearings; leave one out.")
+    if seat and needs_axis(kind) and "axis" not in part:
+        raise InputError(
+            f"{where}: stiffness_{seat[0]} counts from an axis; add the axis of its bearing, e.g. axis = [0, 0, 1]."
+        )
+    return seat
 
 
 def _check_chain(joints: tuple[JointPlan, ...], where: str) -> None:

@@ -7,13 +7,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any
 
-from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
-from kinetostat.algebra.vector import AXES, IDENTITY, X_AXIS, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector
+from kinetostat.algebra.scalar import Scalar, sqrt, total
+from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.cross_section import linear_density_of, rigidity_of
 from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Turn
-from kinetostat.machine.link import Beam, lumped_springs, matrix_springs
+from kinetostat.machine.link import Beam, any_up, lumped_springs, matrix_springs, seat_springs
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
-from kinetostat.machine.written.joints import JOINT_TYPES
+from kinetostat.machine.series import springs_in_a_row
+from kinetostat.machine.written.copies import direction_in, joint_numbers, matrix_in
+from kinetostat.machine.written.joints import JOINT_TYPES, own_axis
 from kinetostat.machine.written.plan import NAME, SUMMARY, JointPlan, LegPlan, LinkPlan, Plan, literals
 from kinetostat.machine.written.tables import tables_of
 
@@ -74,48 +76,57 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
 
 def chain_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[Step]:
     """The elements of a leg at the home pose, from base to platform."""
-    data = [tables[f"legs.{leg.name}.{joint.name}"] for joint in leg.joints]
+    data = [joint_numbers(leg, joint, tables) for joint in leg.joints]
     steps: list[Step] = []
     for i, joint in enumerate(leg.joints):
-        title = PartName(leg.name, joint.name)
-        bearing = (
-            matrix_springs(
-                PartName(leg.name, f"{joint.name} bearing compliance"), joint.compliance, Vector(*data[i].point)
-            )
-            if joint.compliance
-            else ()
-        )
-        steps += [Step(spring, False) for spring in bearing]
-        steps += [Step(element, True) for element in _elements(title, joint, data[i])]
+        seat = [Step(spring, False) for spring in _seat(leg, joint, data[i])]
+        moving = _moving(leg, joint, data[i], tables)
+        steps += [*moving, *seat] if JOINT_TYPES[joint.kind].seat_travels else [*seat, *moving]
         link = leg.links.get(joint.joins[1])
         if link is not None:
             ends = Vector(*data[i].point), Vector(*data[i + 1].point)
-            steps += [
-                Step(element, False)
-                for element in _link_elements(PartName(leg.name, link.name), link, ends, plan, tables)
-            ]
+            steps += [Step(element, False) for element in _link_elements(leg, link, ends, plan, tables)]
     return steps
 
 
-def _elements(title: str, joint: JointPlan, data: Any) -> Sequence[Element]:
-    """The movable elements of a joint, in order."""
+def _seat(leg: LegPlan, joint: JointPlan, data: Any) -> Sequence[Spring]:
+    """The springs of a joint's bearings: of a matrix, or of its stiffness in its own axes."""
+    name, point = PartName(leg.name, f"{joint.name} bearing compliance"), Vector(*data.point)
+    if joint.compliance:
+        return matrix_springs(name, matrix_in(leg, joint.compliance), point)
+    if joint.seat:
+        stiffness = {way: getattr(data, f"stiffness_{way}") for way in joint.seat}
+        return seat_springs(name, own_axis(data), point, stiffness)
+    return ()
+
+
+def _moving(leg: LegPlan, joint: JointPlan, data: Any, tables: Mapping[str, Any]) -> list[Step]:
+    """The movable elements of a joint, in order; of springs in a row the first one moves."""
+    title = PartName(leg.name, joint.name)
     elements = JOINT_TYPES[joint.kind].elements(title, data)
     if not joint.sprung:
-        return elements
+        return [Step(element, True) for element in elements]
     (freedom,) = (element for element in elements if isinstance(element, Joint))
     name = f"{title} actuator" if joint.actuated else f"{title} hinge"
-    return (Spring(name, freedom, data.stiffness, title, joint.actuated, not joint.actuated),)
+    stiffness = 0.0 if joint.series else data.stiffness
+    spring = Spring(name, freedom, stiffness, title, joint.actuated, not joint.actuated)
+    if not joint.series:
+        return [Step(spring, True)]
+    row = tables[f"{leg.table(joint.name)}.stiffness"]
+    row = springs_in_a_row(spring, [(key, getattr(row, key)) for key in joint.series], joint.name)
+    return [Step(part, i == 0) for i, part in enumerate(row)]
 
 
 def _link_elements(
-    title: str, link: LinkPlan, ends: tuple[Vector, Vector], plan: Plan, tables: Mapping[str, Any]
+    leg: LegPlan, link: LinkPlan, ends: tuple[Vector, Vector], plan: Plan, tables: Mapping[str, Any]
 ) -> Sequence[Element]:
     """Return the elements that stand for a flexible link."""
+    title = PartName(leg.name, link.name)
     if link.model == "rigid":
         return ()
     if link.model == "matrix":
-        return matrix_springs(title, link.compliance, ends[1])
-    up = Vector(*link.up) if link.up else _any_up(ends)
+        return matrix_springs(title, matrix_in(leg, link.compliance), ends[1])
+    up = direction_in(leg, link.up) if link.up else any_up(ends[1] - ends[0])
     shape, data = plan.shapes[link.cross_section], tables[f"sections.{link.cross_section}"]
     rigidity = rigidity_of(shape, data, link.model == "timoshenko")
     if link.model == "lumped":
@@ -127,7 +138,7 @@ def members(plan: Plan, **tables: Any) -> list[Member]:
     """The links between two joints that can move: those after the first joint of their leg that is not fixed."""
     links = []
     for leg in plan.legs:
-        points = [Vector(*tables[f"legs.{leg.name}.{joint.name}"].point) for joint in leg.joints]
+        points = [Vector(*joint_numbers(leg, joint, tables).point) for joint in leg.joints]
         moves = False
         for joint, start, end in zip(leg.joints, points, points[1:], strict=False):
             moves = moves or joint.kind != "fixed"
@@ -139,25 +150,9 @@ def members(plan: Plan, **tables: Any) -> list[Member]:
     return links
 
 
-def _any_up(ends: tuple[Vector, Vector]) -> Vector:
-    """The base axis that is furthest from a link's direction: for cross-sections that look alike from all sides."""
-    sizes = [c * c for c in (ends[1] - ends[0]).components()]
-    across = [axis for axis, size in zip(AXES, sizes, strict=True) if is_zero(size)]
-    if across:
-        return across[0]
-    best, least = X_AXIS, sizes[0]
-    for axis, size in ((Y_AXIS, sizes[1]), (Z_AXIS, sizes[2])):
-        nearer = size < least
-        chosen = [where(nearer, a, b) for a, b in zip(axis.components(), best.components(), strict=True)]
-        best, least = Vector(*chosen), where(nearer, size, least)
-    return best
-
-
 def _length(plan: Plan, tables: Mapping[str, Any]) -> Scalar:
     """Root mean square distance of the joints from P at the home pose, m."""
     centre = Vector(*tables["platform"].point)
-    arms = [
-        Vector(*tables[f"legs.{leg.name}.{joint.name}"].point) - centre for leg in plan.legs for joint in leg.joints
-    ]
+    arms = [Vector(*joint_numbers(leg, joint, tables).point) - centre for leg in plan.legs for joint in leg.joints]
     squares = total([arm.dot(arm) for arm in arms])
     return sqrt(squares * (1.0 / len(arms)))

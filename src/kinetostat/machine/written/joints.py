@@ -30,6 +30,9 @@ class JointType:
         elements: from the name of a joint and its numbers to what the chain of a leg has for it, base to platform.
         stiffness: kind of quantity of its stiffness, for a type of one freedom, which may have an actuator or a spring
             of its own; None for all others.
+        seat: directions in which its bearings may have a stiffness: those of `SEAT` in which it does not move.
+        seat_travels: whether its bearings go with the body that it moves, as those of a carriage do; those of other
+            joints stay on the base side.
         in_plane: where its axis must point in a planar machine, "normal" to the plane or "along" it, "always" if it has
             none; empty if a planar machine cannot have it.
     """
@@ -39,6 +42,31 @@ class JointType:
     elements: Callable[[str, Any], Sequence[Element]]
     stiffness: str | None = None
     in_plane: str = ""
+    seat: tuple[str, ...] = ()
+    seat_travels: bool = False
+
+
+SEAT = {
+    "radial": Field(
+        Quantity("linear stiffness", "of the bearings in any direction across the joint's axis", positive=True)
+    ),
+    "axial": Field(Quantity("linear stiffness", "of the bearings along the joint's axis", positive=True)),
+    "tilt": Field(Quantity("torsional stiffness", "of the bearings about any axis across the joint's", positive=True)),
+    "torsion": Field(Quantity("torsional stiffness", "of the bearings about the joint's axis", positive=True)),
+}
+"""Directions in which data sheets give the stiffness of a joint: what is written as stiffness_radial and so on."""
+
+
+def needs_axis(kind: str) -> bool:
+    """Whether a type of joint has no axis unless its bearings have a stiffness."""
+    return not {"axis", "first_axis"} & JOINT_TYPES[kind].fields.keys()
+
+
+def own_axis(data: Any) -> Vector:
+    """The axis from which the stiffness of a joint's bearings counts; of a universal joint, the normal of both axes."""
+    if hasattr(data, "axis"):
+        return Vector(*data.axis)
+    return unit(data.first_axis).cross(unit(data.second_axis))
 
 
 def unit(axis: Sequence[Scalar]) -> Vector:
@@ -87,6 +115,7 @@ JOINT_TYPES = {
         {"point": POINT, "axis": AXIS},
         _revolute,
         stiffness="torsional stiffness",
+        seat=("radial", "axial", "tilt"),
         in_plane="normal",
     ),
     "prismatic": JointType(
@@ -94,22 +123,31 @@ JOINT_TYPES = {
         {"point": POINT, "axis": AXIS},
         _prismatic,
         stiffness="linear stiffness",
+        seat=("radial", "tilt", "torsion"),
+        seat_travels=True,
         in_plane="along",
     ),
     "cylindrical": JointType(
-        "turns about and slides along `axis` through `point`", {"point": POINT, "axis": AXIS}, _cylindrical
+        "turns about and slides along `axis` through `point`",
+        {"point": POINT, "axis": AXIS},
+        _cylindrical,
+        seat=("radial", "tilt"),
+        seat_travels=True,
     ),
     "universal": JointType(
         "turns about `first_axis`, then about `second_axis`, both through `point` (Hooke joint)",
         {"point": POINT, "first_axis": AXIS, "second_axis": AXIS},
         _universal,
+        seat=("radial", "axial", "torsion"),
     ),
-    "spherical": JointType("turns about `point`", {"point": POINT}, _spherical),
+    "spherical": JointType("turns about `point`", {"point": POINT}, _spherical, seat=("radial", "axial")),
     "helical": JointType(
         "turns about `axis` through `point` and advances by `pitch` per radian",
         {"point": POINT, "axis": AXIS, "pitch": Field(Quantity("length", "advance per radian"))},
         _helical,
         stiffness="torsional stiffness",
+        seat=("radial", "axial", "tilt"),
+        seat_travels=True,
     ),
     "parallelogram": JointType(
         "two bars from the short side at `point` to the one at `far`, short sides along `axis`",
@@ -124,7 +162,13 @@ JOINT_TYPES = {
         },
         _parallelogram,
     ),
-    "fixed": JointType("joins two bodies at `point` and does not move", {"point": POINT}, _fixed, in_plane="always"),
+    "fixed": JointType(
+        "joins two bodies at `point` and does not move",
+        {"point": POINT},
+        _fixed,
+        in_plane="always",
+        seat=tuple(SEAT),
+    ),
 }
 """Types of joints by the name that machine files give them."""
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from kinetostat.machine.machine import Inverse
 
@@ -39,6 +40,8 @@ class JointPlan:
         joins: names of the bodies on its base side and on its platform side.
         actuated: whether a servo holds it.
         sprung: whether it has a stiffness, as an actuator or a flexure hinge.
+        series: keys of the parts that this stiffness is made of, in a row; empty if it is one number.
+        seat: directions in which its bearings have a stiffness: some of `joints.SEAT`.
         compliance: of its own, rows rx ry rz x y z at its point, base axes at the home pose, SI; empty if it is stiff.
     """
 
@@ -48,6 +51,8 @@ class JointPlan:
     actuated: bool
     sprung: bool
     compliance: Matrix
+    series: tuple[str, ...] = ()
+    seat: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -70,6 +75,21 @@ class LinkPlan:
 
 
 @dataclass(frozen=True)
+class Copies:
+    """What a file says about the copies of a leg.
+
+    Attributes:
+        count: how many legs there are.
+        angles: by which they are turned about the z axis of the base, as written; empty for equal steps.
+        mirrored: whether every other one is the mirror image of the one before.
+    """
+
+    count: int
+    angles: tuple[object, ...]
+    mirrored: bool
+
+
+@dataclass(frozen=True)
 class LegPlan:
     """A leg: its joints from base to platform, and those of its links that are flexible, by name.
 
@@ -78,6 +98,9 @@ class LegPlan:
         joints, links: of it.
         idle: see `leg.Leg`.
         inverse: closed form of its joint coordinates, if it has one.
+        written: name of the leg of the file that it is a copy of; empty if it is not a copy.
+        copies: what the file says about that leg's copies.
+        placing: how the copy lies (`copies.Placing`).
     """
 
     name: str
@@ -85,6 +108,13 @@ class LegPlan:
     links: Mapping[str, LinkPlan]
     idle: tuple[int, ...] = ()
     inverse: Inverse | None = None
+    written: str = ""
+    copies: Copies | None = None
+    placing: Any = None
+
+    def table(self, part: str) -> str:
+        """Name of the table with the numbers of one of its joints or links."""
+        return f"legs.{self.written or self.name}.{part}"
 
 
 @dataclass(frozen=True)
@@ -105,6 +135,11 @@ class Plan:
     pose: tuple[str, ...]
     planar: bool
 
+    @property
+    def written(self) -> tuple[LegPlan, ...]:
+        """The legs of the file: of copies, the first."""
+        return tuple({leg.written or leg.name: leg for leg in reversed(self.legs)}.values())[::-1]
+
     def __hash__(self) -> int:
         return hash((tuple(leg.name for leg in self.legs), self.pose, self.planar))
 
@@ -115,11 +150,14 @@ def literals(plan: Plan) -> dict[str, dict[str, object]]:
     for name, shape in plan.shapes.items():
         material = plan.materials[name]
         tables[f"sections.{name}"] = {"shape": shape, **({"material": material} if material else {})}
-    for leg in plan.legs:
+    for leg in plan.written:
+        if leg.copies is not None:
+            angles = {"angles": list(leg.copies.angles)} if leg.copies.angles else {}
+            tables[f"legs.{leg.written}"] = {"copies": leg.copies.count, **angles, "mirrored": leg.copies.mirrored}
         for joint in leg.joints:
-            tables[f"legs.{leg.name}.{joint.name}"] = _joint_literals(joint)
+            tables[leg.table(joint.name)] = _joint_literals(joint)
         for link in leg.links.values():
-            tables[f"legs.{leg.name}.{link.name}"] = _link_literals(link)
+            tables[leg.table(link.name)] = _link_literals(link)
     return tables
 
 

@@ -3,7 +3,8 @@
 from typing import Any
 
 from kinetostat.machine.cross_section import MATERIALS, SHAPE_KINDS, SHAPES
-from kinetostat.machine.written.joints import JOINT_TYPES
+from kinetostat.machine.series import label
+from kinetostat.machine.written.joints import AXIS, JOINT_TYPES, SEAT, needs_axis
 from kinetostat.machine.written.plan import LINK_MODELS, NAME, SPATIAL_POSE, SUMMARY, JointPlan, Plan
 from kinetostat.spec.fields import Field, Quantity, made_table
 from kinetostat.units import KINDS
@@ -17,20 +18,30 @@ def tables_of(plan: Plan) -> dict[str, type]:
     tables = {"platform": made_table("Platform", {"point": Field(point)})}
     for name, shape in plan.shapes.items():
         tables[f"sections.{name}"] = made_table("CrossSection", _shape_fields(shape, plan.materials[name]))
-    for leg in plan.legs:
+    for leg in plan.written:
         for joint in leg.joints:
-            tables[f"legs.{leg.name}.{joint.name}"] = made_table("JointTable", _joint_fields(joint))
+            tables[leg.table(joint.name)] = made_table("JointTable", _joint_fields(joint))
+            if joint.series:
+                tables[f"{leg.table(joint.name)}.stiffness"] = made_table("Series", _series_fields(joint))
     pose = {name: Field(Quantity(POSE_KINDS[name], f"{name} of the platform")) for name in plan.pose}
     return {**tables, "pose": made_table("Pose", pose)}
 
 
 def _joint_fields(joint: JointPlan) -> dict[str, Field]:
     fields = dict(JOINT_TYPES[joint.kind].fields)
-    if joint.sprung:
+    if joint.seat:
+        fields |= {"axis": AXIS} if needs_axis(joint.kind) else {}
+        fields |= {f"stiffness_{way}": SEAT[way] for way in joint.seat}
+    if joint.sprung and not joint.series:
         kind = JOINT_TYPES[joint.kind].stiffness or "torsional stiffness"
         what = "its actuator, held by its servo" if joint.actuated else "the joint's own, as of a flexure hinge"
         fields["stiffness"] = Field(Quantity(kind, what))
     return fields
+
+
+def _series_fields(joint: JointPlan) -> dict[str, Field]:
+    kind = JOINT_TYPES[joint.kind].stiffness or "torsional stiffness"
+    return {key: Field(Quantity(kind, f"{label(key)}, in a row with the others")) for key in joint.series}
 
 
 def _shape_fields(shape: str, material: str) -> dict[str, Field]:
@@ -94,7 +105,11 @@ def _leg() -> dict[str, Any]:
         "type": {"enum": list(JOINT_TYPES), "description": about},
         "joins": {**BODIES, "description": "bodies on the base side and on the platform side"},
         "actuated": {"type": "boolean"},
-        "stiffness": {**QUANTITY, "description": 'of its actuator or flexure; "rigid" is exact'},
+        "stiffness": {
+            "type": ["number", "string", "array", "object"],
+            "description": 'of its actuator or flexure; "rigid" is exact; parts in a row: ["screw 200 N/um", ...]',
+        },
+        **{f"stiffness_{way}": {**QUANTITY, "description": field.quantity.meaning} for way, field in SEAT.items()},
         "compliance": COMPLIANCE,
     }
     models = "; ".join(f"{model}: {meaning}" for model, meaning in LINK_MODELS.items())
@@ -106,7 +121,12 @@ def _leg() -> dict[str, Any]:
     }
     joints = {"type": "array", "minItems": 1, "items": _table({**joint, **fields}, ["name", "type", "joins"])}
     links = {"type": "object", "additionalProperties": _table(link, ["model"])}
-    return _table({"name": {"type": "string"}, "joints": joints, "links": links}, ["name", "joints"])
+    copies = {
+        "copies": {"type": "integer", "minimum": 1, "description": "how many legs, turned about z of the base"},
+        "angles": {"type": "array", "items": QUANTITY, "description": "of the copies; left out: equal steps"},
+        "mirrored": {"type": "boolean", "description": "every other copy is a mirror image in the x-z plane"},
+    }
+    return _table({"name": {"type": "string"}, **copies, "joints": joints, "links": links}, ["name", "joints"])
 
 
 def _field(field: Field) -> dict[str, Any]:

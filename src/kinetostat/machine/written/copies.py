@@ -1,0 +1,143 @@
+"""Copies of a leg that is written once: turned about the z axis of the base, and mirrored in its x-z plane.
+
+Numbers belong to the leg that is written, so that a change of one changes it in every copy. Points, axes and 6x6
+matrices are in the base frame at the home pose.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from kinetostat.algebra.vector import Vector
+from kinetostat.machine.written.plan import Copies, JointPlan, LegPlan, Matrix
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.units import UnitError, parse
+
+KEYS = ("copies", "angles", "mirrored")
+"""What a leg may say about its copies."""
+SNAP = 1e-15
+"""Distance from 0, 1/2 or 1 at which a cosine or sine is meant to be that number: multiples of 30 deg are exact."""
+
+
+@dataclass(frozen=True)
+class Placing:
+    """How a copy lies: mirrored in the x-z plane of the base if it is, then turned about its z axis.
+
+    Attributes:
+        cosine, sine: of the angle of the turn.
+        mirrored: whether it is a mirror image.
+    """
+
+    cosine: float
+    sine: float
+    mirrored: bool
+
+    def vector(self, vector: Vector) -> Vector:
+        """A point or direction of the written leg in the copy."""
+        y = -1.0 * vector.y if self.mirrored else vector.y
+        return Vector(vector.x * self.cosine - y * self.sine, vector.x * self.sine + y * self.cosine, vector.z)
+
+    def matrix(self, matrix: Matrix) -> Matrix:
+        """A compliance of the written leg in the copy: rows rx ry rz x y z. A mirror turns rotations the other way."""
+        if not matrix:
+            return matrix
+        columns = [self.vector(Vector(*axis)).components() for axis in np.eye(3).tolist()]
+        turn = np.array(columns, dtype=float).T
+        both = np.kron(np.diag([-1.0 if self.mirrored else 1.0, 1.0]), turn)
+        return tuple(tuple(row) for row in (both @ np.array(matrix) @ both.T).tolist())
+
+
+def placings(copies: Copies, where: str) -> list[Placing]:
+    """How each of the copies lies, the first one first; mirror images follow the copies that they mirror.
+
+    Raises:
+        InputError: an angle that is not one; names the leg.
+    """
+    turns = copies.count // 2 if copies.mirrored else copies.count
+    angles = [_angle(angle, where) for angle in copies.angles] or [2.0 * math.pi * i / turns for i in range(turns)]
+    images = (False, True) if copies.mirrored else (False,)
+    return [Placing(_exact(math.cos(a)), _exact(math.sin(a)), image) for a in angles for image in images]
+
+
+def _angle(angle: object, where: str) -> float:
+    try:
+        return parse(angle, "angle")
+    except UnitError as error:
+        raise InputError(f"{where}: an entry of angles is {shorten(angle)}: {error}.") from None
+
+
+def _exact(number: float) -> float:
+    near = round(2.0 * number) / 2.0
+    return near + 0.0 if abs(number - near) < SNAP else number
+
+
+def copies_in(leg: dict[str, Any], where: str) -> Copies | None:
+    """What a leg says about its copies, taken out of it; None if it says nothing.
+
+    Raises:
+        InputError: no number of copies, or one that does not go with the angles; names the leg.
+    """
+    count, angles, mirrored = leg.pop("copies", None), leg.pop("angles", []), leg.pop("mirrored", False)
+    if count is None and angles == [] and mirrored is False:
+        return None
+    if not isinstance(mirrored, bool):
+        raise InputError(f"{where}: mirrored is {shorten(mirrored)}; it must be true or false.")
+    if not isinstance(angles, list):
+        raise InputError(f'{where}: angles is {shorten(angles)}; give a list, e.g. ["0 deg", "120 deg", "240 deg"].')
+    each = 2 if mirrored else 1
+    count = count if count is not None else each * max(1, len(angles))
+    if isinstance(count, bool) or not isinstance(count, int) or count < 1 or count % each:
+        even = ", and even, as mirrored legs come in pairs" if mirrored else ""
+        raise InputError(f"{where}: copies is {shorten(count)}; it must be the number of legs, at least {each}{even}.")
+    if angles and len(angles) * each != count:
+        raise InputError(
+            f"{where}: angles has {len(angles)} entries for {count} copies; give {count // each}, or leave it out "
+            "for equal steps around the z axis."
+        )
+    return Copies(count, tuple(angles), mirrored)
+
+
+def copied(leg: LegPlan, copies: Copies | None, where: str) -> tuple[LegPlan, ...]:
+    """The legs that a written leg stands for: itself, or its copies, numbered from 1.
+
+    Raises:
+        InputError: as `placings` does.
+    """
+    if copies is None:
+        return (leg,)
+    return tuple(
+        replace(
+            leg,
+            name=f"{leg.name} {i}",
+            written=leg.name,
+            copies=copies,
+            placing=placing,
+        )
+        for i, placing in enumerate(placings(copies, where), 1)
+    )
+
+
+def joint_numbers(leg: LegPlan, joint: JointPlan, tables: Mapping[str, Any]) -> Any:
+    """The numbers of a joint, with points and axes where they are in this leg."""
+    data = tables[leg.table(joint.name)]
+    if leg.placing is None:
+        return data
+    return SimpleNamespace(**{name: _placed(value, leg.placing) for name, value in vars(data).items()})
+
+
+def matrix_in(leg: LegPlan, matrix: Matrix) -> Matrix:
+    """A compliance that is written for a leg, where it is in this leg."""
+    return matrix if leg.placing is None else leg.placing.matrix(matrix)
+
+
+def direction_in(leg: LegPlan, direction: Sequence[float]) -> Vector:
+    """A direction that is written for a leg, where it points in this leg."""
+    return Vector(*direction) if leg.placing is None else leg.placing.vector(Vector(*direction))
+
+
+def _placed(value: Any, placing: Placing) -> Any:
+    return placing.vector(Vector(*value)).components() if isinstance(value, tuple) else value
