@@ -16,10 +16,12 @@ MARKERS = {
     "notebooks": ("test_notebooks",),
     "browser": ("test_studio_browser", "test_studio_reach", "test_report_browser"),
     "workers": ("test_workers", "test_large_sweeps", "test_studio_runs", "test_studio_search"),
+    "studio": ("test_studio_design", "test_studio_page"),
+    "engines": ("test_validation", "test_mujoco"),
     "packaging": ("test_packaging",),
     "step": ("test_step_file", "test_step_outlines", "test_step_solids"),
 }
-"""Files of tests that plain `pytest` leaves out, because they take long; CI runs them with `-m`."""
+"""Files of tests that plain `pytest` leaves out, because they take long; CI runs them with `-m slow`, or one kind by its name."""
 
 os.environ.pop("UV_RUN_RECURSION_DEPTH", None)
 os.environ["PATH"] = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", os.defpath)])
@@ -55,3 +57,4 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.path.stem in by_file:
             item.add_marker(by_file[item.path.stem])
+            item.add_marker("slow")
