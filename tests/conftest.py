@@ -21,7 +21,7 @@ MARKERS = {
     "packaging": ("test_packaging",),
     "step": ("test_step_file", "test_step_outlines", "test_step_solids"),
 }
-"""Files of tests that plain `pytest` leaves out, because they take long; CI runs them with `-m slow`, or one kind by its name."""
+"""Files of tests that plain `pytest` leaves out, because they take long; CI runs them with `-m slow`."""
 
 os.environ.pop("UV_RUN_RECURSION_DEPTH", None)
 os.environ["PATH"] = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", os.defpath)])
