@@ -29,6 +29,7 @@ _HOMES = {
     "machine_picture": "kinetostat.views.picture",
     "plot": "kinetostat.views.answers",
     "save": "kinetostat.views.answers",
+    "register": "kinetostat.machine.catalogue",
     "report": "kinetostat.views.report.writing",
     "export": "kinetostat.exchange.formats",
     "Machine": "kinetostat.machine.machine",
@@ -49,8 +50,8 @@ _SHOWN = {
 
 __all__ = [
     "InputError", "Machine", "Status", "analyze", "build", "bundled", "changed", "compare", "evaluate", "evaluate_grid",
-    "export", "guidelines", "load", "load_problem", "machine_picture", "optimize", "plot", "report", "reproduce",
-    "save", "sensitivity", "validate", "workspace",
+    "export", "guidelines", "load", "load_problem", "machine_picture", "optimize", "plot", "register", "report",
+    "reproduce", "save", "sensitivity", "validate", "workspace",
 ]  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from typing import Any
 
 from kinetostat.exchange.formats import export as export
 from kinetostat.kinematics.status import Status as Status
+from kinetostat.machine.catalogue import register as register
 from kinetostat.machine.changing import changed as changed
 from kinetostat.machine.loading import build as build
 from kinetostat.machine.loading import bundled as bundled

@@ -16,6 +16,8 @@ CALLED_FROM_OUTSIDE = {
     "error": "called by argparse, by this name",
     "doctype": "called by the parser of XML, by this name",
     "page_pictures": "the pages of a PDF, for the pictures of the documentation",
+    "shares_of": "shares by name, for programs",
+    "to_pandas": "tables of pandas, for programs",
     "engines": "what is installed, for tests and benchmarks",
     "_repr_png_": "called by notebooks, by this name",
 }

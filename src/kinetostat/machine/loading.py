@@ -14,7 +14,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from kinetostat.algebra.scalar import Scalar
-from kinetostat.machine.catalogue import families
+from kinetostat.machine.catalogue import families, register_installed
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.limits import Parts, check_limits
 from kinetostat.machine.machine import Family, Machine
@@ -133,6 +133,8 @@ def _counts(family: Family) -> dict[str, int]:
 
 
 def _family(name: object, origin: str) -> Family:
+    if isinstance(name, str) and name not in families():
+        register_installed()
     known_families = families()
     if isinstance(name, str) and name in known_families:
         return known_families[name]
@@ -192,7 +194,10 @@ def template(family: str) -> str:
         return bundled()[family]
     wanted = family if family == NAME else _family(family, "kinetostat new").name
     simplest = sorted(bundled().items(), key=lambda item: len(item[0]))
-    return next(text for _, text in simplest if documents.parse(text, "")["family"] == wanted)
+    texts = [text for _, text in simplest if documents.parse(text, "")["family"] == wanted]
+    if not texts:
+        raise InputError(f'kinetostat has no file of family "{wanted}"; its own package may bring one.')
+    return texts[0]
 
 
 def machine_schema() -> dict[str, Any]:

@@ -16,6 +16,7 @@ from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.leg import Joint, Leg, Spring, Turn
 from kinetostat.machine.limits import Limits
 from kinetostat.machine.links import LinkKind, density_table
+from kinetostat.machine.parameters import Given, read_numbers, with_values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, table
 from kinetostat.spec.renamed import renamed_property
@@ -251,6 +252,19 @@ class Machine:
         """The machine at its pose; `joints` are its coordinates where the family must be solved for them."""
         placed = {"joints": joints} if self.family.chains else {}
         return self.family.configure(**self.family_tables, **placed)
+
+    def with_values(self, values: Mapping[str, Given] | None = None, **fields: Given) -> "Machine":
+        """The machine with other numbers, each checked by itself: machine.with_values(x="5 mm", base_radius=0.26).
+
+        Args:
+            values: by name of the field: SI, text with a unit, or for a field with several entries an array or list of
+                one for each.
+            fields: the same as keywords; dots in names are written as underscores.
+
+        Raises:
+            InputError: an unknown field, a value of another kind or out of bounds, or an array of the wrong length.
+        """
+        return with_values(self, read_numbers(self.family, {**(values or {}), **fields}))
 
     def chains(self) -> Chains:
         """Its legs at the home pose, where the family has no closed form."""

@@ -5,22 +5,51 @@ Numbers that are hardly what was meant are pointed out here too (`doubts`); what
 
 import difflib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.machine.column import column
-from kinetostat.machine.machine import Family, Machine
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, leaves, quantities
-from kinetostat.units import KINDS
+from kinetostat.units import KINDS, UnitError, parse
 
 FULL_TURN = 2.0 * math.pi
 BEYOND = 100.0
 """How many times the longest of all other lengths a length may be."""
 SOFTEST = 100.0
 """N/m: a part that gives 10 mm under 1 N can be neither a drive nor a link of a machine."""
+
+
+class HasFields(Protocol):
+    """What a family is here: tables of fields under a name."""
+
+    @property
+    def name(self) -> str:
+        """As written in machine files."""
+
+    @property
+    def every_table(self) -> dict[str, type]:
+        """Classes of its tables by name."""
+
+
+class HasNumbers(Protocol):
+    """What a machine is here: a family with numbers in its tables. `machine.machine` imports this module."""
+
+    @property
+    def family(self) -> Any:
+        """Its kind."""
+
+    @property
+    def tables(self) -> Mapping[str, Any]:
+        """One instance for each table of the family."""
+
+    def configure(self) -> Any:
+        """The machine at its pose."""
+
+
+AnyMachine = TypeVar("AnyMachine", bound=HasNumbers)
 
 
 @dataclass(frozen=True)
@@ -61,7 +90,7 @@ def shown(path: str) -> str:
     return path.removeprefix(POSE)
 
 
-def parameters(family: Family) -> Iterator[Parameter]:
+def parameters(family: HasFields) -> Iterator[Parameter]:
     """All parameters of a family: every field, and every entry of fields that hold several."""
     for table, fields in family.every_table.items():
         for name, quantity in quantities(fields).items():
@@ -71,7 +100,7 @@ def parameters(family: Family) -> Iterator[Parameter]:
                 yield from (Parameter(path, quantity, (path,)) for path in paths)
 
 
-def find(family: Family, text: str) -> Parameter:
+def find(family: HasFields, text: str) -> Parameter:
     """The parameter people mean: its path, its name in tables or datasets, or the end of its path if no other ends so.
 
     Args:
@@ -84,12 +113,12 @@ def find(family: Family, text: str) -> Parameter:
     matches = _find(family, text)
     if matches.quantity.apart and len(matches.leaves) > 1:
         raise InputError(
-            f"{matches.path} holds {len(matches.leaves)} numbers; name one of them: {', '.join(matches.leaves)}."
+            f"{matches.shown} holds {len(matches.leaves)} numbers; name one of them: {', '.join(matches.leaves)}."
         )
     return matches
 
 
-def _find(family: Family, text: str) -> Parameter:
+def _find(family: HasFields, text: str) -> Parameter:
     known = {parameter.path: parameter for parameter in parameters(family)}
     for exact in (text, f"{POSE}{text}"):
         if exact in known:
@@ -106,7 +135,7 @@ def _find(family: Family, text: str) -> Parameter:
     raise InputError(f'"{text}" is not a field of family {family.name}; {hint}')
 
 
-def values(machine: Machine) -> dict[str, Scalar]:
+def values(machine: HasNumbers) -> dict[str, Scalar]:
     """Every scalar of a machine by path, SI."""
     scalars: dict[str, Scalar] = {}
     for table, fields in machine.family.every_table.items():
@@ -117,7 +146,7 @@ def values(machine: Machine) -> dict[str, Scalar]:
     return scalars
 
 
-def with_values(machine: Machine, changes: Mapping[str, Any]) -> Machine:
+def with_values(machine: AnyMachine, changes: Mapping[str, Any]) -> AnyMachine:
     """The machine with some scalars replaced, by leaf path: by floats, traced scalars or arrays (as columns)."""
     new = {**values(machine), **{path: column(value) for path, value in changes.items()}}
     tables = {}
@@ -127,10 +156,61 @@ def with_values(machine: Machine, changes: Mapping[str, Any]) -> Machine:
             entries = tuple(new[path] for path in leaves(f"{table}.{name}", quantity))
             made[name] = entries[0] if quantity.count is None else entries
         tables[table] = fields(**made)
-    return replace(machine, tables=tables)
+    new_machine: Any = machine
+    return replace(new_machine, tables=tables)
 
 
-def with_leg(machine: Machine, path: str) -> str:
+Given = float | str | Iterable[float | str]
+"""A value as people give it: SI, or text with a unit; of a field with several entries, one for all or one for each."""
+
+
+def read_numbers(family: HasFields, given: Mapping[str, Given]) -> dict[str, float]:
+    """Read values of fields, each checked by itself: SI by leaf path.
+
+    Args:
+        family: whose fields they are.
+        given: by name of the field, as `find` takes it.
+
+    Raises:
+        InputError: an unknown field, a value that is none or out of bounds, or a list of another length than the field.
+    """
+    read: dict[str, float] = {}
+    for name, written in given.items():
+        # Numbers and arrays of NumPy become those of Python.
+        value = written.tolist() if hasattr(written, "tolist") else written
+        if isinstance(value, str) or not isinstance(value, Iterable):
+            parameter = find(family, name)
+            read.update(dict.fromkeys(parameter.leaves, read_number(parameter, value)))
+            continue
+        parameter, entries = _find(family, name), list(value)
+        if len(entries) != len(parameter.leaves):
+            allowed = f"{len(parameter.leaves)} values" if len(parameter.leaves) > 1 else "one value"
+            raise InputError(f"{parameter.shown} is {shorten(entries)}; give {allowed}.")
+        read.update((leaf, read_number(parameter, v, leaf)) for leaf, v in zip(parameter.leaves, entries, strict=True))
+    return read
+
+
+def read_number(parameter: Parameter, value: object, path: str = "") -> float:
+    """Read one value of a field, SI; `path` names one entry of several.
+
+    Raises:
+        InputError: it is not a quantity of this kind, or one that the field does not allow.
+    """
+    quantity, name = parameter.quantity, shown(path or parameter.path)
+    if isinstance(value, str) and quantity.unset is not None and value.strip().lower() == quantity.show(quantity.unset):
+        return quantity.unset
+    if isinstance(value, float) and (value == quantity.unset or (quantity.stiff and value == math.inf)):
+        return value
+    try:
+        number = parse(value, quantity.kind)
+        quantity.check(number)
+    except UnitError as error:
+        written = quantity.show(value) if isinstance(value, float) else shorten(value)
+        raise InputError(f"{name} is {written}: {error}.") from None
+    return number
+
+
+def with_leg(machine: HasNumbers, path: str) -> str:
     """Return a path for people: "geometry.base_angles.5 (leg 6)", as entries count from 0 and legs have names."""
     field, _, entry = path.rpartition(".")
     whole = next((p for p in parameters(machine.family) if p.path == field and p.quantity.per_leg), None)
@@ -140,7 +220,7 @@ def with_leg(machine: Machine, path: str) -> str:
     return f"{path} ({names.get(int(entry) + 1, f'leg {int(entry) + 1}')})"
 
 
-def doubts(machine: Machine) -> Iterator[str]:
+def doubts(machine: HasNumbers) -> Iterator[str]:
     """A sentence for each implausible number: an angle beyond a turn, one length beyond all, no stiffness."""
     numbers = list(_numbers(machine))
     for path, field, kind, value in numbers:
@@ -153,7 +233,7 @@ def doubts(machine: Machine) -> Iterator[str]:
             yield f'{path} is {value:g} N/m, next to nothing; if N/um are meant, write "{value:g} N/um".'
 
 
-def _numbers(machine: Machine) -> Iterator[tuple[str, str, str, float]]:
+def _numbers(machine: HasNumbers) -> Iterator[tuple[str, str, str, float]]:
     """Path, field, kind and value of every finite number; once for all entries of a field that are alike."""
     given = values(machine)
     fields = {p.path: p for p in parameters(machine.family)}

@@ -7,9 +7,11 @@ end of the file gives the analysis as plain data.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from kinetostat.algebra.screw import COMPONENTS, Screw
 from kinetostat.algebra.symmetric import Symmetric6
@@ -26,7 +28,7 @@ from kinetostat.machine.mass import Mass, moving_masses
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.attribution import Contribution, contributions
+from kinetostat.studies.attribution import Contribution, by_part, contributions
 from kinetostat.studies.indices import Along, Indices, indices_json, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
 from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
@@ -34,7 +36,11 @@ from kinetostat.studies.refusal import why_not
 from kinetostat.studies.rounding import clean_matrix, clean_statics
 from kinetostat.tolerances import DEPENDENT_MOTIONS
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 Rows = list[list[float]]
+Array = npt.NDArray[np.float64]
 
 AXES = ("base", "platform")
 """Axes in which results are given."""
@@ -102,6 +108,71 @@ class Analysis:
         """Mass of all moving parts whose mass is known, kg; None where none is known."""
         known = [float(part.mass) for part in self.masses if part.mass is not None]
         return sum(known) if known else None
+
+    @property
+    def K(self) -> Array:  # noqa: N802
+        """Stiffness at T [n x n], SI, as a read-only array; rows and columns as in `components`.
+
+        Raises:
+            InputError: it is not finite here, or the pose has no answer.
+        """
+        return self._matrix("K", self.stiffness)
+
+    @property
+    def C(self) -> Array:  # noqa: N802
+        """Compliance at T [n x n], SI, as a read-only array; rows and columns as in `components`.
+
+        Raises:
+            InputError: it is not finite here, or the pose has no answer.
+        """
+        return self._matrix("C", self.compliance)
+
+    def _matrix(self, name: str, rows: Rows | None) -> Array:
+        if rows is None:
+            raise InputError(f"{name} has no finite value at this pose. {self.message}")
+        array = np.array(rows)
+        array.setflags(write=False)
+        return array
+
+    def shares_of(self, component: str, matrix: str = "C") -> dict[str, float]:
+        """Shares of the joints and links in one diagonal entry of C or K by name, the greatest first; their sum is 1.
+
+        Args:
+            component: one of `components`.
+            matrix: "C" or "K".
+
+        Raises:
+            InputError: there is no such component, or its entry is zero or infinite and cannot be shared.
+        """
+        row = self.components.index(choice(component, self.components, "component"))
+        pick = attrgetter({"C": "compliance_share", "K": "stiffness_share"}[choice(matrix, ("C", "K"), "matrix")])
+        parts = by_part(self.attribution).items()
+        known = {part: [pick(spring)[row] for spring in members] for part, members in parts}
+        if not known or any(share is None for shares in known.values() for share in shares):
+            raise InputError(f"{matrix}_{component} is zero or infinite here and has no shares. {self.message}")
+        return dict(sorted(((part, sum(shares)) for part, shares in known.items()), key=lambda pair: -pair[1]))
+
+    def to_pandas(self, which: str = "attribution") -> "pd.DataFrame":
+        """Return a table of pandas, SI.
+
+        Args:
+            which: "attribution" (a row for each spring: its part, its stiffness, its shares C_x ... and K_x ... in the
+                diagonal entries), "K" or "C".
+
+        Raises:
+            InputError: there is no such table, or the matrix is not finite here.
+        """
+        import pandas as pd  # takes long to load, which an analysis alone need not wait for
+
+        if choice(which, ("attribution", "K", "C"), "which") != "attribution":
+            return pd.DataFrame(getattr(self, which), list(self.components), list(self.components))
+        rows = [
+            [spring.part, spring.stiffness, *spring.compliance_share, *spring.stiffness_share]
+            for spring in self.attribution
+        ]
+        shares = [f"{matrix}_{component}" for matrix in "CK" for component in self.components]
+        names = pd.Index([spring.spring for spring in self.attribution], name="spring")
+        return pd.DataFrame(rows, names, ["part", "stiffness", *shares])
 
     def along(self, direction: Sequence[float]) -> Along:
         """Stiffness along and about a direction, in the axes of K and C.

@@ -6,7 +6,7 @@ Tables and bars of it are in `views`; the derivatives come from `engine.derivati
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,13 +17,16 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine, need_machine
-from kinetostat.machine.parameters import Parameter, parameters, values
+from kinetostat.machine.parameters import Parameter, parameters, shown, values
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.tolerances import NO_INFLUENCE, ROUND_OFF_OF_ENTRY, ZERO_LENGTH
 from kinetostat.units import KINDS, show
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 WITHOUT_INFLUENCE = ("load", "limits")
 """Tables of a machine file on which no index depends."""
@@ -138,6 +141,14 @@ class Sensitivity:
     parameters: tuple[Influence, ...] = ()
     without_influence: tuple[str, ...] = ()
     without_derivative: tuple[tuple[str, str], ...] = ()
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Return a table of pandas, SI: for each parameter its value, and derivative and percent of each index."""
+        import pandas as pd  # takes long to load
+
+        heads = [f"{name} {what}" for what in ("derivative", "percent") for name in self.quantities]
+        rows = [[shown(p.path), p.value, *p.derivatives, *p.percents] for p in self.parameters]
+        return pd.DataFrame(rows, columns=["parameter", "value", *heads]).set_index("parameter")
 
     def __repr__(self) -> str:
         return f"<Sensitivity of {self.machine.name!r}: {self.status.word}, {len(self.parameters)} parameters>"

@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.engine.batch import Progress, silent
@@ -24,6 +24,9 @@ from kinetostat.spec.ranges import parse_range
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.comparison.design_rows import Row, rows_at_poses, rows_over
 from kinetostat.studies.plain_data import as_answer
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MOST_DESIGNS = 12
 SEPARATOR = ";"
@@ -101,6 +104,14 @@ class Comparison:
     ranges: tuple[str, ...] = ()
     poses: tuple[tuple[int, int], ...] = ()
     over: tuple[Row, ...] = ()
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Return a table of pandas: a row for each number, with its unit, and a column for each design, SI."""
+        import pandas as pd  # takes long to load
+
+        rows = [[row.group, row.name, row.unit, *row.values] for row in (*self.rows, *self.over)]
+        names = [design.label for design in self.designs]
+        return pd.DataFrame(rows, columns=["group", "number", "unit", *names]).set_index(["group", "number"])
 
     def __repr__(self) -> str:
         return f"<Comparison of {', '.join(design.label for design in self.designs)}>"
