@@ -228,8 +228,8 @@ def _check(options: argparse.Namespace) -> int:
     if is_study(options.machine):
         return _check_study(options)
     machine = load_machine(options)
-    print_machine(terminal(), machine)
     analysis = analyze(machine)
+    print_machine(terminal(), machine, f"The file has no mistake. {analysis.message}")
     return no_answer(analysis.message) if analysis.status is not Status.OK else DONE
 
 

@@ -153,6 +153,8 @@ ROUND_OFF_OF_EIGENVALUE = 1e-14
 """Share of the largest eigenvalue or singular value below which one stands for 0: some dozen units of round-off."""
 ROUND_OFF_OF_COMPLEMENT = 1e-12
 """The same share after the subtraction in a Schur complement, which loses two more digits."""
+EQUAL_STIFFNESSES = 1e-9
+"""Relative difference of principal stiffnesses below which they are equal, and their directions are arbitrary."""
 AT_RIGHT_ANGLES = 1e-9
 """Cosine below which a direction is at right angles to a principal one. Without it, a direction that is rigid or free
 would decide the stiffness along all others."""

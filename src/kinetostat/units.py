@@ -5,6 +5,7 @@ A bare number is SI. What a number may mean (its kind) is fixed by the field tha
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -110,16 +111,29 @@ def as_read(value: float, unit: str) -> tuple[float, str]:
     return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
 
 
-def show(value: float, unit: str, digits: int = 4) -> str:
-    """Return a value with its unit as people read it, e.g. "0.3124 m"; angles in rad are shown in degrees.
+def measured(unit: str, known: Iterable[str], example: str) -> tuple[str, float]:
+    """Find which of several SI units a unit is a multiple of.
 
     Args:
-        value: in `unit`; what infinity means ("rigid", "unlimited") is for the caller to say.
-        unit: as in `KINDS`; empty for a number without one.
-        digits: significant digits.
+        unit: such as "N/µm"; an angle counts, so that N·m is not N·m/rad.
+        known: the SI units, such as "N/m".
+        example: units that may be written, for the message.
+
+    Returns:
+        The SI unit, and the SI value of one `unit`.
+
+    Raises:
+        UnitError: it is a multiple of none of them.
     """
-    value, unit = as_read(value, unit)
-    return f"{value + 0.0:.{digits}g} {unit}".rstrip()  # + 0.0 turns -0.0 into 0.0
+    try:
+        given = _registry().Quantity(1.0, unit.replace("·", "*")).to_root_units() if UNIT.fullmatch(unit) else None
+    except (pint.PintError, ValueError):
+        given = None
+    for si in known if given is not None else ():
+        target = _registry().Quantity(1.0, si.replace("·", "*")).to_root_units()
+        if given.units == target.units:
+            return si, float(given.magnitude / target.magnitude)
+    raise UnitError(f'"{unit}" is not a unit of any result; write for example "{example}"')
 
 
 def _parse_text(text: str, wanted: Kind) -> float:

@@ -14,6 +14,8 @@ CALLED_FROM_OUTSIDE = {
     "WITH_CRANKS": "the catalogue takes every family that a module defines",
     "dask_setup": "called by workers of a cluster, by this name",
     "error": "called by argparse, by this name",
+    "_fill_text": "called by argparse, by this name",
+    "_split_lines": "called by argparse, by this name",
     "doctype": "called by the parser of XML, by this name",
     "page_pictures": "the pages of a PDF, for the pictures of the documentation",
     "shares_of": "shares by name, for programs",

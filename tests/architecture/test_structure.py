@@ -10,6 +10,7 @@ from source import PACKAGE, ROOT, imports, modules, wrong_in
 LAYERS = [
     "tolerances",
     "units",
+    "display",
     "spec",
     "algebra",
     "machine",

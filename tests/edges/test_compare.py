@@ -59,7 +59,7 @@ def test_a_machine_of_another_kind_hides_no_difference_of_the_others(capsys):
     assert main(["compare", "hexapod", "hexapod:geometry.base_radius=13 cm", "tripteron"]) == 0
     said = capsys.readouterr().out
     row = next(line for line in said.splitlines() if line.startswith(" geometry.base_radius"))
-    assert row.split()[-5:] == ["0.115", "m", "0.13", "m", "–"]
+    assert row.split()[-5:] == ["115", "mm", "130", "mm", "–"]
     assert "Fields that only one design has are omitted." in said
 
 
@@ -77,7 +77,7 @@ def test_fields_of_one_name_keep_their_own_units(capsys):
     """An actuator is N·m/rad in the one and N/m in the other; the number of entries may differ as well."""
     assert main(["compare", "delta", "orthoglide"]) == 0
     row = next(line for line in capsys.readouterr().out.splitlines() if "stiffness.actuator" in line)
-    assert "3 x 20000 N·m/rad" in row
+    assert "3 x 0.02 N·m/µrad" in row
     assert "3 x 5e7 N/m" in row
     found, _ = rows("hexapod", "tricept")
     assert [len(own) for own in found["differences"]["stiffness.actuator"]] == [6, 3]

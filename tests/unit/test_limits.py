@@ -192,13 +192,13 @@ def test_the_most_fundamental_obstacle_comes_first(placed, reached, singularity_
 
 
 TOLD = [
-    ("hexapod", ["limits.longest_leg=7 cm"], ["Leg", "m long", "limits.longest_leg", "at most 0.07 m", "change the"]),
-    ("hexapod", ["limits.shortest_leg=2 m"], ["limits.shortest_leg", "at least 2 m", "(and 5 more pass it)"]),
+    ("hexapod", ["limits.longest_leg=7 cm"], ["Leg", "mm long", "limits.longest_leg", "at most 70 mm", "change the"]),
+    ("hexapod", ["limits.shortest_leg=2 m"], ["limits.shortest_leg", "at least 2000 mm", "(and 5 more pass it)"]),
     ("hexapod", ["limits.base_joint_angle=10 deg"], ["stands at 50.94", "base's z axis", "at most 10 deg"]),
     ("hexapod", ["limits.platform_joint_angle=10 deg"], ["deg to the platform's z axis", "at most 10 deg"]),
-    ("hexapod", ["limits.leg_diameter=6 cm"], ["and leg", "come within 0.03", "at least 0.06 m"]),
+    ("hexapod", ["limits.leg_diameter=6 cm"], ["and leg", "come within 31.2", "at least 60 mm"]),
     ("hexapod", ["limits.actuator_force=100", "load.force=[0, 0, 600]"], ["carries 158.7", "N", "lower the load"]),
-    ("tripteron", ["limits.travel_to=1 cm", "pose.x=0.6"], ["X slide has travelled 0.1 m", "at most 0.01 m"]),
+    ("tripteron", ["limits.travel_to=1 cm", "pose.x=0.6"], ["X slide has travelled 100 mm", "at most 10 mm"]),
 ]
 
 
@@ -216,7 +216,11 @@ REFUSED = [
     ("hexapod", ["limits.longest_leg=-1"], ["limits.longest_leg", "greater than 0"]),
     ("hexapod", ["limits.base_joint_angle=100 deg"], ["limits.base_joint_angle", "must not exceed 90 deg"]),
     ("hexapod", ["limits.longest_legs=1"], ["limits.longest_legs is not known", "did you mean longest_leg?"]),
-    ("hexapod", ["limits.shortest_leg=2", "limits.longest_leg=1"], ["shortest_leg is 2 m", "longest_leg 1 m", "widen"]),
+    (
+        "hexapod",
+        ["limits.shortest_leg=2", "limits.longest_leg=1"],
+        ["shortest_leg is 2000 mm", "longest_leg 1000 mm", "widen"],
+    ),
     ("hexapod", ["limits.travel_to=1"], ["limits.travel_to has no meaning here", "home pose", "leave it out"]),
     ("hexapod", ["limits.actuator_moment=1"], ["limits.actuator_moment", "an actuated revolute"]),
     ("delta", ["limits.longest_leg=1"], ["limits.longest_leg has no meaning here", "leave it out"]),

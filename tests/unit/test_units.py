@@ -5,7 +5,7 @@ import math
 import pint
 import pytest
 
-from kinetostat.units import KINDS, UNITS, UnitError, parse, show, write
+from kinetostat.units import KINDS, UNITS, UnitError, parse, write
 
 GOOD = [
     ("12 cm", "length", 0.12),
@@ -148,25 +148,6 @@ def test_what_is_written_is_read_back_exactly(kind, value):
 def test_what_is_written_has_its_unit():
     assert write(0.22, "length") == "0.22 m"
     assert write(math.inf, "linear stiffness") == "rigid"
-
-
-@pytest.mark.parametrize(
-    ("value", "unit", "text"),
-    [
-        (math.radians(10), "rad", "10 deg"),
-        (0.31244, "m", "0.3124 m"),
-        (-0.0, "m", "0 m"),
-        (12345678.0, "N/m", "1.235e+07 N/m"),
-        (0.25, "", "0.25"),
-        (math.nan, "m", "nan m"),
-    ],
-)
-def test_what_is_shown_is_rounded_and_has_its_unit(value, unit, text):
-    assert show(value, unit) == text
-
-
-def test_digits_can_be_chosen():
-    assert show(0.31244, "m", 2) == "0.31 m"
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)

@@ -5,7 +5,9 @@ No command is known here. What is not needed for `--help` is imported late, so t
 
 import argparse
 import json
+import re
 import sys
+import textwrap
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -42,14 +44,35 @@ MEMORY = 600.0
 """Seconds of progress from which the remaining time is estimated: several chunks, even where each takes minutes."""
 
 
+_WORDS = re.compile(r"""(?:-[\w-]+ (?!-))?(?:[^\s"']|"[^"]*"|'[^']*')+""")
+"""Words of a command: an option with its value, what stands in quotes, or any other word."""
+
+
 class Help(argparse.RawDescriptionHelpFormatter):
-    """Help whose examples and quoted commands can be typed as they stand."""
+    """Help whose commands can be typed as they stand, broken between words, in examples by a backslash."""
 
     def _expand_help(self, action: argparse.Action) -> str:
         return as_typed(super()._expand_help(action))
 
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        return textwrap.wrap(" ".join(text.split()), width, break_long_words=False, break_on_hyphens=False)
+
     def _fill_text(self, text: str, width: int, indent: str) -> str:
-        return as_typed(super()._fill_text(text, width, indent))
+        return "\n".join(part for line in as_typed(text).splitlines() for part in _broken(indent + line, width))
+
+
+def _broken(line: str, width: int) -> list[str]:
+    """Return a line of the help in as many lines as it needs; an example begins with blanks."""
+    if len(line) <= width:
+        return [line]
+    if not line.startswith(" "):
+        return textwrap.wrap(line, width, break_long_words=False, break_on_hyphens=False)
+    lines = [""]
+    for word in _WORDS.findall(line):
+        if lines[-1] and len(lines[-1]) + len(word) + 5 > width:
+            lines.append("   ")
+        lines[-1] += f" {word}" if lines[-1] else word
+    return [*(f"  {part} \\" for part in lines[:-1]), f"  {lines[-1]}"]
 
 
 class Parser(argparse.ArgumentParser):
@@ -77,6 +100,16 @@ def takes_machine(command: Parser, what: str = MACHINE) -> None:
     """Give a command the machine and `--set`."""
     command.add_argument("machine", metavar="MACHINE", help=what)
     takes_settings(command, 'override a field, e.g. --set geometry.base_radius="26 cm"; repeatable')
+    takes_units(command)
+
+
+def takes_units(command: Parser) -> None:
+    """Give a command `--units`."""
+    command.add_argument(
+        "--units", metavar="UNITS", default="",
+        help='units of printed and drawn results, e.g. --units "mm, deg, N/um, N*m/urad" or --units si (default: those '
+        "of [display] in the machine file, else N/um, N*m/urad, mm, deg); JSON and data files are always in SI",
+    )  # fmt: skip
 
 
 def takes_settings(command: Parser, meaning: str) -> None:
@@ -156,7 +189,8 @@ def load_machine(options: argparse.Namespace, more: "Sequence[str]" = ()) -> "Ma
 
         if options.machine in bundled_studies():
             raise InputError(f'"{options.machine}" {STUDY}')
-    return load(options.machine, [*options.settings, *more])
+    machine = load(options.machine, [*options.settings, *more])
+    return machine.in_units(options.units) if options.units else machine
 
 
 def print_json(data: object) -> None:

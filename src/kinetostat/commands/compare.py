@@ -18,6 +18,7 @@ from kinetostat.commands.common import (
     takes_machine,
     takes_ranges,
     takes_settings,
+    takes_units,
     write_figures,
 )
 
@@ -40,6 +41,7 @@ def add_compare_commands(commands: "Commands") -> None:
         "all designs are compared with the first",
     )  # fmt: skip
     takes_settings(compare, "override a field in all designs; repeatable")
+    takes_units(compare)
     takes_ranges(
         compare,
         "a coordinate of the pose and its range: compare worst, 95 percent and mean over it as well; repeatable",
@@ -63,7 +65,8 @@ def _compare(options: argparse.Namespace) -> int:
     from kinetostat.studies.comparison.designs import as_json, compare, read_design
     from kinetostat.views.comparison_tables import print_comparison
 
-    designs = [read_design(text, options.settings) for text in options.designs]
+    shown = [f"display.units={options.units}"] if options.units else []
+    designs = [read_design(text, [*options.settings, *shown]) for text in options.designs]
     with progress_bar("computing") as progress:
         result = compare(designs, options.ranges, progress)
     written = _write(options, result) if options.output else []

@@ -14,6 +14,7 @@ from kinetostat.commands.common import (
     takes_figures,
     takes_json,
     takes_settings,
+    takes_units,
     write_figures,
 )
 
@@ -40,6 +41,7 @@ def add_optimize_commands(commands: "Commands") -> None:
             command,
             'override a field of the study, e.g. --set optimizer.seed=3, --set variables.0.to="15 cm"; repeatable',
         )
+        takes_units(command)
         takes_figures(command, "the result, its figures and all designs; a stopped search continues there")
         command.add_argument(
             "--resume", action="store_true", help="continue the search in the folder, and refuse if there is none"
@@ -98,6 +100,7 @@ def _report(options: argparse.Namespace, result: "Result") -> int:
     """Write the files of a result, and print it unless JSON was printed."""
     from kinetostat.studies.optimisation.result_data import message, write_result
 
+    result = result.in_units(options.units) if options.units else result
     written = write_result(result, options.output) if options.output else []
     if result.solved and options.output:
         from kinetostat.views.optimisation_figures import pictures

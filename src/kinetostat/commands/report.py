@@ -18,6 +18,7 @@ from kinetostat.commands.common import (
     takes_machine,
     takes_ranges,
     takes_settings,
+    takes_units,
 )
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def add_report_commands(commands: "Commands") -> None:
     )  # fmt: skip
     takes_figures(reproduce, "the page, tables and figures (default: reproduce)")
     reproduce.set_defaults(output=Path("reproduce"))
+    reproduce.add_argument("--full", action="store_true", help="print every number, equation and statement")
     takes_json(reproduce)
 
 
@@ -64,6 +66,7 @@ def _add_report_command(commands: "Commands") -> None:
         help="a machine or study file, the name of a bundled one (see `kinetostat list`), or the folder of a study",
     )  # fmt: skip
     takes_settings(command, "override a field of the machine or of the study; repeatable")
+    takes_units(command)
     takes_ranges(command, "an axis of the maps (one or two); default: two coordinates of the pose, over their reach")
     command.add_argument(
         "--without", metavar="PART", action="append", default=[], choices=WITHOUT,
@@ -100,7 +103,9 @@ def _report(options: argparse.Namespace) -> int:
     result = _search(subject.problem, subject.folder) if subject.problem else None
     if result is not None and not result.solved:
         return no_answer(message(result))
+    result = result.in_units(options.units) if result and options.units else result
     machine = subject.machine if result is None else result.machine
+    machine = machine.in_units(options.units) if options.units else machine
     with progress_bar("computing") as progress:
         answers = gather(machine, wanted.ranges, wanted.without, result, progress)
         if answers.analysis.status is Status.OK:
@@ -155,5 +160,5 @@ def _reproduce(options: argparse.Namespace) -> int:
         options,
         reproduction.explained,
         reproduction.as_json,
-        lambda console: print_summary(console, reproduction, written),
+        lambda console: print_summary(console, reproduction, written, options.full),
     )

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinetostat.commands.common import DONE, MACHINE, add_command, load_machine
+from kinetostat.commands.common import DONE, MACHINE, add_command, load_machine, takes_units
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
@@ -30,6 +30,7 @@ def add_studio_command(commands: "Commands") -> None:
         "--set", metavar="PATH=VALUE", action="append", default=[], dest="settings",
         help='override a field, e.g. --set geometry.base_radius="26 cm"; repeatable',
     )  # fmt: skip
+    takes_units(studio)
     studio.add_argument("--port", type=_port, default=PORT, help=f"port to listen on (default: {PORT})")
     studio.add_argument(
         "--host", default=LOCAL[0],
@@ -65,6 +66,6 @@ def _studio(options: argparse.Namespace) -> int:
             "password or encryption: use it in a network that you trust.",
             file=sys.stderr,
         )
-    name = options.machine if options.machine in bundled() and not options.settings else ""
+    name = options.machine if options.machine in bundled() and not (options.settings or options.units) else ""
     serve(machine, name, options.host, options.port, not options.no_browser, options.state or usual_state())
     return DONE

@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar
+from kinetostat.display import Display
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.limits import LIMITS, About, Limit, Parts, limits_set
 from kinetostat.machine.machine import Chains, Configuration, Machine
 from kinetostat.machine.rods import driven_slides
 from kinetostat.tolerances import LIMIT_SLACK
-from kinetostat.units import show
 
 DIGITS = 6
 """Digits of a value and of its limit in a message: with fewer, a limit that is just passed would look kept."""
@@ -124,9 +124,10 @@ def travels(chains: Chains, joints: Sequence[Scalar]) -> list[tuple[str, Scalar]
     return moved
 
 
-def why_beyond(checks: Sequence[Check]) -> str:
+def why_beyond(checks: Sequence[Check], display: Display) -> str:
     """Return one sentence for each limit that is passed, on the part that passes it furthest; floats only."""
-    sentences = (_sentence([c for c in checks if c.limit is limit and not c.kept]) for limit in _limits_of(checks))
+    passed = ([c for c in checks if c.limit is limit and not c.kept] for limit in _limits_of(checks))
+    sentences = (_sentence(of_limit, display) for of_limit in passed)
     return " ".join(sentence for sentence in sentences if sentence)
 
 
@@ -134,11 +135,13 @@ def _limits_of(checks: Sequence[Check]) -> list[Limit]:
     return [LIMITS[name] for name in dict.fromkeys(check.limit.name for check in checks if not check.kept)]
 
 
-def _sentence(passed: Sequence[Check]) -> str:
+def _sentence(passed: Sequence[Check], display: Display) -> str:
     """Say that one limit is passed, from its checks that are not kept."""
     worst = max(passed, key=lambda check: abs(check.measure - check.bound))
     limit = worst.limit
-    value, allowed = (show(limit.shown(float(number)), limit.unit, DIGITS) for number in (worst.measure, worst.bound))
+    value, allowed = (
+        display.show(limit.shown(float(number)), limit.unit, digits=DIGITS) for number in (worst.measure, worst.bound)
+    )
     more = f" (and {len(passed) - 1} more pass it)" if len(passed) > 1 else ""
     return (
         f"{worst.part[0].upper()}{worst.part[1:]} {limit.sentence.format(value)}, but limits.{limit.name} asks for "

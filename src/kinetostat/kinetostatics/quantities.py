@@ -3,7 +3,7 @@
 Source: theory section 10. At the tool point, base axes.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal, TypeAlias
@@ -155,3 +155,13 @@ GROUPS = {
     "free_stiffness": tuple(f"free_stiffness_{name}" for name in COMPONENTS),
 }
 """Names that stand for several quantities: the six diagonal entries of C and of K, and the six 1/C_ii."""
+
+
+def spoken(name: str) -> str:
+    """The name of a quantity as people say it."""
+    return name.replace("_", " ")
+
+
+def group_of(names: Sequence[str]) -> str:
+    """The group of which all quantities are, such as "stiffness" where all are entries of K; else nothing."""
+    return next((group for group in GROUPS if all(name.startswith(f"{group}_") for name in names)), "")

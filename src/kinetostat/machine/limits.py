@@ -15,11 +15,12 @@ from itertools import combinations
 from kinetostat.algebra.lines import squared_distance
 from kinetostat.algebra.scalar import Scalar, cos
 from kinetostat.algebra.vector import Z_AXIS, Vector
+from kinetostat.display import ENGINEERING
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.rods import Rod, rods
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Field, Quantity, made_table
-from kinetostat.units import KINDS, show
+from kinetostat.units import KINDS
 
 
 @dataclass(frozen=True)
@@ -306,8 +307,8 @@ def check_limits(limits: object, parts: Parts, origin: str) -> None:
         least, most = getattr(limits, low.name), getattr(limits, high.name)
         if low.measure is high.measure and least > most:
             raise InputError(
-                f'"{origin}": limits.{low.name} is {show(least, low.unit)} and limits.{high.name} '
-                f"{show(most, high.unit)}: nothing lies between them; exchange or widen them."
+                f'"{origin}": limits.{low.name} is {ENGINEERING.show(least, low.unit)} and limits.{high.name} '
+                f"{ENGINEERING.show(most, high.unit)}: nothing lies between them; exchange or widen them."
             )
     for limit in limits_set(limits):
         if not any(True for _ in limit.measure(parts)):

@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from kinetostat.algebra.scalar import Scalar
+from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.machine.catalogue import families, register_installed
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.limits import Parts, check_limits
@@ -30,7 +31,7 @@ from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import NO_LIMIT, optional, quantities
 from kinetostat.spec.validation import SCHEMA_VERSION, file_model, tables_in, validate
-from kinetostat.units import RIGID
+from kinetostat.units import RIGID, UnitError
 
 SUFFIX = ".toml"
 STUDY = (
@@ -89,7 +90,8 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
         return _build_written(document, origin, settings)
     family = _family(document.get("family"), origin)
     changed = documents.override(document, settings, _counts(family))
-    machine = _validated(family, resolve(changed, family, origin), origin)
+    display = _display(changed, origin)
+    machine = _validated(family, resolve(changed, family, origin), origin, display)
     placed = machine.configure()
     parts = Parts(placed.legs, placed.platform.rotation.z, family.planar, (), _unloaded(placed.legs))
     check_limits(machine.tables["limits"], parts, origin)
@@ -100,8 +102,10 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     """A machine written leg by leg."""
     named = by_name(document, origin)
     check_paths(named, settings)
-    plan, numbers = separate(documents.override(named, settings, {}), origin)
-    machine = _validated(written.family_of(plan), numbers, origin)
+    changed = documents.override(named, settings, {})
+    display = _display(changed, origin)
+    plan, numbers = separate(changed, origin)
+    machine = _validated(written.family_of(plan), numbers, origin, display)
     check_numbers(plan, machine.tables, origin)
     whole = replace(machine, family=written.family_of(completed(plan, machine.family_tables)))
     chains = whole.chains()
@@ -117,10 +121,18 @@ def _unloaded(legs: Sequence[Leg]) -> list[tuple[Spring, Scalar]]:
     return [(spring, 0.0) for leg in legs for spring in leg.springs if spring.actuated]
 
 
-def _validated(family: Family, document: Document, origin: str) -> Machine:
+def _validated(family: Family, document: Document, origin: str, display: Display) -> Machine:
     tables = family.every_table
     data: Any = validate(document, origin, file_model(family.name, tables), tables)
-    return Machine(data.name, family, tables_in(data, tables))
+    return Machine(data.name, family, tables_in(data, tables), display)
+
+
+def _display(document: Document, origin: str) -> Display:
+    """Take the table [display] out of a document."""
+    try:
+        return read_display(document.pop("display", {}))
+    except UnitError as error:
+        raise InputError(f'"{origin}": {error}.') from None
 
 
 def _counts(family: Family) -> dict[str, int]:
@@ -167,6 +179,9 @@ def as_toml(machine: Machine) -> str:
         lines += ["", f"[{'.'.join(documents.toml_key(part) for part in name.split('.'))}]"]
         lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get(name, {}).items()]
         lines += _quantity_lines(machine.family.every_table[name], table) if table is not None else []
+    if machine.display != ENGINEERING:
+        units = json.dumps(machine.display.units, ensure_ascii=False)
+        lines += ["", "[display]", f"units = {units}", f"digits = {machine.display.digits}"]
     return "\n".join(lines) + "\n"
 
 

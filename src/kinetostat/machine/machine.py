@@ -6,13 +6,14 @@ Points and axes are in the base frame.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, Protocol
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import COMPONENTS, Wrench
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
+from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.machine.leg import Joint, Leg, Spring, Turn
 from kinetostat.machine.limits import Limits
 from kinetostat.machine.links import LinkKind, density_table
@@ -20,6 +21,7 @@ from kinetostat.machine.parameters import Given, read_numbers, with_values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, table
 from kinetostat.spec.renamed import renamed_property
+from kinetostat.units import UnitError
 
 
 @dataclass(frozen=True)
@@ -236,17 +238,30 @@ class Machine:
         name: for people.
         family: its kind.
         tables: one instance per table of the family and per common one, SI.
+        display: units and digits in which people read its results, from the table [display].
     """
 
     name: str
     family: Family
     tables: Mapping[str, Any]
+    display: Display = ENGINEERING
 
     sections = renamed_property("tables")
     own_sections = renamed_property("family_tables")
 
     def __repr__(self) -> str:
         return f"<Machine {self.name!r}, family {self.family.name}>"
+
+    def in_units(self, units: str) -> "Machine":
+        """The machine with results shown in other units, as `--units` and [display] take them.
+
+        Raises:
+            InputError: a unit is unknown.
+        """
+        try:
+            return replace(self, display=read_display({"units": units, "digits": self.display.digits}))
+        except UnitError as error:
+            raise InputError(f"{error}.") from None
 
     def configure(self, joints: Sequence[Scalar] = ()) -> Configuration:
         """The machine at its pose; `joints` are its coordinates where the family must be solved for them."""

@@ -10,6 +10,7 @@ from typing import Any, Literal, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
+from kinetostat.display import DIGITS, EXAMPLE, SI
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, cut, first_mistakes, shorten
 from kinetostat.spec.fields import Quantity, optional, quantities
@@ -17,6 +18,20 @@ from kinetostat.units import KINDS
 
 SCHEMA_VERSION = 1
 
+
+DISPLAY_SCHEMA: dict[str, Any] = {
+    "type": "object",
+    "description": "units and digits in which results are shown; files and JSON stay SI",
+    "properties": {
+        "units": {
+            "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
+            "examples": [EXAMPLE, SI],
+        },
+        "digits": {"type": "integer", "minimum": DIGITS[0], "maximum": DIGITS[1], "default": 4},
+    },
+    "additionalProperties": False,
+}
+"""The schema of the table [display], which `display.read_display` reads."""
 
 MODELS = 64
 """Models of files that are kept: making one takes longer than all else that reading a file is."""
@@ -37,6 +52,7 @@ def _file_model(family: str, tables: tuple[tuple[str, type], ...]) -> type[BaseM
         "name": (str, Field(description="what people call the machine", min_length=1, max_length=80)),
         "family": (Literal[family], Field(description="kind of machine, see `kinetostat list`")),
     }
+    content["display"] = (dict[str, Any], Field(default={}, json_schema_extra=DISPLAY_SCHEMA))
     return _table_model("MachineFile", dict(tables), content)
 
 

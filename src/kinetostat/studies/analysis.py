@@ -5,8 +5,8 @@ end of the file gives the analysis as plain data.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,7 @@ from kinetostat.machine.mass import Mass, moving_masses
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.attribution import Contribution, by_part, contributions
+from kinetostat.studies.attribution import Contribution, Softest, by_part, contributions, softest
 from kinetostat.studies.indices import Along, Indices, indices_json, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
 from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
@@ -67,6 +67,7 @@ class Analysis:
         rigid, free: names of the springs with infinite and with zero stiffness.
         attribution: what each spring contributes to K and C.
         indices: numbers and directions read off K and C.
+        softest: of "translation" and "rotation", the softest direction and what makes it soft.
         mobility: what can move, and the kind of pose.
         internal_loads: statically indeterminate loads.
         load: effects of the machine's [load], None where it has none.
@@ -92,6 +93,7 @@ class Analysis:
     free: tuple[str, ...] = ()
     attribution: tuple[Contribution, ...] = ()
     indices: Indices | None = None
+    softest: Mapping[str, Softest] = field(default_factory=dict)
     mobility: Mobility | None = None
     internal_loads: InternalLoads | None = None
     load: LoadCase | None = None
@@ -218,6 +220,8 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     free = tuple(spring.name for spring in all_springs if spring.stiffness == 0.0)
     extremes = conditioning(response.legs, length, response.guide)
     load = load_case(response, statics, turn)
+    indices = indices_of(stiffness_rows, compliance_rows, length, kept)
+    weakest = {name: softest(block, name, all_springs, statics) for name, block in (indices.free or {}).items()}
     return Analysis(
         machine,
         status,
@@ -233,7 +237,8 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
         rigid=rigid,
         free=free,
         attribution=contributions(all_springs, statics, stiffness, compliance, kept),
-        indices=indices_of(stiffness_rows, compliance_rows, length, kept),
+        indices=indices,
+        softest={name: direction for name, direction in weakest.items() if direction is not None},
         mobility=mobility(configuration, nearby, response.reference),
         internal_loads=internal_loads([leg.name for leg in configuration.legs], response.legs, length, response.guide),
         load=load,
@@ -356,6 +361,7 @@ def as_json(analysis: Analysis, along: Sequence[Along] = ()) -> dict[str, Any]:
         "jacobian_condition": analysis.jacobian_condition,
         "characteristic_length": analysis.characteristic_length,
         **indices_json(analysis.indices),
+        "softest": analysis.softest,
         "along": along,
         "mobility": analysis.mobility and _mobility_json(analysis.mobility),
         "internal_loads": analysis.internal_loads,

@@ -9,8 +9,11 @@ from dataclasses import dataclass
 
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.kinetostatics.assembly import Statics, compliance_shares, stiffness_shares
+from kinetostat.kinetostatics.extremes import ROTATIONS, TRANSLATIONS
+from kinetostat.kinetostatics.indices import PrincipalStiffness
 from kinetostat.machine.leg import Spring
 from kinetostat.spec.renamed import former_names
+from kinetostat.tolerances import EQUAL_STIFFNESSES
 
 
 @former_names(name="spring", compliance="compliance_share")
@@ -68,3 +71,52 @@ def by_part(attribution: Sequence[Contribution]) -> dict[str, list[Contribution]
     for contribution in attribution:
         parts.setdefault(contribution.part, []).append(contribution)
     return parts
+
+
+EQUAL_SHARES = 9
+"""Decimals in which shares are compared, so that equal parts keep their order."""
+
+
+@dataclass(frozen=True)
+class Softest:
+    """The direction in which a force, or a moment, meets the least stiffness, and what makes it soft.
+
+    Attributes:
+        stiffness: N/m or N·m/rad, the other motions free to follow; 0 where the direction is free.
+        directions: unit vectors that span all directions with this stiffness, axes of K and C [1 to 3 x 3].
+        shares: name and share of each part in the compliance there, the greatest first; empty where it is free.
+    """
+
+    stiffness: float
+    directions: tuple[tuple[float, ...], ...]
+    shares: tuple[tuple[str, float], ...]
+
+
+def softest(block: PrincipalStiffness, name: str, springs: Sequence[Spring], statics: Statics) -> Softest | None:
+    """Attribute the compliance in the softest direction of a block of C to the parts of the machine.
+
+    Where several directions are equally soft, the shares are those of their sum, which does not depend on the choice
+    of directions among them.
+
+    Args:
+        block: principal stiffnesses, the other block free to follow.
+        name: "rotation" or "translation".
+        springs, statics: as for `contributions`.
+
+    Returns:
+        None where the whole block is rigid.
+    """
+    least = block.stiffnesses[0]
+    if math.isinf(least):
+        return None
+    pairs = zip(block.stiffnesses, block.directions, strict=True)
+    alike = tuple(tuple(way) for k, way in pairs if math.isclose(k, least, rel_tol=EQUAL_STIFFNESSES))
+    if least == 0.0:
+        return Softest(least, alike, ())
+    rows = ROTATIONS if name == "rotation" else TRANSLATIONS
+    parts: dict[str, float] = {}
+    for spring, share in zip(springs, compliance_shares(statics), strict=True):
+        amount = sum(float(share.entry(i, j)) * way[i % 3] * way[j % 3] for way in alike for i in rows for j in rows)
+        part = spring.part or spring.name
+        parts[part] = parts.get(part, 0.0) + amount * least / len(alike)
+    return Softest(least, alike, tuple(sorted(parts.items(), key=lambda item: -round(item[1], EQUAL_SHARES))))

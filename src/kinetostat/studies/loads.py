@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 from kinetostat.algebra.screw import COMPONENTS, Wrench
 from kinetostat.algebra.vector import Rotation
+from kinetostat.display import ENGINEERING
 from kinetostat.kinetostatics.assembly import Statics
 from kinetostat.kinetostatics.loading import JointReaction, deflection, held_compliance, joint_reactions, spring_loads
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import springs
 from kinetostat.studies.rounding import clean_screw
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
-from kinetostat.units import show
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,7 @@ class LoadCase:
         driven = [spring for spring in self.springs if math.isinf(spring.deformation)]
         if not driven:
             return ""
+        show = ENGINEERING.show
         needed = ", ".join(f"{spring.name} {show(spring.load, 'N·m' if spring.turning else 'N')}" for spring in driven)
         free = [name for name, motion in zip(COMPONENTS, self.deflection, strict=True) if math.isinf(motion)]
         exact = "; the deflection is exact in all other components" if any(map(math.isfinite, self.deflection)) else ""

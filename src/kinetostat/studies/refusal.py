@@ -34,7 +34,7 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
     if status is Status.OUT_OF_REACH:
         return why_out_of_reach(configuration)
     if status is Status.JOINT_LIMIT:
-        return why_beyond(response.checks)
+        return why_beyond(response.checks, machine.display)
     motion = _mobility(response, nearby)
     if motion and not nearby and _locked_joints(configuration) < motion.full_cycle:
         return _lacks_actuators(configuration, motion)

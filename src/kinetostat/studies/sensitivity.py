@@ -23,7 +23,7 @@ from kinetostat.studies.analysis import analyze
 from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.tolerances import NO_INFLUENCE, ROUND_OFF_OF_ENTRY, ZERO_LENGTH
-from kinetostat.units import KINDS, show
+from kinetostat.units import KINDS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -280,7 +280,7 @@ def as_json(answer: Sensitivity) -> dict[str, Any]:
 def notes(answer: Sensitivity) -> Iterator[str]:
     """Explain the percentages: what a percent is of, and which parameters are omitted, in sentences."""
     used = {parameter.measure for parameter in answer.parameters}
-    length = show(answer.characteristic_length, "m")
+    length = answer.machine.display.show(answer.characteristic_length, "m")
     meanings = {
         "length": f"where a length is 0, a percent is one of the characteristic length, {length}",
         "radian": "of an angle, a percent is 0.01 rad (0.57 deg), whatever its value",

@@ -1,11 +1,13 @@
 """Captions of results: their reference point, their axes, and the coordinates of the pose that do not vary."""
 
-import math
 from collections.abc import Collection
 
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.units import KINDS
+
+DIGITS = 6
+"""Digits of a coordinate, which people have written themselves."""
 
 
 def frame_of(machine: Machine, axes: str = "base") -> str:
@@ -14,17 +16,13 @@ def frame_of(machine: Machine, axes: str = "base") -> str:
 
 
 def pose_of(machine: Machine, varied: Collection[str] = ()) -> str:
-    """List the coordinates of the pose that do not vary, lengths in mm, angles in degrees; empty where all vary."""
+    """List the coordinates of the pose that do not vary, in the units of its display; empty where all vary."""
     here = values(machine)
     fixed = [p for p in parameters(machine.family) if p.path.startswith("pose.") and p.path not in varied]
-    return ", ".join(f"{p.path.removeprefix('pose.')} {_shown(float(here[p.path]), p.quantity.kind)}" for p in fixed)
+    shown = (machine.display.show(float(here[p.path]), KINDS[p.quantity.kind].unit, digits=DIGITS) for p in fixed)
+    return ", ".join(f"{p.path.removeprefix('pose.')} {text}" for p, text in zip(fixed, shown, strict=True))
 
 
 def setting_of(machine: Machine, varied: Collection[str] = ()) -> str:
     """Write frame and pose in one line; the arguments are those of `pose_of`."""
     return "; ".join(text for text in (frame_of(machine), pose_of(machine, varied)) if text)
-
-
-def _shown(value: float, kind: str) -> str:
-    scale, unit = {"length": (1e3, "mm"), "angle": (180.0 / math.pi, "deg")}.get(kind, (1.0, KINDS[kind].unit))
-    return f"{value * scale + 0.0:.6g} {unit}".rstrip()

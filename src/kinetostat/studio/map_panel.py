@@ -6,10 +6,10 @@ The values are computed by `answers.compliance_map`; this panel chooses, shows, 
 import time
 from collections.abc import Callable
 
-import numpy as np
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
+from kinetostat.display import Scale
 from kinetostat.engine.points import Array
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.errors import InputError
@@ -20,7 +20,6 @@ from kinetostat.studio.lanes import Lane
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import full_label
 from kinetostat.units import KINDS
-from kinetostat.views.display import Scale, coordinate_scale
 
 
 class MapPanel:
@@ -84,27 +83,28 @@ class MapPanel:
     def _scale(self, path: str) -> tuple[Control, Scale]:
         control = self._session.controls[path]
         kind = KINDS[control.parameter.quantity.kind]
-        return control, coordinate_scale(kind.name, kind.unit, np.array([control.low, control.high]))
+        return control, self._session.machine.display.scale(kind.unit)
 
     def _deliver(self, request: MapRequest, maps: dict[str, Array]) -> None:
         quantity = str(self.quantity.value)
         if (request.across, request.up) != self._ends() or quantity not in maps:
             return  # the designer has chosen other axes meanwhile, and that map is on its way
         (across, x), (up, y) = self._scale(request.across.path), self._scale(request.up.path)
+        scale = self._session.machine.display.scale(QUANTITIES[quantity].unit)
         self.view.run_method(
             "show",
             {
                 "nx": MAP_POINTS,
                 "ny": MAP_POINTS,
-                "values": finite(maps[quantity]),
-                "unit": QUANTITIES[quantity].unit,
+                "values": finite(maps[quantity] * scale.factor),
+                "unit": scale.unit,
                 "x": {"low": across.low * x.factor, "high": across.high * x.factor, "label": x.label(across.label)},
                 "y": {"low": up.low * y.factor, "high": up.high * y.factor, "label": y.label(up.label)},
                 "here": [self._session.value(across.path) * x.factor, self._session.value(up.path) * y.factor],
             },
         )
         took = 1e3 * (time.perf_counter() - request.since)
-        self.time.set_text(f"{MAP_POINTS} × {MAP_POINTS} poses in {took:.0f} ms, {QUANTITIES[quantity].unit}")
+        self.time.set_text(f"{MAP_POINTS} × {MAP_POINTS} poses in {took:.0f} ms, {scale.unit}")
 
     def _chosen(self) -> None:
         if self._asking:

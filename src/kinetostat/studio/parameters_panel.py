@@ -93,7 +93,8 @@ class ParametersPanel:
             self._put(self._session.controls[path], present[path])
 
     def _put(self, control: Control, value: float) -> None:
-        self._rows[control.path].put(shown(control.parameter.quantity, value), control.position_of(value))
+        display = self._session.machine.display
+        self._rows[control.path].put(shown(control.parameter.quantity, value, display), control.position_of(value))
 
     def go_on(self) -> None:
         """Take the latest position of a slider that had to wait; positions before it are skipped."""

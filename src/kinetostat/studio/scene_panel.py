@@ -15,7 +15,6 @@ from kinetostat.studio.answers import Picture, Report
 from kinetostat.studio.controls import FACTOR_STEPS, factor_at, factor_position, factor_text, read_factor
 from kinetostat.studio.elements import THROTTLE, MachineView, QuantityRow
 from kinetostat.studio.lanes import as_sentence
-from kinetostat.studio.wording import engineering
 
 LAYERS = {
     "ellipsoids": "compliance ellipsoids",
@@ -118,8 +117,9 @@ def scene_key(report: Report) -> str:
     """Return the key of the ellipsoids as HTML: the greatest compliance of each."""
     indices = report.analysis.indices
     units = {"translation": "m/N", "rotation": "rad/(N·m)"}
+    display = report.analysis.machine.display
     lines = [
-        f'<li class="key-{name}">{name}: at most {engineering(block.compliances[-1], units[name])}</li>'
+        f'<li class="key-{name}">{name}: at most {display.show(block.compliances[-1], units[name])}</li>'
         for name, block in ((indices and indices.principal_compliances) or {}).items()
     ]
     return f"<ul>{''.join(lines)}</ul>"
@@ -127,8 +127,8 @@ def scene_key(report: Report) -> str:
 
 def headline(report: Report) -> str:
     """Return the diagonal of C as HTML: the motion along or about each axis under a unit load along or about it."""
-    tiles = []
+    tiles, display = [], report.analysis.machine.display
     for name, compliance in zip(report.analysis.components, report.analysis.compliance_diagonal, strict=True):
-        value, _, unit = engineering(compliance, QUANTITIES[f"compliance_{name}"].unit).partition(" ")
+        value, _, unit = display.show(compliance, QUANTITIES[f"compliance_{name}"].unit).partition(" ")
         tiles.append(f"<div><dt>C {name}</dt><dd>{value} <small>{unit or '&nbsp;'}</small></dd></div>")
     return f"<dl>{''.join(tiles)}</dl>"

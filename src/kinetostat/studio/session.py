@@ -144,7 +144,8 @@ class Session:
         """
         self.settle()
         parameter = self.controls[path].parameter
-        value = read_typed(parameter, text, unit_shown(parameter.quantity, self.value(path)))
+        unit = unit_shown(parameter.quantity, self.value(path), self.machine.display)
+        value = read_typed(parameter, text, unit)
         present = values(self.machine)
         if any(present[leaf] != value for leaf in parameter.leaves):
             self._change({path: value})

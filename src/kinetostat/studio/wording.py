@@ -7,68 +7,42 @@ import math
 from collections.abc import Sequence
 from html import escape
 
-import numpy as np
-
+from kinetostat.display import ENGINEERING, Display
 from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.fields import Quantity
-from kinetostat.units import KINDS, show
-from kinetostat.views.display import prefixed_scale
+from kinetostat.units import KINDS
 
 DIGITS = 6
 """Significant digits of a value that may be typed over."""
 AXES = ("x", "y", "z")
 VECTORS = ("offset", "moment", "force", "point", "axis", "first_axis", "second_axis", "far")
 """Fields whose entries are along x, y, z."""
-DASH = "–"
 MINUS = "\u2212"
-ENTRY_UNITS = {
-    "length": (1e3, "mm"),
-    "linear stiffness": (1e-6, "N/µm"),
-    "elastic modulus": (1e-9, "GPa"),
-    "area": (1e4, "cm**2"),
-    "second moment of area": (1e8, "cm**4"),
-}
-"""Factor from SI and unit of the kinds that are written in an engineering unit."""
 LEAST_GAIN = 1e-3
 """Logarithm of the gain that fills a whole bar when no gain is greater, so that tiny ones look tiny."""
 
 
-def shown(quantity: Quantity, value: float) -> str:
+def shown(quantity: Quantity, value: float, display: Display = ENGINEERING) -> str:
     """Return a value as a field shows it, e.g. "220 mm", "30 deg", "20 N/µm"; `units.parse` reads it back."""
     if value == quantity.unset or math.isinf(value):
         return quantity.show(value)
-    factor, unit = ENTRY_UNITS.get(quantity.kind, (1.0, KINDS[quantity.kind].unit))
-    # Long lengths and soft springs read better in SI: 12 m, 3000 N/m.
-    if (unit == "mm" and abs(value) >= 10.0) or (unit == "N/µm" and abs(value) < 1e6):
-        factor, unit = 1.0, KINDS[quantity.kind].unit
-    return show(factor * value, unit, DIGITS).replace("e+0", "e").replace("e+", "e")
+    return display.show(value, KINDS[quantity.kind].unit, digits=DIGITS)
 
 
-def unit_shown(quantity: Quantity, value: float) -> str:
+def unit_shown(quantity: Quantity, value: float, display: Display = ENGINEERING) -> str:
     """Return the unit that a field shows beside a value; empty for "rigid", "no limit" and numbers without a unit."""
-    text = shown(quantity, value)
+    text = shown(quantity, value, display)
     return text.partition(" ")[2] if text[-1:] and text[0] in "+-.0123456789" else ""
 
 
-def engineering(value: float | None, unit: str = "1", digits: int = 4) -> str:
-    """Return a result with an SI prefix, e.g. "3.628 kN/m"; "∞" if it is infinite, a dash if there is none."""
-    if value is None or math.isnan(value):
-        return DASH
-    if math.isinf(value):
-        return "∞"
-    # Not `units.show`: a deflection of some microradians stays in radians.
-    scale = prefixed_scale(unit, np.array([value]))
-    return f"{scale.factor * value:.{digits}g} {'' if unit == '1' else scale.unit}".strip()
+def engineering(value: float | None, unit: str = "1", display: Display = ENGINEERING) -> str:
+    """Return a result with its unit, e.g. "3.628 N/µm"; "∞" if it is infinite, a dash if there is none."""
+    return display.show(value, unit)
 
 
-def scientific(value: float | None) -> str:
-    """Return a matrix entry in four digits, e.g. "5.094e−7"; a dash if there is none."""
-    if value is None:
-        return DASH
-    if math.isinf(value):
-        return "∞"
-    digits, _, power = f"{value:.3e}".partition("e")
-    return "0" if value == 0.0 else f"{digits}e{int(power)}".replace("-", MINUS)
+def entry(value: float | None, unit: str, display: Display = ENGINEERING) -> str:
+    """Return a matrix entry without its unit, e.g. "0.5094"; a dash if there is none."""
+    return display.number(value, unit).replace("-", MINUS)
 
 
 def label(parameter: Parameter) -> str:

@@ -7,70 +7,105 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from kinetostat.kinematics.mobility import Kind, Mobility
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.display import ENGINEERING, Display, number
+from kinetostat.kinematics.mobility import Kind
 from kinetostat.kinetostatics.eigenscrews import Eigenscrew
 from kinetostat.kinetostatics.indices import PrincipalStiffness
 from kinetostat.studies.analysis import Analysis, Rows
 from kinetostat.studies.attribution import by_part
 from kinetostat.studies.indices import Along
 from kinetostat.studies.loads import LoadCase
-from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
-from kinetostat.views.tables import number, numeric_table, print_doubts
+from kinetostat.tolerances import EQUAL_STIFFNESSES, ROUND_OFF_OF_ENTRY
+from kinetostat.views.first_lines import first_lines
+from kinetostat.views.tables import numeric_table, print_doubts
 
-UNITS_OF_K = "N·m/rad, N/rad, N/m"
-UNITS_OF_C = "rad/(N·m), rad/N, m/N"
-ALIKE = 1e-9
-"""Relative difference of principal stiffnesses below which they are one, and their directions a matter of rounding."""
+MATRIX_UNITS = {"stiffness": ("N·m/rad", "N/rad", "N/m"), "compliance": ("rad/(N·m)", "rad/N", "m/N")}
+"""SI units of the blocks of K and C: rotation, coupling, translation."""
+ROTATION_NAMES = COMPONENTS[:3]
 MOST_NAMED = 4
 """Parts of unknown mass that are named."""
 
 
 def print_analysis(console: Console, analysis: Analysis, along: Sequence[Along] = (), full: bool = False) -> None:
-    """K, C, attribution, indices, mobility and loads at one pose; all springs and eigenscrews if `full`."""
-    machine, names = analysis.machine, analysis.components
+    """The answer in five lines, its reasons in tables, K and C last; all springs and eigenscrews if `full`."""
+    machine, names, display = analysis.machine, analysis.components, analysis.machine.display
     console.print(Text.assemble((machine.name, "bold"), f"  {analysis.status.word}"))
-    console.print(analysis.message, highlight=False)
+    answer = Table.grid(padding=(0, 2, 0, 0))
+    for label, text in first_lines(analysis):
+        answer.add_row(Text(label, "bold"), text)
+    console.print(answer)
     print_doubts(console, machine)
-    about = f"Components {' '.join(names)} at the {machine.reference}, {analysis.axes} axes. Rank {analysis.rank}."
-    console.print(about, style="dim", highlight=False)
-    console.print(stiffness_table(analysis))
-    console.print(compliance_table(analysis))
-    console.print(shares_table(analysis, full))
-    shown = [principal_table(analysis), along_table(along)]
-    if full and analysis.indices:
-        shown.append(eigenscrew_table(analysis.indices.eigenscrews, machine.reference))
+    shown = [along_table(along, display), shares_table(analysis, full), principal_table(analysis)]
     if analysis.load:
-        shown += [load_table(names, analysis.load), actuator_table(analysis.load)]
-        shown.append(reaction_table(analysis.load, analysis.axes))
-    for table in shown:
-        if table.row_count:
-            console.print(table)
+        shown += [load_table(names, analysis.load, display), actuator_table(analysis.load, display)]
+        shown.append(reaction_table(analysis.load, analysis.axes, display))
+    _print_tables(console, shown)
     for line in remarks(analysis):
         console.print(line, highlight=False)
+    about = f"Components {' '.join(names)} at the {machine.reference}, {analysis.axes} axes. Rank {analysis.rank}."
+    console.print(about, style="dim", highlight=False)
+    shown = [stiffness_table(analysis), compliance_table(analysis)]
+    if full and analysis.indices:
+        shown.append(eigenscrew_table(analysis.indices.eigenscrews, machine.reference, display))
+    _print_tables(console, shown)
+
+
+def _print_tables(console: Console, tables: Sequence[Table]) -> None:
+    for table in tables:
+        if table.row_count:
+            console.print(table)
+
+
+def matrix_units(kind: str, display: Display = ENGINEERING) -> str:
+    """Return the units of the blocks of K ("stiffness") or C ("compliance"): rotation, coupling, translation."""
+    return ", ".join(display.scale(unit).unit for unit in MATRIX_UNITS[kind])
 
 
 def stiffness_table(analysis: Analysis) -> Table:
     """K, or its diagonal where a direction is rigid."""
-    title = f"Stiffness K ({UNITS_OF_K})"
-    return _matrix_table(title, analysis.components, analysis.stiffness, analysis.stiffness_diagonal, "rigid")
+    display = analysis.machine.display
+    rows = analysis.stiffness or [analysis.stiffness_diagonal]
+    return matrix_table("Stiffness K", "stiffness", analysis.components, rows, display, "rigid")
 
 
 def compliance_table(analysis: Analysis) -> Table:
     """C, or its diagonal where a direction is free."""
-    title = f"Compliance C ({UNITS_OF_C})"
-    return _matrix_table(title, analysis.components, analysis.compliance, analysis.compliance_diagonal, "free")
+    display = analysis.machine.display
+    rows = analysis.compliance or [analysis.compliance_diagonal]
+    return matrix_table("Compliance C", "compliance", analysis.components, rows, display, "free")
 
 
-def _matrix_table(
-    title: str, names: Sequence[str], rows: Rows | None, diagonal: Sequence[float], endless: str
+def matrix_table(
+    title: str,
+    kind: str,
+    names: Sequence[str],
+    rows: Rows | Sequence[Sequence[float]],
+    display: Display = ENGINEERING,
+    endless: str = "∞",
 ) -> Table:
-    table = numeric_table(title, "", names)
-    if rows is None:
-        table.add_row("diagonal", *(number(value, endless) for value in diagonal))
-    else:
-        for name, row in zip(names, rows, strict=True):
-            table.add_row(name, *(number(value) for value in row))
+    """K ("stiffness") or C ("compliance"), each entry in the unit of its block; one row is the diagonal.
+
+    Args:
+        title: to which the units are added.
+        kind: of the matrix.
+        names: of its rows and columns.
+        rows: of the matrix, SI [n x n], or of its diagonal [1 x n].
+        display: units and digits.
+        endless: word for infinity.
+    """
+    table = numeric_table(f"{title} ({matrix_units(kind, display)})", "", names)
+    whole = len(rows) == len(names)
+    for i, row in enumerate(rows):
+        pairs = [(names[i] if whole else name, name) for name in names]
+        cells = (display.number(c, entry_unit(kind, *pair), endless) for c, pair in zip(row, pairs, strict=True))
+        table.add_row(names[i] if whole else "diagonal", *cells)
     return table
+
+
+def entry_unit(kind: str, row: str, column: str) -> str:
+    """Return the SI unit of an entry of K or C by its block."""
+    return MATRIX_UNITS[kind][(row not in ROTATION_NAMES) + (column not in ROTATION_NAMES)]
 
 
 def shares_table(analysis: Analysis, full: bool = False) -> Table:
@@ -86,34 +121,37 @@ def shares_table(analysis: Analysis, full: bool = False) -> Table:
 
 def principal_table(analysis: Analysis) -> Table:
     """Least and largest stiffness of each block, free to follow and held; empty where there is none."""
+    display = analysis.machine.display
     columns = ["least", "largest", "softest direction", "stiffest direction"]
-    table = numeric_table("Principal stiffnesses (N/m, N·m/rad)", "", columns)
+    table = numeric_table(f"Principal stiffnesses ({display.names(['N/m', 'N·m/rad'])})", "", columns)
     indices = analysis.indices
     free, guided = (indices.free or {}, indices.guided or {}) if indices else ({}, {})
-    for what, blocks, block in (
-        ("force", free, "translation"),
-        ("force, rotations held", guided, "translation"),
-        ("moment", free, "rotation"),
-        ("moment, point held", guided, "rotation"),
+    for what, blocks, block, unit in (
+        ("force", free, "translation", "N/m"),
+        ("force, rotations held", guided, "translation", "N/m"),
+        ("moment", free, "rotation", "N·m/rad"),
+        ("moment, point held", guided, "rotation", "N·m/rad"),
     ):
         if block in blocks:
-            table.add_row(what, *_ellipsoid(blocks[block]))
+            table.add_row(what, *_ellipsoid(blocks[block], unit, display))
     return table
 
 
-def along_table(along: Sequence[Along]) -> Table:
+def along_table(along: Sequence[Along], display: Display = ENGINEERING) -> Table:
     """Stiffness along and about directions."""
     columns = ["force", "rotations held", "moment", "point held"]
-    table = numeric_table("Stiffness along and about directions (N/m, N·m/rad)", "direction", columns)
+    title = f"Stiffness along and about directions ({display.names(['N/m', 'N·m/rad'])})"
+    table = numeric_table(title, "direction", columns)
     for stiffness in along:
-        values = (stiffness.force, stiffness.force_held, stiffness.moment, stiffness.moment_held)
-        table.add_row(_direction(stiffness.direction), *(number(value, "rigid") for value in values))
+        forces = (display.number(k, "N/m", "rigid") for k in (stiffness.force, stiffness.force_held))
+        moments = (display.number(k, "N·m/rad", "rigid") for k in (stiffness.moment, stiffness.moment_held))
+        table.add_row(_direction(stiffness.direction), *forces, *moments)
     return table
 
 
-def _ellipsoid(block: PrincipalStiffness) -> list[str]:
+def _ellipsoid(block: PrincipalStiffness, unit: str, display: Display) -> list[str]:
     """Least and largest and their directions; once where there is but one."""
-    values = [number(value, "rigid") for value in (block.stiffnesses[0], block.stiffnesses[-1])]
+    values = [display.number(value, unit, "rigid") for value in (block.stiffnesses[0], block.stiffnesses[-1])]
     directions = [_directions(block, block.stiffnesses[0]), _directions(block, block.stiffnesses[-1])]
     return [*values, *directions] if len(block.stiffnesses) > 1 else [values[0], "", directions[0], ""]
 
@@ -121,10 +159,10 @@ def _ellipsoid(block: PrincipalStiffness) -> list[str]:
 def _directions(block: PrincipalStiffness, stiffness: float) -> str:
     """The direction of a principal stiffness; where several are alike, all that have it."""
     pairs = list(zip(block.stiffnesses, block.directions, strict=True))
-    others = [way for k, way in pairs if not math.isclose(k, stiffness, rel_tol=ALIKE)]
+    others = [way for k, way in pairs if not math.isclose(k, stiffness, rel_tol=EQUAL_STIFFNESSES)]
     alike = len(pairs) - len(others)
     if alike == 1:
-        return next(_direction(way) for k, way in pairs if math.isclose(k, stiffness, rel_tol=ALIKE))
+        return next(_direction(way) for k, way in pairs if math.isclose(k, stiffness, rel_tol=EQUAL_STIFFNESSES))
     return f"any ⊥ {_direction(others[0])}" if others else "any"
 
 
@@ -132,58 +170,73 @@ def _direction(vector: Sequence[float]) -> str:
     return " ".join(f"{round(component, 2) + 0.0:+.2f}" for component in vector)
 
 
-def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str) -> Table:
+def eigenscrew_table(screws: Sequence[Eigenscrew], reference: str, display: Display = ENGINEERING) -> Table:
     """Eigenvalue, pitch, direction and point of each, the point from the reference point."""
-    heads = ["eigenvalue (N/rad)", "pitch (mm/rad)", "direction", f"point from {reference[-1]} (mm)"]
+    length = display.scale("m")
+    heads = [
+        display.scale("N/rad").label("eigenvalue"),
+        f"pitch ({length.unit}/rad)",
+        "direction",
+        length.label(f"point from {reference[-1]}"),
+    ]
     table = numeric_table("Eigenscrews", "", heads)
     for i, screw in enumerate(screws, 1):
-        point = "–" if screw.point is None else _millimetres(screw.point)
-        pitch = "infinite" if math.isinf(screw.pitch) else number(1e3 * screw.pitch)
-        table.add_row(str(i), number(screw.eigenvalue, "infinite"), pitch, _direction(screw.direction), point)
+        point = "–" if screw.point is None else _point(screw.point, display)
+        cells = (display.number(screw.eigenvalue, "N/rad", "infinite"), display.number(screw.pitch, "m", "infinite"))
+        table.add_row(str(i), *cells, _direction(screw.direction), point)
     return table
 
 
-def _millimetres(point: Sequence[float]) -> str:
-    """A point given in m, without rounding."""
-    return " ".join(f"{1e3 * c if abs(c) > ROUND_OFF_OF_ENTRY else 0.0:.4g}" for c in point)
+def _point(point: Sequence[float], display: Display) -> str:
+    """A point given in m, without round-off."""
+    return " ".join(display.number(c if abs(c) > ROUND_OFF_OF_ENTRY else 0.0, "m") for c in point)
 
 
-def load_table(names: Sequence[str], load: LoadCase) -> Table:
+def load_table(names: Sequence[str], load: LoadCase, display: Display = ENGINEERING) -> Table:
     """The load and the deflection of the reference point."""
-    kept = [("rx", "ry", "rz", "x", "y", "z").index(name) for name in names]
-    table = numeric_table("Load (N·m, N) and the deflection under it (rad, m)", "", names)
-    table.add_row("load", *(number(load.wrench[i]) for i in kept))
-    table.add_row("deflection", *(number(load.deflection[i], "free") for i in kept))
+    units = [("N·m", "rad") if name in ROTATION_NAMES else ("N", "m") for name in names]
+    motions = ", ".join(dict.fromkeys(display.deflection(motion).unit for _, motion in units))
+    title = f"Load ({display.names([loaded for loaded, _ in units])}) and the deflection under it ({motions})"
+    table = numeric_table(title, "", names)
+    kept = [COMPONENTS.index(name) for name in names]
+    pairs = list(zip(kept, units, strict=True))
+    table.add_row("load", *(display.number(load.wrench[i], unit) for i, (unit, _) in pairs))
+    moved = (load.deflection[i] * display.deflection(unit).factor for i, (_, unit) in pairs)
+    table.add_row("deflection", *(number(motion, "free", display.digits) for motion in moved))
     return table
 
 
-def actuator_table(load: LoadCase) -> Table:
-    """What each actuator bears, and how far it gives."""
-    table = numeric_table("Actuators under this load", "", ["load", "", "deformation", ""])
+def actuator_table(load: LoadCase, display: Display = ENGINEERING) -> Table:
+    """What each actuator bears, and how far it deforms."""
+    table = numeric_table("Actuators under this load", "", ["load", "deformation"])
     for spring in load.springs:
         if spring.actuated:
             units = ("N·m", "rad") if spring.turning else ("N", "m")
-            table.add_row(spring.name, number(spring.load), units[0], number(spring.deformation, "free"), units[1])
+            table.add_row(
+                spring.name, display.show(spring.load, units[0]), display.show_deflection(spring.deformation, units[1])
+            )
     return table
 
 
-def reaction_table(load: LoadCase, axes: str) -> Table:
+def reaction_table(load: LoadCase, axes: str, display: Display = ENGINEERING) -> Table:
     """The wrench in each joint, in base or platform axes."""
-    title = f"Joint reactions: load that each joint passes on towards the base (N·m, N; {axes} axes)"
+    units = display.names(["N·m", "N"])
+    title = f"Joint reactions: load that each joint passes on towards the base ({units}; {axes} axes)"
     table = numeric_table(title, "joint", ["mx", "my", "mz", "fx", "fy", "fz"])
     for reaction in load.reactions:
-        table.add_row(reaction.joint, *(number(float(c)) for c in reaction.wrench.components()))
+        pairs = zip(reaction.wrench.components(), ["N·m"] * 3 + ["N"] * 3, strict=True)
+        table.add_row(reaction.joint, *(display.number(float(c), unit) for c, unit in pairs))
     return table
 
 
 def remarks(analysis: Analysis) -> list[str]:
     """Mobility, internal loads, centre, condition and mass, a sentence each."""
-    lines = []
+    lines, display = [], analysis.machine.display
     if analysis.mobility:
         mobility = analysis.mobility
         extra = f", {mobility.here.redundant} redundant constraints" if mobility.here.redundant else ""
         lines.append(f"Mobility: {mobility.full_cycle} freedoms, {mobility.actuators} actuators{extra}.")
-        lines.append(f"{_sort_of_pose(mobility.kind)}. {margins(mobility)}")
+        lines.append(f"{_sort_of_pose(mobility.kind)}.")
     if analysis.internal_loads and analysis.internal_loads.degree:
         legs = ", ".join(analysis.internal_loads.legs)
         lines.append(
@@ -193,22 +246,17 @@ def remarks(analysis: Analysis) -> list[str]:
     if analysis.indices:
         centre = analysis.indices.centres["stiffness"]
         if centre is not None:
-            lines.append(f"Centre of stiffness: {_millimetres(centre)} mm from the {analysis.machine.reference}.")
+            place = f"{_point(centre, display)} {display.scale('m').unit}"
+            lines.append(f"Centre of stiffness: {place} from the {analysis.machine.reference}.")
         lines.append(
             f"Condition numbers: {number(analysis.indices.stiffness_condition, 'infinite')} of K, "
             f"{number(analysis.wrench_condition)} of the leg wrenches, "
             f"{number(analysis.jacobian_condition, 'infinite')} of the Jacobian of the actuators; "
-            f"rotations are scaled by the characteristic length, {number(analysis.characteristic_length)} m."
+            f"rotations are scaled by the characteristic length, {display.show(analysis.characteristic_length, 'm')}."
         )
     if analysis.masses:
         lines.append(_moving(analysis))
     return lines
-
-
-def margins(mobility: Mobility) -> str:
-    """Return a sentence with the singularity margins of a pose, to two digits."""
-    legs, platform = mobility.leg_distance, mobility.platform_distance
-    return f"Singularity margin (0 to 1): legs {legs:.2g}, platform {platform:.2g}."
 
 
 def _sort_of_pose(kind: Kind) -> str:
@@ -228,4 +276,4 @@ def _moving(analysis: Analysis) -> str:
     shown = ", ".join(unknown[:MOST_NAMED])
     more = f" and {len(unknown) - MOST_NAMED} more" if len(unknown) > MOST_NAMED else ""
     without = f"; not counted, as no mass is given: {shown}{more}" if unknown else ", all links and the platform"
-    return f"Moving mass: {number(analysis.moving_mass)} kg{without}."
+    return f"Moving mass: {analysis.machine.display.show(analysis.moving_mass, 'kg')}{without}."

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from kinetostat.display import Display
 from kinetostat.studies.comparison.design_rows import Row
 from kinetostat.studies.comparison.designs import Comparison
 from kinetostat.studies.setting import frame_of
-from kinetostat.views.display import prefixed_scale
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout, set_title
 
 WIDE = 30.0
@@ -37,7 +37,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
         figure = Figure(figsize=(sum(widths) + 0.6 * len(panels) + 0.6, height), layout="constrained")
         axes = figure.subplots(1, len(panels), squeeze=False, width_ratios=widths).flat
         for panel, (title, bars) in zip(axes, panels, strict=True):
-            _bars(panel, title, bars, len(comparison.designs))
+            _bars(panel, title, bars, len(comparison.designs), comparison.display)
         styles = zip(string.ascii_uppercase, comparison.designs, strict=False)
         handles = [
             Patch(color=_colour(i), label=f"{letter}  {_short(design.label)}")
@@ -83,11 +83,11 @@ def _pairs(rows: Sequence[Row], grid: bool) -> Bars:
     return [(label, group["mean"], group["worst"]) for label, group in groups.items()]
 
 
-def _bars(panel: Axes, title: str, bars: Bars, count: int) -> None:
+def _bars(panel: Axes, title: str, bars: Bars, count: int, display: Display) -> None:
     unit = bars[0][1].unit
     heights = np.array([_numbers(bar) for _, bar, _ in bars])
     dots = np.array([_numbers(dot) if dot else [math.nan] * count for _, _, dot in bars])
-    scale = prefixed_scale(unit, np.concatenate([heights, dots]))
+    scale = display.scale(unit)
     heights, dots = heights * scale.factor, dots * scale.factor
     width = 0.8 / count
     seen = heights[np.isfinite(heights) & (heights > 0.0)]

@@ -10,16 +10,19 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from kinetostat.display import Display, number
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.studies.comparison.design_rows import Better, Row
 from kinetostat.studies.comparison.designs import Comparison, SoftDirection
-from kinetostat.validation.comparison import Array, Validation
-from kinetostat.views.analysis_tables import UNITS_OF_C
-from kinetostat.views.tables import number, numeric_table, readable, text_table
+from kinetostat.validation.comparison import Validation
+from kinetostat.views.analysis_tables import matrix_table
+from kinetostat.views.tables import numeric_table, readable, text_table
 
 NAMED, CELL = 27, 20
 """Widths, in characters, of the first column and of one design: what fits is printed side by side."""
 MOST_SHARES = 3
+DIGITS = 9
+"""Digits in which a machine is compared with an independent engine."""
 MISSING = "–"
 """Shown for a design that has no such field."""
 
@@ -36,11 +39,12 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
         console.print(Text.assemble((letter, "bold"), title, why))
     console.print("Percentages are changes against A; the best value of each row is bold.", style="dim")
     _print_differences(console, comparison, letters)
-    _print_rows(console, "At the pose of each design", letters, comparison.rows)
+    display = comparison.display
+    _print_rows(console, "At the pose of each design", letters, comparison.rows, display)
     _print_softest(console, comparison, letters)
     if comparison.ranges:
         counts = ", ".join(f"{letter} {n:,} of {m:,}" for letter, (n, m) in zip(letters, comparison.poses, strict=True))
-        _print_rows(console, f"Over {', '.join(comparison.ranges)}", letters, comparison.over, by_group=True)
+        _print_rows(console, f"Over {', '.join(comparison.ranges)}", letters, comparison.over, display, by_group=True)
         console.print(f"Poses with a result: {counts}.", highlight=False)
 
 
@@ -50,7 +54,7 @@ def _print_differences(console: Console, comparison: Comparison, letters: str) -
     for difference in comparison.differences:
         pairs = zip(difference.parameters, difference.values, strict=True)
         rows[difference.path] = [
-            readable(row, parameter.quantity) if parameter else MISSING for parameter, row in pairs
+            readable(row, parameter.quantity, comparison.display) if parameter else MISSING for parameter, row in pairs
         ]
     for abreast in _abreast(console, letters):
         table = text_table("Where the files differ", "field", *(letters[i] for i in abreast))
@@ -72,7 +76,9 @@ def _abreast(console: Console, letters: str) -> Iterator[list[int]]:
         yield [0, *range(start, min(start + others, len(letters)))]
 
 
-def _print_rows(console: Console, title: str, letters: str, rows: Sequence[Row], by_group: bool = False) -> None:
+def _print_rows(
+    console: Console, title: str, letters: str, rows: Sequence[Row], display: Display, by_group: bool = False
+) -> None:
     for shown in _abreast(console, letters):
         table = numeric_table(title, "", [letters[i] for i in shown])
         group = rows[0].group if rows else ""
@@ -80,16 +86,16 @@ def _print_rows(console: Console, title: str, letters: str, rows: Sequence[Row],
             if row.group != group:
                 table.add_section()
                 group = row.group
-            unit = "" if row.unit == "1" else f" {row.unit}"
+            unit = "" if row.unit == "1" else f" {display.scale(row.unit).unit}"
             name = f"{row.group} {row.name}" if by_group else row.name
-            table.add_row(f"{name}{unit}", *(_cell(row, i) for i in shown))
+            table.add_row(f"{name}{unit}", *(_cell(row, i, display) for i in shown))
         console.print(table)
 
 
-def _cell(row: Row, i: int) -> Text:
+def _cell(row: Row, i: int, display: Display) -> Text:
     """Return a value and its change against the first design; green where it is better."""
     endless = "rigid" if row.better is Better.MORE else "free"
-    value, percent = number(row.values[i], endless), row.percents[i]
+    value, percent = display.number(row.values[i], row.unit, endless), row.percents[i]
     shown = Text(value, "bold" if i in row.best else "")
     if i == 0 or percent is None:
         return Text.assemble(shown, "" if i == 0 else " " * 9)
@@ -134,21 +140,14 @@ def print_validation(console: Console, validation: Validation, agreed: float) ->
     kept = list(family.components)
     titles = {"kinetostat": validation.ours, validation.engine: validation.theirs}
     for title, matrix in titles.items():
-        shown = f"Compliance C, {title} ({UNITS_OF_C})"
-        console.print(matrix_table(shown, family.component_names, matrix[kept][:, kept]))
+        rows = matrix[kept][:, kept].tolist()
+        shown = f"Compliance C, {title}"
+        console.print(matrix_table(shown, "compliance", family.component_names, rows, validation.machine.display))
     console.print(difference_table(validation))
     console.print(trial_table(validation))
     verdict = "agree" if validation.difference <= agreed else "DIFFER"
     largest = f"the largest relative difference is {validation.difference:.1e}, allowed is {agreed:g}"
     console.print(f"The two {verdict}: {largest}.", highlight=False)
-
-
-def matrix_table(title: str, names: Sequence[str], matrix: Array) -> Table:
-    """A compliance."""
-    table = numeric_table(title, "", names)
-    for name, row in zip(names, matrix, strict=True):
-        table.add_row(name, *(number(float(entry)) for entry in row))
-    return table
 
 
 def diagonal_table(validation: Validation) -> Table:
@@ -158,7 +157,9 @@ def diagonal_table(validation: Validation) -> Table:
     for i, name in zip(family.components, family.component_names, strict=True):
         ours, theirs = float(validation.ours[i, i]), float(validation.theirs[i, i])
         apart = f"{abs(theirs / ours - 1.0):.1e}" if ours else "–"
-        table.add_row(name, f"{ours:.9g}", f"{theirs:.9g}", apart, QUANTITIES[f"compliance_{name}"].unit)
+        scale = validation.machine.display.scale(QUANTITIES[f"compliance_{name}"].unit)
+        cells = (number(value * scale.factor, digits=DIGITS) for value in (ours, theirs))
+        table.add_row(name, *cells, apart, scale.unit)
     return table
 
 

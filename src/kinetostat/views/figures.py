@@ -17,10 +17,12 @@ from matplotlib.colors import LogNorm
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 
+from kinetostat.display import Scale, number, with_unit
+from kinetostat.kinetostatics.quantities import group_of, spoken
 from kinetostat.studies.grid.grid import failures
 from kinetostat.studies.storage import replacing
-from kinetostat.views.display import Scale, coordinate_scale, family_of_names, prefixed_scale, spoken
-from kinetostat.views.levels import levels_of, usual_range
+from kinetostat.views.grid_tables import display_of
+from kinetostat.views.levels import levels_of
 
 STYLE: Any = {
     "font.family": "DejaVu Sans",
@@ -81,7 +83,8 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
         y, y_label = axis_values(dataset, str(up))
         lines = []
         for panel, name in zip(panels, names, strict=False):
-            lines += _contour_panel(panel, x, y, dataset[name].transpose(up, across))
+            scale = display_of(dataset).scale(dataset[name].attrs["units"])
+            lines += _contour_panel(panel, x, y, dataset[name].transpose(up, across), scale)
             panel.set(xlabel=x_label, ylabel=y_label)
             set_axis_scales(panel, dataset, str(across), str(up))
         for unused in list(figure.axes)[len(names) : rows * columns]:
@@ -181,7 +184,7 @@ def _setting(dataset: xr.Dataset) -> tuple[str, str]:
 def axis_values(dataset: xr.Dataset, name: str) -> tuple[Array, str]:
     """Values of a coordinate as an axis shows them, and its label with the unit."""
     coordinate = dataset[name]
-    scale = coordinate_scale(coordinate.attrs["kind"], coordinate.attrs["units"], coordinate.values)
+    scale = display_of(dataset).scale(coordinate.attrs["units"])
     return coordinate.values * scale.factor, scale.label(_plain(name))
 
 
@@ -197,18 +200,15 @@ def set_axis_scales(panel: Axes, dataset: xr.Dataset, across: str, up: str) -> N
     lengths = [dataset[name].attrs["kind"] == "length" for name in (across, up)]
     spans = [np.ptp(dataset[name].values) for name in (across, up)]
     if all(lengths) and 0.5 < spans[0] / spans[1] < 2.0:
-        per_metre = [coordinate_scale("length", "m", dataset[name].values).factor for name in (across, up)]
-        panel.set_aspect(per_metre[0] / per_metre[1])
+        panel.set_aspect("equal")
     if dataset[across].attrs["log"]:
         panel.set_xscale("log")
     if dataset[up].attrs["log"]:
         panel.set_yscale("log")
 
 
-def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray) -> list[QuadContourSet]:
+def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: Scale) -> list[QuadContourSet]:
     """Fill a panel with bands of colour; return its lines, whose values can be written once the layout is fixed."""
-    finite = data.values[np.isfinite(data.values)]
-    scale = prefixed_scale(data.attrs["units"], np.array(usual_range(finite) if finite.size else [0.0]))
     values = np.ma.masked_invalid(data.values * scale.factor)
     panel.set_title(scale.label(data.attrs["symbol"]))
     panel.set_facecolor("#eeeeee")
@@ -219,7 +219,7 @@ def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray) -> list[
         return []
     if np.ptp(values.compressed()) <= FLAT * np.abs(values).max():
         panel.set_facecolor("#b5dbe3")
-        _note(panel, f"constant: {values.compressed()[0]:.6g} {scale.unit}")
+        _note(panel, f"constant: {with_unit(number(float(values.compressed()[0])), scale.unit)}")
         return []
     levels = levels_of(values.compressed())
     norm = LogNorm(levels.bounds[0], levels.bounds[-1]) if levels.logarithmic else None
@@ -261,11 +261,11 @@ def _curve_panel(panel: Axes, dataset: xr.Dataset, across: str, names: Sequence[
     logarithmic = bool(dataset[across].attrs["log"])
     values = np.concatenate([dataset[name].values for name in names])
     unit = dataset[names[0]].attrs["units"]
-    scale = Scale(1.0, unit) if logarithmic else prefixed_scale(unit, values)
+    scale = display_of(dataset).scale(unit)
     for name, colour, dash in zip(names, COLOURS, DASHES, strict=False):
         panel.plot(x, dataset[name].values * scale.factor, dash, color=colour, label=dataset[name].attrs["symbol"])
     if logarithmic:
         panel.set(xscale="log", yscale="log" if np.nanmin(values) > 0 else "linear")
-    panel.set(xlabel=x_label, ylabel=scale.label(spoken(family_of_names(names) or names[0])))
+    panel.set(xlabel=x_label, ylabel=scale.label(spoken(group_of(names) or names[0])))
     panel.margins(x=0.0)
     panel.legend(loc="best")

@@ -8,14 +8,14 @@ from collections.abc import Iterator, Mapping, Sequence
 import xarray as xr
 from rich.console import Console
 
+from kinetostat.display import Display
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.studies.grid.grid import failures
 from kinetostat.studies.grid.stored_grid import Extremes, StoredGrid
 from kinetostat.studies.workspace.verdicts import INSIDE, phrase
 from kinetostat.studies.workspace.workspace import Workspace
-from kinetostat.views.display import coordinate_scale, family_of_names, spoken
-from kinetostat.views.tables import number, numeric_table
+from kinetostat.views.tables import numeric_table
 
 LONGEST = 60
 """Rows of a sweep that are printed one by one; of longer ones and of maps, the extremes."""
@@ -27,15 +27,21 @@ def print_dataset(console: Console, dataset: xr.Dataset, names: Sequence[str]) -
         _print_curve(console, dataset, names)
     else:
         extremes = {name: _extremes(dataset[name]) for name in names}
-        _print_extremes(console, dataset.attrs["machine"], {str(d): n for d, n in dataset.sizes.items()}, extremes)
+        sizes = {str(d): n for d, n in dataset.sizes.items()}
+        _print_extremes(console, dataset.attrs["machine"], sizes, extremes, display_of(dataset))
     _print_failures(console, failures(dataset), dataset["status"].size)
+
+
+def display_of(dataset: xr.Dataset) -> Display:
+    """Return the units in which a dataset of this version wants to be read."""
+    return Display(dataset.attrs.get("display", ""))
 
 
 def print_stored(console: Console, stored: StoredGrid) -> None:
     """A grid in a file: the extremes of each quantity, and what was there before."""
     question = stored.question
     sizes = dict(zip(question.dims, question.grid.shape, strict=True))
-    _print_extremes(console, question.machine.name, sizes, stored.tally.extremes)
+    _print_extremes(console, question.machine.name, sizes, stored.tally.extremes, question.machine.display)
     failed: dict[Status, int] = {
         status: count for status, count in stored.tally.statuses.items() if status != Status.OK
     }
@@ -53,26 +59,35 @@ def _print_failures(console: Console, counts: Mapping[Status, int], size: int) -
 
 def _print_curve(console: Console, dataset: xr.Dataset, names: Sequence[str]) -> None:
     (across,) = dataset["status"].dims
-    coordinate = dataset[across]
-    group = family_of_names(names)
+    coordinate, display = dataset[across], display_of(dataset)
+    group = group_of(names)
     title = f"{dataset.attrs['machine']}: {spoken(group)}".removesuffix(": ")
-    heads = [f"{spoken(name.removeprefix(f'{group}_'))}\n{QUANTITIES[name].unit}" for name in names]
-    table = numeric_table(title, f"{across}\n{coordinate.attrs['units']}", heads)
+    units = {name: QUANTITIES[name].unit for name in names}
+    heads = [f"{spoken(name.removeprefix(f'{group}_'))}\n{_head(display, units[name])}" for name in names]
+    unit = coordinate.attrs["units"]
+    table = numeric_table(title, f"{across}\n{_head(display, unit)}", heads)
     for i, value in enumerate(coordinate.values):
-        table.add_row(number(float(value)), *(number(float(dataset[name].values[i])) for name in names))
+        cells = (display.number(float(dataset[name].values[i]), units[name]) for name in names)
+        table.add_row(display.number(float(value), unit), *cells)
     console.print(table)
+
+
+def _head(display: Display, unit: str) -> str:
+    return "" if unit == "1" else display.scale(unit).unit
 
 
 def _extremes(data: xr.DataArray) -> Extremes:
     return Extremes(float(data.min()), float(data.mean()), float(data.max()))
 
 
-def _print_extremes(console: Console, machine: str, sizes: Mapping[str, int], extremes: Mapping[str, Extremes]) -> None:
+def _print_extremes(
+    console: Console, machine: str, sizes: Mapping[str, int], extremes: Mapping[str, Extremes], display: Display
+) -> None:
     size = " × ".join(f"{dim} ({count})" for dim, count in sizes.items())
     table = numeric_table(f"{machine}: {size}", "quantity", ["unit", "least", "mean", "largest"])
     for name, extreme in extremes.items():
-        statistics = (extreme.least, extreme.mean, extreme.largest)
-        table.add_row(name, QUANTITIES[name].unit, *(number(value) for value in statistics))
+        unit, statistics = QUANTITIES[name].unit, (extreme.least, extreme.mean, extreme.largest)
+        table.add_row(name, _head(display, unit), *(display.number(value, unit) for value in statistics))
     console.print(table)
 
 
@@ -82,6 +97,7 @@ ERRORS = 2
 
 def print_workspace(console: Console, workspace: Workspace) -> None:
     """Volume, why the rest is outside, how far the inside extends, and what it asks of the machine."""
+    display = display_of(workspace.dataset)
     for line in _summary(workspace):
         console.print(line, highlight=False)
     total = workspace.dataset["verdict"].size
@@ -95,7 +111,8 @@ def print_workspace(console: Console, workspace: Workspace) -> None:
     if workspace.demands:
         table = numeric_table("Demands on the machine within the workspace", "", ["from", "to", ""])
         for demand in workspace.demands:
-            table.add_row(demand.title, number(demand.least), number(demand.greatest), demand.unit)
+            cells = (display.number(value, demand.unit) for value in (demand.least, demand.greatest))
+            table.add_row(demand.title, *cells, display.scale(demand.unit).unit)
         console.print(table)
 
 
@@ -122,10 +139,11 @@ def _summary(workspace: Workspace) -> Iterator[str]:
 
 
 def _print_extents(console: Console, workspace: Workspace) -> None:
+    display = display_of(workspace.dataset)
     table = numeric_table("Extent of the workspace", "", ["from", "to", ""])
     for dim, ends in workspace.extents.items():
         coordinate = workspace.dataset[dim]
-        scale = coordinate_scale(coordinate.attrs["kind"], coordinate.attrs["units"], coordinate.values)
-        low, high = (number(round(end * scale.factor, 9)) for end in ends)
-        table.add_row(dim.removeprefix("pose."), low, high, scale.unit)
+        unit = coordinate.attrs["units"]
+        low, high = (display.number(float(end), unit) for end in ends)
+        table.add_row(dim.removeprefix("pose."), low, high, display.scale(unit).unit)
     console.print(table)

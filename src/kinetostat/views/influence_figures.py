@@ -164,7 +164,8 @@ def _curves(panel: Axes, guidelines: Guidelines, element: Element, limits: np.nd
     rigid_now = element.stiffness == math.inf
     ends = np.log10([*finite, *([] if rigid_now else [1.0])])
     factors = np.logspace(ends.min() - 2.0 * DECADES, ends.max() + DECADES, POINTS)
-    present = 1.0 if element.stiffness is None else limit_of(element.stiffness, 1.0)
+    scale = guidelines.machine.display.scale(element.unit)
+    present = 1.0 if element.stiffness is None else limit_of(element.stiffness, 1.0) * scale.factor
     stiff = stiffening(guidelines.machine, element, factors)
     for colour, dash, curve, limit in zip(COLOURS, DASHES, stiff, limits, strict=False):
         if limit == math.inf:
@@ -175,7 +176,7 @@ def _curves(panel: Axes, guidelines: Guidelines, element: Element, limits: np.nd
     if not rigid_now:
         panel.axvline(present, color="#888888", linewidth=0.8, linestyle=":")
         panel.text(present, 3.0, " now", fontsize=6.5, color="#666666", ha="left")
-    unit = f"stiffness ({element.unit})" if element.stiffness is not None else "multiple of the present stiffness"
+    unit = scale.label("stiffness") if element.stiffness is not None else "multiple of the present stiffness"
     panel.set(xscale="log", ylim=(0.0, 104.0), xlabel=unit, ylabel="stiffness, % of that with\na rigid element")
     panel.set_title(element.name)
     panel.margins(x=0.0)

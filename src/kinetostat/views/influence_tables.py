@@ -11,18 +11,21 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from kinetostat.display import number
+from kinetostat.kinetostatics.quantities import group_of, spoken
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.guidelines.moves import Move
 from kinetostat.studies.guidelines.roles import Roles
 from kinetostat.studies.guidelines.sentences import LEAST, MATTERS, statements
 from kinetostat.studies.sensitivity import PER, Sensitivity, notes
-from kinetostat.units import KINDS, show
-from kinetostat.views.display import family_of_names, spoken
-from kinetostat.views.tables import number, numeric_table, omitted
+from kinetostat.units import KINDS, RIGID
+from kinetostat.views.tables import numeric_table, omitted
 
 MOST_INFLUENCES = 40
 """Parameters that are printed; `--json` has all."""
+DIGITS = 6
+"""Digits of the value of a parameter."""
 NEGLIGIBLE = 0.0005
 """Percent per percent below which a 0 is printed."""
 
@@ -39,7 +42,7 @@ def print_sensitivity(console: Console, sensitivity: Sensitivity) -> None:
 
 def influence_table(sensitivity: Sensitivity, count: int) -> Table:
     """Return the first parameters by rank, with their values and their effect on each index."""
-    group = family_of_names(sensitivity.quantities)
+    group = group_of(sensitivity.quantities)
     heads = [spoken(name.removeprefix(f"{group}_")) for name in sensitivity.quantities]
     title = f"{sensitivity.machine.name}: {spoken(group)}, {PER}" if group else f"{sensitivity.machine.name}: {PER}"
     table = numeric_table(title, "parameter", ["value", *heads])
@@ -47,7 +50,7 @@ def influence_table(sensitivity: Sensitivity, count: int) -> Table:
         name = with_leg(sensitivity.machine, influence.path)
         table.add_row(
             name,
-            show(influence.value, KINDS[influence.kind].unit, 6),
+            sensitivity.machine.display.show(influence.value, KINDS[influence.kind].unit, RIGID, DIGITS),
             *(_percent(percent) for percent in influence.percents),
         )
     return table
@@ -163,13 +166,14 @@ def limit_table(guidelines: Guidelines, here: Roles) -> Table:
     )
     for k, element in enumerate(guidelines.elements):
         row = here.rigid[k, :, 0].tolist()
+        scale = guidelines.machine.display.scale(element.unit)
         if element.stiffness is None:
             table.add_row(element.name, "1 × now", *(_limit(factor) for factor in row))
         else:
             rigid = element.stiffness == math.inf
             present = 1.0 if rigid else element.stiffness
-            now = "rigid" if rigid else f"{_limit(element.stiffness)} {element.unit}"
-            table.add_row(element.name, now, *(_limit(factor * present) for factor in row))
+            now = f"rigid ({scale.unit})" if rigid else f"{_limit(element.stiffness * scale.factor)} {scale.unit}"
+            table.add_row(element.name, now, *(_limit(factor * present * scale.factor) for factor in row))
     return table
 
 

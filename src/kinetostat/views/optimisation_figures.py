@@ -8,11 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from kinetostat.display import Display, Scale
+from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.studies.optimisation.log import Log
 from kinetostat.studies.optimisation.problem import Objective
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.robustness import Scatter
-from kinetostat.views.display import Scale, prefixed_scale, spoken
 from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, set_title
 
 BINS = 40
@@ -41,7 +42,7 @@ def convergence(log: Log, title: str) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(6.8, 3.0), layout="constrained")
         left, right = figure.subplots(1, 2)
-        scale = _scaled(objective, np.concatenate([best, mean]))
+        scale = log.problem.machine.display.scale(objective.term.unit)
         left.plot(steps, mean * scale.factor, color=COLOURS[1], label="mean of the population", linestyle="--")
         left.plot(steps, best * scale.factor, color=COLOURS[0], label="best")
         left.set(xlabel=across, ylabel=_axis(objective, scale))
@@ -92,7 +93,7 @@ def _gains(panel: Axes, result: Result) -> None:
 
 def _places(panel: Axes, result: Result) -> None:
     """Draw each variable on a scale from its lower to its upper bound."""
-    space = result.problem.space
+    space, display = result.problem.space, result.problem.machine.display
     most = np.where(space.catalogue > 0, np.maximum(space.catalogue - 1, 1), 1)
     before, after = space.initial / most, result.genes / most
     for place, variable in enumerate(space.searched):
@@ -104,10 +105,10 @@ def _places(panel: Axes, result: Result) -> None:
                 arrowprops={"arrowstyle": "-", "color": "#888888", "linewidth": 0.8}, zorder=1,
             )  # fmt: skip
         panel.plot(after[place], place, "o", color=COLOURS[0], zorder=3)
-        value = variable.shown(float(space.values(result.genes)[place]))
+        value = variable.shown(float(space.values(result.genes)[place]), display)
         panel.annotate(value, (1.04, place), va="center", fontsize=7)
-        ends = [variable.shown(0.0 if variable.choices is not None else variable.low)]
-        ends.append(variable.shown(variable.high))
+        ends = [variable.shown(0.0 if variable.choices is not None else variable.low, display)]
+        ends.append(variable.shown(variable.high, display))
         for x, text, side in zip((0.0, 1.0), ends, ("left", "right"), strict=True):
             panel.annotate(text, (x, place), (0, 5), textcoords="offset points", ha=side, fontsize=5.5, color="#777777")
     panel.set_yticks(range(space.size), [variable.name for variable in space.searched])
@@ -132,7 +133,7 @@ def front(result: Result) -> Figure:
         figure = Figure(figsize=(4.2 * columns if columns == 1 else 3.1 * columns, 3.2 * rows), layout="constrained")
         panels = figure.subplots(rows, columns, squeeze=False).flat
         for panel, (i, j) in zip(panels, pairs, strict=False):
-            x, y = (_scaled(problem.objectives[k], best[:, k]) for k in (i, j))
+            x, y = (problem.machine.display.scale(problem.objectives[k].term.unit) for k in (i, j))
             panel.scatter(
                 feasible[:, i] * x.factor, feasible[:, j] * y.factor, s=3, color="#c8c8c8", linewidths=0,
                 rasterized=True, label="evaluated designs",
@@ -158,15 +159,15 @@ def tolerances(result: Result) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(3.6 * len(scatters) + 0.6, 2.9), layout="constrained")
         for panel, scatter in zip(figure.subplots(1, len(scatters), squeeze=False).flat, scatters, strict=True):
-            _histogram(panel, scatter)
+            _histogram(panel, scatter, result.problem.machine.display)
         set_title(figure, f"{result.problem.study.name}: under the tolerances")
         fix_layout(figure)
     return figure
 
 
-def _histogram(panel: Axes, scatter: Scatter) -> None:
+def _histogram(panel: Axes, scatter: Scatter, display: Display) -> None:
     samples = scatter.samples[np.isfinite(scatter.samples)]
-    scale = prefixed_scale(scatter.unit, samples) if scatter.unit != "SI" else Scale(1.0, scatter.unit)
+    scale = display.scale(scatter.unit)
     panel.hist(samples * scale.factor, bins=BINS, color=COLOURS[5], edgecolor="white", linewidth=0.3)
     marks = (("nominal", scatter.nominal, "-"), ("95 % within", scatter.usual, "--"), ("worst", scatter.worst, ":"))
     for (label, value, dash), colour in zip(marks, ("#222222", COLOURS[0], COLOURS[1]), strict=True):
@@ -175,11 +176,6 @@ def _histogram(panel: Axes, scatter: Scatter) -> None:
     panel.margins(x=0.03)
     panel.set_ylim(top=panel.get_ylim()[1] * 1.4)
     panel.legend(loc="upper left", fontsize=6.5, frameon=True, framealpha=1.0, edgecolor="none")
-
-
-def _scaled(objective: Objective, values: np.ndarray) -> Scale:
-    unit = objective.term.unit
-    return Scale(1.0, unit) if unit == "SI" else prefixed_scale(unit, values)
 
 
 def _axis(objective: Objective, scale: Scale) -> str:

@@ -10,17 +10,19 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from kinetostat.display import ENGINEERING, Display, number
+from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.result_data import message
 from kinetostat.studies.optimisation.ridges import ridge_sentences
 from kinetostat.studies.optimisation.robustness import Robustness
-from kinetostat.views.display import spoken
-from kinetostat.views.tables import number, numeric_table
+from kinetostat.views.tables import numeric_table
 
 
 def print_study(console: Console, problem: Problem) -> None:
     """Print the question of a study: poses, objectives, constraints and variables."""
+    console.print("The file has no mistake, and its machine can be read.", highlight=False)
     console.print(Text.assemble((problem.study.name, "bold"), f"  {problem.machine.name}"))
     console.print(f"Evaluated at {problem.poses.description}; method {problem.method}.", highlight=False)
     for aim in aims(problem):
@@ -33,7 +35,8 @@ def print_study(console: Console, problem: Problem) -> None:
 def aims(problem: Problem) -> list[str]:
     """Objectives and constraints, a line each."""
     objectives = [
-        f"Objective: {term.goal} {spoken(term.term.label)}{_unit(term.term.unit)}" for term in problem.objectives
+        f"Objective: {term.goal} {spoken(term.term.label)}{_unit(term.term.unit, problem.machine.display)}"
+        for term in problem.objectives
     ]
     return objectives + [f"Constraint: {spoken(term.label)}" for term in problem.constraints]
 
@@ -44,7 +47,7 @@ def bounds_table(problem: Problem) -> Table:
     table.add_column("meaning")
     for variable in problem.space.searched:
         low = 0.0 if variable.choices is not None else variable.low
-        cells = (variable.shown(value) for value in (variable.initial, low, variable.high))
+        cells = (variable.shown(value, problem.machine.display) for value in (variable.initial, low, variable.high))
         table.add_row(variable.name, *cells, variable.quantity.meaning)
     return table
 
@@ -54,8 +57,8 @@ def not_searched(problem: Problem) -> str:
     return ", ".join(variable.name for variable in problem.space.variables if variable.fixed)
 
 
-def _unit(unit: str) -> str:
-    return "" if unit == "1" else f" ({unit})"
+def _unit(unit: str, display: Display) -> str:
+    return "" if unit == "1" else f" ({display.scale(unit).unit})"
 
 
 MOST_ROWS = 25
@@ -78,7 +81,7 @@ def print_result(console: Console, result: Result) -> None:
     console.print(variable_table(result))
     console.print(direction_table(result))
     if result.robustness:
-        console.print(scatter_table(result.robustness))
+        console.print(scatter_table(result.robustness, problem.machine.display))
         if result.robustness.failing:
             console.print(failing(result.robustness), highlight=False)
     for line in remarks(result):
@@ -87,6 +90,7 @@ def print_result(console: Console, result: Result) -> None:
 
 def worth_table(result: Result) -> Table:
     """Objectives and constraints before and after."""
+    display = result.problem.machine.display
     best = "knee of the front" if len(result.problem.objectives) > 1 else "best"
     table = numeric_table(
         "Objectives and constraints" if result.problem.constraints else "Objectives",
@@ -96,17 +100,14 @@ def worth_table(result: Result) -> Table:
     for k, objective in enumerate(result.problem.objectives):
         before, after = result.initial.objectives[0, k], result.outcome.objectives[0, k]
         gain = before / after if objective.sign > 0 else after / before
-        name = f"{objective.goal} {objective.term.label}"
-        table.add_row(name, _exact(before), _exact(after), _times(gain), objective.term.unit)
+        name, scale = f"{objective.goal} {objective.term.label}", display.scale(objective.term.unit)
+        cells = (_exact(value * scale.factor) for value in (before, after))
+        table.add_row(name, *cells, _times(gain), "" if scale.unit == "1" else scale.unit)
     for k, constraint in enumerate(result.problem.constraints):
         before, after = result.initial.constraints[0, k], result.outcome.constraints[0, k]
-        table.add_row(
-            constraint.label,
-            number(before),
-            number(after),
-            "",
-            "" if constraint.term.unit == "1" else constraint.term.unit,
-        )
+        unit = constraint.term.unit
+        cells = (display.number(value, unit) for value in (before, after))
+        table.add_row(constraint.label, *cells, "", "" if unit == "1" else display.scale(unit).unit)
     return table
 
 
@@ -120,12 +121,13 @@ def variable_table(result: Result) -> Table:
         ["initial", "best", "at bound", *heads],
     )
     influences = {influence.name: influence for influence in result.influences}
-    values = result.problem.space.values(result.genes)
+    values, display = result.problem.space.values(result.genes), result.problem.machine.display
     for variable, value in zip(result.problem.space.searched, values, strict=True):
         influence = influences.get(variable.name)
         percents = [_percent(p) for p in influence.percents] if influence else [""] * len(objectives)
         bound = influence.bound if influence else ""
-        table.add_row(variable.name, variable.shown(variable.initial), variable.shown(value), bound, *percents)
+        shown = (variable.shown(number, display) for number in (variable.initial, value))
+        table.add_row(variable.name, *shown, bound, *percents)
         for field in variable.fields[1:]:
             table.add_row(f"  with {field.path}", "", "", "", *[""] * len(heads))
     return table
@@ -133,25 +135,28 @@ def variable_table(result: Result) -> Table:
 
 def direction_table(result: Result) -> Table:
     """The compliance of each direction before and after."""
+    display = result.problem.machine.display
     worst = "" if result.problem.poses.count == 1 else ", the worst of all poses"
     table = numeric_table(f"Compliance{worst}", "direction", ["initial", "best", "change", "unit"])
     for direction in result.directions:
         name = direction.name.removeprefix("compliance_")
-        table.add_row(
-            name, number(direction.before), number(direction.after), times_stiffer(direction.gain), direction.unit
-        )
+        cells = (display.number(value, direction.unit) for value in (direction.before, direction.after))
+        table.add_row(name, *cells, times_stiffer(direction.gain), display.scale(direction.unit).unit)
     return table
 
 
-def scatter_table(robustness: Robustness) -> Table:
+def scatter_table(robustness: Robustness, display: Display = ENGINEERING) -> Table:
     """Return the scatter of the objectives under the tolerances."""
     title = f"Under the tolerances: {robustness.machines:,} random machines"
     title += f" and {robustness.corners:,} corners (every tolerance at an end)" if robustness.corners else ""
     table = numeric_table(title, "", ["nominal", "mean", "std. dev.", "95 % within", "worst", "unit"])
     for scatter in robustness.scatters:
-        figures = (_exact(value) for value in (scatter.nominal, scatter.mean))
-        rest = (number(scatter.deviation), _exact(scatter.usual), _exact(scatter.worst))
-        table.add_row(scatter.label, *figures, *rest, scatter.unit)
+        scale = display.scale(scatter.unit)
+        nominal, mean, usual, worst = (
+            _exact(value * scale.factor) for value in (scatter.nominal, scatter.mean, scatter.usual, scatter.worst)
+        )
+        deviation = display.number(scatter.deviation, scatter.unit)
+        table.add_row(scatter.label, nominal, mean, deviation, usual, worst, scale.unit)
     return table
 
 
@@ -164,7 +169,12 @@ def front_table(result: Result) -> Table:
     """Designs of the front, the knee among them."""
     problem, outcome = result.problem, result.log.outcome(result.front)
     shown = {round(k * (len(result.front) - 1) / (MOST_ROWS - 1)) for k in range(MOST_ROWS)} | {result.knee}
-    names = [f"{objective.term.label}\n{objective.term.unit}".replace(" (", "\n(") for objective in problem.objectives]
+    units = [objective.term.unit for objective in problem.objectives]
+    display = problem.machine.display
+    names = [
+        f"{objective.term.label}\n{display.scale(unit).unit}".replace(" (", "\n(")
+        for objective, unit in zip(problem.objectives, units, strict=True)
+    ]
     variables = [variable.name.split(".", 1)[1].replace("_", "\n") for variable in problem.space.searched]
     title = f"Pareto front: {len(result.front)} designs" + (
         f", {len(shown)} shown" if len(result.front) > len(shown) else ""
@@ -173,9 +183,8 @@ def front_table(result: Result) -> Table:
     for k in sorted(k for k in shown if k < len(result.front)):
         genes = result.log.genes(result.front[k : k + 1])[0]
         values = zip(problem.space.searched, problem.space.values(genes), strict=True)
-        cells = [number(value) for value in outcome.objectives[k]] + [
-            variable.shown(value) for variable, value in values
-        ]
+        cells = [display.number(value, unit) for value, unit in zip(outcome.objectives[k], units, strict=True)]
+        cells += [variable.shown(value, display) for variable, value in values]
         table.add_row("knee" if k == result.knee else "", *cells, style="bold" if k == result.knee else None)
     return table
 

@@ -27,7 +27,7 @@ from kinetostat.studies.storage import write_dataset, write_json, write_text
 from kinetostat.views.drawing import three_views
 from kinetostat.views.figures import Tell, contour_maps, curves, save
 from kinetostat.views.optimisation_figures import convergence
-from kinetostat.views.paper_page import page
+from kinetostat.views.paper_page import misprints, page
 from kinetostat.views.tables import text_table
 
 FIGURE_4 = "Fig. 4: stiffness against the stiffness of the passive links"
@@ -82,8 +82,26 @@ def figures(reproduction: Reproduction) -> dict[str, Figure]:
     }
 
 
-def print_summary(console: Console, reproduction: Reproduction, written: Sequence[Path]) -> None:
-    """Print every number next to the printed one, then equations, statements and the verdict."""
+def print_summary(console: Console, reproduction: Reproduction, written: Sequence[Path], full: bool = False) -> None:
+    """Print the verdict and the misprints of the paper; every number, equation and statement if `full`."""
+    console.print(verdict(reproduction), style="bold green" if reproduction.explained else "bold red", highlight=False)
+    for line in misprints(reproduction):
+        console.print(line, highlight=False)
+    if full:
+        _print_everything(console, reproduction)
+    else:
+        differing = [comparison for comparison in reproduction.comparisons if comparison.verdict is Verdict.DIFFERS]
+        if differing:
+            console.print(_numbers_table(differing))
+    more = "" if full else "; --full prints every number, equation and statement"
+    console.print(f"wrote {written[0]} and {len(written) - 1} more files beside it{more}", highlight=False)
+    console.print("next:", highlight=False)
+    for line in (f"{command()} analyze tripteron", starting("studio", "studio")):
+        console.print(f"  {line}", highlight=False, soft_wrap=True)
+
+
+def _print_everything(console: Console, reproduction: Reproduction) -> None:
+    """Print every number next to the printed one, then equations and statements."""
     console.print(_numbers_table(reproduction.comparisons))
     equations = text_table(
         "Equations 1-32: matrices of the paper against those of kinetostat", "eq.", "statement", "residual", ""
@@ -97,12 +115,6 @@ def print_summary(console: Console, reproduction: Reproduction, written: Sequenc
         console.print(Text.assemble((claim.place, "bold"), f"  {claim.finding.value}"))
         console.print(f"  {claim.statement}", highlight=False)
         console.print(f"  {claim.measured} {claim.limits}", highlight=False, style="dim")
-    console.print()
-    console.print(verdict(reproduction), style="bold green" if reproduction.explained else "bold red", highlight=False)
-    console.print(f"wrote {written[0]} and {len(written) - 1} more files beside it", highlight=False)
-    console.print("next:", highlight=False)
-    for line in (f"{command()} analyze tripteron", starting("studio", "studio")):
-        console.print(f"  {line}", highlight=False, soft_wrap=True)
 
 
 def verdict(reproduction: Reproduction) -> str:

@@ -1,6 +1,6 @@
 """The reproduction of the paper as one self-contained HTML page: no script, no request, pictures inside."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from importlib.metadata import version
 from itertools import groupby
@@ -23,6 +23,7 @@ MARKS = {
     Finding.FAILS: "bad",
 }
 
+COUNTS = ("no", "one", "two", "three", "four", "five", "six")
 NUMERIC = (False, False, True, True, False, False)
 """Columns of the table of numbers."""
 
@@ -67,6 +68,7 @@ def page(reproduction: Reproduction, figures: Mapping[str, Figure]) -> str:
         "<h2>Numbers</h2>",
         "<p>A number is equal to print if it rounds to the digits that are printed. A misprint is listed only where "
         "the corrected digits are reached, with the reason.</p>",
+        *(f"<p>{escape(line)}</p>" for line in misprints(reproduction)),
         *_numbers(reproduction.comparisons),
         "<h2>Equations 1 to 32</h2>",
         _equations(reproduction),
@@ -83,6 +85,28 @@ def page(reproduction: Reproduction, figures: Mapping[str, Figure]) -> str:
         f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in printed.TYPOGRAPHY)}</ul>",
     ]
     return whole_page("Zhang and Gosselin's machine, reproduced by kinetostat", STYLE, body)
+
+
+def misprints(reproduction: Reproduction) -> Iterator[str]:
+    """Write a sentence on the misprints of each place of the paper: what is printed, what it should say, and why."""
+    known = [comparison for comparison in reproduction.comparisons if comparison.verdict is Verdict.MISPRINT]
+    for place, group in groupby(known, key=lambda comparison: comparison.place):
+        wrong = list(group)
+        pairs = [
+            f"{_symbol(place, each.component)} {each.printed} should read "
+            f"{printed.ERRATA[place, each.component].corrected}"
+            for each in wrong
+        ]
+        count = COUNTS[len(wrong)] if len(wrong) < len(COUNTS) else str(len(wrong))
+        are = "number is a misprint" if len(wrong) == 1 else "numbers are misprints"
+        reason = printed.ERRATA[place, wrong[0].component].reason
+        yield f"{place}: {count} {are} of the paper. {'; '.join(pairs)}. Reason: {reason}."
+
+
+def _symbol(place: str, component: str) -> str:
+    """Return the symbol of a number of the paper's tables: C_rx in Table III, K_rx in Table IV."""
+    letter = {"Table III": "C_", "Table IV": "K_"}.get(place.partition(",")[0], "")
+    return component if "/" in component else f"{letter}{component}"
 
 
 def _tiles(reproduction: Reproduction) -> str:

@@ -8,10 +8,9 @@ from matplotlib.figure import Figure
 
 from kinetostat.engine.points import Array
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.studies.evaluation.evaluation import PoseAnswers
 from kinetostat.studies.setting import setting_of
-from kinetostat.views.display import coordinate_scale, family_of_names, prefixed_scale, spoken
 from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting
 
 ABSENT = "#dddddd"
@@ -36,12 +35,12 @@ def path_figure(answers: PoseAnswers) -> Figure:
         ratios = [1.9] * len(groups) + [1.25] * len(kinds)
         panels = list(figure.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=ratios).flat)
         for panel, (unit, members) in zip(panels, groups.items(), strict=False):
-            scale = prefixed_scale(unit, np.concatenate([answers.values[name] for name in members]))
+            scale = answers.machine.display.scale(unit)
             curves = {QUANTITIES[name].symbol: answers.values[name] * scale.factor for name in members}
-            _panel(panel, answers, curves, scale.label(spoken(family_of_names(members) or members[0])))
+            _panel(panel, answers, curves, scale.label(spoken(group_of(members) or members[0])))
         for panel, kind in zip(panels[len(groups) :], kinds, strict=True):
             shown = [(field, values) for field, values in fields if field.quantity.kind == kind]
-            scale = coordinate_scale(kind, shown[0][0].unit, np.concatenate([values for _, values in shown]))
+            scale = answers.machine.display.scale(shown[0][0].unit)
             _panel(panel, answers, {f.shown: values * scale.factor for f, values in shown}, scale.label(kind))
         panels[-1].set_xlabel("pose")
         figure.suptitle(answers.machine.name, fontsize=10)

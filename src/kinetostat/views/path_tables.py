@@ -5,12 +5,12 @@ from rich.console import Console
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.studies.evaluation.evaluation import PoseAnswers
-from kinetostat.views.tables import number, numeric_table
+from kinetostat.views.tables import numeric_table
 
 
 def print_path(console: Console, answers: PoseAnswers) -> None:
     """Print how many poses have a result, and the extremes of each quantity with the numbers of their poses, from 1."""
-    count, failed = answers.poses.count, answers.failures
+    count, failed, display = answers.poses.count, answers.failures, answers.machine.display
     inside = count - sum(len(numbers) for numbers in failed.values())
     console.print(f"{answers.machine.name}: {inside:,} of {count:,} poses have a result.", highlight=False)
     for status, numbers in failed.items():
@@ -25,6 +25,8 @@ def print_path(console: Console, answers: PoseAnswers) -> None:
     )
     for name, values in answers.values.items():
         low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
-        ends = (number(float(values[low])), str(low + 1), number(float(values[high])), str(high + 1))
-        table.add_row(name, QUANTITIES[name].unit, *ends)
+        unit = QUANTITIES[name].unit
+        least, largest = (display.number(float(values[k]), unit) for k in (low, high))
+        head = "" if unit == "1" else display.scale(unit).unit
+        table.add_row(name, head, least, str(low + 1), largest, str(high + 1))
     console.print(table)

@@ -6,21 +6,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from kinetostat.display import ENGINEERING, Display
 from kinetostat.machine.loading import kinds_of_machine
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import doubts, parameters, values
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.study import StudyFile
-from kinetostat.units import KINDS, show
+from kinetostat.units import KINDS
+from kinetostat.views.fitted_table import FittedTable
 
-Number = float | None
-
-LARGE = 1e6
-"""Size from which a value of a machine is written with a power of ten."""
+DIGITS_OF_INPUT = 10
+"""Digits of what people have written themselves."""
 PIPED = 100
 """Width of texts, in characters, where there is no terminal."""
 UNBOUND = 10_000
@@ -47,8 +46,10 @@ def print_studies(console: Console, studies: Mapping[str, StudyFile]) -> None:
     console.print(table)
 
 
-def print_machine(console: Console, machine: Machine) -> None:
-    """Print every value of a machine with its meaning, and notes on implausible ones."""
+def print_machine(console: Console, machine: Machine, verdict: str = "") -> None:
+    """Print a verdict, every value of a machine with its meaning, and notes on implausible ones."""
+    if verdict:
+        console.print(verdict, highlight=False)
     console.print(machine_table(machine))
     print_doubts(console, machine)
 
@@ -67,27 +68,23 @@ def machine_table(machine: Machine) -> Table:
     entries = {leaf for parameter in fields if parameter.quantity.count for leaf in parameter.leaves}
     whole = [parameter for parameter in fields if parameter.path not in entries]
     for parameter in whole:
-        shown = readable([numbers[leaf] for leaf in parameter.leaves], parameter.quantity)
+        shown = readable([numbers[leaf] for leaf in parameter.leaves], parameter.quantity, machine.display)
         table.add_row(parameter.path, shown, parameter.quantity.meaning)
     return table
 
 
-def readable(values: Sequence[float], quantity: Quantity) -> str:
-    """Return all entries of a field for a table, e.g. "3 x 0.5 m" where they are equal."""
-    texts = [_readable(value, quantity) for value in values]
+def readable(values: Sequence[float], quantity: Quantity, display: Display = ENGINEERING) -> str:
+    """Return all entries of a field for a table, in up to ten digits, e.g. "3 x 500 mm" where they are equal."""
+    texts = [readable_value(value, quantity, display) for value in values]
     alike = f"{len(texts)} x {texts[0]}" if len(texts) > 1 else texts[0]
     return alike if len(set(texts)) == 1 else ", ".join(texts)
 
 
-def _readable(value: float, quantity: Quantity) -> str:
-    """Return a value with ten digits, large ones with a power of ten (7e10 Pa), angles in degrees."""
-    unit = KINDS[quantity.kind].unit
+def readable_value(value: float, quantity: Quantity, display: Display = ENGINEERING) -> str:
+    """Return a value of a machine file as people read it, e.g. "500 mm", "rigid", "none"."""
     if math.isinf(value):
         return quantity.show(value)
-    if abs(value) < LARGE:
-        return show(value, unit, 10)
-    digits, _, power = f"{value:.9e}".partition("e")
-    return f"{digits.rstrip('0').rstrip('.')}e{int(power)} {unit}".rstrip()
+    return display.show(value, KINDS[quantity.kind].unit, digits=DIGITS_OF_INPUT)
 
 
 class Piped(Console):
@@ -113,15 +110,6 @@ def terminal() -> Console:
     return Console(**plain) if sys.stdout.isatty() else Piped(width=PIPED, **plain)
 
 
-def number(value: Number, endless: str = "∞") -> str:
-    """A number for a table: at most ten characters, a word where it is infinite, a dash where there is none."""
-    if value is None or math.isnan(value):
-        return "–"
-    if math.isinf(value):
-        return endless
-    return f"{value:.6g}" if value == 0.0 or 1e-2 <= abs(value) < 1e6 else f"{value:.4g}"
-
-
 def print_written(console: Console, paths: Iterable[Path]) -> None:
     """Name the files that were written."""
     for path in paths:
@@ -134,25 +122,18 @@ def omitted(count: int) -> str:
     return f"{count} {noun} with less effect {verb} omitted"
 
 
-def text_table(title: str, *columns: str) -> Table:
-    """A table without rules between its rows."""
-    table = _titled(title)
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="left" if i == 0 else "default")
+def text_table(title: str, *columns: str) -> FittedTable:
+    """A table of texts, which are broken between words where the terminal is narrow."""
+    table = FittedTable(title)
+    for column in columns:
+        table.add_column(column)
     return table
 
 
-def numeric_table(title: str, first: str, columns: Sequence[str]) -> Table:
+def numeric_table(title: str, first: str, columns: Sequence[str]) -> FittedTable:
     """A table whose columns after the first hold numbers."""
-    table = _titled(title)
+    table = FittedTable(title)
     table.add_column(first, no_wrap=True)
     for column in columns:
         table.add_column(column, justify="right", no_wrap=True)
     return table
-
-
-def _titled(title: str) -> Table:
-    """An empty table, wide enough for its title on one line."""
-    return Table(
-        title=title, min_width=len(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False
-    )

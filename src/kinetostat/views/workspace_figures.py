@@ -19,7 +19,6 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from kinetostat.studies.workspace.conditions import Condition
 from kinetostat.studies.workspace.region import surface
 from kinetostat.studies.workspace.verdicts import BEYOND, FAILS, INSIDE, LIMIT, PLAIN, phrase
-from kinetostat.views.display import coordinate_scale
 from kinetostat.views.figures import (
     COLOURS,
     STYLE,
@@ -30,6 +29,7 @@ from kinetostat.views.figures import (
     set_axis_scales,
     set_title,
 )
+from kinetostat.views.grid_tables import display_of
 
 KNOWN = dict(zip([*PLAIN.values(), BEYOND], ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#e3bcd1"), strict=True))
 """Colours of verdicts that need no limit and no condition."""
@@ -85,8 +85,8 @@ def _shown(dataset: xr.Dataset, dims: Sequence[str]) -> Array:
 def _at(dataset: xr.Dataset, dim: str) -> str:
     """A coordinate and its value, for titles."""
     coordinate = dataset[dim]
-    scale = coordinate_scale(coordinate.attrs["kind"], coordinate.attrs["units"], np.atleast_1d(coordinate.values))
-    return f"{dim.removeprefix('pose.')} = {float(coordinate) * scale.factor:.4g} {scale.unit}"
+    value = display_of(dataset).show(float(coordinate), coordinate.attrs["units"])
+    return f"{dim.removeprefix('pose.')} = {value}"
 
 
 def _colours(labels: Sequence[str]) -> list[str]:

@@ -7,6 +7,7 @@ from kinetostat.machine.series import label
 from kinetostat.machine.written.joints import AXIS, JOINT_TYPES, SEAT, needs_axis
 from kinetostat.machine.written.plan import LINK_MODELS, NAME, SPATIAL_POSE, SUMMARY, JointPlan, Plan
 from kinetostat.spec.fields import Field, Quantity, made_table
+from kinetostat.spec.validation import DISPLAY_SCHEMA
 from kinetostat.units import KINDS
 
 POSE_KINDS = {"x": "length", "y": "length", "z": "length", "roll": "angle", "pitch": "angle", "yaw": "angle"}
@@ -81,6 +82,7 @@ def written_schema(version: int) -> dict[str, Any]:
             "tool": {"type": "object"},
             "load": {"type": "object"},
             "limits": {"type": "object"},
+            "display": DISPLAY_SCHEMA,
         },
         ["name", "family", "platform", "pose", "legs"],
     )

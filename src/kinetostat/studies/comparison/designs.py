@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.display import Display
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.elements import element_share, elements, without_rounding
@@ -112,6 +113,11 @@ class Comparison:
         rows = [[row.group, row.name, row.unit, *row.values] for row in (*self.rows, *self.over)]
         names = [design.label for design in self.designs]
         return pd.DataFrame(rows, columns=["group", "number", "unit", *names]).set_index(["group", "number"])
+
+    @property
+    def display(self) -> Display:
+        """Units in which all designs are shown: those of the first."""
+        return self.designs[0].machine.display
 
     def __repr__(self) -> str:
         return f"<Comparison of {', '.join(design.label for design in self.designs)}>"

@@ -76,7 +76,12 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
     grid = Grid([Axis(parameter.leaves, span.values(parameter.quantity)) for span, parameter in pairs])
     names = resolve_quantities(quantities, machine.family.component_names)
     refuse_absent(machine, names, chosen)
-    origin = {"machine": machine.name, "machine_file": as_toml(machine), "kinetostat": version("kinetostat")}
+    origin = {
+        "machine": machine.name,
+        "machine_file": as_toml(machine),
+        "display": machine.display.units,
+        "kinetostat": version("kinetostat"),
+    }
     attributes = {**origin, "frame": frame_of(machine), "pose": pose_of(machine, taken)}
     labels = xr.Dataset({}, _coordinates(grid, pairs), attributes)
     return GridQuestion(machine, grid, tuple(parameter.path for parameter in chosen), tuple(names), labels)

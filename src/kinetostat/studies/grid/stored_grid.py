@@ -4,16 +4,18 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from kinetostat.display import ENGINEERING
 from kinetostat.engine.batch import Evaluation, Progress, silent
 from kinetostat.engine.chunks import Compute, Work, here, in_chunks
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.machine.loading import as_toml
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.grid.grid import ABOUT_STATUS, GridQuestion, about
 from kinetostat.studies.plain_data import as_answer
@@ -164,7 +166,8 @@ def _as_record(question: GridQuestion, file: str) -> Record:
         "study": STUDY_VERSION,
         "kinetostat": attributes["kinetostat"],
         "file": file,
-        "machine": attributes["machine_file"],
+        # How results are shown does not part a study from the one that it continues.
+        "machine": as_toml(replace(question.machine, display=ENGINEERING)),
         "axes": axes,
         "quantities": list(question.names),
     }

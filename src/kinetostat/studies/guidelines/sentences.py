@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.display import number
 from kinetostat.kinetostatics.elements import LINKS_TOGETHER, Element
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines.guidelines import Guidelines
@@ -112,7 +113,7 @@ def _counts_as_rigid(answer: Guidelines, here: Roles) -> Iterator[Statement]:
             most = max(factors[i] for i in directions)
             where = _where(answer, directions)
             clauses.append(
-                f"{where} from {_stiffness(element, most)} on"
+                f"{where} from {_stiffness(answer, element, most)} on"
                 if most < math.inf
                 else f"never {where}, where nothing else is compliant"
             )
@@ -143,7 +144,7 @@ def _at_worst(answer: Guidelines, k: int, directions: Sequence[int]) -> str:
     finite = [i for i in directions if most[i] < math.inf]
     if not finite:
         return ""
-    limit = _stiffness(answer.elements[k], max(most[i] for i in finite))
+    limit = _stiffness(answer, answer.elements[k], max(most[i] for i in finite))
     return f" At every pose of the grid {_where(answer, finite)} from {limit} on."
 
 
@@ -213,12 +214,12 @@ def _percents(least: float, most: float) -> str:
     return f"{high}\N{NO-BREAK SPACE}%" if low == high else f"{low} to {high}\N{NO-BREAK SPACE}%"
 
 
-def _stiffness(element: Element, factor: float) -> str:
+def _stiffness(answer: Guidelines, element: Element, factor: float) -> str:
     """A limit as a stiffness with its unit, and as a multiple of the present one."""
     if element.stiffness is None:
         return f"{factor:.3g} times {'their' if _many(element) else 'its'} present stiffness"
     now = "" if element.stiffness == math.inf else f" ({factor:.3g} times now)"
-    return f"{limit_of(element.stiffness, factor):.4g} {element.unit}{now}"
+    return f"{answer.machine.display.show(limit_of(element.stiffness, factor), element.unit)}{now}"
 
 
 def _against_actuators(answer: Guidelines, element: Element, factor: float) -> str:
@@ -226,9 +227,10 @@ def _against_actuators(answer: Guidelines, element: Element, factor: float) -> s
     actuator = answer.actuator
     if actuator is None or actuator.stiffness is None or element.stiffness is None:
         return ""
-    ratio = limit_of(element.stiffness, factor) / actuator.stiffness
-    unit = "times" if actuator.unit == element.unit else f"{element.unit} per {actuator.unit} of"
-    return f" The largest of these is {ratio:.3g} {unit} an actuator."
+    scales = [answer.machine.display.scale(part.unit) for part in (element, actuator)]
+    ratio = limit_of(element.stiffness, factor) * scales[0].factor / (actuator.stiffness * scales[1].factor)
+    unit = "times" if actuator.unit == element.unit else f"{scales[0].unit} per {scales[1].unit} of"
+    return f" The largest of these is {number(ratio, digits=3)} {unit} an actuator."
 
 
 def limit_of(stiffness: float, factor: float) -> float:

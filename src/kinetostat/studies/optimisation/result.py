@@ -111,6 +111,10 @@ class Result:
         """What the best design is worth."""
         return self.log.outcome([self.best])
 
+    def in_units(self, units: str) -> "Result":
+        """The result shown in other units; see `Machine.in_units`."""
+        return replace(self, problem=replace(self.problem, machine=self.problem.machine.in_units(units)))
+
     @property
     def machine(self) -> Machine:
         """The best design as a machine."""

@@ -189,11 +189,11 @@ def _room(at: Array, way: Array) -> float:
 
 def ridge_sentences(ridges: Sequence[Ridge], problem: Problem) -> list[str]:
     """Describe ridges in sentences."""
-    by_name = {variable.name: variable for variable in problem.space.searched}
+    by_name, display = {variable.name: variable for variable in problem.space.searched}, problem.machine.display
     sentences = []
     for ridge in ridges:
         ways = [
-            f"{name} from {by_name[name].shown(start)} to {by_name[name].shown(end)}"
+            f"{name} from {by_name[name].shown(start, display)} to {by_name[name].shown(end, display)}"
             for name, start, end in zip(ridge.names, ridge.start, ridge.end, strict=True)
         ]
         how = f", together with {', '.join(ways[1:])}" if ways[1:] else ""

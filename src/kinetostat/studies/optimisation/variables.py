@@ -10,13 +10,17 @@ from functools import cached_property
 
 import numpy as np
 
+from kinetostat.display import ENGINEERING, Display
 from kinetostat.engine.points import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find, values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.study import VariableTable
-from kinetostat.units import KINDS, UnitError, parse, write
+from kinetostat.units import KINDS, RIGID, UnitError, parse
+
+DIGITS = 6
+"""Digits of the value of a variable."""
 
 
 @dataclass(frozen=True)
@@ -67,13 +71,11 @@ class Variable:
             columns.update(dict.fromkeys(field.leaves, value))
         return columns
 
-    def shown(self, value: float) -> str:
-        """A value as people read it: a label, degrees, or SI with the unit."""
+    def shown(self, value: float, display: Display = ENGINEERING) -> str:
+        """A value as people read it: a label, or a number with its unit."""
         if self.choices is not None:
             return self.labels[int(value)] if value >= 0 else "none of the choices"
-        if self.quantity.kind == "angle":
-            return f"{math.degrees(value):.6g} deg"
-        return write(float(f"{value:.6g}"), self.quantity.kind)
+        return display.show(value, self.unit, RIGID, DIGITS)
 
 
 @dataclass(frozen=True)

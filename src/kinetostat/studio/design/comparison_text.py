@@ -7,9 +7,10 @@ import math
 import string
 from html import escape
 
+from kinetostat.display import DASH, Display
 from kinetostat.studies.comparison.design_rows import Better, Row
 from kinetostat.studies.comparison.designs import Comparison, SoftDirection
-from kinetostat.studio.wording import DASH, engineering, gains, heading, paragraph, table
+from kinetostat.studio.wording import engineering, gains, heading, paragraph, table
 from kinetostat.views.tables import readable
 
 SAME = 0.05
@@ -65,15 +66,15 @@ def _gain(row: Row, k: int) -> float | None:
 
 def _rows(comparison: Comparison, letters: str) -> str:
     head = "".join(f'<th scope="col">{letter}</th>' for letter in letters)
-    body = "".join(_row(row) for row in comparison.rows)
+    body = "".join(_row(row, comparison.display) for row in comparison.rows)
     caption = "<caption>At the pose of each design</caption>"
     return f'<table class="figures">{caption}<thead><tr><th></th>{head}</tr></thead><tbody>{body}</tbody></table>'
 
 
-def _row(row: Row) -> str:
+def _row(row: Row, display: Display) -> str:
     cells = []
     for i, (value, percent) in enumerate(zip(row.values, row.percents, strict=True)):
-        shown = escape(engineering(value, row.unit))
+        shown = escape(engineering(value, row.unit, display))
         strong = f"<b>{shown}</b>" if i in row.best else shown
         cells.append(f"<td>{strong}{_change(row, percent) if i else ''}</td>")
     return f'<tr><th scope="row">{escape(row.name.replace("_", " "))}</th>{"".join(cells)}</tr>'
@@ -93,7 +94,9 @@ def _differences(comparison: Comparison, letters: str) -> str:
     rows = []
     for difference in comparison.differences:
         pairs = zip(difference.values, difference.parameters, strict=True)
-        rows.append([difference.path, *(readable(values, p.quantity) if p else DASH for values, p in pairs)])
+        rows.append(
+            [difference.path, *(readable(values, p.quantity, comparison.display) if p else DASH for values, p in pairs)]
+        )
     families = [design.machine.family.name for design in comparison.designs]
     if len(set(families)) > 1:
         rows = [["family", *families], *rows]

@@ -8,10 +8,9 @@ from collections.abc import Callable
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
+from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.studio.design.progress import Progress
 from kinetostat.studio.elements import DesignTable, FrontView, choice
-from kinetostat.studio.wording import shown
-from kinetostat.views.display import spoken
 
 NONE = -1
 """The choice of no objective for the colour."""
@@ -111,7 +110,7 @@ def _table(progress: Progress) -> tuple[list[str], list[list[float]], list[list[
     for objectives, design in zip(progress.objectives, designs, strict=True):
         values.append([*objectives, *design])
         pairs = zip(space.searched, design, strict=True)
-        sizes = [v.shown(size) if v.choices is not None else shown(v.quantity, size) for v, size in pairs]
+        sizes = [v.shown(size, progress.problem.machine.display) for v, size in pairs]
         texts.append([*(f"{value:.{DIGITS}g}" for value in objectives), *sizes])
     names = [spoken(variable.name.removeprefix("geometry.")) for variable in space.searched]
     return [*goals, *names], values, texts

@@ -6,9 +6,10 @@ The numbers are those of `optimize --json`; here they are only rounded and arran
 import math
 from typing import Any
 
+from kinetostat.display import DASH
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studio.design.progress import Progress
-from kinetostat.studio.wording import DASH, engineering, gains, heading, paragraph, shown, table
+from kinetostat.studio.wording import engineering, gains, heading, paragraph, table
 
 SACRIFICED = 0.01
 """Share of the stiffness below which the loss in a direction is pointed out."""
@@ -42,7 +43,7 @@ def _so_far(progress: Progress) -> str:
     if progress.genes is not None:
         space = progress.problem.space
         pairs = zip(space.searched, space.values(progress.genes[0]), strict=True)
-        rows += [[variable.name, variable.shown(value)] for variable, value in pairs]
+        rows += [[variable.name, variable.shown(value, progress.problem.machine.display)] for variable, value in pairs]
     return heading("Best so far") + table("Best so far", ["", "best"], rows)
 
 
@@ -65,9 +66,9 @@ def _design(problem: Problem, result: dict[str, Any]) -> str:
         variable = first.get(path)
         if variable is None or variable.choices is not None:
             before, after = DASH, f"{value:.6g}"
-            before = variable.shown(variable.initial) if variable else before
+            before = variable.shown(variable.initial, problem.machine.display) if variable else before
         else:
-            before, after = (shown(variable.quantity, v) for v in (variable.initial, value))
+            before, after = (variable.shown(v, problem.machine.display) for v in (variable.initial, value))
         percents = slopes.get(path, {}).get("percent_per_percent", [])
         rows.append([path, before, after, bounds.get(path, ""), ", ".join(_percent(p) for p in percents)])
     note = paragraph("% per %: change of the objective per percent of the variable; of an angle, per 0.01 rad.", "note")

@@ -64,9 +64,9 @@ def contributions_text(analysis: Analysis, component: str) -> str:
     if not rows:
         return paragraph(f"The platform moves freely in {component}: a spring there has no stiffness.")
     unit = QUANTITIES[f"compliance_{component}"].unit
-    return paragraph(f"Compliance in {component}: {engineering(compliance, unit)}", "lead") + bars(
-        "contributions to the compliance", rows
-    )
+    return paragraph(
+        f"Compliance in {component}: {engineering(compliance, unit, analysis.machine.display)}", "lead"
+    ) + bars("contributions to the compliance", rows)
 
 
 class SensitivityPanel(Panel):

@@ -63,14 +63,19 @@ class LinkPanel(Panel):
         if self._session is None or request.field.path not in self._session.controls:
             return
         control = self._session.controls[request.field.path]
-        unit, (matrix, letters) = KINDS[control.parameter.quantity.kind].unit, BLOCKS[str(self.block.value)]
+        matrix, letters = BLOCKS[str(self.block.value)]
         units = {"compliance": ("rad/(N·m)", "m/N"), "stiffness": ("N·m/rad", "N/m")}[matrix]
-        present = self._session.value(request.field.path)
+        x = self._session.machine.display.scale(KINDS[control.parameter.quantity.kind].unit)
+        y = self._session.machine.display.scale(units[letters != "r"])
+        present = self._session.value(request.field.path) * x.factor
         data = {
-            "x": answer.across,
-            "lines": [{"name": name.split("_")[1], "values": line} for name, line in answer.values.items()],
-            "label": {"x": f"{control.label} ({unit})", "y": f"{matrix} ({units[letters != 'r']})"},
-            "unit": units[letters != "r"],
+            "x": [across * x.factor for across in answer.across],
+            "lines": [
+                {"name": name.split("_")[1], "values": [None if value is None else value * y.factor for value in line]}
+                for name, line in answer.values.items()
+            ],
+            "label": {"x": x.label(control.label), "y": y.label(matrix)},
+            "unit": y.unit,
             "here": present if 0.0 < present < math.inf else None,
             "log": True,
         }

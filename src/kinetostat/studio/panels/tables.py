@@ -7,16 +7,16 @@ from collections.abc import Sequence
 
 from nicegui import ui
 
+from kinetostat.display import DASH, Display
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studio.answers import Report
 from kinetostat.studio.elements import toggle
 from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
-from kinetostat.studio.wording import DASH, engineering, heading, paragraph, scientific, table
-from kinetostat.views.analysis_tables import UNITS_OF_C, UNITS_OF_K
+from kinetostat.studio.wording import engineering, entry, heading, paragraph, table
+from kinetostat.views.analysis_tables import entry_unit, matrix_units
 
 KINDS = {"C": "compliance", "K": "stiffness"}
-MATRIX_UNITS = {"C": UNITS_OF_C, "K": UNITS_OF_K}
 PRINCIPAL_UNITS = {"translation": "N/m", "rotation": "N·m/rad"}
 COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")
 
@@ -64,12 +64,18 @@ def matrix_table(analysis: Analysis, kind: str) -> str:
         analysis: of one pose.
         kind: "C" or "K".
     """
-    names, rows = analysis.components, _rows(analysis, kind)
+    names, rows, display = analysis.components, _rows(analysis, kind), analysis.machine.display
     title = f"{KINDS[kind]} matrix {kind}"
     if rows is not None:
-        body = [[name, *map(scientific, row)] for name, row in zip(names, rows, strict=True)]
-        return table(title, ["", *names], body, "matrix") + paragraph(MATRIX_UNITS[kind])
-    body = [[name, scientific(entry)] for name, entry in zip(names, _diagonal(analysis, kind), strict=True)]
+        units = [[entry_unit(KINDS[kind], row, column) for column in names] for row in names]
+        cells = [
+            [entry(value, unit, display) for value, unit in zip(row, of_row, strict=True)]
+            for row, of_row in zip(rows, units, strict=True)
+        ]
+        body = [[name, *row] for name, row in zip(names, cells, strict=True)]
+        return table(title, ["", *names], body, "matrix") + paragraph(matrix_units(KINDS[kind], display))
+    diagonal = zip(names, _diagonal(analysis, kind), strict=True)
+    body = [[name, engineering(value, entry_unit(KINDS[kind], name, name), display)] for name, value in diagonal]
     reason = "A part is free" if kind == "C" else "A part is rigid"
     note = paragraph(f"{reason}, so {kind} is not finite; its diagonal is shown.")
     return note + table(title, ["", "diagonal"], body, "matrix")
@@ -99,9 +105,13 @@ def indices_text(analysis: Analysis) -> str:
 
 
 def _principal(analysis: Analysis) -> str:
-    blocks = analysis.indices.free if analysis.indices else None
+    blocks, display = analysis.indices.free if analysis.indices else None, analysis.machine.display
     rows = [
-        [f"{name} {n}", engineering(stiffness, PRINCIPAL_UNITS[name]), ", ".join(f"{c:.3f}" for c in direction)]
+        [
+            f"{name} {n}",
+            display.show(stiffness, PRINCIPAL_UNITS[name]),
+            ", ".join(f"{c:.3f}" for c in direction),
+        ]
         for name, block in (blocks or {}).items()
         for n, (stiffness, direction) in enumerate(zip(block.stiffnesses, block.directions, strict=True), 1)
     ]
@@ -116,7 +126,7 @@ def _pose(analysis: Analysis) -> str:
         ["condition number of the actuators' Jacobian", engineering(analysis.jacobian_condition)],
         ["condition number of K", engineering(indices.stiffness_condition if indices else None)],
         ["rank", str(analysis.rank)],
-        ["characteristic length", engineering(analysis.characteristic_length, "m")],
+        ["characteristic length", engineering(analysis.characteristic_length, "m", analysis.machine.display)],
     ]
     if mobility is not None:
         rows += [
@@ -133,7 +143,7 @@ def _pose(analysis: Analysis) -> str:
 def _centres(analysis: Analysis) -> str:
     centres = analysis.indices.centres if analysis.indices else {}
     rows = [
-        [name, ", ".join(engineering(float(c), "m") for c in point) if point else DASH]
+        [name, ", ".join(engineering(float(c), "m", analysis.machine.display) for c in point) if point else DASH]
         for name, point in centres.items()
     ]
     title = f"Centres, measured from the {analysis.machine.reference}"
@@ -154,14 +164,16 @@ class LoadsPanel(Panel):
 
 def load_text(analysis: Analysis) -> str:
     """Deflection and spring loads as tables; without a load, how to set one."""
-    load = analysis.load
+    load, display = analysis.load, analysis.machine.display
     if load is None:
         return paragraph("The tool carries no load. Set a force or a moment under Load on the left.")
     tool = [
-        [name, *_loaded(wrench, motion, name.startswith("r"))]
+        [name, *_loaded(wrench, motion, name.startswith("r"), display)]
         for name, wrench, motion in zip(COMPONENTS, load.wrench, load.deflection, strict=True)
     ]
-    springs = [[spring.name, *_loaded(spring.load, spring.deformation, spring.turning)] for spring in load.springs]
+    springs = [
+        [spring.name, *_loaded(spring.load, spring.deformation, spring.turning, display)] for spring in load.springs
+    ]
     return (
         heading("Tool point")
         + table("tool point", ["", "load", "deflection"], tool)
@@ -170,5 +182,5 @@ def load_text(analysis: Analysis) -> str:
     )
 
 
-def _loaded(load: float, motion: float, turning: bool) -> list[str]:
-    return [engineering(load, "N·m" if turning else "N"), engineering(motion, "rad" if turning else "m")]
+def _loaded(load: float, motion: float, turning: bool, display: Display) -> list[str]:
+    return [display.show(load, "N·m" if turning else "N"), display.show_deflection(motion, "rad" if turning else "m")]

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from importlib.metadata import version
 
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import parameters, values
 from kinetostat.studies.report.answers import Answers
+from kinetostat.studies.setting import pose_of
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.report.content import Report
 from kinetostat.views.report.design import guideline_section, sensitivity_section
@@ -20,7 +19,6 @@ from kinetostat.views.report.stiffness import load_section, stiffness_section, w
 from kinetostat.views.report.study import study_section
 from kinetostat.views.report.summary import summary_section
 from kinetostat.views.report.typesetting import typeset
-from kinetostat.views.tables import readable
 
 
 def report_of(
@@ -68,16 +66,9 @@ def report_of(
 
 def _title_block(answers: Answers) -> list[tuple[str, str]]:
     analysis, machine = answers.analysis, answers.machine
-    rows = [("Machine", machine.name), ("Family", machine.family.name), ("Pose", _pose(machine))]
+    rows = [("Machine", machine.name), ("Family", machine.family.name), ("Pose", typeset(pose_of(machine)))]
     return [
         *rows,
-        ("Reference", f"{machine.reference}, {analysis.axes} axes, SI units"),
+        ("Reference", f"{machine.reference}, {analysis.axes} axes"),
         ("Program", f"kinetostat {version('kinetostat')}"),
     ]
-
-
-def _pose(machine: Machine) -> str:
-    current = values(machine)
-    fields = [p for p in parameters(machine.family) if p.path.startswith("pose.") and len(p.leaves) == 1]
-    texts = [f"{p.path.removeprefix('pose.')} {readable([current[p.path]], p.quantity)}" for p in fields]
-    return typeset(", ".join(texts))

@@ -9,8 +9,8 @@ from kinetostat.kinematics.mobility import Kind, Mobility
 from kinetostat.spec.fields import NO_LIMIT
 from kinetostat.spec.installation import adding
 from kinetostat.studies.analysis import Analysis
-from kinetostat.views.analysis_tables import margins
 from kinetostat.views.drawing import three_views
+from kinetostat.views.first_lines import margins
 from kinetostat.views.report.content import Block, Figure, Paragraph, Section
 from kinetostat.views.report.pictures import SHARE, WITHOUT, Shown, can_be_live, drawn
 from kinetostat.views.report.typesetting import printed, typeset

@@ -5,17 +5,17 @@ Nothing is computed here.
 
 import xarray as xr
 
+from kinetostat.display import number
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.grid.grid import failures
 from kinetostat.studies.report.answers import Answers
 from kinetostat.views.analysis_tables import (
-    UNITS_OF_C,
-    UNITS_OF_K,
     actuator_table,
     compliance_table,
     eigenscrew_table,
     load_table,
+    matrix_units,
     principal_table,
     reaction_table,
     remarks,
@@ -23,11 +23,11 @@ from kinetostat.views.analysis_tables import (
     stiffness_table,
 )
 from kinetostat.views.figures import axis_values, contour_maps, curves
+from kinetostat.views.grid_tables import display_of
 from kinetostat.views.report.content import Block, Figure, Paragraph, Section, Table
 from kinetostat.views.report.pictures import SHARE, Shown, drawn
 from kinetostat.views.report.provenance import MOTION
 from kinetostat.views.report.typesetting import printed, typeset
-from kinetostat.views.tables import number
 
 BLOCKS = "Blocks: {}, {} and {} (rotation, coupling, translation)."
 NO_LOAD = (
@@ -47,8 +47,8 @@ def stiffness_section(analysis: Analysis) -> Section:
     matrices: list[Block] = [
         Paragraph(about),
         MOTION,
-        printed(stiffness_table(analysis), f"Stiffness K. {BLOCKS.format(*UNITS_OF_K.split(', '))}", split),
-        printed(compliance_table(analysis), f"Compliance C. {BLOCKS.format(*UNITS_OF_C.split(', '))}", split),
+        printed(stiffness_table(analysis), f"Stiffness K. {_blocks('stiffness', analysis)}", split),
+        printed(compliance_table(analysis), f"Compliance C. {_blocks('compliance', analysis)}", split),
     ]
     if analysis.stiffness is None or analysis.compliance is None:
         endless = "rigid: K is infinite there" if analysis.stiffness is None else "free: C is infinite there"
@@ -67,6 +67,11 @@ def stiffness_section(analysis: Analysis) -> Section:
     )
 
 
+def _blocks(kind: str, analysis: Analysis) -> str:
+    """Name the units of the blocks of K or C."""
+    return BLOCKS.format(*matrix_units(kind, analysis.machine.display).split(", "))
+
+
 def _attribution(analysis: Analysis) -> tuple[Block, ...]:
     states = [(names, word) for names, word in ((analysis.rigid, "Rigid"), (analysis.free, "Free")) if names]
     caption = "Shares of joints and links in the diagonal of C; each column adds up to 100 %."
@@ -81,11 +86,13 @@ def _attribution(analysis: Analysis) -> tuple[Block, ...]:
 
 def _indices(analysis: Analysis) -> tuple[Block, ...]:
     blocks: list[Block] = [Paragraph(typeset(line)) for line in remarks(analysis)]
-    principal = principal_table(analysis)
+    principal, display = principal_table(analysis), analysis.machine.display
     if principal.row_count:
-        caption = "Principal stiffnesses (N/m, N·m/rad) and their directions x y z, the other motions free or held."
+        units = display.names(["N/m", "N·m/rad"])
+        caption = f"Principal stiffnesses ({units}) and their directions x y z, the other motions free or held."
         blocks.append(printed(principal, caption))
-    screws = eigenscrew_table(analysis.indices.eigenscrews if analysis.indices else (), analysis.machine.reference)
+    known = analysis.indices.eigenscrews if analysis.indices else ()
+    screws = eigenscrew_table(known, analysis.machine.reference, display)
     if screws.row_count:
         blocks.append(printed(screws, f"Eigenscrews of the stiffness; points from the {analysis.machine.reference}."))
     return tuple(blocks)
@@ -93,18 +100,20 @@ def _indices(analysis: Analysis) -> tuple[Block, ...]:
 
 def load_section(analysis: Analysis, pictures: Shown) -> Section:
     """Write the section on the load of the file, or say how to add one."""
-    point = analysis.machine.reference
+    point, display = analysis.machine.reference, analysis.machine.display
     if analysis.load is None:
         return Section("Load case", (Paragraph(NO_LOAD.format(point)),))
+    loaded = load_table(analysis.components, analysis.load, display)
     tables = [
         (
-            load_table(analysis.components, analysis.load),
-            f"The load at the {point} (N·m, N) and its deflection (rad, m).",
+            loaded,
+            f"{str(loaded.title).replace('Load', f'The load at the {point}', 1)}.",
         ),
-        (actuator_table(analysis.load), "Actuators under the load."),
+        (actuator_table(analysis.load, display), "Actuators under the load."),
         (
-            reaction_table(analysis.load, analysis.axes),
-            f"Load that each joint passes on towards the base, at the joint (N·m, N; {analysis.axes} axes).",
+            reaction_table(analysis.load, analysis.axes, display),
+            "Load that each joint passes on towards the base, at the joint "
+            f"({display.names(['N·m', 'N'])}; {analysis.axes} axes).",
         ),
     ]
     blocks: list[Block] = [printed(table, caption) for table, caption in tables if table.row_count]
@@ -146,13 +155,14 @@ def _mapped(maps: xr.Dataset) -> list[Block]:
 
 def _extremes(maps: xr.Dataset, names: list[str]) -> Table:
     """The least and the greatest value of each quantity."""
-    rows = []
+    rows, display = [], display_of(maps)
     for name in names:
         known = maps[name].where(maps["status"] == int(Status.OK)).values
         if (known == known).any():
             least, most = float(maps[name].min()), float(maps[name].max())
             ratio = number(most / least) if least > 0.0 else "–"
-            texts = [typeset(number(value, "free")) for value in (least, most)]
-            rows.append((name.replace("_", " "), *texts, typeset(ratio), maps[name].attrs["units"]))
+            unit = maps[name].attrs["units"]
+            texts = [typeset(display.number(value, unit, "free")) for value in (least, most)]
+            rows.append((name.replace("_", " "), *texts, typeset(ratio), display.scale(unit).unit))
     heads = ("quantity", "least", "greatest", "ratio", "unit")
     return Table("Extremes over these poses.", heads, tuple(rows), (False, True, True, True, False))

@@ -5,10 +5,10 @@ Nothing is computed here.
 
 from collections.abc import Iterator
 
+from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.result_data import message
-from kinetostat.views.display import spoken
 from kinetostat.views.optimisation_figures import pictures
 from kinetostat.views.optimisation_tables import (
     aims,
@@ -25,7 +25,6 @@ from kinetostat.views.optimisation_tables import (
 from kinetostat.views.report.content import Block, Paragraph, Points, Section
 from kinetostat.views.report.pictures import drawn
 from kinetostat.views.report.typesetting import printed, typeset
-from kinetostat.views.tables import number
 
 METHODS = {
     "genetic": "a genetic algorithm",
@@ -57,10 +56,10 @@ def gains(result: Result) -> Iterator[str]:
     """Generate a sentence on each objective, with its value before and after."""
     for k, objective in enumerate(result.problem.objectives):
         before, after = result.initial.objectives[0, k], result.outcome.objectives[0, k]
-        unit = "" if objective.term.unit in ("1", "SI") else f" {objective.term.unit}"
+        unit, show = objective.term.unit, result.problem.machine.display.show
+        before, after = (show(value, "1" if unit == "SI" else unit) for value in (before, after))
         label = spoken(objective.term.label)
-        change = f"{number(before)}{unit} before, {number(after)}{unit} now."
-        yield f"{label[0].upper()}{label[1:]} ({objective.goal}): {change}"
+        yield f"{label[0].upper()}{label[1:]} ({objective.goal}): {before} before, {after} now."
 
 
 def _question(problem: Problem) -> tuple[Block, ...]:
@@ -96,7 +95,8 @@ def _answer(result: Result) -> tuple[Block, ...]:
     if several:
         blocks.append(printed(front_table(result), "Designs of the front."))
     if result.robustness:
-        blocks.append(printed(scatter_table(result.robustness), "Objectives under the tolerances."))
+        scatter = scatter_table(result.robustness, result.problem.machine.display)
+        blocks.append(printed(scatter, "Objectives under the tolerances."))
         blocks.append(drawn(figures["tolerances"](), CAPTIONS["tolerances"]))
         if result.robustness.failing:
             blocks.append(Paragraph(failing(result.robustness)))

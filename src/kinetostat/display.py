@@ -1,0 +1,201 @@
+"""Results in the units that people read: the one formatter of terminal, reports, figures and the studio.
+
+Only units and digits change here; files and JSON stay SI, and what people write is read in `units`.
+"""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+from kinetostat.units import UnitError, measured
+
+SI = "si"
+"""How people write that every result is shown in SI units."""
+DIGITS = (2, 12)
+"""The fewest and the most significant digits that may be asked for."""
+DASH = "–"
+"""Stands where there is no number."""
+INFINITE = "∞"
+PLAIN_POWERS = (-3, 5)
+"""Numbers are written without a power of ten from 0.001 to 999999."""
+UNIT_OF = {
+    "m": "mm",
+    "rad": "deg",
+    "N/m": "N/µm",
+    "N·m/rad": "N·m/µrad",
+    "N/rad": "N/µrad",
+    "m/N": "µm/N",
+    "rad/(N·m)": "µrad/(N·m)",
+    "rad/N": "µrad/N",
+    "N": "N",
+    "N·m": "N·m",
+    "kg": "kg",
+    "kg/m": "kg/m",
+    "kg/m**3": "kg/m**3",
+    "Pa": "GPa",
+    "N·m**2": "N·m**2",
+    "m**2": "cm**2",
+    "m**4": "cm**4",
+}
+"""The engineering unit of each SI unit. In N, N·m, µm and µrad every entry of K is a millionth of that in SI, so that K
+stays symmetric and K C = 1 also as printed."""
+DUAL = {"N/m": "m/N", "N·m/rad": "rad/(N·m)", "N/rad": "rad/N"}
+"""Stiffnesses and the compliances whose units follow from theirs."""
+EXAMPLE = "mm, deg, N/um, N*m/urad"
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How to show values of one SI unit: multiply by `factor` and write `unit`."""
+
+    factor: float
+    unit: str
+
+    def label(self, what: str) -> str:
+        """Return the label of an axis or a column: what it shows, and its unit in brackets."""
+        return f"{what} ({self.unit})" if self.unit not in ("", "1") else what
+
+
+@dataclass(frozen=True)
+class Display:
+    """The units and the digits in which people want to read results.
+
+    Attributes:
+        units: units by commas, such as "mm, deg, N/um", or "si", or both; what is not named is in `UNIT_OF`.
+        digits: significant digits of a result.
+    """
+
+    units: str = ""
+    digits: int = 4
+
+    def scale(self, unit: str) -> Scale:
+        """Return the scale of an SI unit; a unit that has no other way to be read stays as it is."""
+        return _scales(self.units).get(unit, Scale(1.0, unit))
+
+    def deflection(self, unit: str) -> Scale:
+        """Return the scale of a small motion in m or rad: that of the compliances, µm and µrad unless chosen."""
+        compliance = {"m": "m/N", "rad": "rad/(N·m)"}[unit]
+        return _small(self.scale(compliance).unit.partition("/")[0])
+
+    def number(self, value: float | None, unit: str = "1", endless: str = INFINITE) -> str:
+        """Return an SI value as a number in the unit of `scale`, without the unit."""
+        return number(value and value * self.scale(unit).factor, endless, self.digits)
+
+    def show(self, value: float | None, unit: str, endless: str = INFINITE, digits: int | None = None) -> str:
+        """Return an SI value with its unit, e.g. "312.4 mm".
+
+        Args:
+            value: SI; None or NaN gives a dash.
+            unit: its SI unit; "1" or nothing for a number without one.
+            endless: stands for infinity, without a unit.
+            digits: significant digits, if not those of this display.
+        """
+        scale = self.scale(unit)
+        return with_unit(number(value and value * scale.factor, endless, digits or self.digits), scale.unit)
+
+    def show_deflection(self, value: float | None, unit: str, endless: str = "free") -> str:
+        """Return a small motion, in m or rad, with its unit, e.g. "12.3 µm"."""
+        scale = self.deflection(unit)
+        return with_unit(number(value and value * scale.factor, endless, self.digits), scale.unit)
+
+    def names(self, units: Sequence[str]) -> str:
+        """Return the units in which values of these SI units are shown, by commas."""
+        return ", ".join(dict.fromkeys(self.scale(unit).unit for unit in units))
+
+
+ENGINEERING = Display()
+"""The units of `UNIT_OF`, in four digits."""
+
+
+def read_display(given: object) -> Display:
+    """Read a table [display] of a machine file.
+
+    Args:
+        given: what the file says: a table with `units` (text or a list of texts) and `digits`, both optional.
+
+    Raises:
+        UnitError: it is not such a table, a unit is unknown, or the number of digits is out of bounds.
+    """
+    if not isinstance(given, dict) or not given.keys() <= {"units", "digits"}:
+        raise UnitError(f'display must be a table that may hold units = "{EXAMPLE}" and digits = 4')
+    units, digits = given.get("units", ""), given.get("digits", ENGINEERING.digits)
+    units = ", ".join(map(str, units)) if isinstance(units, list) else units
+    if not isinstance(units, str):
+        raise UnitError(f'display.units must be text; write units by commas, e.g. "{EXAMPLE}", or "{SI}"')
+    if not isinstance(digits, int) or not DIGITS[0] <= digits <= DIGITS[1]:
+        raise UnitError(f"display.digits is {digits!r}; give a whole number from {DIGITS[0]} to {DIGITS[1]}")
+    try:
+        _scales(units)
+    except UnitError as error:
+        raise UnitError(f"display.units: {error}") from None
+    return Display(units, digits)
+
+
+def number(value: float | None, endless: str = INFINITE, digits: int = 4) -> str:
+    """Return a number with so many significant digits, zeros at its end left out, e.g. "0.5", "26195", "1.2e-7".
+
+    A dash stands for None and NaN, `endless` for infinity.
+    """
+    if value is None or math.isnan(value):
+        return DASH
+    if math.isinf(value):
+        return endless if value > 0.0 else f"-{endless}"
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    size = int(power)
+    if float(mantissa) == 0.0:
+        return "0"
+    if PLAIN_POWERS[0] <= size <= PLAIN_POWERS[1]:
+        return _trimmed(f"{value:.{max(digits - 1 - size, 0)}f}")
+    return f"{_trimmed(mantissa)}e{size}"
+
+
+def with_unit(text: str, unit: str) -> str:
+    """Return a number and its unit; words and dashes that stand for a number have none."""
+    return f"{text} {unit}".rstrip() if text[-1:].isdigit() and unit != "1" else text
+
+
+def _trimmed(text: str) -> str:
+    """Return a number without the zeros at the end of its fraction."""
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+@cache
+def _scales(units: str) -> dict[str, Scale]:
+    """Read the units that were chosen; return the scale of each SI unit.
+
+    Raises:
+        UnitError: one of them is not a unit of any result.
+    """
+    words = [word.strip() for word in units.split(",") if word.strip()]
+    whole = SI in (word.lower() for word in words)
+    chosen = {si: si if whole else unit for si, unit in UNIT_OF.items()}
+    named = {}
+    for word in words:
+        if word.lower() not in (SI, "engineering"):
+            unit = _spelled(word)
+            named[measured(unit, UNIT_OF, EXAMPLE)[0]] = unit
+    for stiff, soft in DUAL.items():
+        for given, other in ((stiff, soft), (soft, stiff)):
+            if given in named and other not in named:
+                chosen[other] = _reciprocal(named[given])
+    chosen |= named
+    return {si: Scale(1.0 / measured(unit, [si], EXAMPLE)[1], unit) for si, unit in chosen.items()}
+
+
+@cache
+def _small(unit: str) -> Scale:
+    return Scale(1.0 / measured(unit, ["m", "rad"], EXAMPLE)[1], unit)
+
+
+def _spelled(unit: str) -> str:
+    """Return a unit as it is printed: "N m/urad" becomes "N·m/µrad"."""
+    unit = re.sub(r"(?<!\*)\*(?!\*)|(?<=\w)\s+(?=\w)", "·", unit.replace("μ", "µ"))
+    return re.sub(r"\bu(?=(?:m|rad|N)\b)", "µ", unit.replace(" ", ""))
+
+
+def _reciprocal(unit: str) -> str:
+    """Return a unit upside down: "N·m/rad" becomes "rad/(N·m)"."""
+    top, _, bottom = unit.partition("/")
+    return f"{bottom.strip('()')}/{f'({top})' if '·' in top else top}"

@@ -1,0 +1,104 @@
+"""The answer first: an analysis in five lines, before its reasons and its matrices.
+
+Nothing is computed but 1/C and lengths of vectors; every view that begins with the answer takes its lines from here.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from kinetostat.algebra.scalar import reciprocal
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.kinematics.mobility import Mobility
+from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.attribution import Softest
+from kinetostat.studies.loads import LoadCase
+from kinetostat.studies.setting import pose_of
+
+MOST_NAMED = 3
+"""Parts that are named as what makes a direction soft."""
+NAMED = 0.05
+"""Share of the compliance from which a part is named."""
+BLOCKS = (("translation", "along", "N/m"), ("rotation", "about", "N·m/rad"))
+
+
+def first_lines(analysis: Analysis) -> list[tuple[str, str]]:
+    """Return label and text of each line: pose and verdict, stiffness, softest direction, margin, and the load."""
+    pose = pose_of(analysis.machine)
+    lines = [("Pose", f"{pose}. {analysis.message}" if pose else analysis.message)]
+    lines.append(("Stiffness", f"{_felt(analysis)} (1/C at the {analysis.machine.reference}, {analysis.axes} axes)."))
+    if analysis.softest:
+        lines.append(("Softest", "; ".join(_softest(analysis)) + "."))
+    if analysis.mobility:
+        lines.append(("Margin", margins(analysis.mobility)))
+    if analysis.load:
+        lines.append(("Load", _loaded(analysis, analysis.load)))
+    return lines
+
+
+def margins(mobility: Mobility) -> str:
+    """Return a sentence with the singularity margins of a pose, to two digits."""
+    legs, platform = mobility.leg_distance, mobility.platform_distance
+    least = min(legs, platform)
+    return f"Singularity margin {least:.2g} (0 singular, 1 best): legs {legs:.2g}, platform {platform:.2g}."
+
+
+def _felt(analysis: Analysis) -> str:
+    """Say what stiffness a tool feels along and about each axis, with all other motions free to follow."""
+    display = analysis.machine.display
+    sentences = []
+    for _, word, unit in BLOCKS:
+        of_block = [
+            (name, compliance)
+            for name, compliance in zip(analysis.components, analysis.compliance_diagonal, strict=True)
+            if (name in COMPONENTS[:3]) == (word == "about")
+        ]
+        values = [f"{name[-1]} {display.number(reciprocal(c), unit, 'rigid')}" for name, c in of_block]
+        sentences.append(f"{word} {', '.join(values)} {display.scale(unit).unit}")
+    return "; ".join(sentences)
+
+
+def _softest(analysis: Analysis) -> Iterator[str]:
+    """Say for forces and for moments in which direction the machine is softest, how soft, and what makes it so."""
+    display = analysis.machine.display
+    for block, word, unit in BLOCKS:
+        if (direction := analysis.softest.get(block)) is not None:
+            stiffness = display.show(direction.stiffness, unit, "rigid") if direction.stiffness else "free"
+            yield f"{word} {_where(direction)} {stiffness}{_mainly(direction)}"
+
+
+def _where(direction: Softest) -> str:
+    """Name the softest direction: an axis, a vector, or the plane or space of all that are equally soft."""
+    if len(direction.directions) == 3:
+        return "any direction"
+    vectors = [_vector(way) for way in direction.directions]
+    return vectors[0] if len(vectors) == 1 else f"any direction between {' and '.join(vectors)}"
+
+
+def _vector(way: Sequence[float]) -> str:
+    """Return an axis by its name, any other unit vector by its components; a direction has no sign."""
+    largest = max(range(3), key=lambda i: abs(way[i]))
+    rounded = [round(c * math.copysign(1.0, way[largest]), 2) + 0.0 for c in way]
+    return "xyz"[largest] if abs(rounded[largest]) == 1.0 else f"({', '.join(f'{c:g}' for c in rounded)})"
+
+
+def _mainly(direction: Softest) -> str:
+    largest = [(name, 100.0 * share) for name, share in direction.shares[:MOST_NAMED] if share >= NAMED]
+    named = [f"{name} {percent:.0f}\N{NO-BREAK SPACE}%" for name, percent in largest]
+    return f", mainly from {', '.join(named)}" if named else ""
+
+
+def _loaded(analysis: Analysis, load: LoadCase) -> str:
+    """Say how far the load moves the tool, and which actuator carries most."""
+    display = analysis.machine.display
+    turned, moved = math.hypot(*load.deflection[:3]), math.hypot(*load.deflection[3:])
+    sentence = (
+        f"Under it the {analysis.machine.reference} moves {display.show_deflection(moved, 'm')} and turns "
+        f"{display.show_deflection(turned, 'rad')}"
+    )
+    most = []
+    for turning, unit in ((False, "N"), (True, "N·m")):
+        springs = [spring for spring in load.springs if spring.actuated and spring.turning is turning]
+        if springs:
+            worst = max(springs, key=lambda spring: abs(spring.load))
+            most.append(f"{worst.name} carries {display.show(worst.load, unit)}")
+    return f"{sentence}; {', '.join(most)}, the most of all actuators." if most else f"{sentence}."
