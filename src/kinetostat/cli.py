@@ -129,6 +129,11 @@ def _parser() -> Parser:
         dest="urdf",
         help="convert a URDF with closed loops into a machine written leg by leg",
     )
+    source.add_argument(
+        "--legs-of",
+        metavar="MACHINE",
+        help="write a bundled machine or one from a file leg by leg, joint by joint, at its pose",
+    )
     schema = add_command(
         commands,
         "schema",
@@ -203,6 +208,11 @@ def _new(options: argparse.Namespace) -> int:
         from kinetostat.exchange.urdf_import import machine_text
 
         print(machine_text(options.urdf), end="")
+        return DONE
+    if options.legs_of is not None:
+        from kinetostat.exchange.leg_by_leg import legs_of
+
+        print(legs_of(options.legs_of), end="")
         return DONE
     from kinetostat.machine.loading import template
     from kinetostat.studies.bundled import study_template

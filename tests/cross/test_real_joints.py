@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.vector import Vector
+from kinetostat.exchange.leg_by_leg import legs_of
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.link import seat_springs
 from kinetostat.machine.loading import as_toml, build, bundled, load
 from kinetostat.spec import document
 from kinetostat.studies.analysis import analyze
+from kinetostat.studies.grid.grid import evaluate_grid
 
 NAME = "hexapod-hardware"
 POSES = [(), ("pose.x=20 mm", "pose.z=310 mm", "pose.pitch=8 deg", "pose.yaw=-5 deg")]
@@ -122,6 +124,46 @@ def test_a_copied_matrix_turns_with_its_leg():
     for turn, sign in ((third, 1.0), (np.diag([1.0, -1.0, 1.0]), -1.0)):  # the machine looks alike from all legs
         both = np.kron(np.diag([sign, 1.0]), turn)
         np.testing.assert_allclose(both @ rows @ both.T, rows, rtol=1e-9, atol=1e-12 * np.abs(rows).max())
+
+
+@pytest.mark.parametrize("name", ["hexapod", "delta", "passive-leg-4dof-driven"])
+def test_in_a_family_a_series_is_one_spring_of_its_total(name):
+    """Also where one number is for all legs, in a grid, and once it is written back."""
+    field = "passive_actuator" if name == "passive-leg-4dof-driven" else "actuator"
+    whole = load(name)
+    given = getattr(whole.tables["stiffness"], field)
+    single = given if isinstance(given, float) else given[0]
+    unit = "N/m" if name == "hexapod" else "N*m/rad"
+    machine = load(name, [f'stiffness.{field}=["gear {3.0 * single!r} {unit}", "long belt {1.5 * single!r} {unit}"]'])
+    np.testing.assert_allclose(compliance(machine), compliance(whole), rtol=1e-12, atol=1e-20)
+    assert build(as_toml(machine), "it").tables == machine.tables
+    parts = {c.part: c.compliance_share for c in analyze(machine).attribution}
+    leg = "passive leg actuator" if field == "passive_actuator" else "leg 1"
+    belt, gear = (np.array(parts[f"{leg} {part}"], dtype=float) for part in ("long belt", "gear"))
+    np.testing.assert_allclose(belt, 2.0 * gear, rtol=1e-12)
+    path = f"stiffness.{field}.gear"
+    swept = evaluate_grid(machine, [f"{path}={single!r}:{3.0 * single!r}:2"], ["compliance"])
+    for i, stiffness in enumerate((single, 3.0 * single)):
+        alone = np.diag(compliance(build(as_toml(machine), "it", [f"{path}={stiffness!r}"])))
+        values = [float(swept[f"compliance_{c}"][i]) for c in ("rx", "ry", "rz", "x", "y", "z")]
+        np.testing.assert_allclose(values, alone, rtol=1e-11, atol=1e-20)
+
+
+@pytest.mark.parametrize("name", [name for name in bundled() if "passive-leg" not in name])
+def test_a_machine_written_out_leg_by_leg_is_the_same(name):
+    """At its pose, and where its actuators have moved: K and C of the family, from the joints of the new file."""
+    machine = build(legs_of(name), "it")
+    np.testing.assert_allclose(
+        compliance(machine), compliance(load(name)), rtol=1e-8, atol=1e-12 * np.abs(compliance(load(name))).max()
+    )
+    assert set(vars(machine.tables["pose"])) <= set("xyz") | {"roll", "pitch", "yaw"}
+
+
+def test_a_file_leg_by_leg_follows_its_family_to_other_poses():
+    moved = ["pose.x=12 cm", "pose.z=-70 cm"]
+    np.testing.assert_allclose(
+        compliance(build(legs_of("delta"), "it", moved)), compliance(load("delta", moved)), rtol=1e-8, atol=1e-18
+    )
 
 
 def test_a_change_of_the_written_leg_changes_every_copy():

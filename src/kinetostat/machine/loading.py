@@ -21,9 +21,10 @@ from kinetostat.machine.limits import Parts, check_limits
 from kinetostat.machine.machine import Family, Machine
 from kinetostat.machine.rigidities import resolve
 from kinetostat.machine.rods import driven_slides
+from kinetostat.machine.series import family_with_parts, with_named_parts
 from kinetostat.machine.written import family as written
 from kinetostat.machine.written.checking import check_numbers, completed
-from kinetostat.machine.written.document import by_name, check_paths, separate
+from kinetostat.machine.written.document import by_name, check_paths, separate, with_parts
 from kinetostat.machine.written.plan import NAME, SUMMARY
 from kinetostat.machine.written.tables import written_schema
 from kinetostat.spec import document as documents
@@ -89,9 +90,12 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
     if document.get("family") == NAME:
         return _build_written(document, origin, settings)
     family = _family(document.get("family"), origin)
-    changed = documents.override(document, settings, _counts(family))
+    named = with_named_parts(document, family, origin)
+    changed = documents.override(named, settings, _counts(family_with_parts(family, named)))
+    changed = with_named_parts(changed, family, origin)
     display = _display(changed, origin)
-    machine = _validated(family, resolve(changed, family, origin), origin, display)
+    resolved = resolve(changed, family, origin)
+    machine = _validated(family_with_parts(family, changed), resolved, origin, display)
     placed = machine.configure()
     parts = Parts(placed.legs, placed.platform.rotation.z, family.planar, (), _unloaded(placed.legs))
     check_limits(machine.tables["limits"], parts, origin)
@@ -102,7 +106,7 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     """A machine written leg by leg."""
     named = by_name(document, origin)
     check_paths(named, settings)
-    changed = documents.override(named, settings, {})
+    changed = with_parts(documents.override(named, settings, {}), origin)
     display = _display(changed, origin)
     plan, numbers = separate(changed, origin)
     machine = _validated(written.family_of(plan), numbers, origin, display)

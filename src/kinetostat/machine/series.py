@@ -8,11 +8,19 @@ import keyword
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache, partial
+from typing import Any
 
 from kinetostat.algebra.scalar import Scalar
-from kinetostat.machine.leg import PartName, Spring
+from kinetostat.machine.leg import Element, Leg, PartName, Spring
+from kinetostat.machine.machine import Configuration, Family
+from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.fields import Field, made_table, optional, quantities
+from kinetostat.units import KINDS
 
+KEPT = 64
+"""Families with parts that are kept, so that machines with the same parts share tables and compiled programs."""
 MOST_PARTS = 12
 """Parts of a series: more is a mistake."""
 
@@ -65,7 +73,7 @@ def springs_in_a_row(spring: Spring, named: Sequence[tuple[str, Scalar]], joint:
     row = []
     for number, (key, stiffness) in enumerate(named):
         title = f"{joint} {label(key)}".strip()
-        name = PartName(spring.of.leg, title) if isinstance(spring.of, PartName) else label(key)
+        name = PartName(spring.of.leg, title) if isinstance(spring.of, PartName) else f"{spring.of} {label(key)}"
         first = number == 0
         row.append(
             replace(
@@ -96,3 +104,83 @@ def _entry(entry: object, where: str) -> tuple[str, str]:
             'e.g. "ball screw 200 N/um".'
         )
     return match[1], match[2]
+
+
+def with_named_parts(document: Document, family: Family, origin: str) -> Document:
+    """A copy of a document of a family in which the series of its actuators are tables by part.
+
+    Raises:
+        InputError: a series in a field that is not an actuator's, or a part that is not one; names the field.
+    """
+    stiffness = document.get("stiffness")
+    if not isinstance(stiffness, dict):
+        return document
+    fields = {key: value for key, value in stiffness.items() if key in _stiffnesses(family) and is_series(value)}
+    for key in fields:
+        if not key.endswith("actuator"):
+            raise InputError(
+                f'"{origin}": stiffness.{key} is {shorten(fields[key])}; only an actuator is a series of parts, '
+                "because they must carry one load along one freedom."
+            )
+    named = {key: parts(value, f'"{origin}": stiffness.{key}') for key, value in fields.items()}
+    return {**document, "stiffness": {**stiffness, **named}}
+
+
+def family_with_parts(family: Family, document: Document) -> Family:
+    """The family whose machine files have a number for each part of the series in a document; itself without any."""
+    stiffness = document.get("stiffness")
+    fields = stiffness.items() if isinstance(stiffness, dict) else ()
+    series = tuple((key, tuple(value)) for key, value in fields if key in _stiffnesses(family) and is_series(value))
+    return _family_with_parts(family, series) if series else family
+
+
+def _stiffnesses(family: Family) -> set[str]:
+    known = quantities(family.tables["stiffness"])
+    return {name for name, quantity in known.items() if KINDS[quantity.kind].name.endswith("stiffness")}
+
+
+@lru_cache(KEPT)
+def _family_with_parts(family: Family, series: tuple[tuple[str, tuple[str, ...]], ...]) -> Family:
+    whole = family.tables["stiffness"]
+    known, by_field = quantities(whole), dict(series)
+    rest = {
+        name: Field(quantity, getattr(whole, name) if name in optional(whole) else None)
+        for name, quantity in known.items()
+        if name not in by_field
+    }
+    rows = {
+        f"stiffness.{field}": made_table(
+            "Series",
+            {key: Field(replace(known[field], meaning=f"{label(key)}, in a row with the others")) for key in keys},
+        )
+        for field, keys in series
+    }
+    tables = {**family.tables, "stiffness": made_table("Stiffness", rest), **rows}
+    return replace(family, tables=tables, configure=partial(_configured, family, series))
+
+
+class Row(tuple[tuple[str, Scalar], ...]):
+    """Key and stiffness of the parts of a series, where a family has the stiffness of one actuator."""
+
+
+def _configured(family: Family, series: tuple[tuple[str, tuple[str, ...]], ...], **tables: Any) -> Configuration:
+    """The machine at its pose, with the parts of each series as springs in the place of one."""
+    whole, rest = family.tables["stiffness"], tables["stiffness"]
+    known, given = quantities(whole), dict(vars(rest))
+    for field, keys in series:
+        numbers = tables.pop(f"stiffness.{field}")
+        columns = [getattr(numbers, key) for key in keys]
+        if known[field].count is None:
+            given[field] = Row(zip(keys, columns, strict=True))
+        else:
+            given[field] = tuple(Row(zip(keys, entries, strict=True)) for entries in zip(*columns, strict=True))
+    configuration = family.configure(**{**tables, "stiffness": whole(**given)})
+    return replace(configuration, legs=tuple(_in_parts(leg) for leg in configuration.legs))
+
+
+def _in_parts(leg: Leg) -> Leg:
+    chain: list[Element] = []
+    for element in leg.chain:
+        row = element.stiffness if isinstance(element, Spring) else None
+        chain += springs_in_a_row(element, row) if isinstance(row, Row) else (element,)  # type: ignore[arg-type]
+    return replace(leg, chain=tuple(chain))

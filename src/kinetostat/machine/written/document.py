@@ -54,10 +54,20 @@ def by_name(document: Document, origin: str) -> Document:
             raise InputError(f"{where} is {shorten(leg)}; it must be a table with name, joints and links.")
         if "joints" in leg:
             legs[name] = _merged(leg, where)
-        for key, part in legs[name].items():
+    return with_parts(result, origin)
+
+
+def with_parts(document: Document, origin: str) -> Document:
+    """The document with each series of parts as a table by part; legs, joints and links have names already.
+
+    Raises:
+        InputError: a part that is not one; names leg and joint.
+    """
+    for name, leg in document["legs"].items():
+        for key, part in leg.items() if isinstance(leg, dict) else ():
             if isinstance(part, dict) and is_series(part.get("stiffness")):
-                part["stiffness"] = parts(part["stiffness"], f'{where}, joint "{key}": stiffness')
-    return result
+                part["stiffness"] = parts(part["stiffness"], f'"{origin}": leg "{name}", joint "{key}": stiffness')
+    return document
 
 
 def _merged(leg: dict[str, Any], where: str) -> dict[str, Any]:

@@ -1,0 +1,236 @@
+"""Any machine as a file leg by leg, at its pose: joints by point and axis, and what deflects between them.
+
+Actuators with springs in a row become series of parts; whatever else deflects between two joints becomes the 6x6 of a
+link, which is exact. Points, axes and matrices are in the base frame at the pose, which is the file's home pose.
+"""
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby, pairwise
+from typing import Any
+
+import numpy as np
+
+from kinetostat.algebra.vector import Vector
+from kinetostat.kinematics.mobility import task_coordinates
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring
+from kinetostat.machine.limits import limits_set
+from kinetostat.machine.link import Parallelogram
+from kinetostat.machine.loading import load
+from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.written.plan import BASE, NAME, PLATFORM, SPATIAL_POSE
+from kinetostat.spec.document import Document, toml_key
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.validation import SCHEMA_VERSION
+
+
+def legs_of(name: str) -> str:
+    """The text of a machine file leg by leg that is the same machine as a bundled one or one from a file.
+
+    Args:
+        name: of a bundled machine, or path of a machine file.
+
+    Raises:
+        InputError: no such machine, or it cannot be placed at its pose.
+    """
+    machine = load(name)
+    return _text(document_of(machine), machine)
+
+
+def document_of(machine: Machine) -> Document:
+    """A machine as what its file leg by leg would say.
+
+    Raises:
+        InputError: it cannot be placed at its pose.
+    """
+    configuration = respond(machine).configuration
+    if not all(np.isfinite(_numbers(point)).all() for leg in configuration.legs for point in leg.path):
+        raise InputError(f"{machine.name} cannot be placed at its pose; change [pose] until `kinetostat check` is ok.")
+    turn, point = configuration.platform.rotation, configuration.platform.translation
+    document: Document = {"schema": SCHEMA_VERSION, "name": machine.name, "family": NAME}
+    document |= {"space": "planar"} if machine.family.planar else {}
+    document |= {"platform": {"point": _numbers(point)}, "pose": _pose(configuration, point)}
+    document["legs"] = [_Chain(leg, point).document() for leg in configuration.legs]
+    tool = machine.tables["tool"]
+    if any(tool.offset) or tool.mass:
+        document["tool"] = {"offset": _numbers(turn.apply(Vector(*tool.offset))), "mass": tool.mass}
+    load_given = machine.tables["load"]
+    if any(load_given.moment) or any(load_given.force):
+        document["load"] = {"moment": list(load_given.moment), "force": list(load_given.force)}
+    upright = _numbers(turn.z) == [0.0, 0.0, 1.0]
+    table = machine.tables["limits"]
+    limits = {limit.name: getattr(table, limit.name) for limit in limits_set(table)}
+    if not upright:  # the platform's z axis is that of the base at the home pose of a file leg by leg
+        limits.pop("platform_joint_angle", None)
+    return document | ({"limits": limits} if limits else {})
+
+
+def _pose(configuration: Configuration, point: Vector) -> dict[str, float]:
+    given = [SPATIAL_POSE[number] for number in task_coordinates(configuration, point)]
+    home = dict(zip("xyz", _numbers(point), strict=True))
+    return {name: home.get(name, 0.0) for name in given}
+
+
+@dataclass
+class _Chain:
+    """The joints and links of one leg while they are written."""
+
+    leg: Leg
+    tip: Vector
+    joints: list[dict[str, Any]] = field(default_factory=list)
+    links: dict[str, Any] = field(default_factory=dict)
+    pending: list[Spring] = field(default_factory=list)
+
+    def document(self) -> dict[str, Any]:
+        """The leg as its entry in the file."""
+        elements = list(_free_where_zero(self.leg.chain))
+        for kind, run in groupby(elements, key=_run):
+            row = list(run)
+            if kind == "joint":
+                self._add_joints([element for element in row if isinstance(element, Joint)])
+            else:
+                self._add_elements(row)
+        if self.pending:
+            self._add({"name": "flange", "type": "fixed", "point": _numbers(self.tip)})
+        self.joints[-1]["joins"] = [self.joints[-1]["joins"][0], PLATFORM]
+        _with_universal(self.joints)
+        links = {"links": self.links} if self.links else {}
+        return {"name": str(self.leg.name), "joints": self.joints, **links}
+
+    def _add_elements(self, row: Sequence[Element]) -> None:
+        series: list[Spring] = []
+        for element in row:
+            if isinstance(element, Spring) and series and _same_freedom(series[0].joint, element.joint):
+                series.append(element)
+                self.joints[-1]["stiffness"] = [f"{self._name(s.name)} {_stiffness(s)}" for s in series]
+            elif isinstance(element, Spring) and (element.actuated or element.hinge):
+                series = [element]
+                about = {"actuated": True} if element.actuated else {}
+                self._add({**self._freedom(element.joint), **about, "stiffness": _stiffness(element)}, element.of)
+            elif isinstance(element, Parallelogram):
+                self._add(_parallelogram(element), element.name)
+            else:
+                self.pending += [spring for spring in element.springs if spring.stiffness != RIGID]
+
+    def _add_joints(self, row: Sequence[Joint]) -> None:
+        points = {joint.point for joint in row}
+        numbers = _numbers(row[0].point) if row[0].point is not None else self._near()
+        turning = len(points) == 1 and None not in points and not any(joint.pitch for joint in row)
+        if len(row) == 2 and turning:
+            axes = {"first_axis": _numbers(row[0].axis), "second_axis": _numbers(row[1].axis)}
+            self._add({"type": "universal", "point": numbers, **axes}, row[0].name)
+        elif len(row) == 3 and turning:
+            self._add({"type": "spherical", "point": numbers}, row[0].name)
+        else:
+            for joint in row:
+                self._add(self._freedom(joint), joint.name)
+
+    def _freedom(self, joint: Joint) -> dict[str, Any]:
+        axis = {"axis": _numbers(joint.axis)}
+        if joint.point is None:
+            point = _numbers(joint.carriage) if joint.carriage is not None else self._near()
+            return {"type": "prismatic", "point": point, **axis}
+        pitch = {"pitch": float(joint.pitch)} if joint.pitch else {}
+        return {"type": "helical" if pitch else "revolute", "point": _numbers(joint.point), **axis, **pitch}
+
+    def _near(self) -> list[float]:
+        """A point for a slide that has none: that of the joint before it."""
+        return list(self.joints[-1]["point"]) if self.joints else _numbers(next(iter(self.leg.path), self.tip))
+
+    def _add(self, joint: dict[str, Any], title: str = "") -> None:
+        """Add a joint, and before it what deflects since the last one: as its seat, or as the link that it ends."""
+        name = self._unused(joint.pop("name", "") or self._name(title) or joint["type"])
+        bodies = (self.joints[-1]["joins"][1] if self.joints else BASE), f"body {len(self.joints) + 1}"
+        compliance = _compliance(self.pending, Vector(*joint["point"]))
+        if compliance and self.joints:
+            body = self._unused(self._name(self.pending[0].of))
+            self.joints[-1]["joins"] = [self.joints[-1]["joins"][0], body]
+            bodies = body, bodies[1]
+            self.links[body] = {"model": "matrix", "compliance": compliance}
+        elif compliance:
+            joint["compliance"] = compliance
+        self.pending = []
+        kind, point = joint.pop("type"), joint.pop("point")
+        self.joints.append({"name": name, "type": kind, "joins": list(bodies), "point": point, **joint})
+
+    def _name(self, title: str) -> str:
+        """The name of a part without that of its leg and without dots."""
+        title = title.kind if isinstance(title, PartName) else title.removeprefix(f"{self.leg.name} ")
+        return title.replace(".", " ").strip()[:30]
+
+    def _unused(self, name: str) -> str:
+        used = {joint["name"] for joint in self.joints} | self.links.keys()
+        numbered = (f"{name} {i}" for i in range(2, 99))
+        return name if name not in used else next(other for other in numbered if other not in used)
+
+
+def _run(element: Element) -> str:
+    return "joint" if isinstance(element, Joint) else "element"
+
+
+def _free_where_zero(chain: Iterable[Element]) -> Iterable[Element]:
+    """The chain with a joint in the place of each spring that is free and not an actuator."""
+    for element in chain:
+        free = isinstance(element, Spring) and not element.actuated and element.stiffness == 0.0
+        yield element.joint if free else element  # type: ignore[attr-defined]
+
+
+def _same_freedom(first: Joint, second: Joint) -> bool:
+    return (first.axis, first.point, first.pitch) == (second.axis, second.point, second.pitch)
+
+
+def _with_universal(joints: list[dict[str, Any]]) -> None:
+    """Of two ball joints with a strut between them the first becomes universal, so that the strut cannot spin."""
+    balls = [i for i, joint in enumerate(joints) if joint["type"] == "spherical"]
+    for first, second in pairwise(balls):
+        if all(joint["type"] == "prismatic" for joint in joints[first + 1 : second]):
+            joints[first] |= {"type": "universal", "axis": joints[second]["name"]}
+
+
+def _parallelogram(element: Parallelogram) -> dict[str, Any]:
+    ends = {"point": _numbers(element.near), "far": _numbers(element.far), "axis": _numbers(element.side)}
+    bar = {} if element.bar == RIGID else {"bar_stiffness": float(element.bar)}
+    return {"type": "parallelogram", **ends, "width": float(element.width), **bar}
+
+
+def _compliance(springs: Sequence[Spring], point: Vector) -> list[list[float]]:
+    """What springs between two joints deflect at a point, as a 6x6; empty if there are none."""
+    twists = [np.array(spring.joint.twist(point).components(), dtype=float) for spring in springs]
+    total = sum((np.outer(t, t) / s.stiffness for t, s in zip(twists, springs, strict=True)), np.zeros((6, 6)))
+    return total.tolist() if springs else []
+
+
+def _stiffness(spring: Spring) -> str:
+    unit = "N/m" if spring.joint.point is None else "N*m/rad"
+    return "rigid" if spring.stiffness == RIGID else f"{float(spring.stiffness)!r} {unit}"
+
+
+def _numbers(vector: Vector) -> list[float]:
+    return [float(c) + 0.0 for c in vector.components()]
+
+
+def _text(document: Document, machine: Machine) -> str:
+    """The document as a file that people can read: a line for each joint."""
+    lines = [
+        f"# {machine.name}, leg by leg at the pose of its file, which is the home pose here. Numbers are in SI.",
+        "# Links as a 6x6 are those of this pose; masses of links are not carried over.",
+    ]
+    lines += [f"{key} = {_toml(value)}" for key, value in document.items() if not isinstance(value, dict | list)]
+    for key, table in document.items():
+        if isinstance(table, dict):
+            lines += ["", f"[{key}]", *(f"{name} = {_toml(value)}" for name, value in table.items())]
+    for leg in document["legs"]:
+        lines += ["", "[[legs]]", f"name = {_toml(leg['name'])}", "joints = ["]
+        lines += [f"  {_toml(joint)}," for joint in leg["joints"]] + ["]"]
+        lines += [f"links.{toml_key(name)} = {_toml(link)}" for name, link in leg.get("links", {}).items()]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{toml_key(key)} = {_toml(entry)}" for key, entry in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(_toml(entry) for entry in value) + "]"
+    return json.dumps(value, ensure_ascii=False)
