@@ -15,7 +15,7 @@ MARKERS = {
     "documents": ("test_documents", "test_recipes"),
     "notebooks": ("test_notebooks",),
     "browser": ("test_studio_browser", "test_studio_reach", "test_report_browser"),
-    "workers": ("test_workers", "test_large_sweeps", "test_studio_runs", "test_studio_search"),
+    "workers": ("test_workers", "test_hash_seeds", "test_large_sweeps", "test_studio_runs", "test_studio_search"),
     "studio": ("test_studio_design", "test_studio_page"),
     "engines": ("test_validation", "test_mujoco"),
     "packaging": ("test_packaging",),
