@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from functools import cache
 from pathlib import Path
 
@@ -67,6 +68,17 @@ UNITS = Path(__file__).with_name("units.txt")
 RIGID = "rigid"
 """How people write an infinite stiffness."""
 
+IN_FILES = {
+    "length": ("mm", "m"),
+    "angle": ("deg", "rad"),
+    "linear stiffness": ("N/um", "N/m"),
+    "elastic modulus": ("GPa", "Pa"),
+    "area": ("mm**2", "m**2"),
+}
+"""Units in which a file gives a number where nothing was written before; the one with the fewest digits is taken."""
+PLAIN = (1e-4, 1e6)
+"""Between these a number is written without an exponent."""
+
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _NAME = r"[A-Za-zµμ°]+(?:\s*(?:\*\*|\^)\s*[1-4])?"
 _UNDER = rf"/\s*\({_NAME}(?:\s*[*·]\s*{_NAME})*\)"
@@ -104,6 +116,45 @@ def parse(value: object, kind: str, bare: str = "") -> float:
 def write(value: float, kind: str) -> str:
     """Return an SI value as text for a file, e.g. "0.22 m"; `parse` reads it back exactly. Infinity is "rigid"."""
     return RIGID if math.isinf(value) else f"{value!r} {KINDS[kind].unit}".rstrip()
+
+
+def written(value: float, kind: str, like: object = None) -> str | float:
+    """Return an SI value as people write it in a file: the shortest text from which `parse` reads exactly this value.
+
+    Args:
+        value: SI; infinity is "rigid".
+        kind: a key of `KINDS`.
+        like: what stood in the file before, whose unit is kept where it can be; a bare number stays a bare number.
+    """
+    if math.isinf(value):
+        return RIGID
+    bare = isinstance(like, int | float) and not isinstance(like, bool)
+    if bare or not KINDS[kind].unit:
+        return value
+    match = _NUMBER.fullmatch(like) if isinstance(like, str) else None
+    texts = [_exactly(value, unit, KINDS[kind]) for unit in ([match[2]] if match else IN_FILES.get(kind, ()))]
+    known = [text for text in texts if text is not None] or [_exactly(value, _ascii(KINDS[kind].unit), KINDS[kind])]
+    return min((text for text in known if text), key=lambda text: sum(c.isdigit() for c in text))
+
+
+def _exactly(value: float, unit: str, wanted: Kind) -> str | None:
+    """Return the shortest number with this unit that is read as exactly this value; None where there is none."""
+    try:
+        factor = _factor(unit, wanted) if unit else 1.0
+    except UnitError:
+        return None
+    for digits in range(1, 18):
+        number = f"{value / factor + 0.0:.{digits}g}"
+        if float(number) * factor == value:
+            mantissa, _, exponent = number.partition("e")
+            plain = not exponent or PLAIN[0] <= abs(float(number)) < PLAIN[1]
+            return f"{f'{Decimal(number):f}' if plain else f'{mantissa}e{int(exponent)}'} {unit}".rstrip()
+    return None
+
+
+def _ascii(unit: str) -> str:
+    """Return a unit of `KINDS` with signs that every keyboard has."""
+    return unit.replace("·", "*")
 
 
 def as_read(value: float, unit: str) -> tuple[float, str]:

@@ -10,6 +10,7 @@ import pytest
 from kinetostat.cli import main
 from kinetostat.commands.common import DONE
 from kinetostat.machine.loading import as_toml, load
+from kinetostat.machine.saving import as_file
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.study_folder import HISTORY, QUESTION, study_folder
@@ -84,7 +85,7 @@ def test_a_search_ends_as_the_command_does(runs, capsys, tmp_path):
     assert found.best == told["convergence"]["best"]
     assert found.mean == told["convergence"]["mean"]
     assert found.objectives == [[told["objective"]]]
-    assert as_toml(found.design(0)) == (run.folder / "best.toml").read_text("utf-8")
+    assert as_file(found.design(0)) == (run.folder / "best.toml").read_text("utf-8")
 
 
 @pytest.mark.parametrize("damage", ["history", "question", "folder"])

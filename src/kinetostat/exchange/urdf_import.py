@@ -12,8 +12,9 @@ import numpy as np
 from kinetostat.exchange.urdf_export import OPPOSITE, TIP
 from kinetostat.exchange.urdf_file import Array, FileJoint, FileLoop, UrdfFile, numbers, read
 from kinetostat.kinematics.mobility import task_coordinates
-from kinetostat.machine.loading import as_toml, build
+from kinetostat.machine.loading import build
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.saving import as_file
 from kinetostat.machine.written.plan import BASE, NAME, PLANAR_POSE, PLATFORM, SPATIAL_POSE
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
@@ -50,7 +51,7 @@ def machine_text(path: Path) -> str:
     """
     return (
         f"# Read from {path.name}. The home pose is the one of zero joint coordinates; actuators of which the URDF\n"
-        f"# gives no stiffness are rigid here.\n{as_toml(read_machine(path))}"
+        f"# gives no stiffness are rigid here.\n{as_file(read_machine(path))}"
     )
 
 

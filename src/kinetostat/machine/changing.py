@@ -1,6 +1,7 @@
 """A machine with other numbers, checked as its file would be. Reads and writes no file."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine, need_machine
@@ -51,4 +52,5 @@ def rebuilt(machine: Machine) -> Machine:
     Raises:
         InputError: its numbers contradict each other.
     """
-    return build(parse(as_toml(machine), machine.name), machine.name)
+    again = build(parse(as_toml(machine), machine.name), machine.name)
+    return replace(again, written=machine.written)

@@ -18,7 +18,7 @@ from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.machine.catalogue import families, register_installed
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.limits import Parts, check_limits
-from kinetostat.machine.machine import Family, Machine
+from kinetostat.machine.machine import Family, Machine, Written
 from kinetostat.machine.rigidities import resolve
 from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
@@ -29,7 +29,7 @@ from kinetostat.machine.written.plan import NAME, SUMMARY
 from kinetostat.machine.written.tables import written_schema
 from kinetostat.spec import document as documents
 from kinetostat.spec.document import Document
-from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.spec.fields import NO_LIMIT, optional, quantities
 from kinetostat.spec.validation import SCHEMA_VERSION, file_model, tables_in, validate
 from kinetostat.units import RIGID, UnitError
@@ -63,13 +63,13 @@ def load(machine: str | Path, settings: Sequence[str] = ()) -> Machine:
     name = str(machine)
     shipped = bundled()
     if name in shipped:
-        return build(documents.parse(shipped[name], name), name, settings)
+        return build(shipped[name], name, settings)
     path = Path(machine)
     if not documents.exists(path):
         near = difflib.get_close_matches(name, shipped, 1)
         hint = f'did you mean "{near[0]}"?' if near else f"bundled machines: {', '.join(shipped)}."
         raise InputError(f"{shorten(name)} is neither a file nor a bundled machine; {hint}")
-    return build(documents.read(path), name, settings)
+    return build(documents.read_text(path), name, settings)
 
 
 def build(document: str | Document, origin: str = "the machine", settings: Sequence[str] = ()) -> Machine:
@@ -84,7 +84,8 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
         InputError: a mistake in the document or an override.
     """
     if isinstance(document, str):
-        document = documents.parse(document, origin)
+        machine = build(documents.parse(document, origin), origin, settings)
+        return replace(machine, written=Written(document, tuple(several(settings))))
     if documents.is_study(document):
         raise InputError(f'"{origin}" {STUDY}')
     if document.get("family") == NAME:
@@ -167,8 +168,13 @@ def kinds_of_machine() -> dict[str, str]:
     return {**{family.name: family.summary for family in families().values()}, NAME: SUMMARY}
 
 
-def as_toml(machine: Machine) -> str:
-    """A machine file that `load` reads back as the same machine; numbers in SI with their units, all digits."""
+def as_toml(machine: Machine, readable: bool = False) -> str:
+    """A machine file that `load` reads back as the same machine; it never depends on how the machine was written.
+
+    Args:
+        machine: of any family.
+        readable: numbers in the units of people where that needs fewer digits; otherwise all are in SI, for programs.
+    """
     lines = [
         f"schema = {SCHEMA_VERSION}",
         f"name   = {json.dumps(machine.name, ensure_ascii=False)}",
@@ -182,7 +188,7 @@ def as_toml(machine: Machine) -> str:
             continue
         lines += ["", f"[{'.'.join(documents.toml_key(part) for part in name.split('.'))}]"]
         lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get(name, {}).items()]
-        lines += _quantity_lines(machine.family.every_table[name], table) if table is not None else []
+        lines += _quantity_lines(machine.family.every_table[name], table, readable) if table is not None else []
     if machine.display != ENGINEERING:
         units = json.dumps(machine.display.units, ensure_ascii=False)
         lines += ["", "[display]", f"units = {units}", f"digits = {machine.display.digits}"]
@@ -194,13 +200,15 @@ def _left_out(fields: type, table: Any) -> bool:
     return optional(fields) == set(quantities(fields)) and bool(table == fields())
 
 
-def _quantity_lines(fields: type, table: Any) -> Iterator[str]:
+def _quantity_lines(fields: type, table: Any, readable: bool) -> Iterator[str]:
     for field, quantity in quantities(fields).items():
         values = getattr(table, field)
         if quantity.unset is not None and values == quantity.unset:
             continue
-        texts = [json.dumps(quantity.show(value)) for value in (values if quantity.count else (values,))]
-        yield f"{field} = {'[' + ', '.join(texts) + ']' if quantity.count else texts[0]}"
+        show = quantity.written if readable else quantity.show
+        texts = [json.dumps(show(value)) for value in (values if quantity.count else (values,))]
+        alone = quantity.count is None or (readable and not quantity.apart and len(set(texts)) == 1)
+        yield f"{field} = {texts[0] if alone else '[' + ', '.join(texts) + ']'}"
 
 
 def template(family: str) -> str:

@@ -231,6 +231,19 @@ class Family:
 
 
 @dataclass(frozen=True)
+class Written:
+    """What a machine was read from, so that saving it keeps comments, units and order.
+
+    Attributes:
+        text: of its file.
+        settings: overrides "path=value" with which it was read.
+    """
+
+    text: str
+    settings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Machine:
     """A machine of some family with its reference pose; never modified, only replaced.
 
@@ -239,12 +252,14 @@ class Machine:
         family: its kind.
         tables: one instance per table of the family and per common one, SI.
         display: units and digits in which people read its results, from the table [display].
+        written: the file it was read from; None where it was made of data. Comparisons leave it out.
     """
 
     name: str
     family: Family
     tables: Mapping[str, Any]
     display: Display = ENGINEERING
+    written: Written | None = field(default=None, compare=False, repr=False)
 
     sections = renamed_property("tables")
     own_sections = renamed_property("family_tables")

@@ -36,6 +36,15 @@ def read(path: Path) -> Document:
     Raises:
         InputError: if there is no such file, or if it is a folder, too large, not text, or not TOML.
     """
+    return parse(read_text(path), str(path))
+
+
+def read_text(path: Path) -> str:
+    """Read the text of a file.
+
+    Raises:
+        InputError: if there is no such file, or if it is a folder, too large, or not text.
+    """
     try:
         with path.open("rb") as stream:
             # A pipe or device has no size to ask for: one byte more than allowed shows that it is too large.
@@ -47,12 +56,11 @@ def read(path: Path) -> Document:
     if len(data) > LARGEST_FILE:
         raise InputError(f'"{path}" is larger than {LARGEST_FILE >> 20} MiB; it should be a short TOML text.')
     try:
-        text = data.decode("utf-8")
+        return data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(
             f'"{path}" is not text: byte {error.start} is not UTF-8; it must be TOML, saved as UTF-8.'
         ) from None
-    return parse(text, str(path))
 
 
 def parse(text: str, origin: str) -> Document:
@@ -102,7 +110,7 @@ def override(document: Document, settings: Sequence[str], counts: Mapping[str, i
         if path.count(".") >= DEEPEST:
             raise InputError(f"--set {shorten(path)} has more than {DEEPEST} parts; no field is nested so deeply.")
         _repeat(result, path.strip(), counts)
-        _put(result, path.strip(), _value(text.strip()))
+        _put(result, path.strip(), setting_value(text.strip()))
     return result
 
 
@@ -119,8 +127,8 @@ def _repeat(document: Document, path: str, counts: Mapping[str, int]) -> None:
         table[name] = [table[name]] * counts[field]
 
 
-def _value(text: str) -> object:
-    """Read a value as TOML, or else as text."""
+def setting_value(text: str) -> object:
+    """Read the value of an override as TOML, or else as text."""
     try:
         check_bounds(text, "--set")
         parsed = tomllib.loads(f"value = {text}\n")

@@ -15,7 +15,7 @@ from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
 from kinetostat.spec.errors import shorten
-from kinetostat.units import KINDS, RIGID, UnitError, parse, write
+from kinetostat.units import KINDS, RIGID, UnitError, parse, write, written
 
 LARGEST = {"length": 1e6, "angle": 1e3}
 """Bounds on size, in SI: far beyond any machine, well inside float64."""
@@ -129,6 +129,10 @@ class Quantity:
     def show(self, value: float) -> str:
         """An SI value of it as text that a file may hold."""
         return NO_LIMIT if value == self.unset else write(value, self.kind)
+
+    def written(self, value: float, like: object = None) -> str | float:
+        """An SI value of it as people write it in a file, in the unit of what stood there before."""
+        return NO_LIMIT if value == self.unset else written(value, self.kind, like)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)

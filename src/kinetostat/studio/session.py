@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.changing import changed, rebuilt, related
-from kinetostat.machine.loading import as_toml, build, bundled, load
+from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, values
-from kinetostat.spec.document import LARGEST_FILE, parse
+from kinetostat.machine.saving import as_file
+from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studio.controls import Control, controls
 from kinetostat.studio.typed_value import typed_value
@@ -88,7 +89,7 @@ class Session:
         Raises:
             InputError: it is too large, is not text, or has a mistake; the session stays as it was.
         """
-        self._start(Memory(build(parse(sent_text(data, name), name), name)))
+        self._start(Memory(build(sent_text(data, name), name)))
 
     def take(self, machine: Machine) -> bool:
         """Take another design: as a change that can be undone if it is of the same kind, else as a new machine.
@@ -202,7 +203,7 @@ class Session:
     def as_file(self) -> tuple[str, bytes]:
         """A file name and the machine as TOML."""
         name = "".join(c if c.isalnum() and c.isascii() else "-" for c in self.machine.name.lower()).strip("-")
-        return f"{name or 'machine'}.toml", as_toml(self.machine).encode()
+        return f"{name or 'machine'}.toml", as_file(self.machine).encode()
 
 
 def read_typed(parameter: Parameter, text: str, shown_unit: str) -> float:

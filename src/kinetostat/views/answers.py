@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from rich.console import Console
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.saving import as_file
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.studies import analysis, sensitivity
 from kinetostat.studies.analysis import Analysis
@@ -185,7 +185,7 @@ def _writers(what: object) -> dict[str, Writer]:
             return {".png": lambda path: write_bytes(path, what)}
         case Machine():
             return {
-                ".toml": lambda path: write_text(path, as_toml(what)),
+                ".toml": lambda path: write_text(path, as_file(what)),
                 ".png": lambda path: write_bytes(path, machine_picture(what)),
                 ".glb": lambda path: write_bytes(path, glb(scene_of(what))),
             }

@@ -25,6 +25,7 @@ USED = {
     "pymoo": "pymoo.operators.crossover.sbx",
     "rich": "rich.console",
     "scipy": "scipy.optimize",
+    "tomlkit": "tomlkit",
     "xarray": "xarray",
 }
 """The part of each package that is used, which must load."""

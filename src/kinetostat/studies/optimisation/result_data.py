@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from kinetostat.engine.points import Array
-from kinetostat.machine.loading import as_toml
+from kinetostat.machine.saving import as_file
 from kinetostat.studies.optimisation.assessment import Outcome, Verdict
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import Result
@@ -174,5 +174,5 @@ def write_result(result: Result, folder: Path) -> list[Path]:
     write_dataset(written[1], as_dataset(result))
     if result.solved:
         written.append(folder / "best.toml")
-        write_text(written[-1], as_toml(result.machine))
+        write_text(written[-1], as_file(result.machine))
     return written

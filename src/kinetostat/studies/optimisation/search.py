@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from kinetostat.machine.loading import as_toml, build
-from kinetostat.spec import document as documents
+from kinetostat.machine.saving import as_file
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.study import read_study
 from kinetostat.studies.optimisation.assessment import Assessor
@@ -168,7 +168,7 @@ def _take_up(problem: Problem, study: StudyFolder, log: Log) -> None:
     question = question_of(problem, log.width)
     if study.question(question) is None:
         (study.path / ROWS).unlink(missing_ok=True)
-        study.begin(question)
+        study.begin(question | {"machine file": as_file(problem.machine)})
 
 
 def stored_problem(folder: Path) -> Problem:
@@ -183,7 +183,7 @@ def stored_problem(folder: Path) -> Problem:
         question = None
     if not isinstance(question, dict) or not {"optimisation", "machine"} <= question.keys():
         raise InputError(f'"{folder}" is not the folder of an optimisation; give a study file, or such a folder.')
-    machine = build(documents.parse(question["machine"], str(folder)), str(folder))
+    machine = build(question.get("machine file", question["machine"]), str(folder))
     return problem_of(read_study(question["optimisation"], str(folder)), machine)
 
 
@@ -194,7 +194,7 @@ def begin_search(problem: Problem, folder: Path) -> None:
         InputError: it cannot be written.
     """
     with study_folder(folder) as study:
-        study.begin(question_of(problem, Log(problem).width))
+        study.begin(question_of(problem, Log(problem).width) | {"machine file": as_file(problem.machine)})
 
 
 def kept_log(problem: Problem, folder: Path, record: Record) -> Log:

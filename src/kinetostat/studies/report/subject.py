@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from kinetostat.machine.loading import as_toml, bundled, load
+from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.saving import as_file
 from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.study_text import study_toml
@@ -64,7 +65,7 @@ def _stored(folder: Path, settings: Sequence[str]) -> Subject:
 
 def texts_of(problem: Problem) -> Texts:
     """Texts from which a problem can be read again, the study first."""
-    return ("study.toml", study_toml(problem.study)), ("machine.toml", as_toml(problem.machine))
+    return ("study.toml", study_toml(problem.study)), ("machine.toml", as_file(problem.machine))
 
 
 def _study(name: str, path: Path, settings: Sequence[str]) -> Subject:

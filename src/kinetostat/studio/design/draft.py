@@ -8,9 +8,10 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
-from kinetostat.machine.loading import as_toml, build, bundled, load
+from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
+from kinetostat.machine.saving import as_file
 from kinetostat.spec.document import Document, parse
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Quantity
@@ -154,7 +155,7 @@ def sent_draft(data: bytes, name: str, present: Machine) -> Draft:
     if study.machine in bundled():
         machine: Machine | None = load(study.machine, changes)
     else:
-        machine = build(parse(as_toml(present), present.name), present.name, changes) if changes else None
+        machine = build(as_file(present), present.name, changes) if changes else None
     draft = draft_of(study, machine)
     draft.problem(present)
     return draft
@@ -203,7 +204,7 @@ def _reference(machine: Machine) -> tuple[str, dict[str, str]]:
 
 def _changes(machine: Machine, old: dict[str, Any]) -> dict[str, str]:
     quantities = {leaf: p.quantity for p in parameters(machine.family) for leaf in p.leaves}
-    return {path: quantities[path].show(value) for path, value in values(machine).items() if value != old[path]}
+    return {path: str(quantities[path].written(value)) for path, value in values(machine).items() if value != old[path]}
 
 
 def _without_none(table: dict[str, Any]) -> dict[str, Any]:

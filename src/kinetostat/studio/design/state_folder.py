@@ -8,8 +8,9 @@ import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from kinetostat.machine.loading import as_toml, load
+from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.saving import as_file
 from kinetostat.spec.document import read
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.storage import write_text
@@ -17,7 +18,8 @@ from kinetostat.studies.storage import write_text
 MOST = 100
 """Machines that are kept."""
 LONGEST_NAME, LONGEST_NOTE = 80, 400
-REMARK = "# "
+REMARK = "# Note:"
+"""The beginning of the first line of a favourite; files of earlier versions have the bare note as a comment."""
 
 
 def usual_state() -> Path:
@@ -86,7 +88,7 @@ class Favourites:
                 first = path.read_text("utf-8").partition("\n")[0]
             except (OSError, InputError):
                 continue
-            note = first.removeprefix(REMARK) if first.startswith(REMARK) else ""
+            note = first.removeprefix(REMARK).removeprefix("# ").strip() if first.startswith("#") else ""
             favourites.append(Favourite(number, path, name, note))
         return favourites
 
@@ -106,8 +108,9 @@ class Favourites:
             raise InputError(f"{MOST} favourites are kept, the most there may be; delete one that you no longer need.")
         number = max(present, default=0) + 1
         path = self._folder / f"{number:04d}-{slug(name, 'machine')}.toml"
-        remark = f"{REMARK}{note}\n" if note else ""
-        write_text(path, remark + as_toml(replace(machine, name=name)))
+        lines = as_file(replace(machine, name=name)).splitlines(keepends=True)
+        rest = lines[1:] if lines[0].startswith(REMARK) else lines
+        write_text(path, "".join([f"{REMARK} {note}".rstrip() + "\n", *rest]))
         return Favourite(number, path, name, note)
 
     def delete(self, number: int) -> None:

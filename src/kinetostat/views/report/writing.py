@@ -11,8 +11,8 @@ from pathlib import Path
 
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.saving import as_file
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import as_json
 from kinetostat.studies.optimisation.result import Result
@@ -91,7 +91,7 @@ def report(
     answers = gather(machine, ranges, without, result, progress)
     if answers.analysis.status is not Status.OK:
         raise InputError(answers.analysis.message)
-    inputs = texts_of(result.problem) if result else (("machine.toml", as_toml(machine)),)
+    inputs = texts_of(result.problem) if result else (("machine.toml", as_file(machine)),)
     write_report(answers, wanted, [inputs[0][0]], inputs, place, progress)
     return place
 
@@ -130,7 +130,7 @@ def write_report(
     """
     command = shlex.join(["kinetostat", "report", *subject, *wanted.options(), "-o", path.name])
     results = json.dumps(as_json(answers.analysis), ensure_ascii=False, allow_nan=False, indent=1)
-    origin = Origin(command, inputs, as_toml(answers.machine), results)
+    origin = Origin(command, inputs, as_file(answers.machine), results)
     about = {name: text for name, text in (("Author", wanted.author), ("Date", wanted.date)) if text}
     page = path.suffix == ".html"
     validation = _validation(answers.machine, wanted)
