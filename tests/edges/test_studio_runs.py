@@ -10,8 +10,8 @@ import pytest
 from kinetostat.cli import main
 from kinetostat.commands.common import DONE
 from kinetostat.machine.loading import as_toml, load
-from kinetostat.machine.saving import as_file
 from kinetostat.machine.parameters import values
+from kinetostat.machine.saving import as_file
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.study_folder import HISTORY, QUESTION, study_folder
 from kinetostat.studio.controls import controls
