@@ -5,6 +5,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
 
 import httpx
+import numpy as np
 import pytest
 from browser import browser, needs_chromium, served
 from matplotlib import image
@@ -48,6 +49,45 @@ def test_the_machine_is_there_to_be_seen(page):
     assert blue > 1500
     assert orange > 800
     assert page.text(".pose-status") == "ok"
+
+
+def test_the_platform_is_pulled_by_its_handle_and_one_undo_takes_it_back(page):
+    values, tab = page.tab.locator(".quantity-text"), page.tab
+    before = values.nth(0).input_value()
+    x, y = tab.evaluate("document.querySelector('.machine-view').handleAt('platform x')")
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x + 12, y, steps=3)
+    tab.mouse.move(x + 24, y, steps=3)
+    tab.wait_for_function("before => document.querySelector('.quantity-text').value !== before", arg=before)
+    tab.mouse.up()
+    tab.wait_for_function("parseFloat(document.querySelector('.quantity-text').value) > 1")
+    tab.get_by_role("button", name="Undo (Ctrl+Z)").click()
+    tab.wait_for_function("before => document.querySelector('.quantity-text').value === before", arg=before)
+
+
+def test_a_contribution_under_the_pointer_lights_its_leg(page):
+    row = page.tab.locator("li[data-leg]").first
+    row.hover()
+    page.tab.wait_for_function(
+        "leg => document.querySelector('.machine-view').dataset.linked === leg", arg=row.get_attribute("data-leg")
+    )
+    assert "linked" in row.get_attribute("class")
+
+
+def test_the_view_is_saved_as_a_picture(page):
+    with page.tab.expect_download() as download:
+        page.tab.get_by_role("button", name="Save the picture as PNG").click()
+    assert download.value.suggested_filename == "zhang---gosselin-4-dof.png"
+    picture = image.imread(download.value.path())
+    view = page.tab.locator(".machine-view").bounding_box()
+    assert picture.shape[1] == pytest.approx(2 * view["width"], abs=2)
+    assert np.ptp(picture[:, :, 0]) > 0.5
+
+
+def test_a_finger_scrolls_the_page_over_the_picture(page):
+    canvas = page.tab.locator(".machine-view canvas").first
+    assert canvas.evaluate("canvas => getComputedStyle(canvas).touchAction") == "pan-y"
 
 
 def test_a_slider_moves_the_machine_by_the_keyboard(page):

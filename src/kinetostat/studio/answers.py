@@ -19,6 +19,7 @@ from kinetostat.machine.machine import Load, Machine
 from kinetostat.machine.parameters import find, values
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.sensitivity import Sensitivity, sensitivity
+from kinetostat.studio.pulling import handles
 from kinetostat.tolerances import SINGULAR
 from kinetostat.views.scene import machine_scene as scenes
 from kinetostat.views.scene.analysis_overlays import overlays_of
@@ -38,11 +39,13 @@ class PictureRequest:
     Attributes:
         machine: at its present pose.
         sizes: proportions it was loaded with, so that balls and rods keep their thickness while it changes.
+        axes: of `pulling`, along and about which its platform can be pulled.
         fit: whether the camera should move until all of it is seen.
     """
 
     machine: Machine
     sizes: Proportions
+    axes: tuple[str, ...] = ()
     fit: bool = False
 
 
@@ -63,7 +66,8 @@ def picture(request: PictureRequest) -> Picture:
     scene = scenes.machine_scene(request.machine, response.configuration, request.sizes)
     if status is Status.SINGULAR:
         scene = _with_free_twist(scene, response, request.sizes)
-    return Picture(status, {**as_data(scene), "fit": request.fit})
+    grips = [handle.as_data() for handle in handles(response.configuration, request.axes)]
+    return Picture(status, {**as_data(scene), "handles": grips, "fit": request.fit})
 
 
 def _drawable(status: Status, response: Response) -> bool:

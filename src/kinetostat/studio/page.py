@@ -17,6 +17,7 @@ from kinetostat.studio.answers import Picture, PictureRequest, Report, ReportReq
 from kinetostat.studio.design.design_tab import DesignTab, Workshop
 from kinetostat.studio.elements import BrowserLink, icon_button, refuse, toggle, upload_field
 from kinetostat.studio.files_menu import FilesMenu
+from kinetostat.studio.handles import Handles
 from kinetostat.studio.lanes import Lane, as_sentence
 from kinetostat.studio.map_panel import MapPanel
 from kinetostat.studio.panels import Panel
@@ -24,6 +25,7 @@ from kinetostat.studio.panels.contributions import ContributionsPanel, Sensitivi
 from kinetostat.studio.panels.link_stiffness import LinkPanel
 from kinetostat.studio.panels.tables import IndicesPanel, LoadsPanel, MatricesPanel
 from kinetostat.studio.parameters_panel import ParametersPanel
+from kinetostat.studio.pulling import free_axes
 from kinetostat.studio.scene_panel import ScenePanel
 from kinetostat.studio.session import Memory, Session
 from kinetostat.views.scene.proportions import proportions_of
@@ -62,7 +64,8 @@ class StudioPage:
             with ui.element("section").classes("left").props('aria-label="parameters"'):
                 self.parameters = ParametersPanel(self.session, self.changed, lambda: self._pictures.busy)
             with ui.element("section").classes("middle").props('aria-label="machine"'):
-                self.scene = ScenePanel(self._exaggerate)
+                self.scene = ScenePanel(self._exaggerate, lambda: self.session.machine.name)
+                self.handles = Handles(self.session, self.scene.view, self.changed)
             with ui.element("section").classes("right").props('aria-label="linked views"'):
                 with ui.element("div").classes("card map-card"):
                     self.map = MapPanel(self.session, self.changed)
@@ -105,7 +108,7 @@ class StudioPage:
     def changed(self) -> None:
         """Request map and picture for new numbers of the machine; the report follows the picture."""
         self.map.refresh(time.perf_counter())
-        self._pictures.ask(PictureRequest(self.session.machine, self._sizes))
+        self._pictures.ask(PictureRequest(self.session.machine, self._sizes, self._axes))
         self.parameters.refresh()
         self._offer_history()
 
@@ -119,12 +122,13 @@ class StudioPage:
         self._listening = True
         ui.page_title(f"{machine.name} · kinetostat studio")
         self._sizes = proportions_of(machine, respond(self.session.origin).configuration)
+        self._axes = free_axes(machine)
         self.parameters.fill()
         self.map.fill()
         self.design.renew()
         self._offer_history()
         self.map.refresh()
-        self._pictures.ask(PictureRequest(machine, self._sizes, fit=True))
+        self._pictures.ask(PictureRequest(machine, self._sizes, self._axes, fit=True))
 
     def _offer_history(self) -> None:
         self.undo.set_enabled(self.session.can_undo)
@@ -210,7 +214,7 @@ class StudioPage:
         self.changed()
 
     def _close(self) -> None:
-        for part in (self._pictures, self._reports, self.map, self.files, self.design):
+        for part in (self._pictures, self._reports, self.handles, self.map, self.files, self.design):
             part.close()
         for panel in self.panels.values():
             panel.close()

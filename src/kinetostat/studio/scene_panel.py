@@ -4,6 +4,7 @@ What is drawn comes from `answers` as solids; this panel only places it on the p
 """
 
 from collections.abc import Callable
+from typing import Any
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
@@ -13,8 +14,9 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, Report
 from kinetostat.studio.controls import FACTOR_STEPS, factor_at, factor_position, factor_text, read_factor
-from kinetostat.studio.elements import THROTTLE, MachineView, QuantityRow
+from kinetostat.studio.elements import THROTTLE, MachineView, QuantityRow, icon_button
 from kinetostat.studio.lanes import as_sentence
+from kinetostat.studio.session import file_stem
 
 LAYERS = {
     "ellipsoids": "compliance ellipsoids",
@@ -23,8 +25,10 @@ LAYERS = {
     "springs": "virtual springs",
     "frames": "frames",
     "labels": "leg numbers",
+    "handles": "handles to pull",
 }
 """Layers of the picture that can be hidden, and their names on the page."""
+GHOST = "Keep the machine as it is as a ghost, to compare it with what comes; once more to remove it"
 EXAGGERATION = "factor by which the deflected shape is drawn larger than it is: a number, or auto"
 KEPT = "The picture and the figures still show the last good pose."
 VIEWS = {"iso": "view from the corner", "front": "front view", "side": "side view", "top": "view from above"}
@@ -33,13 +37,16 @@ VIEWS = {"iso": "view from the corner", "front": "front view", "side": "side vie
 class ScenePanel:
     """The picture and figures of the machine; at a pose without an answer, they stay and the reason is shown."""
 
-    def __init__(self, exaggerate: Callable[[float | None], None]) -> None:
+    def __init__(self, exaggerate: Callable[[float | None], None], name: Callable[[], str]) -> None:
         """Build the picture with its tools, the line about the pose, and the figures.
 
         Args:
             exaggerate: draws the deflected shape with another factor; None to choose one.
+            name: gives the name of the machine, for saved pictures.
         """
-        self._exaggerate = exaggerate
+        self._exaggerate, self._name = exaggerate, name
+        self._shown: dict[str, Any] | None = None
+        self._ghost = False
         self._hidden: set[str] = set()
         with ui.element("div").classes("stage"):
             self._stage()
@@ -53,6 +60,8 @@ class ScenePanel:
             for view, text in VIEWS.items():
                 button = ui.button(view, on_click=lambda view=view: self.view.run_method("look", view))
                 button.props("flat dense no-caps").tooltip(text).mark(f"view-{view}")
+            self.ghost = icon_button("filter_none", GHOST, self._keep_ghost, "ghost")
+            icon_button("photo_camera", "Save the picture as PNG", self._save, "picture")
         with ui.element("div").classes("scene-key"):
             self.key = ui.html("", sanitize=False).mark("scene-key")
             self.scale = QuantityRow("deflection ×", EXAGGERATION, FACTOR_STEPS, slides=True).mark("exaggeration")
@@ -79,9 +88,20 @@ class ScenePanel:
         else:
             self._exaggerate(factor)
 
+    def _keep_ghost(self) -> None:
+        """Keep the machine as it is as a translucent shape behind those to come, or remove that shape."""
+        solids = [] if self._ghost or self._shown is None else self._shown["solids"]
+        self._ghost = bool(solids)
+        self.ghost.classes(toggle="pressed").props(f'aria-pressed="{str(self._ghost).lower()}"')
+        self.view.run_method("ghost", [{**s, "material": "removed"} for s in solids if s["layer"] == "machine"])
+
+    def _save(self) -> None:
+        self.view.run_method("save", file_stem(self._name()))
+
     def draw(self, picture: Picture) -> None:
         """Show a pose, if there is something to draw."""
         if picture.scene is not None:
+            self._shown = picture.scene
             self.view.run_method("show", picture.scene)
 
     def explain(self, report: Report, automatic: bool) -> None:

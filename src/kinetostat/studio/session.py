@@ -202,8 +202,7 @@ class Session:
 
     def as_file(self) -> tuple[str, bytes]:
         """A file name and the machine as TOML."""
-        name = "".join(c if c.isalnum() and c.isascii() else "-" for c in self.machine.name.lower()).strip("-")
-        return f"{name or 'machine'}.toml", as_file(self.machine).encode()
+        return f"{file_stem(self.machine.name)}.toml", as_file(self.machine).encode()
 
 
 def read_typed(parameter: Parameter, text: str, shown_unit: str) -> float:
@@ -219,6 +218,11 @@ def read_typed(parameter: Parameter, text: str, shown_unit: str) -> float:
         return typed_value(text, quantity.kind, shown_unit)
     except UnitError as error:
         raise InputError(f"{parameter.path} is {shorten(text)}: {error}.") from None
+
+
+def file_stem(name: str) -> str:
+    """Return the name of a machine as that of a file."""
+    return "".join(c if c.isalnum() and c.isascii() else "-" for c in name.lower()).strip("-") or "machine"
 
 
 def sent_text(data: bytes, name: str) -> str:

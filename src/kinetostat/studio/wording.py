@@ -4,7 +4,7 @@ Values come in SI and leave as text; names and texts that may come from a file a
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 
 from kinetostat.display import ENGINEERING, Display
@@ -85,12 +85,19 @@ def table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind
     return f'<table class="figures {kind}"><caption>{escape(caption)}</caption>{columns}<tbody>{body}</tbody></table>'
 
 
-def bars(caption: str, rows: Sequence[tuple[str, float, str]]) -> str:
-    """Return horizontal bars: of each a name, its length as a share of the track (coloured if negative), and a text."""
+def bars(caption: str, rows: Sequence[tuple[str, float, str]], legs: Mapping[str, str] | None = None) -> str:
+    """Return horizontal bars.
+
+    Args:
+        caption: read aloud by screen readers, not shown.
+        rows: of each bar its name, its length as a share of the track (coloured if negative), and a text.
+        legs: legs by the name of a bar; the picture lights them with the bar under the pointer.
+    """
     if not rows:
         return paragraph("There is nothing to show.")
+    of_leg = {name: f' data-leg="{escape(leg)}"' for name, leg in (legs or {}).items()}
     items = "".join(
-        f'<li><span class="bar-name" title="{escape(name)}">{escape(name)}</span>'
+        f'<li{of_leg.get(name, "")}><span class="bar-name" title="{escape(name)}">{escape(name)}</span>'
         f'<span class="bar-track"><span class="bar-fill {"negative" if share < 0 else ""}" '
         f'style="width:{100 * min(abs(share), 1.0):.2f}%"></span></span>'
         f'<span class="bar-value">{escape(text)}</span></li>'

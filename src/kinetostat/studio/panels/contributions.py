@@ -64,9 +64,10 @@ def contributions_text(analysis: Analysis, component: str) -> str:
     if not rows:
         return paragraph(f"The platform moves freely in {component}: a spring there has no stiffness.")
     unit = QUANTITIES[f"compliance_{component}"].unit
+    legs = {str(spring.of): leg.name for leg in analysis.machine.configure().legs for spring in leg.springs}
     return paragraph(
         f"Compliance in {component}: {engineering(compliance, unit, analysis.machine.display)}", "lead"
-    ) + bars("contributions to the compliance", rows)
+    ) + bars("contributions to the compliance", rows, legs)
 
 
 class SensitivityPanel(Panel):

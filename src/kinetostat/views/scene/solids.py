@@ -197,6 +197,7 @@ def solid_data(solid: Solid) -> dict[str, Any]:
     return {
         "name": solid.name,
         "layer": solid.layer,
+        "leg": solid.leg,
         "material": solid.material,
         "shape": _shape_data(solid.shape),
         "place": [round(c, DECIMALS) for v in columns_of(solid) for c in v.components()],

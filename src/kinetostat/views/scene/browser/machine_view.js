@@ -1,5 +1,6 @@
 // Draws scenes of solids: light, materials, camera and labels live here; what there is to see does not.
 import { CSS2DObject, CSS2DRenderer, OrbitControls, THREE } from "nicegui-scene";
+import { Handles } from "kinetostat-scene/handles.js";
 import { geometryOf } from "kinetostat-scene/solid_geometry.js";
 import { isDark, onTheme } from "kinetostat-scene/theme.js";
 
@@ -8,6 +9,8 @@ const THEMES = {
   dark: { sky: 0x1b222c, ground: 0x11161d, grid: 0x6b7a8c, gridOpacity: 0.28, shadow: 0.5, light: 0.72 },
 };
 const VIEWS = { iso: [1.0, -1.35, 0.75], front: [0, -1, 0.02], side: [1, 0, 0.02], top: [0, -0.02, 1] };
+const HANDLES = "handles"; // the layer of what can be pulled
+const TOUCH = "pan-y"; // a finger turns the machine by moving aside, and scrolls the page by moving up or down
 const FILLED = 0.84; // share of the canvas across which the machine may reach
 const UNLIT = new Set(["frames", "directions", "ellipsoids", "deflection"]);
 
@@ -28,6 +31,7 @@ export default {
   template: `<div class="machine-view"><canvas tabindex="0" role="img" :aria-label="label"
       @keydown="turn"></canvas><div class="machine-labels"></div></div>`,
   props: { label: String, hidden: Array, looks: Object },
+  emits: ["pull", "settle"],
   mounted() {
     const canvas = this.$el.querySelector("canvas");
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawsInSoftware(), alpha: false });
@@ -40,7 +44,21 @@ export default {
     this.world = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(32, 1, 0.01, 100);
     this.camera.up.set(0, 0, 1);
+    this.handles = new Handles(
+      this.world,
+      (item, goal) => this.$emit("pull", { of: item.of, leg: item.leg, axis: item.axis, goal, start: this.pullStarts }),
+      () => this.$emit("settle"),
+    );
+    this.$el.handleAt = this.handleAt;
+    this.$el.addEventListener("pointerdown", this.press, true); // before the camera's controls
+    this.$el.addEventListener("touchstart", this.keepTouch, { capture: true, passive: false });
+    canvas.addEventListener("pointermove", this.hover);
+    canvas.addEventListener("pointerleave", () => this.link(""));
+    this.listening = new AbortController();
+    const over = (event) => this.link(event.target.closest?.("[data-leg]")?.dataset.leg ?? "");
+    document.addEventListener("pointerover", over, { signal: this.listening.signal });
     this.controls = new OrbitControls(this.camera, canvas);
+    canvas.style.touchAction = TOUCH; // the controls have forbidden all of it
     this.controls.addEventListener("change", () => this.draw());
     this.controls.addEventListener("start", () => (this.view = null));
     this.slow = drawsInSoftware();
@@ -69,6 +87,7 @@ export default {
   },
   beforeUnmount() {
     clearTimeout(this.resting);
+    this.listening.abort();
     this.observer.disconnect();
     this.themes.disconnect();
     this.controls.dispose();
@@ -165,6 +184,7 @@ export default {
     },
     show(scene) {
       this.put("machine", scene.solids, scene.labels);
+      if (scene.handles) this.handles.put(scene.handles);
       const first = this.size !== scene.size && (!this.size || Math.abs(this.size / scene.size - 1) > 0.6);
       const centre = new THREE.Vector3(...scene.centre);
       if (first || scene.fit) {
@@ -191,6 +211,11 @@ export default {
       this.put("overlay", solids, labels);
       this.draw();
     },
+    // Another machine, or this one as it was, as a translucent shape behind the present one; none to remove it.
+    ghost(solids) {
+      this.put("ghost", solids, []);
+      this.draw();
+    },
     put(name, solids, labels) {
       const group = (this.groups[name] ??= { root: new THREE.Group(), meshes: new Map() });
       if (!group.root.parent) this.world.add(group.root);
@@ -205,7 +230,9 @@ export default {
           group.root.add(mesh);
         }
         mesh.geometry = geometryOf(this.geometries, solid.shape);
-        mesh.material = this.materials[solid.material];
+        mesh.userData.leg = name === "machine" ? solid.leg : "";
+        mesh.userData.material = solid.material;
+        mesh.material = this.material(mesh);
         const unlit = UNLIT.has(solid.layer);
         mesh.castShadow = !unlit && !mesh.material.transparent;
         mesh.receiveShadow = !unlit;
@@ -229,8 +256,124 @@ export default {
       });
       this.hide();
     },
+    material(mesh) {
+      const name = mesh.userData.material;
+      if (!mesh.userData.leg || mesh.userData.leg !== this.linked) return this.materials[name];
+      const lit = `${name}, lit`;
+      if (!this.materials[lit]) {
+        this.materials[lit] = this.materials[name].clone();
+        this.materials[lit].emissive = new THREE.Color(0xffb000);
+        this.materials[lit].emissiveIntensity = 0.55;
+      }
+      return this.materials[lit];
+    },
+    // Lights a leg in the picture, and marks everything on the page that is about it.
+    link(leg) {
+      if (leg === (this.linked ?? "")) return;
+      this.linked = leg;
+      for (const mesh of this.groups.machine?.meshes.values() ?? []) mesh.material = this.material(mesh);
+      for (const row of document.querySelectorAll("[data-leg]")) row.classList.toggle("linked", row.dataset.leg === leg);
+      this.$el.dataset.linked = leg;
+      this.draw();
+    },
+    spot(event) {
+      const frame = this.$el.getBoundingClientRect();
+      const [u, v] = [(event.clientX - frame.left) / frame.width, (event.clientY - frame.top) / frame.height];
+      return new THREE.Vector2(2 * u - 1, 1 - 2 * v);
+    },
+    hover(event) {
+      if (event.buttons || this.handles.held || this.looking) return;
+      this.looking = true; // once a frame is often enough
+      const spot = this.spot(event);
+      requestAnimationFrame(() => {
+        this.looking = false;
+        const item = this.handles.hit(this.camera, spot);
+        if (this.handles.hover(item)) this.draw();
+        this.$el.style.cursor = item ? "grab" : "";
+        this.link(item?.leg || this.legAt(spot));
+      });
+    },
+    legAt(spot) {
+      this.caster ??= new THREE.Raycaster();
+      this.caster.setFromCamera(spot, this.camera);
+      const meshes = [...(this.groups.machine?.meshes.values() ?? [])].filter((mesh) => mesh.visible);
+      return this.caster.intersectObjects(meshes, false)[0]?.object.userData.leg ?? "";
+    },
+    keepTouch(event) {
+      const [finger] = event.touches;
+      if (event.touches.length === 1 && this.handles.hit(this.camera, this.spot(finger))) event.preventDefault();
+    },
+    press(event) {
+      const item = event.button === 0 && this.handles.hit(this.camera, this.spot(event));
+      if (!item || !this.handles.grab(item, this.camera, this.spot(event))) return;
+      event.stopPropagation();
+      event.preventDefault();
+      this.pullStarts = (this.pullStarts ?? 0) + 1;
+      this.$el.style.cursor = "grabbing";
+      const ended = new AbortController();
+      const options = { signal: ended.signal };
+      const release = () => {
+        ended.abort();
+        this.handles.release();
+        this.$el.style.cursor = "";
+      };
+      window.addEventListener("pointermove", (moved) => this.handles.pull(this.spot(moved)), options);
+      for (const end of ["pointerup", "pointercancel"]) window.addEventListener(end, release, options);
+    },
+    // Where a handle is on the page; for tests.
+    handleAt(name) {
+      const item = this.handles.items.get(name);
+      const grip = { 0: [0, 0, 0], 1: [0, 0.85, 0], 2: [0.66, 0, 0] }[item.axis.length];
+      item.object.updateWorldMatrix(true, false);
+      const point = new THREE.Vector3(...grip).applyMatrix4(item.object.matrixWorld).project(this.camera);
+      const frame = this.$el.getBoundingClientRect();
+      return [frame.left + ((point.x + 1) / 2) * frame.width, frame.top + ((1 - point.y) / 2) * frame.height];
+    },
+    // Saves the picture as it is, labels included, as a PNG of twice its size on the page.
+    save(name) {
+      const ratio = this.renderer.getPixelRatio();
+      const shown = this.handles.root.visible;
+      this.handles.root.visible = false;
+      this.renderer.setPixelRatio(2);
+      this.renderer.render(this.world, this.camera);
+      const { domElement } = this.renderer;
+      const sheet = document.createElement("canvas");
+      [sheet.width, sheet.height] = [domElement.width, domElement.height];
+      const pen = sheet.getContext("2d");
+      pen.drawImage(domElement, 0, 0); // at once: the browser clears what it has shown
+      pen.scale(sheet.width / this.$el.clientWidth, sheet.height / this.$el.clientHeight);
+      for (const text of this.$el.querySelectorAll(".machine-label")) this.write(pen, text);
+      this.renderer.setPixelRatio(ratio);
+      this.handles.root.visible = shown;
+      this.render(); // at once: a canvas is empty after its size has changed
+      this.draw();
+      sheet.toBlob((blob) => {
+        const link = document.createElement("a");
+        link.href = URL.createObjectURL(blob);
+        link.download = `${name}.png`;
+        link.click();
+        setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+      });
+    },
+    write(pen, text) {
+      const style = getComputedStyle(text);
+      if (style.display === "none") return;
+      const [frame, box] = [this.$el.getBoundingClientRect(), text.getBoundingClientRect()];
+      const [x, y] = [box.left - frame.left, box.top - frame.top];
+      if (parseFloat(style.borderWidth)) {
+        pen.beginPath();
+        pen.roundRect(x, y, box.width, box.height, box.height / 2);
+        [pen.fillStyle, pen.strokeStyle] = [style.backgroundColor, style.borderColor];
+        pen.fill();
+        pen.stroke();
+      }
+      pen.font = `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`;
+      [pen.textAlign, pen.textBaseline, pen.fillStyle] = ["center", "middle", style.color];
+      pen.fillText(text.textContent, x + box.width / 2, y + box.height / 2);
+    },
     hide() {
       const hidden = new Set(this.hidden ?? []);
+      this.handles.root.visible = !hidden.has(HANDLES);
       for (const group of Object.values(this.groups)) {
         for (const object of [...group.meshes.values(), ...group.labels]) {
           object.visible = !hidden.has(object.userData.layer);
@@ -341,6 +484,7 @@ export default {
       if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
     },
     render() {
+      this.handles.scale(this.camera, this.size);
       this.renderer.render(this.world, this.camera);
       this.labelRenderer.render(this.world, this.camera);
       this.$el.dataset.drawn = Number(this.$el.dataset.drawn ?? 0) + 1;

@@ -1,0 +1,240 @@
+"""The numbers of a machine that bring its platform, or a joint of a plate, to where a designer pulls it.
+
+Every family has coordinates and fields of its own. So the numbers are computed by least squares over those that move
+the part at all; nothing is known here of what they mean, and nothing of the page.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kinetostat.algebra.vector import IDENTITY, Displacement, Rotation, Vector, rotation_along
+from kinetostat.engine.points import Array
+from kinetostat.kinematics.closure import solve_joints
+from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.views.scene.anatomy import anatomy
+
+MOVES, TURNS = ("x", "y", "z"), ("rx", "ry", "rz")
+PLATFORM, BASE, HEAD = "platform", "base", "head"
+"""Of what a handle is: the whole platform, a joint on the base, or a joint on the platform."""
+HOLD = 0.03
+"""Weight of what should stay (the orientation under a push, the place under a turn) against what is pulled."""
+LEAST, ASIDE = 0.5, 5.0
+"""A platform is free along or about an axis if it can follow a unit pull by this share, and moves aside by less than
+this (in units of the machine's length, and rad)."""
+FAINT = 1e-3
+"""Share of the largest effect on a part from which a number counts as one that moves it."""
+DIFFERENCE = 1e-6
+"""Step of finite differences, in units of the machine's length or in rad."""
+ITERATIONS, HALVINGS = 6, 4
+DONE = 1e-7
+"""Residual, in units of the machine's length, at which the part is where it was pulled."""
+RANK = 1e-6
+"""Singular values below this share of the largest count as zero: motions that no number can make."""
+
+
+@dataclass(frozen=True)
+class Handle:
+    """What can be pulled.
+
+    Attributes:
+        of: `PLATFORM`, `BASE` or `HEAD`.
+        leg: name of the leg whose joint it is; of the platform empty.
+        point: base frame, m.
+        axes: of `MOVES` and `TURNS`, along or about which the platform can be pulled; a joint moves in its plate.
+    """
+
+    of: str
+    leg: str
+    point: Vector
+    axes: tuple[str, ...] = ()
+
+    def as_data(self) -> dict[str, Any]:
+        """Convert it to plain data for the browser."""
+        point = [float(c) for c in self.point.components()]
+        return {"of": self.of, "leg": self.leg, "point": point, "axes": list(self.axes)}
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A wish of the designer.
+
+    Attributes:
+        machine: as it is now.
+        of, leg: the handle.
+        axis: of a platform's handle, one of `MOVES` or `TURNS`.
+        goal: where the platform should be, or at its translation the joint.
+    """
+
+    machine: Machine
+    of: str
+    leg: str
+    axis: str
+    goal: Displacement
+
+
+def placed(machine: Machine) -> Configuration:
+    """Return where the parts of a machine are at its pose, without any stiffness."""
+    return machine.configure(solve_joints(machine).coordinates if machine.family.chains else ())
+
+
+def handles(configuration: Configuration, axes: tuple[str, ...]) -> list[Handle]:
+    """Return what can be pulled: the platform at P along some axes, and joints of actuated legs but those on rails."""
+    legs = [part for leg in configuration.legs if (part := anatomy(leg)).actuated]
+    joints = [Handle(BASE, leg.leg, leg.foot) for leg in legs if not leg.on_rail]
+    joints += [Handle(HEAD, leg.leg, leg.head) for leg in legs]
+    return [Handle(PLATFORM, "", configuration.platform.translation, axes), *joints]
+
+
+def free_axes(machine: Machine) -> tuple[str, ...]:
+    """Return the axes of the base along and about which the coordinates of the pose can move the platform."""
+    now = placed(machine)
+    length = float(now.length)
+    slopes = _slopes(_Problem(machine, _pose(machine), length, lambda moved: _motion(moved, now.platform, length)))
+    return tuple(axis for k, axis in enumerate((*MOVES, *TURNS)) if _follows(slopes, k, _weights(axis)))
+
+
+def _follows(slopes: Array, k: int, weights: Array) -> bool:
+    """Whether the pose can follow a unit pull along or about the axis `k`, without running away aside."""
+    wish = np.eye(6)[k]
+    motion = slopes @ np.linalg.lstsq(weights[:, None] * slopes, weights * wish, rcond=RANK)[0]
+    return bool(motion[k] > LEAST and np.abs(motion - wish).max() < ASIDE)
+
+
+def _weights(axis: str) -> Array:
+    """Return what counts of the platform's motion under a pull: the place under a push, the turn under a turn."""
+    return np.array([1.0] * 3 + [HOLD] * 3 if axis in MOVES else [HOLD] * 3 + [1.0] * 3)
+
+
+def pulled(pull: Pull) -> dict[str, float]:
+    """Return the numbers, by leaf path, that bring a part as near as possible to where it is pulled.
+
+    Of a platform the coordinates of the pose change, of a joint the geometry. What the pull is not about should stay: a
+    machine that can turn while it moves keeps its orientation, and one that cannot lets it follow.
+    """
+    machine, now = pull.machine, placed(pull.machine)
+    length = float(now.length)
+    if pull.of == PLATFORM:
+        weights = _weights(pull.axis)
+        return _solved(
+            _Problem(machine, _pose(machine), length, lambda moved: weights * _motion(moved, pull.goal, length))
+        )
+    goal, base = pull.goal.translation, pull.of == BASE
+    # A joint of the platform is compared in the platform's axes: its place there is geometry, whatever the pose.
+    wanted = goal if base else now.platform.inverse().apply(goal)
+
+    def missing(configuration: Configuration) -> Array:
+        leg = next(leg for leg in configuration.legs if leg.name == pull.leg)
+        part = anatomy(leg)
+        point = part.foot if base else configuration.platform.inverse().apply(part.head)
+        return np.array((point - wanted).components(), dtype=float) / length
+
+    return _solved(_Problem(machine, _geometry(machine, pull.leg), length, missing))
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Numbers that may change, by path with their kind, and what is to vanish, in units of the machine's length (m)."""
+
+    machine: Machine
+    unknowns: dict[str, str]
+    length: float
+    residual: Callable[[Configuration], Array]
+
+    def at(self, numbers: Array) -> Array:
+        changes = dict(zip(self.unknowns, numbers.tolist(), strict=True))
+        return self.residual(placed(with_values(self.machine, changes)))
+
+    @property
+    def start(self) -> Array:
+        present = values(self.machine)
+        return np.array([float(present[path]) for path in self.unknowns])
+
+    @property
+    def units(self) -> Array:
+        """Size of each unknown: the machine's length, or a radian."""
+        return np.array([self.length if kind == "length" else 1.0 for kind in self.unknowns.values()])
+
+
+def _solved(problem: _Problem) -> dict[str, float]:
+    """Go downhill by Gauss and Newton; a step that leads out of reach, or uphill, is halved."""
+    numbers, units = problem.start, problem.units
+    residual, effective = problem.at(numbers), np.zeros(len(numbers), dtype=bool)
+    for _ in range(ITERATIONS):
+        if not np.isfinite(residual).all() or np.abs(residual).max() < DONE:
+            break
+        slopes = _slopes(problem, numbers, residual)
+        effective = effective | slopes.any(axis=0)
+        step = units * np.linalg.lstsq(slopes, -residual, rcond=RANK)[0]
+        for _ in range(HALVINGS):
+            trial = problem.at(numbers + step)
+            if np.isfinite(trial).all() and np.linalg.norm(trial) < np.linalg.norm(residual):
+                break
+            step = 0.5 * step
+        else:
+            break
+        numbers, residual = numbers + step, trial
+    # All numbers that have an effect, changed or not: a whole pull changes the same ones, and is one step to undo.
+    return {path: float(n) for path, n, counts in zip(problem.unknowns, numbers, effective, strict=True) if counts}
+
+
+def _slopes(problem: _Problem, numbers: Array | None = None, residual: Array | None = None) -> Array:
+    """Differentiate the residual by each unknown in its unit [residuals x unknowns]; 0 where it has no effect."""
+    numbers = problem.start if numbers is None else numbers
+    residual = problem.at(numbers) if residual is None else residual
+    columns = []
+    for k, unit in enumerate(problem.units):
+        ahead = numbers.copy()
+        ahead[k] += DIFFERENCE * unit
+        columns.append((problem.at(ahead) - residual) / DIFFERENCE)
+    slopes = np.nan_to_num(np.array(columns, dtype=float).T.reshape(len(residual), len(columns)))
+    effects = np.linalg.norm(slopes, axis=0)
+    return slopes * (effects > FAINT * effects.max(initial=0.0))
+
+
+def _pose(machine: Machine) -> dict[str, str]:
+    return _fields(machine, lambda path: path.startswith("pose."))
+
+
+def _geometry(machine: Machine, leg: str) -> dict[str, str]:
+    """Lengths and angles of the machine itself; of a machine written leg by leg, those of one leg."""
+    apart = ("pose.", "tool.", "load.", "limits.", "sections.")
+    written = machine.family.chains is not None
+    mine = (f"legs.{leg}.", "geometry.")
+    return _fields(machine, lambda path: not path.startswith(apart) and (not written or path.startswith(mine)))
+
+
+def _fields(machine: Machine, chosen: Callable[[str], bool]) -> dict[str, str]:
+    return {
+        leaf: parameter.quantity.kind
+        for parameter in parameters(machine.family)
+        for leaf in parameter.leaves
+        if parameter.quantity.kind in ("length", "angle") and chosen(leaf)
+    }
+
+
+def _motion(configuration: Configuration, goal: Displacement, length: float) -> Array:
+    """What a platform lacks to a goal: translation in units of the machine's length, then the turn, rad (small)."""
+    platform = configuration.platform
+    apart = (platform.translation - goal.translation) * (1.0 / length)
+    now, wanted = platform.rotation, goal.rotation
+    turn = (wanted.x.cross(now.x) + wanted.y.cross(now.y) + wanted.z.cross(now.z)) * 0.5
+    return np.array([*apart.components(), *turn.components()], dtype=float)
+
+
+def goal_of(start: Displacement, axis: str, amount: float) -> Displacement:
+    """Return a platform's place after a move (m) along, or a turn (rad) about, an axis of the base through P."""
+    direction = (Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0))["xyz".index(axis[-1])]
+    if axis in MOVES:
+        return Displacement(start.rotation, start.translation + direction * amount)
+    turn: Rotation = rotation_along(direction, math.cos(amount), math.sin(amount))
+    return Displacement(turn @ start.rotation, start.translation)
+
+
+def point_goal(point: Sequence[float]) -> Displacement:
+    """Return the goal of a joint that is pulled to a point, base frame, m."""
+    return Displacement(IDENTITY, Vector(*point))
