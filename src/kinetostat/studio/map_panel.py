@@ -6,20 +6,26 @@ The values are computed by `answers.compliance_map`; this panel chooses, shows, 
 import time
 from collections.abc import Callable
 
+import numpy as np
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from kinetostat.display import Scale
 from kinetostat.engine.points import Array
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studio.answers import MAP_POINTS, Ends, MapRequest, compliance_map, finite, map_quantities
 from kinetostat.studio.controls import Control
-from kinetostat.studio.elements import THROTTLE, MapView, choice, refuse
+from kinetostat.studio.elements import THROTTLE, MapView, choice, icon_button, refuse
 from kinetostat.studio.lanes import Lane
-from kinetostat.studio.session import Session
+from kinetostat.studio.session import Session, read_typed
 from kinetostat.studio.wording import full_label
 from kinetostat.units import KINDS
+from kinetostat.views.usual_values import usual_range
+
+LENGTHS = ("m", "mm")
+"""Units of axes that have one scale if both have the same."""
+RANGE = 'range of the {} axis, such as "-5 to 8 cm"; empty for the whole range of the slider'
 
 
 class MapPanel:
@@ -38,16 +44,22 @@ class MapPanel:
             self.quantity = choice({}, "map of", self._chosen, "map-quantity")
             self.across = choice({}, "horizontal axis", self._chosen, "map-across")
             self.up = choice({}, "vertical axis", self._chosen, "map-up")
+            with icon_button("straighten", "Ranges of the axes", self._show_ranges, "map-ranges"):
+                self._menu = ui.menu().props("no-parent-event").classes("map-ranges")
+        with self._menu:
+            self.ranges = [self._range_field(side) for side in ("horizontal", "vertical")]
         self.view = MapView("map of the chosen quantity; click, drag or arrow keys move the machine").mark("map")
         self.view.on("pick", self._pick, throttle=THROTTLE)
         self.view.on("settle", self._settle)
         self.time = ui.label("").classes("server-time").mark("map-time")
         self._asking = False
+        self._chosen_ranges: dict[str, tuple[float, float]] = {}
         self.fill()
 
     def fill(self) -> None:
         """Offer the numbers and quantities of a machine that has just been loaded; nothing is computed yet."""
         self._asking = False
+        self._chosen_ranges.clear()
         machine = self._session.machine
         fields = {control.path: full_label(control.parameter) for control in self._mappable()}
         first, second, *_ = fields
@@ -77,8 +89,12 @@ class MapPanel:
         self._lane.close()
 
     def _ends(self) -> tuple[Ends, Ends]:
-        across, up = (self._session.controls[str(axis.value)] for axis in (self.across, self.up))
-        return Ends(across.path, across.low, across.high), Ends(up.path, up.low, up.high)
+        across, up = (self._ends_of(str(axis.value)) for axis in (self.across, self.up))
+        return across, up
+
+    def _ends_of(self, path: str) -> Ends:
+        control = self._session.controls[path]
+        return Ends(path, *self._chosen_ranges.get(path, (control.low, control.high)))
 
     def _scale(self, path: str) -> tuple[Control, Scale]:
         control = self._session.controls[path]
@@ -90,21 +106,71 @@ class MapPanel:
         if (request.across, request.up) != self._ends() or quantity not in maps:
             return  # the designer has chosen other axes meanwhile, and that map is on its way
         (across, x), (up, y) = self._scale(request.across.path), self._scale(request.up.path)
+        values = maps[quantity]
+        known = values[np.isfinite(values)]
+        ends = np.array(usual_range(known) if known.size else (0.0, 0.0))
         scale = self._session.machine.display.scale(QUANTITIES[quantity].unit)
         self.view.run_method(
             "show",
             {
                 "nx": MAP_POINTS,
                 "ny": MAP_POINTS,
-                "values": finite(maps[quantity] * scale.factor),
+                "values": finite(values * scale.factor),
+                "ends": (ends * scale.factor).tolist(),
                 "unit": scale.unit,
-                "x": {"low": across.low * x.factor, "high": across.high * x.factor, "label": x.label(across.label)},
-                "y": {"low": up.low * y.factor, "high": up.high * y.factor, "label": y.label(up.label)},
+                "alike": x == y and x.unit in LENGTHS,
+                "x": {**_axis(request.across, x), "label": x.label(across.label)},
+                "y": {**_axis(request.up, y), "label": y.label(up.label)},
                 "here": [self._session.value(across.path) * x.factor, self._session.value(up.path) * y.factor],
             },
         )
         took = 1e3 * (time.perf_counter() - request.since)
-        self.time.set_text(f"{MAP_POINTS} × {MAP_POINTS} poses in {took:.0f} ms, {scale.unit}")
+        self.time.set_text(f"{MAP_POINTS} × {MAP_POINTS} poses in {took:.0f} ms")
+
+    def _range_field(self, side: str) -> ui.input:
+        field = ui.input(f"{side} axis").props("dense outlined").classes("field").tooltip(RANGE.format(side))
+        field.on("keydown.enter", self._take_ranges).on("blur", self._take_ranges)
+        return field.mark(f"map-range-{side}")
+
+    def _show_ranges(self) -> None:
+        for field, ends in zip(self.ranges, self._ends(), strict=True):
+            field.set_value(self._range_text(ends))
+        self._menu.open()
+
+    def _range_text(self, ends: Ends) -> str:
+        _, scale = self._scale(ends.path)
+        return f"{ends.low * scale.factor:.4g} to {ends.high * scale.factor:.4g} {scale.unit}"
+
+    def _take_ranges(self) -> None:
+        """Take what was typed as the ranges of both axes; what cannot be read is refused with the reason."""
+        for field, ends in zip(self.ranges, self._ends(), strict=True):
+            text = str(field.value or "").strip()
+            if text == self._range_text(ends):
+                continue
+            try:
+                chosen = self._read_range(ends.path, text)
+            except InputError as error:
+                refuse(str(error))
+                return
+            self._chosen_ranges.pop(ends.path, None)
+            if chosen is not None:
+                self._chosen_ranges[ends.path] = chosen
+        self.refresh()
+
+    def _read_range(self, path: str, text: str) -> tuple[float, float] | None:
+        """Return the ends of a range from text such as "-5 to 8 cm"; None if it is empty."""
+        if not text:
+            return None
+        control, scale = self._scale(path)
+        first, to, last = text.partition(" to ")
+        if not to:
+            raise InputError(f'the range of {control.label} is {shorten(text)}; write two numbers, e.g. "-5 to 8 cm".')
+        high = read_typed(control.parameter, last, scale.unit)
+        unit = last.strip().lstrip("+-.0123456789eE \u2212").strip() or scale.unit
+        low = read_typed(control.parameter, first, unit)
+        if not low < high:
+            raise InputError(f"the range of {control.label} is {shorten(text)}; its first end must be the lower one.")
+        return low, high
 
     def _chosen(self) -> None:
         if self._asking:
@@ -126,3 +192,8 @@ class MapPanel:
         except InputError as error:
             refuse(str(error))
         self._on_change()
+
+
+def _axis(ends: Ends, scale: Scale) -> dict[str, float]:
+    """Return the ends of an axis in the unit that it shows."""
+    return {"low": ends.low * scale.factor, "high": ends.high * scale.factor}

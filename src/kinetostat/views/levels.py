@@ -11,18 +11,14 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.ticker import MaxNLocator
 
+from kinetostat.views.usual_values import WIDE, usual_range
+
 Array = npt.NDArray[np.float64]
 
 LEVELS = 12
 """Bands of a map, about."""
-USUAL = (2.0, 98.0)
-"""Percentiles between which values are usual."""
-FAR = 1.0
-"""How far an extreme may lie from the usual values, in units of their range, before the map leaves it out."""
 SAME = 1e-9
 """Share of the range of levels within which a level and an extreme are the same."""
-WIDE = 30.0
-"""Ratio of the usual values, if all are positive, from which levels follow the logarithm."""
 STEPS = ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,))
 """Levels within a decade, from few decades to many."""
 
@@ -40,20 +36,6 @@ class Levels:
     bounds: Array
     logarithmic: bool
     extend: Literal["neither", "min", "max", "both"]
-
-
-def usual_range(values: Array) -> tuple[float, float]:
-    """Return the ends between which a map should resolve values: extremes only where they lie near all others.
-
-    A map of 41 x 41 poses with a single pose next to a singularity would otherwise be of one colour.
-
-    Args:
-        values: of any shape; those that are not finite are ignored, at least one must be finite.
-    """
-    finite = values[np.isfinite(values)]
-    least, low, high, greatest = np.percentile(finite, [0.0, *USUAL, 100.0])
-    far = FAR * (high - low)
-    return float(low if low - least > far else least), float(high if greatest - high > far else greatest)
 
 
 def levels_of(values: Array) -> Levels:

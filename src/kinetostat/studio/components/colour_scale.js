@@ -1,6 +1,6 @@
 // Colours for numbers, in bands that the eye can tell apart, and the bar that says which is which.
 import { colour } from "kinetostat-scene/theme.js";
-import { short } from "kinetostat-studio/plot_axes.js";
+import { logTicks, niceTicks, short } from "kinetostat-studio/plot_axes.js";
 
 const VIRIDIS = [
   [68, 1, 84], [72, 36, 117], [65, 68, 135], [53, 95, 141], [42, 120, 142], [33, 145, 140],
@@ -29,15 +29,18 @@ export function css(rgb) {
   return `rgb(${rgb.map(Math.round).join(",")})`;
 }
 
-export function colourScale(known) {
-  const [low, high] = [Math.min(...known), Math.max(...known)];
+// `ends`, where given, are those between which colours resolve values; beyond them an arrow at the bar says so.
+export function colourScale(known, ends) {
+  const [least, greatest] = [Math.min(...known), Math.max(...known)];
+  const [low, high] = ends ?? [least, greatest];
   const [log, constant] = [low > 0 && high / low > WIDE_RANGE, !(high - low > ALIKE * Math.abs(high))];
   const share = (value) => (log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low));
-  const inverse = (at) => (log ? low * (high / low) ** at : low + (high - low) * at);
   return {
     none: known.length === 0,
     share: (value) => (constant ? 0.5 : share(value)),
-    ticks: constant ? [[0.5, high]] : [0, 0.25, 0.5, 0.75, 1].map((at) => [at, inverse(at)]),
+    ticks: constant ? [[0.5, high]] : (log ? logTicks : niceTicks)(low, high, 5).map((value) => [share(value), value]),
+    below: least < low - ALIKE * (high - low),
+    above: greatest > high + ALIKE * (high - low),
   };
 }
 
@@ -46,6 +49,18 @@ export function colourBar(pen, box, scale) {
   for (let band = 0; band < BANDS; band++) {
     pen.fillStyle = css(bandColour(band));
     pen.fillRect(x, box.y + box.height * (1 - (band + 1) / BANDS), 11, box.height / BANDS + 0.6);
+  }
+  for (const [beyond, foot, way, band] of [
+    [scale.above, box.y, -1, BANDS - 1],
+    [scale.below, box.y + box.height, 1, 0],
+  ]) {
+    if (!beyond) continue;
+    pen.fillStyle = css(bandColour(band));
+    pen.beginPath();
+    pen.moveTo(x, foot);
+    pen.lineTo(x + 11, foot);
+    pen.lineTo(x + 5.5, foot + 7 * way);
+    pen.fill();
   }
   pen.fillStyle = colour("ink-soft");
   pen.textAlign = "left";

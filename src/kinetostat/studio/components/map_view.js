@@ -3,6 +3,8 @@ import { bandColour, bandOf, colourBar, colourScale } from "kinetostat-studio/co
 import { colour } from "kinetostat-scene/theme.js";
 import { frame, niceTicks, plot, prepare, short } from "kinetostat-studio/plot_axes.js";
 
+const STRIP = 0.3; // least side of a map with equal scales, as a share of the room
+
 export default {
   mixins: [plot],
   template: `<div class="plot"><canvas tabindex="0" role="img" :aria-label="label" @pointerdown="press"
@@ -12,7 +14,7 @@ export default {
   methods: {
     show(map) {
       this.map = map;
-      this.scale = colourScale(map.values.filter((value) => value !== null));
+      this.scale = colourScale(map.values.filter((value) => value !== null), map.ends);
       this.draw();
       this.tell();
     },
@@ -26,9 +28,10 @@ export default {
       const sheet = prepare(this.canvas, this.$el);
       if (!sheet) return;
       const { pen, width, height } = sheet;
-      const box = { left: 0, bottom: height, x: 58, y: 8, width: width - 58 - 78, height: height - 8 - 40 };
+      const box = { left: 0, bottom: height, x: 58, y: 18, width: width - 58 - 70, height: height - 18 - 48 };
       this.box = box;
       if (box.width < 20 || box.height < 20) return;
+      this.makeEqual(box);
       this.paint(pen, box, sheet.ratio);
       const { x, y } = this.map;
       const across = niceTicks(x.low, x.high, Math.max(2, box.width / 62));
@@ -37,8 +40,23 @@ export default {
         x: across.map((t) => [this.toX(t), short(t)]),
         y: up.map((t) => [this.toY(t), short(t)]),
       }, { x: x.label, y: y.label });
-      if (!this.scale.none) colourBar(pen, box, this.scale);
+      if (!this.scale.none) {
+        colourBar(pen, box, this.scale);
+        pen.textAlign = "right";
+        pen.fillText(this.map.unit === "1" ? "" : this.map.unit, width - 2, 7);
+      }
       this.cross(pen, box);
+    },
+    // Lengths on both axes have one scale, unless the map would become a strip.
+    makeEqual(box) {
+      const { x, y, alike } = this.map;
+      if (!alike) return;
+      const scale = Math.min(box.width / (x.high - x.low), box.height / (y.high - y.low));
+      const [width, height] = [scale * (x.high - x.low), scale * (y.high - y.low)];
+      if (Math.min(width, height) < STRIP * Math.min(box.width, box.height)) return;
+      box.x += (box.width - width) / 2;
+      box.y += (box.height - height) / 2;
+      Object.assign(box, { width, height, left: box.x - 58, bottom: box.y + height + 40 });
     },
     paint(pen, box, ratio) {
       const { nx, ny, values } = this.map;
@@ -88,7 +106,9 @@ export default {
       const { here } = this.map;
       if (!here) return;
       const [x, y] = [this.toX(here[0]), this.toY(here[1])];
-      if (x < box.x - 1 || x > box.x + box.width + 1 || y < box.y - 1 || y > box.y + box.height + 1) return;
+      const outside = x < box.x - 1 || x > box.x + box.width + 1 || y < box.y - 1 || y > box.y + box.height + 1;
+      this.$el.dataset.outside = outside;
+      if (outside) return this.pointAway(pen, box, x, y);
       for (const [width, style] of [[4, "rgba(0,0,0,.55)"], [2, "#fff"]]) {
         pen.lineWidth = width;
         pen.strokeStyle = style;
@@ -100,6 +120,21 @@ export default {
         }
         pen.stroke();
       }
+    },
+    // An arrow at the border shows where the pose lies that the map does not reach.
+    pointAway(pen, box, x, y) {
+      const clip = (at, low, size) => Math.min(Math.max(at, low + 12), low + size - 12);
+      const [nearX, nearY] = [clip(x, box.x, box.width), clip(y, box.y, box.height)];
+      pen.save();
+      pen.translate(nearX, nearY);
+      pen.rotate(Math.atan2(y - nearY, x - nearX));
+      pen.beginPath();
+      for (const [dx, dy] of [[9, 0], [-6, -7], [-3, 0], [-6, 7]]) pen.lineTo(dx, dy);
+      pen.closePath();
+      [pen.lineWidth, pen.strokeStyle, pen.fillStyle] = [3, "rgba(0,0,0,.55)", "#fff"];
+      pen.stroke();
+      pen.fill();
+      pen.restore();
     },
     toX(value) {
       const { low, high } = this.map.x;
