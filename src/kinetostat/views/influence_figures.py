@@ -24,9 +24,9 @@ from kinetostat.studies.guidelines.roles import EXCESS, stiffening
 from kinetostat.studies.guidelines.sentences import limit_of
 from kinetostat.studies.sensitivity import PER, Sensitivity
 from kinetostat.studies.setting import setting_of
-from kinetostat.views.usual_values import usual_range
 from kinetostat.views.figures import COLOURS, DASHES, STYLE, Drawings, fix_layout, note_setting, set_title, slim_bar
 from kinetostat.views.influence_tables import NEGLIGIBLE
+from kinetostat.views.usual_values import usual_range
 
 MOST_LINES = 30
 """Parameters that are shown."""

@@ -34,7 +34,7 @@ export default {
       this.makeEqual(box);
       this.paint(pen, box, sheet.ratio);
       const { x, y } = this.map;
-      const across = niceTicks(x.low, x.high, Math.max(2, box.width / 62));
+      const across = niceTicks(x.low, x.high, Math.max(2, box.width / 46));
       const up = niceTicks(y.low, y.high, Math.max(2, box.height / 42));
       frame(pen, box, {
         x: across.map((t) => [this.toX(t), short(t)]),
