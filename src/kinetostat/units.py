@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cache
+from numbers import Real
 from pathlib import Path
 
 import pint
@@ -103,7 +104,7 @@ def parse(value: object, kind: str, bare: str = "") -> float:
         UnitError: it is not a number, the unit is unknown, or the unit is of another kind.
     """
     wanted = replace(KINDS[kind], bare=bare)
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
+    if isinstance(value, bool) or not isinstance(value, Real | str):
         raise UnitError(f"it must be {_allowed(wanted)}")
     if isinstance(value, str):
         return _parse_text(value, wanted)

@@ -7,6 +7,7 @@ from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import Given, find, read_number
 from kinetostat.spec.document import parse
+from kinetostat.spec.errors import InputError, shorten
 
 INDEPENDENT = ("pose", "tool", "load")
 """Tables whose numbers need only be checked by themselves."""
@@ -22,20 +23,24 @@ def read_value(machine: Machine, name: str, text: str) -> float:
 
 
 def changed(machine: Machine, values: Mapping[str, Given]) -> Machine:
-    """The machine with some fields, or entries of fields, at other values, each checked by itself.
+    """The machine with some fields, or entries of fields, at other values, checked as a file would be.
 
-    Cheap, and of the same family, so that what has been compiled for it is used again.
+    Of the same family, so that what has been compiled for it is used again.
 
     Args:
         machine: which stays as it is.
         values: by name of the field, in SI or as text with a unit; for a field with several entries one for all, or a
-            list or array of one for each.
+            list or array of one for each; infinity is "rigid".
 
     Raises:
-        InputError: an unknown field, no quantity, a value out of bounds, or a list of the wrong length.
+        InputError: an unknown field, no quantity, a value out of bounds, a list of the wrong length, or numbers that
+            contradict each other.
     """
     need_machine(machine)
-    return machine.with_values(values)
+    if not isinstance(values, Mapping):
+        raise InputError(f'values is {shorten(values)}; give a value for each field, e.g. {{"pose.z": "12 cm"}}.')
+    new = machine.with_values(values)
+    return rebuilt(new) if any(related(machine, name) for name in values) else new
 
 
 def related(machine: Machine, path: str) -> bool:

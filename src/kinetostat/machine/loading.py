@@ -19,6 +19,7 @@ from kinetostat.machine.catalogue import families, register_installed
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.limits import Parts, check_limits
 from kinetostat.machine.machine import Family, Machine, Written
+from kinetostat.machine.parameters import check_contrast
 from kinetostat.machine.rigidities import resolve
 from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
@@ -129,7 +130,9 @@ def _unloaded(legs: Sequence[Leg]) -> list[tuple[Spring, Scalar]]:
 def _validated(family: Family, document: Document, origin: str, display: Display) -> Machine:
     tables = family.every_table
     data: Any = validate(document, origin, file_model(family.name, tables), tables)
-    return Machine(data.name, family, tables_in(data, tables), display)
+    machine = Machine(data.name, family, tables_in(data, tables), display)
+    check_contrast(machine, origin)
+    return machine
 
 
 def _display(document: Document, origin: str) -> Display:

@@ -17,7 +17,7 @@ from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.machine.leg import Joint, Leg, Spring, Turn
 from kinetostat.machine.limits import Limits
 from kinetostat.machine.links import LinkKind, density_table
-from kinetostat.machine.parameters import Given, read_numbers, with_values
+from kinetostat.machine.parameters import Given, check_contrast, read_numbers, with_values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, table
 from kinetostat.spec.renamed import renamed_property
@@ -294,7 +294,9 @@ class Machine:
         Raises:
             InputError: an unknown field, a value of another kind or out of bounds, or an array of the wrong length.
         """
-        return with_values(self, read_numbers(self.family, {**(values or {}), **fields}))
+        machine = with_values(self, read_numbers(self.family, {**(values or {}), **fields}))
+        check_contrast(machine, self.name)
+        return machine
 
     def chains(self) -> Chains:
         """Its legs at the home pose, where the family has no closed form."""

@@ -13,11 +13,13 @@ from kinetostat.algebra.scalar import Scalar
 from kinetostat.machine.column import column
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, leaves, quantities
-from kinetostat.units import KINDS, UnitError, parse
+from kinetostat.units import KINDS, RIGID, UnitError
 
 FULL_TURN = 2.0 * math.pi
 BEYOND = 100.0
 """How many times the longest of all other lengths a length may be."""
+CONTRAST = 1e22
+"""By which factor stiffnesses in one machine may differ, in SI: from 1e24 on round-off hides the stiffer."""
 SOFTEST = 100.0
 """N/m: a part that gives 10 mm under 1 N can be neither a drive nor a link of a machine."""
 
@@ -202,12 +204,10 @@ def read_number(parameter: Parameter, value: object, path: str = "") -> float:
     if isinstance(value, float) and (value == quantity.unset or (quantity.stiff and value == math.inf)):
         return value
     try:
-        number = parse(value, quantity.kind)
-        quantity.check(number)
+        return quantity.number(value)
     except UnitError as error:
-        written = quantity.show(value) if isinstance(value, float) else shorten(value)
+        written = quantity.show(value) if isinstance(value, float) and math.isfinite(value) else shorten(value)
         raise InputError(f"{name} is {written}: {error}.") from None
-    return number
 
 
 def with_leg(machine: HasNumbers, path: str) -> str:
@@ -218,6 +218,34 @@ def with_leg(machine: HasNumbers, path: str) -> str:
         return path
     names = {leg.number: leg.name for leg in machine.configure().legs}
     return f"{path} ({names.get(int(entry) + 1, f'leg {int(entry) + 1}')})"
+
+
+def check_contrast(machine: HasNumbers, origin: str) -> None:
+    """Refuse stiffnesses so far apart that double precision cannot tell the stiffest one from a rigid one.
+
+    Args:
+        machine: with numbers; those that are free or rigid are exact beside any others.
+        origin: names it in messages.
+
+    Raises:
+        InputError: names the softest and the stiffest.
+    """
+    stiff = [p for p in parameters(machine.family) if p.quantity.stiff]
+    given = values(machine)
+    known = [(float(given[leaf]), leaf, p) for p in stiff for leaf in p.leaves if 0.0 < float(given[leaf]) < math.inf]
+    if not known:
+        return
+    (soft, softest, low), (hard, stiffest, high) = min(known, key=_first), max(known, key=_first)
+    if hard > CONTRAST * soft:
+        raise InputError(
+            f'"{origin}": {softest} is {low.quantity.show(soft)} and {stiffest} {high.quantity.show(hard)}; '
+            f"stiffnesses of one machine may differ by a factor of {CONTRAST:g} at most: write 0 for what is free, "
+            f'"{RIGID}" for what is rigid.'
+        )
+
+
+def _first(entry: tuple[float, str, Parameter]) -> float:
+    return entry[0]
 
 
 def doubts(machine: HasNumbers) -> Iterator[str]:

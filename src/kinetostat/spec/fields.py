@@ -21,6 +21,10 @@ LARGEST = {"length": 1e6, "angle": 1e3}
 """Bounds on size, in SI: far beyond any machine, well inside float64."""
 LARGEST_OTHER = 1e20
 """The bound of every other kind."""
+LEAST = {"length": 1e-12, "area": 1e-24, "second moment of area": 1e-48, "elastic modulus": 1.0}
+"""Least values of what must be greater than 0, in SI: less than an atom, softer than a gel."""
+SOFTEST = 1e-12
+"""Least stiffness and rigidity but 0, in SI: far below a strand of protein, where machines are not."""
 
 NO_LIMIT = "none"
 """How people write that a limit is not set."""
@@ -92,24 +96,36 @@ class Quantity:
         return tuple(self._read_one(entry, f"entry {i}: ") for i, entry in enumerate(value))
 
     def _read_one(self, value: object, where: str = "") -> float:
-        if self.unset is not None and isinstance(value, str) and value.strip().lower() == NO_LIMIT:
-            return self.unset
         try:
-            number = parse(value, self.kind)
-            self.check(number)
+            return self.number(value)
         except UnitError as error:
             entry = f"{where}{shorten(value)}: " if where else ""
             raise PydanticCustomError("quantity", "{said}{reason}", {"said": entry, "reason": str(error)}) from None
+
+    def number(self, value: object) -> float:
+        """Return the SI value of a number or of text with a unit, within the bounds.
+
+        Raises:
+            UnitError: with the reason.
+        """
+        if self.unset is not None and isinstance(value, str) and value.strip().lower() == NO_LIMIT:
+            return self.unset
+        number = parse(value, self.kind)
+        self.check(number)
         return number
 
     def check(self, number: float) -> None:
-        """Refuse an SI value that is out of bounds.
+        """Refuse an SI value that is out of bounds; infinity stands for "rigid" of a stiffness, and for no limit.
 
         Raises:
             UnitError: with the reason.
         """
         kind = KINDS[self.kind]
         example = f'e.g. "{kind.example}"'
+        if number == self.unset:
+            return
+        if math.isnan(number) or (math.isinf(number) and not (self.stiff and number > 0.0)):
+            raise UnitError(f"it is not a finite number, {example}")
         if self.stiff and number < 0:
             raise UnitError(
                 f'a {self.kind.split()[-1]} cannot be negative; write 0 for a free element, {example}, or "{RIGID}"'
@@ -121,6 +137,10 @@ class Quantity:
         if number > self.most:
             most = f"{math.degrees(self.most):g} deg" if self.kind == "angle" else f"{self.most:g} {kind.unit}"
             raise UnitError(f"it must not exceed {most}, {example}")
+        least = SOFTEST if self.stiff else LEAST.get(self.kind, 0.0) if self.positive else 0.0
+        if 0.0 < number < least:
+            softest = f"; write 0 for a free element, or {example}" if self.stiff else f", {example}"
+            raise UnitError(f"it must be at least {least:g} {kind.unit}, and nothing is below that{softest}")
         largest = LARGEST.get(self.kind, LARGEST_OTHER)
         if abs(number) > largest and not math.isinf(number):
             advice = f'; write "{RIGID}"' if self.stiff else ""

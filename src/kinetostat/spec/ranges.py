@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
-from kinetostat.units import KINDS, UnitError, parse, write
+from kinetostat.units import KINDS, UnitError, write
 
 MOST_VALUES = 1_000_000
 """Values along one axis."""
@@ -52,12 +52,10 @@ class Range:
 
     def _end(self, text: str, quantity: Quantity) -> float:
         try:
-            number = parse(text, quantity.kind)
-            quantity.check(number)
+            return quantity.number(text)
         except UnitError as error:
             example = KINDS[quantity.kind].example
             raise InputError(f"{self.field}: {shorten(text)}: {error} (in a range, e.g. {example}).") from None
-        return number
 
 
 def parse_range(text: str) -> Range:

@@ -3,8 +3,9 @@
 The formulas are in `kinetostatics`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 from kinetostat.kinetostatics.centres import (
@@ -26,10 +27,13 @@ from kinetostat.kinetostatics.indices import (
     guided_stiffnesses,
     principal_compliances,
 )
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.renamed import former_names
 
 Rows = Sequence[Sequence[float]]
+
+LONGEST = 1e100
+"""The greatest component of a direction: its square is still a number."""
 
 
 @former_names(principal="principal_compliances", condition="stiffness_condition")
@@ -85,6 +89,7 @@ def stiffness_along(
         InputError: if the direction has no length, or none in the plane of a planar machine.
     """
     values: dict[str, float | None] = {}
+    direction = three_numbers(direction)
     blocks: tuple[tuple[Block, str], ...] = (("translation", "force"), ("rotation", "moment"))
     for block, name in blocks:
         for kind, function in (("", free_stiffness_along), ("_held", guided_stiffness_along)):
@@ -93,9 +98,27 @@ def stiffness_along(
             except ValueError:
                 values[name + kind] = None
     if all(value is None for value in values.values()):
-        shown = ", ".join(f"{c:g}" for c in direction)
-        raise InputError(f"--along {shown} is not a direction of this machine; give three numbers, e.g. --along 0,0,1.")
-    return Along(tuple(direction), **values)
+        raise InputError(
+            f"The direction {shorten(direction)} is none of this machine, because it is zero or lies out of its plane; "
+            "give three numbers, e.g. (0, 0, 1), on the command line --along 0,0,1."
+        )
+    return Along(direction, **values)
+
+
+def three_numbers(direction: Sequence[float]) -> tuple[float, ...]:
+    """A direction as three finite floats of a size that can be squared.
+
+    Raises:
+        InputError: it is something else.
+    """
+    given = [] if isinstance(direction, str) or not isinstance(direction, Iterable) else list(direction)
+    numbers = [float(c) for c in given if isinstance(c, Real) and not isinstance(c, bool)]
+    if len(given) != 3 or len(numbers) != 3 or not all(abs(c) <= LONGEST for c in numbers):
+        raise InputError(
+            f"The direction is {shorten(direction)}; give three finite numbers, e.g. (0, 0, 1), on the command line "
+            "--along 0,0,1; its length does not matter."
+        )
+    return tuple(numbers)
 
 
 def indices_of(stiffness: Rows | None, compliance: Rows | None, length: float, components: tuple[int, ...]) -> Indices:

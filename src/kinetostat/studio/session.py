@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.changing import changed, rebuilt, related
+from kinetostat.machine.changing import rebuilt, related
 from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, values
@@ -161,7 +161,7 @@ class Session:
         self._change(where)
 
     def _change(self, numbers: Mapping[str, float]) -> None:
-        new = changed(self.machine, numbers)
+        new = self.machine.with_values(numbers)
         paths = tuple(numbers)
         if self._dragged != paths:
             self._note()

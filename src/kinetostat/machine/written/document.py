@@ -28,6 +28,7 @@ from kinetostat.machine.written.plan import (
 )
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
+from kinetostat.spec.fields import LARGEST_OTHER, SOFTEST
 
 MOST_LEGS, MOST_JOINTS = 24, 24
 """Legs of a machine and joints of a leg: more is a mistake, and the equations would take minutes."""
@@ -282,6 +283,12 @@ def _matrix(value: object, where: str) -> Matrix:
             "six rows of six."
         )
     matrix = np.array(value, dtype=float)
+    soft = [float(c) for c in np.diag(matrix) if c > 0.0 and not 1.0 / LARGEST_OTHER <= c <= 1.0 / SOFTEST]
+    if soft:
+        raise InputError(
+            f"{where}: compliance has {soft[0]:g} on its diagonal; give 0 where it is rigid, and elsewhere from "
+            f"{1.0 / LARGEST_OTHER:g} to {1.0 / SOFTEST:g} in SI units; what is free is a joint."
+        )
     size = np.sqrt(np.abs(np.outer(np.diag(matrix), np.diag(matrix))))
     scaled = matrix / np.where(size > 0.0, size, 1.0)
     if np.abs(scaled - scaled.T).max() > SYMMETRIC or np.linalg.eigvalsh(scaled)[0] < -SYMMETRIC:

@@ -14,7 +14,7 @@ from kinetostat.spec.study import PosesTable
 from kinetostat.studies.grid.grid import GridQuestion, grid_question
 from kinetostat.studies.workspace.region import unit_product
 from kinetostat.studies.workspace.workspace import workspace
-from kinetostat.units import UnitError, parse
+from kinetostat.units import UnitError
 
 MOST_POSES = 1_000_000
 
@@ -73,8 +73,7 @@ def _row(machine: Machine, row: Mapping[str, float | str], where: str) -> dict[s
     for name, written in row.items():
         field = find(machine.family, name)
         try:
-            value = parse(written, field.quantity.kind)
-            field.quantity.check(value)
+            value = field.quantity.number(written)
         except UnitError as error:
             raise InputError(f"{where}.{name} is {shorten(written)}: {error}.") from None
         row_values.update(dict.fromkeys(field.leaves, value))

@@ -239,12 +239,10 @@ def _bound(written: float | str, quantity: Quantity, name: str) -> float:
 
 
 def _value(written: float | str, quantity: Quantity, name: str) -> float:
-    read = _parsed(written, quantity, name)
     try:
-        quantity.check(read)
+        return quantity.number(written)
     except UnitError as error:
         raise InputError(f"{name} is {shorten(written)}: {error}.") from None
-    return read
 
 
 def _parsed(written: float | str, quantity: Quantity, name: str) -> float:
