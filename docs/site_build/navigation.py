@@ -4,8 +4,8 @@ from pathlib import Path
 
 TUTORIALS = ("paper-machine", "own-machine", "real-hexapod", "read-a-map", "optimise", "jupyter")
 PAGES = {
-    "Start": ["start", "install"],
-    "Tutorials": [f"tutorials/{name}" for name in TUTORIALS],
+    "Start": ["start", "overview", "install"],
+    "Tutorials": [*(f"tutorials/{name}" for name in TUTORIALS), "exercises"],
     "Do": [
         "leg-by-leg",
         "how-to-choose-a-link-model",
