@@ -17,6 +17,8 @@ sys.path.append(str(ROOT / "tests"))
 from pages import blocks  # noqa: E402  (of the tests)
 
 SIZE = (760, 440)
+HIDDEN = ("frames", "labels", "springs")
+"""Layers that these pictures leave out."""
 PAPER = "zhang-gosselin-4dof"
 
 
@@ -31,7 +33,8 @@ def keep(name: str, *machines: Machine) -> None:
     width, height = SIZE[0] // len(machines), SIZE[1]
     image = Image.new("RGB", (width * len(machines), height))
     for i, machine in enumerate(machines):
-        image.paste(Image.open(BytesIO(machine_picture(machine, (width, height)))).convert("RGB"), (i * width, 0))
+        drawn = machine_picture(machine, (width, height), hidden=HIDDEN)
+        image.paste(Image.open(BytesIO(drawn)).convert("RGB"), (i * width, 0))
     path = ROOT / "docs" / "images" / f"{name}.png"
     image.quantize(128).save(path, optimize=True)
     print(f"docs/images/{path.name}  {path.stat().st_size >> 10} KiB")
