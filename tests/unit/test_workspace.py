@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from kinetostat.engine.batch import NATIVE_FROM
+from kinetostat.engine.batch import NATIVE_FROM, evaluate
+from kinetostat.engine.points import Table
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
@@ -13,7 +14,8 @@ from kinetostat.machine.loading import build, load
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec import document
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.workspace.verdicts import BEYOND, INSIDE
+from kinetostat.studies.workspace.borders import depth
+from kinetostat.studies.workspace.verdicts import BEYOND, INSIDE, Judge
 from kinetostat.studies.workspace.workspace import workspace
 from kinetostat.views.answers import plot
 
@@ -230,3 +232,40 @@ def test_sections_are_equally_spaced_and_the_legend_has_the_lines_that_are_drawn
     assert np.ptp(np.diff(lengths)) < 0.2
     told = {text.get_text() for text in figure.legends[0].get_texts()}
     assert "stiffness_z = 5000 N/um" not in told, "no panel has that edge"
+
+
+class TestBorders:
+    """Where the verdict changes between two nodes, to a fraction of a step, whatever bounds the workspace."""
+
+    def test_on_either_side_of_a_border_the_verdict_is_another(self):
+        machine = load("hexapod", ["limits.longest_leg=20 cm"])
+        result = workspace(machine, ["pose.x=-8 cm:8 cm:9", "pose.z=14 cm:26 cm:9"], ["free_stiffness_z > 30 N/um"])
+        judge = Judge(machine, result.conditions)
+        data = result.dataset
+        border = data["border_pose.x"].values
+        verdict, x, z = data["verdict"].values, data["pose.x"].values, data["pose.z"].values
+        nodes = np.argwhere(np.isfinite(border))
+        assert len(nodes) > 8
+        assert (verdict[:-1] != verdict[1:]).sum() == len(nodes)
+        for i, k in nodes[(border[tuple(nodes.T)] > 0.02) & (border[tuple(nodes.T)] < 0.98)]:
+            for side, wanted in ((-0.01, True), (0.01, False)):
+                share = border[i, k] + side
+                poses = {"pose.x": np.array([x[i] + share * (x[1] - x[0])]), "pose.z": np.array([z[k]])}
+                answer = evaluate(machine, Table(poses), judge.quantities)
+                code = judge.verdicts(answer.status, answer.values, lambda _, poses=poses: poses)[0]
+                assert bool(code == verdict[i, k]) is wanted
+
+    def test_the_depth_vanishes_on_a_straight_border(self):
+        """A border at any slope: linear interpolation between nodes on either side gives it back."""
+        x, y = np.meshgrid(np.arange(12.0), np.arange(12.0), indexing="ij")
+        signed = 0.6 * x + 0.8 * y - 7.3
+        region = signed <= 0.0
+        shares = [np.full(signed.shape, np.nan) for _ in range(2)]
+        for k, slope in enumerate((0.6, 0.8)):
+            shares[k] = np.where((signed <= 0.0) != (signed + slope <= 0.0), -signed / slope, np.nan)
+        field = depth(region, shares)
+        assert ((field > 0.0) == region).all()
+        inner, outer = field[:-1], field[1:]
+        crossing = region[:-1] & ~region[1:]
+        at = inner[crossing] / (inner[crossing] - outer[crossing])
+        assert np.abs(at - shares[0][:-1][crossing]).max() < 0.2

@@ -10,15 +10,20 @@ import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap, to_rgb
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from scipy import ndimage
 
+from kinetostat.kinetostatics.quantities import spoken
+from kinetostat.studies.workspace.borders import depth
 from kinetostat.studies.workspace.conditions import Condition
 from kinetostat.studies.workspace.region import surface
 from kinetostat.studies.workspace.verdicts import BEYOND, FAILS, INSIDE, LIMIT, PLAIN, phrase
+from kinetostat.studies.workspace.workspace import BORDER, SOFTEST
 from kinetostat.views.figures import (
     COLOURS,
     STYLE,
@@ -28,8 +33,10 @@ from kinetostat.views.figures import (
     fix_layout,
     set_axis_scales,
     set_title,
+    slim_bar,
 )
 from kinetostat.views.grid_tables import display_of
+from kinetostat.views.usual_values import WIDE, usual_range
 
 KNOWN = dict(zip([*PLAIN.values(), BEYOND], ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#e3bcd1"), strict=True))
 """Colours of verdicts that need no limit and no condition."""
@@ -37,7 +44,8 @@ LIMITED = ("#f2c77a", "#eea27a", "#f3ea9a", "#d8b98a", "#e7d3b5", "#c9a27e", "#f
 UNMET = ("#a9d2ee", "#7fa8cf", "#c5cbe9", "#8fc4d4", "#b7c7d9", "#9db4e0")
 SECTIONS = 9
 """Greatest number of cuts in a picture."""
-SOLID = "#5fb39a"
+EDGE = "#1d6b55"
+"""Colour of the outline of the inside."""
 FINEST = 64
 """Nodes along an axis that the picture of a solid shows at most."""
 LIGHT = np.array([-0.45, -0.7, 0.55])
@@ -67,7 +75,7 @@ def pictures(dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[Co
     cuts = [dataset.isel({dims[2]: int(i)}) for i in _shown(dataset, dims)]
     return {
         "-sections": partial(_sections, cuts, labels, conditions, title),
-        "-solid": partial(_solid, dataset, dims[:3], title),
+        "-solid": partial(_solid, dataset, dims[:3], _telling(conditions), title),
     }
 
 
@@ -134,9 +142,13 @@ def _fill(panel: Axes, cut: xr.Dataset, labels: Sequence[str], conditions: Seque
     palette = ListedColormap(_colours(labels))
     panel.grid(visible=False)
     panel.pcolormesh(x, y, verdict, cmap=palette, vmin=-0.5, vmax=len(labels) - 0.5, shading="nearest", rasterized=True)
-    inside = (verdict == 0).astype(float)
-    if 0.0 < inside.mean() < 1.0:
-        panel.contour(x, y, inside, levels=[0.5], colors="#1d6b55", linewidths=0.9)
+    shares = [cut[f"{BORDER}{dim}"].transpose(up, across).values for dim in (up, across)]
+    for code in sorted(np.unique(verdict), reverse=True):
+        within = depth(verdict == code, shares)
+        if within.min() < 0.0 < within.max():
+            panel.contourf(x, y, within, levels=[0.0, 2.0], colors=[_colours(labels)[code]])
+            if code == 0:
+                panel.contour(x, y, within, levels=[0.0], colors=EDGE, linewidths=0.9)
     elsewhere = ~np.isin(verdict, [i for i, label in enumerate(labels) if label == INSIDE or label.startswith(FAILS)])
     edges = set()
     for condition, colour in zip(conditions, COLOURS, strict=False):
@@ -173,25 +185,64 @@ def _edge(condition: Condition) -> str:
     return condition.text.replace(condition.comparison, "=", 1)
 
 
-def _solid(dataset: xr.Dataset, dims: Sequence[str], title: str) -> Figure:
-    """The inside as a lit solid in a box with scales."""
+def _telling(conditions: Sequence[Condition]) -> str:
+    """Choose the quantity that colours a solid: that of the first condition, else the least stiffness."""
+    return next((condition.quantity for condition in conditions), SOFTEST)
+
+
+def _solid(dataset: xr.Dataset, dims: Sequence[str], quantity: str, title: str) -> Figure:
+    """The inside as a lit solid in a box with scales, coloured by a quantity on its surface."""
     thin = dataset.isel({dim: slice(None, None, -(-dataset.sizes[dim] // FINEST)) for dim in dims})
     axes = [axis_values(thin, dim) for dim in dims]
     ends = [axis_values(dataset, dim)[0] for dim in dims]
-    triangles = surface(thin["verdict"].transpose(*dims).values == 0, [values for values, _ in axes])
+    inside = thin["verdict"].transpose(*dims).values == 0
+    # Borders hold for steps of the whole grid; a thinned one has none of its own.
+    shares = [dataset[f"{BORDER}{dim}"].transpose(*dims).values for dim in dims] if thin.sizes == dataset.sizes else []
+    triangles = surface(depth(inside, shares or _halves(inside)), [values for values, _ in axes])
+    scale = display_of(dataset).scale(dataset[quantity].attrs["units"])
+    values = scale.factor * _on(triangles, thin[quantity].transpose(*dims).values, inside, [v for v, _ in axes])
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(5.2, 4.8), layout="constrained")
         panel = figure.add_subplot(projection="3d")
-        colours = _lit(triangles)
+        norm = _norm_of(values)
+        low, high = norm.vmin or 0.0, norm.vmax or 1.0
+        colours = _lit(triangles) * mpl.colormaps["viridis"](norm(values))[:, :3]
         solid = Poly3DCollection(triangles, facecolors=colours, edgecolors=colours, linewidths=0.2, rasterized=True)
         panel.add_collection3d(solid)
         panel.set(xlabel=axes[0][1], ylabel=axes[1][1], zlabel=axes[2][1])
         panel.set(xlim=_ends(ends[0]), ylim=_ends(ends[1]), zlim=_ends(ends[2]))
         lengths = all(dataset[dim].attrs["kind"] == "length" for dim in dims)
         panel.set_box_aspect([float(np.ptp(dataset[dim].values)) for dim in dims] if lengths else None, zoom=0.9)
+        extremes = int((values < low).any()) + 2 * int((values > high).any())
+        bar = figure.colorbar(
+            ScalarMappable(norm, "viridis"), ax=panel, shrink=0.6, pad=0.12, label=scale.label(spoken(quantity)),
+            extend=("neither", "min", "max", "both")[extremes],
+        )  # fmt: skip
+        slim_bar(bar)
         set_title(figure, title)
         fix_layout(figure)
     return figure
+
+
+def _norm_of(values: Array) -> Normalize:
+    """Return a colour scale over the usual values on a surface, logarithmic where these span decades."""
+    low, high = usual_range(values) if np.isfinite(values).any() else (0.0, 1.0)
+    return LogNorm(low, high) if low > 0.0 and high > WIDE * low else Normalize(low, high)
+
+
+def _halves(inside: np.ndarray) -> list[np.ndarray]:
+    """Return borders half-way between nodes."""
+    return [np.full(inside.shape, 0.5)] * inside.ndim
+
+
+def _on(triangles: Array, values: Array, inside: np.ndarray, axes: Sequence[Array]) -> Array:
+    """Interpolate values of nodes at the middle of each triangle; nodes outside have that of the nearest one inside."""
+    if not len(triangles):
+        return np.zeros(0)
+    known = inside & np.isfinite(values)
+    nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
+    steps = [(triangles[:, :, k].mean(axis=1) - axis[0]) / (axis[1] - axis[0]) for k, axis in enumerate(axes)]
+    return np.asarray(ndimage.map_coordinates(values[tuple(nearest)], steps, order=1, mode="nearest"))
 
 
 def _ends(values: Array) -> tuple[float, float]:
@@ -199,12 +250,12 @@ def _ends(values: Array) -> tuple[float, float]:
 
 
 def _lit(triangles: Array) -> Array:
-    """A colour for each triangle by how it faces the light, scales made equal [n x 3]."""
+    """The brightness of each triangle by how it faces the light, scales made equal [n x 1]."""
     if not len(triangles):
-        return np.zeros((0, 3))
+        return np.zeros((0, 1))
     spread = np.ptp(triangles.reshape(-1, 3), axis=0)
     even = triangles / np.where(spread > 0.0, spread, 1.0)
     normals = np.cross(even[:, 1] - even[:, 0], even[:, 2] - even[:, 0])
     sizes = np.linalg.norm(normals, axis=1, keepdims=True)
     facing = (normals / np.where(sizes > 0.0, sizes, 1.0)) @ (LIGHT / np.linalg.norm(LIGHT))
-    return np.outer(0.68 + 0.32 * facing, to_rgb(SOLID))
+    return np.asarray(0.76 + 0.24 * facing)[:, None]

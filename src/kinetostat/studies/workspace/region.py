@@ -69,23 +69,22 @@ def unit_product(units: Sequence[str]) -> str:
 
 
 Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 TETRAHEDRA = np.array([[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]])
 """Corners of the six tetrahedra about the diagonal of a cell."""
-HALF = 0.5
-"""Value of the surface between inside (1) and outside (0)."""
+EVERYWHERE = 2
+"""Nodes outside that are added around the region, so that its surface closes at the ends of the axes."""
 
 
-def surface(inside: Mask, axes: Sequence[Array]) -> Array:
+def surface(depth: Array, axes: Sequence[Array]) -> Array:
     """Triangles around a region, their corners turning to the left as seen from outside [n x 3 x 3].
 
     Args:
-        inside: which nodes are [nx x ny x nz].
+        depth: positive at nodes inside, negative outside, 0 on the surface between [nx x ny x nz].
         axes: evenly spaced coordinates of the nodes; the triangles are in the same units and stay between their ends.
     """
-    field = _rounded(np.pad(inside, 2).astype(float))
+    field = np.pad(depth, EVERYWHERE, constant_values=-1.0)
     cells = _mixed_cells(field)
     parts = []
     for corners in TETRAHEDRA:
@@ -94,19 +93,12 @@ def surface(inside: Mask, axes: Sequence[Array]) -> Array:
     triangles = np.concatenate(parts) if parts else np.zeros((0, 3, 3))
     start = np.array([axis[0] for axis in axes])
     step = np.array([axis[1] - axis[0] for axis in axes])
-    return np.clip(start + (triangles - 2.0) * step, start, [axis[-1] for axis in axes])
-
-
-def _rounded(field: Array) -> Array:
-    """Weighted means over neighbouring nodes, 1 : 2 : 1 along each axis."""
-    for axis in range(field.ndim):
-        field = 0.5 * field + 0.25 * (np.roll(field, 1, axis) + np.roll(field, -1, axis))
-    return field
+    return np.clip(start + (triangles - EVERYWHERE) * step, start, [axis[-1] for axis in axes])
 
 
 def _mixed_cells(field: Array) -> npt.NDArray[np.int64]:
     """Lowest corners of the cells through which the surface passes [n x 3]."""
-    high = field > HALF
+    high = field > 0.0
     size = [n - 1 for n in field.shape]
     counts = np.zeros(size, dtype=int)
     for i, j, k in CORNERS:
@@ -116,9 +108,9 @@ def _mixed_cells(field: Array) -> npt.NDArray[np.int64]:
 
 def _cut(nodes: Array, values: Array) -> list[Array]:
     """Triangles in tetrahedra with given corners [n x 4 x 3] and values there [n x 4]."""
-    order = np.argsort(values <= HALF, axis=1, kind="stable")  # corners inside first
+    order = np.argsort(values <= 0.0, axis=1, kind="stable")  # corners inside first
     nodes, values = np.take_along_axis(nodes, order[..., None], 1), np.take_along_axis(values, order, 1)
-    count = (values > HALF).sum(axis=1)
+    count = (values > 0.0).sum(axis=1)
     sides = {1: [((0, 1), (0, 2), (0, 3))], 3: [((0, 3), (1, 3), (2, 3))]}
     sides[2] = [((0, 2), (0, 3), (1, 3)), ((0, 2), (1, 3), (1, 2))]
     triangles_of = []
@@ -136,5 +128,5 @@ def _cut(nodes: Array, values: Array) -> list[Array]:
 
 
 def _crossing(corners: Array, values: Array, first: int, other: int) -> Array:
-    share = (HALF - values[:, first]) / (values[:, other] - values[:, first])
+    share = -values[:, first] / (values[:, other] - values[:, first])
     return corners[:, first] + share[:, None] * (corners[:, other] - corners[:, first])

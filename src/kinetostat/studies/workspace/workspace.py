@@ -20,10 +20,15 @@ from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.grid.grid import IN_MEMORY, MOST_DIMENSIONS, GridQuestion, answer, grid_question
 from kinetostat.studies.plain_data import as_answer
+from kinetostat.studies.workspace.borders import Shares, borders
 from kinetostat.studies.workspace.conditions import Condition, parse_condition
 from kinetostat.studies.workspace.region import METHOD, Volume, estimate_volume
 from kinetostat.studies.workspace.verdicts import INSIDE, Codes, Demand, Judge, Mask, Numbers, Poses, demands
 
+SOFTEST = "least_translational_stiffness"
+"""Quantity by which a workspace is coloured where no condition names another."""
+BORDER = "border_"
+BORDER_MEANING = "share of the step to the next node at which the verdict changes, along"
 MOST_DEMANDS = 200_000
 """Inside nodes at which lengths, angles and loads are computed; of more nodes, evenly chosen ones."""
 
@@ -35,7 +40,8 @@ class Workspace:
 
     Attributes:
         dataset: over the nodes of the grid: `status` (`Status` codes), `verdict` (place in `verdicts`), `connected`
-            (whether inside and joined to the file's pose), `singularity_margin` and the quantities of the conditions.
+            (whether inside and joined to the file's pose), `singularity_margin`, the least translational stiffness, the
+            quantities of the conditions, and along each axis the borders of verdicts (`studies.workspace.borders`).
         verdicts: what may become of a node, "inside" first; then why not.
         nodes: how many nodes have each verdict.
         volume: of the inside, whether joined to the file's pose or not.
@@ -86,7 +92,7 @@ def workspace(
     """
     need_machine(machine)
     judge = Judge(machine, tuple(parse_condition(text, machine.family.component_names) for text in several(conditions)))
-    question = grid_question(machine, ranges, ["singularity_margin", *judge.quantities])
+    question = grid_question(machine, ranges, [*dict.fromkeys(["singularity_margin", SOFTEST, *judge.quantities])])
     _check(question)
     total = question.grid.size + Cells(question.grid.axes).size
     nodes = answer(question, lambda done, _: progress(done, total))
@@ -95,10 +101,11 @@ def workspace(
     )
     inside = verdict == 0
     volume = _volume(judge, question, seed, lambda done, _: progress(question.grid.size + done, total))
+    edges = borders(judge, question, verdict, _nearest(question))
     home = _home(question)
     connected = connected_to(inside, home) if home is not None else np.zeros_like(inside)
     return Workspace(
-        _labelled(nodes, verdict, connected, judge, volume),
+        _labelled(nodes, verdict, connected, judge, volume, edges),
         judge.labels,
         {label: int((verdict == i).sum()) for i, label in enumerate(judge.labels)},
         volume,
@@ -149,15 +156,19 @@ def _volume(judge: Judge, question: GridQuestion, seed: int, progress: Progress)
     return estimate_volume(judge.inside(evaluation.status, evaluation.values), sizes, units)
 
 
+def _nearest(question: GridQuestion) -> list[int]:
+    """The node nearest to the file's pose, however far that is."""
+    here = values(question.machine)
+    return [int(np.abs(axis.values - float(here[axis.paths[0]])).argmin()) for axis in question.grid.axes]
+
+
 def _home(question: GridQuestion) -> tuple[int, ...] | None:
     """The node nearest to the file's pose; None where that is off the grid by more than half a step."""
-    here = values(question.machine)
-    node = []
-    for axis in question.grid.axes:
-        apart = np.abs(axis.values - float(here[axis.paths[0]]))
-        if apart.min() > 0.5001 * float(axis.values[1] - axis.values[0]):
+    here, node = values(question.machine), _nearest(question)
+    for axis, place in zip(question.grid.axes, node, strict=True):
+        apart = abs(axis.values[place] - float(here[axis.paths[0]]))
+        if apart > 0.5001 * float(axis.values[1] - axis.values[0]):
             return None
-        node.append(int(apart.argmin()))
     return tuple(node)
 
 
@@ -182,8 +193,10 @@ def _extents(question: GridQuestion, inside: Mask) -> dict[str, tuple[float, flo
     return extents
 
 
-def _labelled(nodes: xr.Dataset, verdict: Codes, connected: Mask, judge: Judge, volume: Volume) -> xr.Dataset:
-    """The dataset of the nodes with verdicts and volume."""
+def _labelled(
+    nodes: xr.Dataset, verdict: Codes, connected: Mask, judge: Judge, volume: Volume, edges: Sequence[Shares]
+) -> xr.Dataset:
+    """The dataset of the nodes with verdicts, borders and volume."""
     dims = nodes["status"].dims
     words = " ".join("_".join(label.split()) for label in judge.labels)
     about = {"flag_values": list(range(len(judge.labels))), "flag_meanings": words}
@@ -196,6 +209,8 @@ def _labelled(nodes: xr.Dataset, verdict: Codes, connected: Mask, judge: Judge, 
     wanted = nodes.drop_vars("aspect").assign(
         verdict=(dims, verdict, about), connected=(dims, connected.astype(np.int8), about_connected)
     )
+    for dim, edge in zip(dims, edges, strict=False):
+        wanted[f"{BORDER}{dim}"] = (dims, edge, {"long_name": f"{BORDER_MEANING} {dim}", "units": "1"})
     pose = {path: float(value) for path, value in values(judge.machine).items() if path.startswith("pose.")}
     return wanted.assign_attrs({**figures, "volume_method": METHOD, **pose})
 
