@@ -117,7 +117,7 @@ def test_ctrl_c_is_an_exit_code_of_its_own(monkeypatch, capsys):
     assert "stopped" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         main(["--help"])
-    assert f"{STOPPED} stopped by Ctrl-C" in capsys.readouterr().out
+    assert f"{STOPPED} stopped by Ctrl-C" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize("command", ["sweep", "map", "sensitivity"])

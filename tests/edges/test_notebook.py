@@ -63,17 +63,17 @@ def test_a_machine_shows_its_picture_and_its_fields(shown):
     data = base64.b64decode(picture["src"].removeprefix("data:image/png;base64,"))
     assert data.startswith(b"\x89PNG")
     assert picture["alt"] == load("planar-3rpr").name
-    assert any(row[0] == "geometry.base_radius" and row[1].endswith(" m") for row in page.rows)
+    assert any(row[0] == "geometry.base_radius" and row[1].endswith(" mm") for row in page.rows)
 
 
 def test_an_analysis_shows_the_numbers_of_the_terminal_with_their_units(shown):
     found = analyze(load("planar-3rpr", ["load.force=[5, 0, 0]"]))
     page = Reader(shown(found)["text/html"])
     said = " ".join(page.words)
-    assert "Stiffness K (N·m/rad, N/rad, N/m)" in said
+    assert "Stiffness K (N·m/µrad, N/µrad, N/µm)" in said
     assert "Actuators under this load" in said
     matrix = [row for row in page.rows if row[0] == "rz" and len(row) == 4]
-    assert float(matrix[0][1]) == pytest.approx(found.stiffness[0][0], rel=1e-3)
+    assert float(matrix[0][1]) == pytest.approx(1e-6 * found.stiffness[0][0], rel=1e-3)
     assert len(page.images) == 1
 
 

@@ -39,11 +39,11 @@ def test_the_page_shows_what_analyze_says(capsys):
     async def steps(page):
         assert page.one("status").text == "ok"
         headline = page.one("headline").content
-        assert "945.2 <small>mm/N</small>" in headline
+        assert "0.9452 <small>m/N</small>" in headline
         await page.choose("matrix-kind", "C")
         await page.front("Matrices")
         table = page.one("matrix-table").content
-        assert f"<td>{found['compliance'][3][3]:.3e}".replace("e-01", "e\u22121") in table
+        assert "<td>0.9452</td>" in table
         copied = matrix_text(analyze(load(MACHINE)), "C")
         assert [[float(cell) for cell in line.split("\t")] for line in copied.splitlines()] == found["compliance"]
 

@@ -25,7 +25,7 @@ from kinetostat.views.tables import numeric_table, omitted
 MOST_INFLUENCES = 40
 """Parameters that are printed; `--json` has all."""
 DIGITS = 6
-"""Digits of the value of a parameter."""
+"""Digits of the value of a parameter, and of the coefficients of K, which are compared with those of papers."""
 NEGLIGIBLE = 0.0005
 """Percent per percent below which a 0 is printed."""
 
@@ -134,7 +134,7 @@ def equations(guidelines: Guidelines) -> list[str]:
     """Return the diagonal of K as sums over elements, a line each; no lines where K is not such a sum."""
     rows = (guidelines.stiffness_equations or {}).items()
     sums = [
-        " + ".join(f"{number(row[i])} k({element})" for element, row in rows if row[i] != 0.0)
+        " + ".join(f"{number(row[i], digits=DIGITS)} k({element})" for element, row in rows if row[i] != 0.0)
         for i in range(len(guidelines.components))
     ]
     return (
