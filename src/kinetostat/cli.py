@@ -5,6 +5,7 @@ Imports are late on purpose: `kinetostat --help` must not wait for libraries tha
 
 import argparse
 import errno
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -63,6 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     from kinetostat.spec.errors import InputError
 
+    _take_surroundings()
     try:
         code = _run(arguments)
         sys.stdout.flush()
@@ -84,6 +86,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return BAD_INPUT
+
+
+def _take_surroundings() -> None:
+    """Work where output is closed or knows few characters, and whatever window system figures are meant for.
+
+    Figures are only written to files, so that a window system that is not there must not matter.
+    """
+    os.environ["MPLBACKEND"] = "agg"
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - open until the end
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _run(arguments: Sequence[str] | None) -> int:

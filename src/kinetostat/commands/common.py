@@ -194,8 +194,9 @@ def load_machine(options: argparse.Namespace, more: "Sequence[str]" = ()) -> "Ma
 
 
 def print_json(data: object) -> None:
-    """Print plain data as JSON."""
-    print(json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1))
+    """Print plain data as JSON, with escapes where the output does not know all characters."""
+    plain = not (getattr(sys.stdout, "encoding", None) or "utf-8").lower().startswith("utf")
+    print(json.dumps(data, ensure_ascii=plain, allow_nan=False, indent=1))
 
 
 def give(

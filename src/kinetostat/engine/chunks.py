@@ -123,7 +123,7 @@ def _client(distributed: Any, crew: Crew) -> Iterator[Any]:
     if crew.address is not None:
         try:
             client = distributed.Client(crew.address, timeout=PATIENCE)
-        except (OSError, ValueError) as error:
+        except (OSError, TypeError, ValueError) as error:
             raise InputError(f'no Dask scheduler answers at "{crew.address}" ({error}); check --cluster.') from None
         with client:
             yield client

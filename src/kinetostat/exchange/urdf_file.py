@@ -5,6 +5,7 @@ size and counts are bounded. What a machine makes of the data is decided in `urd
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -133,6 +134,9 @@ class _Reader:
     def __init__(self, robot: Element, origin: str) -> None:
         self._robot, self._origin = robot, origin
         self._links = [self._text(link, "name", "a link") for link in robot.findall("link")]
+        often, count = next(iter(Counter(self._links).most_common(1)), ("", 0))
+        if count > 1:
+            raise InputError(f'"{origin}" defines the link {shorten(often)} twice; give each link a name of its own.')
         self._elements = robot.findall("joint")
         transmitted = robot.findall("transmission/joint")
         self._driven = {joint.get("name") for joint in transmitted}

@@ -9,6 +9,7 @@ placements are in the base frame.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import isnan
 
 import numpy as np
 import numpy.typing as npt
@@ -43,7 +44,8 @@ def why_out_of_reach(configuration: Configuration) -> str:
     """Say which legs do not close, a sentence each, with the lengths in m and what to change."""
     sentences = []
     for closure in configuration.closures:
-        if clearance(closure) >= 0.0:
+        # A part of a leg whose beginning does not close has no place, and no span to tell.
+        if clearance(closure) >= 0.0 or isnan(closure.span):
             continue
         far = closure.span > closure.longest
         limit = f"at most {closure.longest:.6g} m" if far else f"at least {closure.shortest:.6g} m"
@@ -52,7 +54,7 @@ def why_out_of_reach(configuration: Configuration) -> str:
             f"The {closure.leg} would have to span {closure.span:.6g} m, but its links bridge {limit}; "
             f"{advice} its links."
         )
-    return " ".join(sentences)
+    return " ".join(sentences) or "The legs cannot reach the platform at this pose; move it nearer to the home pose."
 
 
 def platform_placement(chains: Chains) -> Displacement:

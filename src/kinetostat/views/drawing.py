@@ -93,6 +93,8 @@ def _alignment(part: float, low: str, high: str) -> str:
 
 def _loop(points: Loop) -> Loop:
     """Points sorted by their angle about their centre in the x-y plane."""
+    if not points:
+        return []
     cx, cy = sum(p.x for p in points) / len(points), sum(p.y for p in points) / len(points)
     return sorted(points, key=lambda p: math.atan2(p.y - cy, p.x - cx))
 

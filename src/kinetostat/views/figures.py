@@ -164,7 +164,9 @@ def fix_layout(figure: Figure) -> None:
 
 def set_title(figure: Figure, title: str) -> None:
     """Write the title over a figure, in as many lines as its width asks for."""
-    figure.suptitle("\n".join(textwrap.wrap(title, int(TITLE_CHARACTERS * figure.get_figwidth()))), fontsize=10)
+    lines = textwrap.wrap(title, int(TITLE_CHARACTERS * figure.get_figwidth()))
+    # Names from files stand in titles: two dollar signs in one are no mathematics.
+    figure.suptitle("\n".join(lines), fontsize=10, parse_math=False)
 
 
 def note_setting(figure: Figure, *lines: str) -> None:

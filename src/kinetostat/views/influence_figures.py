@@ -178,5 +178,5 @@ def _curves(panel: Axes, guidelines: Guidelines, element: Element, limits: np.nd
         panel.text(present, 3.0, " now", fontsize=6.5, color="#666666", ha="left")
     unit = scale.label("stiffness") if element.stiffness is not None else "multiple of the present stiffness"
     panel.set(xscale="log", ylim=(0.0, 104.0), xlabel=unit, ylabel="stiffness, % of that with\na rigid element")
-    panel.set_title(element.name)
+    panel.set_title(element.name, parse_math=False)
     panel.margins(x=0.0)

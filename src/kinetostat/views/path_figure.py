@@ -11,7 +11,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.studies.evaluation.evaluation import PoseAnswers
 from kinetostat.studies.setting import setting_of
-from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting
+from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting, set_title
 
 ABSENT = "#dddddd"
 """Behind poses that have no result."""
@@ -43,7 +43,7 @@ def path_figure(answers: PoseAnswers) -> Figure:
             scale = answers.machine.display.scale(shown[0][0].unit)
             _panel(panel, answers, {f.shown: values * scale.factor for f, values in shown}, scale.label(kind))
         panels[-1].set_xlabel("pose")
-        figure.suptitle(answers.machine.name, fontsize=10)
+        set_title(figure, answers.machine.name)
         note_setting(figure, *_notes(answers))
         fix_layout(figure)
     return figure

@@ -47,15 +47,25 @@ def by_name(document: Document, origin: str) -> Document:
     legs = result.get("legs")
     if isinstance(legs, list):
         result["legs"] = legs = _named(legs, f'"{origin}"', "leg")
-    if not isinstance(legs, dict) or not 1 <= len(legs) <= MOST_LEGS:
-        raise InputError(f'"{origin}": it needs 1 to {MOST_LEGS} legs, each written as [[legs]] with name and joints.')
+    _check_legs(legs, origin)
     for name, leg in legs.items():
-        where = f'"{origin}": leg "{name}"'
-        if not isinstance(leg, dict):
-            raise InputError(f"{where} is {shorten(leg)}; it must be a table with name, joints and links.")
         if "joints" in leg:
-            legs[name] = _merged(leg, where)
+            legs[name] = _merged(leg, f'"{origin}": leg "{name}"')
     return with_parts(result, origin)
+
+
+def _check_legs(legs: object, origin: str) -> None:
+    """Refuse what is no table of legs by name, whether a file or an override says it."""
+    if not isinstance(legs, dict) or not 1 <= len(legs) <= MOST_LEGS:
+        given = "" if isinstance(legs, dict | None) else f"legs is {shorten(legs)}; "
+        raise InputError(
+            f'"{origin}": {given}it needs 1 to {MOST_LEGS} legs, each written as [[legs]] with name and joints.'
+        )
+    for name, leg in legs.items():
+        if not isinstance(leg, dict):
+            raise InputError(
+                f'"{origin}": leg "{name}" is {shorten(leg)}; it must be a table with name, joints and links.'
+            )
 
 
 def with_parts(document: Document, origin: str) -> Document:
@@ -64,6 +74,7 @@ def with_parts(document: Document, origin: str) -> Document:
     Raises:
         InputError: a part that is not one; names leg and joint.
     """
+    _check_legs(document["legs"], origin)
     for name, leg in document["legs"].items():
         for key, part in leg.items() if isinstance(leg, dict) else ():
             if isinstance(part, dict) and is_series(part.get("stiffness")):

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any
 
-from kinetostat.algebra.scalar import Scalar, sqrt, total
+from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.cross_section import linear_density_of, rigidity_of
 from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Turn
@@ -151,8 +151,8 @@ def members(plan: Plan, **tables: Any) -> list[Member]:
 
 
 def _length(plan: Plan, tables: Mapping[str, Any]) -> Scalar:
-    """Root mean square distance of the joints from P at the home pose, m."""
+    """Root mean square distance of the joints from P at the home pose, m; 1 m where all are at P, as slides may be."""
     centre = Vector(*tables["platform"].point)
     arms = [Vector(*joint_numbers(leg, joint, tables).point) - centre for leg in plan.legs for joint in leg.joints]
     squares = total([arm.dot(arm) for arm in arms])
-    return sqrt(squares * (1.0 / len(arms)))
+    return 1.0 if is_zero(squares) else sqrt(squares * (1.0 / len(arms)))

@@ -188,7 +188,14 @@ def settings_of(changes: Mapping[str, Any], above: str = "") -> Iterator[str]:
         if isinstance(value, dict):
             yield from settings_of(value, path)
         else:
-            yield f"{path}={json.dumps(value)}"
+            yield f"{path}={_as_setting(value, path)}"
+
+
+def _as_setting(value: object, path: str) -> str:
+    try:
+        return json.dumps(value)
+    except TypeError:
+        raise InputError(f"set.{path} is {shorten(value)}; it must be a number, a text, or a list of them.") from None
 
 
 def _objective(machine: Machine, table: ObjectiveTable, poses: PoseSet, where: str) -> Objective:
