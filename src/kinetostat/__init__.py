@@ -30,6 +30,7 @@ _HOMES = {
     "plot": "kinetostat.views.answers",
     "save": "kinetostat.views.answers",
     "register": "kinetostat.machine.catalogue",
+    "requirements": "kinetostat.studies.requirements",
     "report": "kinetostat.views.report.writing",
     "export": "kinetostat.exchange.formats",
     "Machine": "kinetostat.machine.machine",
@@ -51,7 +52,8 @@ _SHOWN = {
 __all__ = [
     "InputError", "Machine", "Status", "analyze", "build", "bundled", "changed", "compare", "evaluate", "evaluate_grid",
     "export", "guidelines", "load", "load_problem", "machine_picture", "optimize", "plot", "register", "report",
-    "reproduce", "save", "sensitivity", "validate", "workspace",
+    "reproduce",
+    "requirements", "save", "sensitivity", "validate", "workspace",
 ]  # fmt: skip
 
 

@@ -19,6 +19,7 @@ from kinetostat.studies.guidelines.guidelines import guidelines as guidelines
 from kinetostat.studies.optimisation.problem import load_problem as load_problem
 from kinetostat.studies.optimisation.search import optimize as optimize
 from kinetostat.studies.paper.reproduction import reproduce as reproduce
+from kinetostat.studies.requirements import requirements as requirements
 from kinetostat.studies.sensitivity import sensitivity as sensitivity
 from kinetostat.studies.workspace.workspace import workspace as workspace
 from kinetostat.validation.comparison import validate as validate

@@ -10,14 +10,17 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import (
     BAD_INPUT,
     DONE,
+    NO_ANSWER,
     Help,
     Parser,
     add_command,
     give,
+    judged,
     load_machine,
     no_answer,
     print_json,
@@ -38,6 +41,10 @@ from kinetostat.spec.installation import as_typed
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of the system where standard output is a file on a full or failing disk; other files say it by themselves."""
 
+if TYPE_CHECKING:
+    from kinetostat.machine.machine import Machine
+    from kinetostat.studies.requirements import Verdict
+
 EXAMPLES = """examples:
   kinetostat list
   kinetostat analyze zhang-gosselin-4dof
@@ -51,7 +58,7 @@ EXAMPLES = """examples:
   kinetostat reproduce
   kinetostat doctor
 
-exit codes: 0 done, 1 the question has no answer, 2 bad input, 130 stopped by Ctrl-C
+exit codes: 0 done, 1 the question has no answer or a requirement is not met, 2 bad input, 130 stopped by Ctrl-C
 """
 
 
@@ -256,7 +263,17 @@ def _check(options: argparse.Namespace) -> int:
     machine = load_machine(options)
     analysis = analyze(machine)
     print_machine(terminal(), machine, f"The file has no mistake. {analysis.message}")
-    return no_answer(analysis.message) if analysis.status is not Status.OK else DONE
+    code = judged(machine)
+    return no_answer(analysis.message) if analysis.status is not Status.OK else code
+
+
+def _verdicts(machine: "Machine") -> "tuple[Verdict, ...]":
+    """Judge the requirements of a machine; what judges them is loaded only where there are any."""
+    if not machine.requirements:
+        return ()
+    from kinetostat.studies.requirements import requirements
+
+    return requirements(machine)
 
 
 def _check_study(options: argparse.Namespace) -> int:
@@ -273,13 +290,16 @@ def _analyze(options: argparse.Namespace) -> int:
     from kinetostat.studies.analysis import analyze, as_json
     from kinetostat.views.analysis_tables import print_analysis
 
-    analysis = analyze(load_machine(options), options.axes)
+    machine = load_machine(options)
+    verdicts = _verdicts(machine)
+    analysis = analyze(machine, options.axes)
     answered = analysis.status is Status.OK
     along = [analysis.along(direction) for direction in options.along] if answered else []
-    return give(
+    code = give(
         options,
         answered,
-        lambda: as_json(analysis, along),
-        lambda console: print_analysis(console, analysis, along, options.full),
+        lambda: as_json(analysis, along, verdicts),
+        lambda console: print_analysis(console, analysis, along, options.full, verdicts),
         message=analysis.message,
     )
+    return code if all(verdict.met for verdict in verdicts) else NO_ANSWER

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from kinetostat.machine.changing import changed, read_value, rebuilt, related
+from kinetostat.machine.changing import changed, rebuilt, related
 from kinetostat.machine.loading import load
-from kinetostat.machine.parameters import values
+from kinetostat.machine.parameters import read_numbers, values
 from kinetostat.spec.errors import InputError
 
 MACHINE = "zhang-gosselin-4dof"
@@ -26,7 +26,7 @@ def test_a_change_is_what_set_makes():
      ("stiffness.passive_links.0", "rigid", math.inf), ("limits.longest_leg", "none", math.inf)],
 )  # fmt: skip
 def test_values_are_read_with_any_unit(path, text, value):
-    assert read_value(load(MACHINE), path, text) == pytest.approx(value)
+    assert all(number == pytest.approx(value) for number in read_numbers(load(MACHINE).family, {path: text}).values())
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def test_values_are_read_with_any_unit(path, text, value):
 )  # fmt: skip
 def test_what_a_file_may_not_say_is_refused(path, text, words):
     with pytest.raises(InputError, match=words):
-        read_value(load(MACHINE), path, text)
+        read_numbers(load(MACHINE).family, {path: text})
 
 
 def test_out_of_bounds_is_refused():

@@ -257,6 +257,20 @@ def search_bar(what: str) -> "Iterator[Callable[[int, int, str], None]]":
         )
 
 
+def judged(machine: "Machine", printing: bool = True) -> int:
+    """Judge the requirements of a machine's file, print the verdicts, and return the exit code."""
+    if not machine.requirements:
+        return DONE
+    from kinetostat.studies.requirements import requirements
+    from kinetostat.views.requirement_lines import print_requirements
+    from kinetostat.views.tables import terminal
+
+    verdicts = requirements(machine)
+    if printing:
+        print_requirements(terminal(), verdicts, machine.display)
+    return DONE if all(verdict.met for verdict in verdicts) else NO_ANSWER
+
+
 def no_answer(message: str) -> int:
     """Print why there is no result; return the exit code."""
     print(f"kinetostat: {as_typed(message)}", file=sys.stderr)

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import (
-    DONE,
     NO_ANSWER,
     add_command,
+    judged,
     no_answer,
     print_json,
     search_bar,
@@ -114,4 +114,4 @@ def _report(options: argparse.Namespace, result: "Result") -> int:
 
         print_result(terminal(), result)
         print_written(terminal(), written)
-    return DONE
+    return judged(result.machine, printing=not options.json)

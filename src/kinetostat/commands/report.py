@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import (
     DONE,
+    NO_ANSWER,
     add_command,
     give,
     load_machine,
@@ -114,7 +115,7 @@ def _report(options: argparse.Namespace) -> int:
     if answers.analysis.status is not Status.OK:
         return no_answer(answers.analysis.message)
     print_written(terminal(), [path])
-    return DONE
+    return DONE if all(verdict.met for verdict in answers.requirements) else NO_ANSWER
 
 
 def _search(problem: "Problem", folder: Path | None) -> "Result":

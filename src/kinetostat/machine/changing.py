@@ -5,21 +5,12 @@ from dataclasses import replace
 
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine, need_machine
-from kinetostat.machine.parameters import Given, find, read_number
+from kinetostat.machine.parameters import Given, find
 from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError, shorten
 
 INDEPENDENT = ("pose", "tool", "load")
 """Tables whose numbers need only be checked by themselves."""
-
-
-def read_value(machine: Machine, name: str, text: str) -> float:
-    """The SI value that people wrote for a field, or for one entry of it.
-
-    Raises:
-        InputError: no such field, no quantity, or one that the field does not allow.
-    """
-    return read_number(find(machine.family, name), text)
 
 
 def changed(machine: Machine, values: Mapping[str, Given]) -> Machine:

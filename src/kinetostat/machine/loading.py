@@ -32,6 +32,7 @@ from kinetostat.spec import document as documents
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.spec.fields import NO_LIMIT, optional, quantities
+from kinetostat.spec.requirements import requirement_lines, requirements_schema, take_requirements
 from kinetostat.spec.validation import SCHEMA_VERSION, file_model, tables_in, validate
 from kinetostat.units import RIGID, UnitError
 
@@ -89,8 +90,13 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
         return replace(machine, written=Written(document, tuple(several(settings))))
     if documents.is_study(document):
         raise InputError(f'"{origin}" {STUDY}')
-    if document.get("family") == NAME:
-        return _build_written(document, origin, settings)
+    rest, others, required = take_requirements(document, settings, origin)
+    build_kind = _build_written if rest.get("family") == NAME else _build_family
+    return replace(build_kind(rest, origin, others), requirements=required)
+
+
+def _build_family(document: Document, origin: str, settings: Sequence[str]) -> Machine:
+    """A machine of a family in closed form."""
     family = _family(document.get("family"), origin)
     named = with_named_parts(document, family, origin)
     changed = documents.override(named, settings, _counts(family_with_parts(family, named)))
@@ -195,7 +201,7 @@ def as_toml(machine: Machine, readable: bool = False) -> str:
     if machine.display != ENGINEERING:
         units = json.dumps(machine.display.units, ensure_ascii=False)
         lines += ["", "[display]", f"units = {units}", f"digits = {machine.display.digits}"]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *requirement_lines(machine.requirements)]) + "\n"
 
 
 def _left_out(fields: type, table: Any) -> bool:
@@ -236,6 +242,9 @@ def machine_schema() -> dict[str, Any]:
     union: Any = reduce(operator.or_, models)
     schema = TypeAdapter(union).json_schema()
     schema["anyOf"].append(written_schema(SCHEMA_VERSION))
+    files = [kind for kind in (*schema["$defs"].values(), *schema["anyOf"]) if "family" in kind.get("properties", {})]
+    for kind in files:
+        kind["properties"]["requirements"] = requirements_schema()
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "kinetostat machine file",

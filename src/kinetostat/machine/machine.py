@@ -21,6 +21,7 @@ from kinetostat.machine.parameters import Given, check_contrast, read_numbers, w
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, table
 from kinetostat.spec.renamed import renamed_property
+from kinetostat.spec.requirements import Requirement
 from kinetostat.units import UnitError
 
 
@@ -253,6 +254,7 @@ class Machine:
         tables: one instance per table of the family and per common one, SI.
         display: units and digits in which people read its results, from the table [display].
         written: the file it was read from; None where it was made of data. Comparisons leave it out.
+        requirements: of its file's table [requirements], by name; they change no number (`studies.requirements`).
     """
 
     name: str
@@ -260,6 +262,7 @@ class Machine:
     tables: Mapping[str, Any]
     display: Display = ENGINEERING
     written: Written | None = field(default=None, compare=False, repr=False)
+    requirements: Mapping[str, Requirement] = field(default_factory=dict)
 
     sections = renamed_property("tables")
     own_sections = renamed_property("family_tables")

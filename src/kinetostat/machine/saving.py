@@ -18,6 +18,7 @@ from kinetostat.machine.parameters import values
 from kinetostat.spec.document import setting_value
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Quantity, quantities
+from kinetostat.spec.requirements import requirement_lines
 
 LONGEST = 1 << 17
 """Characters of a file that is edited: tomlkit needs a second for as many."""
@@ -61,7 +62,7 @@ def _edited(written: Written, machine: Machine) -> str | None:
 
 def _same(first: Machine, second: Machine) -> bool:
     alike = first.name == second.name and first.family.literals == second.family.literals
-    alike = alike and first.display == second.display
+    alike = alike and first.display == second.display and first.requirements == second.requirements
     return alike and first.family.name == second.family.name and values(first) == values(second)
 
 
@@ -69,6 +70,8 @@ def _bring(document: Any, present: Machine, machine: Machine) -> None:
     """Write all that differs between the machine in the document and the wanted one."""
     if machine.name != present.name:
         _put(document, "name", machine.name)
+    if machine.requirements != present.requirements:
+        document.update(tomlkit.parse("\n".join(requirement_lines(machine.requirements))))
     for table, literals in machine.family.literals.items():
         known = present.family.literals.get(table, {})
         for key in (key for key, value in literals.items() if known.get(key) != value):

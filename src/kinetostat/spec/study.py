@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from kinetostat.spec.document import Document, override
 from kinetostat.spec.errors import InputError, cut, first_mistakes, shorten
+from kinetostat.spec.requirements import Requirements
 
 MOST_POPULATION = 100_000
 MOST_GENERATIONS = 100_000
@@ -150,6 +151,9 @@ class StudyFile(Table):
     poses: PosesTable = Field(default=PosesTable(), description="where the machine is judged")
     optimizer: OptimizerTable = Field(default=OptimizerTable(), description="how to search")
     robustness: RobustnessTable = Field(default=RobustnessTable(), description="tolerances of manufacture")
+    requirements: Requirements = Field(
+        default={}, description="what the best design must meet, by name; beside those of the machine's file"
+    )
 
 
 def read_study(document: Document, origin: str, settings: Sequence[str] = ()) -> StudyFile:

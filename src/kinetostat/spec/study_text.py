@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from kinetostat.spec.document import toml_key
+from kinetostat.spec.requirements import requirement_lines
 from kinetostat.spec.study import StudyFile
 
 TABLES = ("set", "poses", "optimizer", "robustness")
@@ -21,6 +22,7 @@ def study_toml(study: StudyFile) -> str:
             lines += _table(f"[[{name}]]", table)
     for name in TABLES[1:]:
         lines += _table(f"[{name}]", content.get(name, {}))
+    lines += requirement_lines(study.requirements)
     return "\n".join(lines) + "\n"
 
 

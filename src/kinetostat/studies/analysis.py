@@ -335,8 +335,8 @@ def _message(
     return " ".join(sentences) or Status.OK.sentence
 
 
-def as_json(analysis: Analysis, along: Sequence[Along] = ()) -> dict[str, Any]:
-    """Return the analysis, with stiffnesses along chosen directions, as plain data."""
+def as_json(analysis: Analysis, along: Sequence[Along] = (), requirements: Sequence[object] = ()) -> dict[str, Any]:
+    """Return the analysis as plain data, with stiffnesses along chosen directions and verdicts on requirements."""
     machine = analysis.machine
     pose = {path.removeprefix("pose."): value for path, value in values(machine).items() if path.startswith("pose.")}
     position, rotation = analysis.platform or (None, None)
@@ -363,6 +363,7 @@ def as_json(analysis: Analysis, along: Sequence[Along] = ()) -> dict[str, Any]:
         **indices_json(analysis.indices),
         "softest": analysis.softest,
         "along": along,
+        **({"requirements": requirements} if requirements else {}),
         "mobility": analysis.mobility and _mobility_json(analysis.mobility),
         "internal_loads": analysis.internal_loads,
         "load": analysis.load,

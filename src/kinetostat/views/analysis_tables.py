@@ -16,8 +16,10 @@ from kinetostat.studies.analysis import Analysis, Rows
 from kinetostat.studies.attribution import by_part
 from kinetostat.studies.indices import Along
 from kinetostat.studies.loads import LoadCase
+from kinetostat.studies.requirements import Verdict
 from kinetostat.tolerances import EQUAL_STIFFNESSES, ROUND_OFF_OF_ENTRY
 from kinetostat.views.first_lines import first_lines
+from kinetostat.views.requirement_lines import print_requirements
 from kinetostat.views.tables import numeric_table, print_doubts
 
 MATRIX_UNITS = {"stiffness": ("N·m/rad", "N/rad", "N/m"), "compliance": ("rad/(N·m)", "rad/N", "m/N")}
@@ -27,14 +29,22 @@ MOST_NAMED = 4
 """Parts of unknown mass that are named."""
 
 
-def print_analysis(console: Console, analysis: Analysis, along: Sequence[Along] = (), full: bool = False) -> None:
-    """The answer in five lines, its reasons in tables, K and C last; all springs and eigenscrews if `full`."""
+def print_analysis(
+    console: Console,
+    analysis: Analysis,
+    along: Sequence[Along] = (),
+    full: bool = False,
+    requirements: Sequence[Verdict] = (),
+) -> None:
+    """Print the answer in five lines, requirements, reasons in tables, K and C last; all springs if `full`."""
     machine, names, display = analysis.machine, analysis.components, analysis.machine.display
     console.print(Text.assemble((machine.name, "bold"), f"  {analysis.status.word}"))
     answer = Table.grid(padding=(0, 2, 0, 0))
     for label, text in first_lines(analysis):
         answer.add_row(Text(label, "bold"), text)
     console.print(answer)
+    if requirements:
+        print_requirements(console, requirements, display)
     print_doubts(console, machine)
     shown = [along_table(along, display), shares_table(analysis, full), principal_table(analysis)]
     if analysis.load:

@@ -3,7 +3,7 @@
 import difflib
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -164,6 +164,7 @@ def problem_of(study: StudyFile, machine: Machine) -> Problem:
     Raises:
         InputError: a field, quantity, bound or value that does not fit the machine.
     """
+    machine = replace(machine, requirements={**machine.requirements, **study.requirements})
     poses = read_poses(machine, study.poses)
     space = read_space(machine, study.variables)
     both = [path for path in space.paths if path in poses.columns]

@@ -21,6 +21,7 @@ from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.grid.grid import evaluate_grid
 from kinetostat.studies.guidelines.guidelines import Guidelines, guidelines
 from kinetostat.studies.optimisation.result import Result
+from kinetostat.studies.requirements import Verdict, requirements
 from kinetostat.studies.sensitivity import Sensitivity, sensitivity
 
 PROBES = 48
@@ -56,6 +57,7 @@ class Answers:
         sensitivity: of the diagonal of C.
         result: of the study that the machine is the best design of.
         refused: why there is no answer, by the name of the part.
+        requirements: of the machine's file, judged.
     """
 
     machine: Machine
@@ -65,6 +67,7 @@ class Answers:
     sensitivity: Sensitivity | None = None
     result: Result | None = None
     refused: dict[str, str] = field(default_factory=dict)
+    requirements: tuple[Verdict, ...] = ()
 
 
 def gather(
@@ -97,6 +100,7 @@ def gather(
     refused: dict[str, str] = {}
     if not over:
         refused["maps"] = "No coordinate of the pose can change by itself here, so that there is nothing to map."
+    judged = requirements(machine)
     progress(1, STEPS)
     maps = evaluate_grid(machine, over, list(_diagonal(machine))) if over and "maps" not in without else None
     progress(2, STEPS)
@@ -104,7 +108,7 @@ def gather(
     progress(3, STEPS)
     advice = _advice(machine, over) if "guidelines" not in without else None
     progress(5, STEPS)
-    return Answers(machine, analysis, maps, advice, ranked, result, refused)
+    return Answers(machine, analysis, maps, advice, ranked, result, refused, judged)
 
 
 def _advice(machine: Machine, over: Sequence[str]) -> Guidelines:

@@ -12,7 +12,7 @@ from kinetostat.studies.setting import pose_of
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.report.content import Report
 from kinetostat.views.report.design import guideline_section, sensitivity_section
-from kinetostat.views.report.machine import data_section, machine_section
+from kinetostat.views.report.machine import data_section, machine_section, portrait
 from kinetostat.views.report.pictures import shown
 from kinetostat.views.report.provenance import Origin, method_section, record_section, validation_section
 from kinetostat.views.report.stiffness import load_section, stiffness_section, workspace_section
@@ -42,9 +42,9 @@ def report_of(
     pictures = shown(analysis)
     engine = () if isinstance(validation, str) else (validation.engine, validation.version)
     sections = [
-        summary_section(answers, validation),
+        summary_section(answers, validation, portrait(analysis, pictures, live)),
         *([study_section(result)] if result else []),
-        machine_section(analysis, pictures, live),
+        machine_section(analysis),
         data_section(analysis),
         stiffness_section(analysis),
         load_section(analysis, pictures),

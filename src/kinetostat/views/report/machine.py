@@ -17,8 +17,8 @@ from kinetostat.views.report.typesetting import printed, typeset
 from kinetostat.views.tables import machine_table
 
 
-def machine_section(analysis: Analysis, pictures: Shown, live: bool) -> Section:
-    """Write the section with pictures and mobility.
+def portrait(analysis: Analysis, pictures: Shown, live: bool) -> Figure:
+    """The picture of the machine on the first page.
 
     Args:
         analysis: at the pose.
@@ -31,13 +31,13 @@ def machine_section(analysis: Analysis, pictures: Shown, live: bool) -> Section:
         caption += WITHOUT.format(adding("report"))
     if turning and pictures.factor is not None:
         caption += f" Deflections are drawn {pictures.factor:,.6g} times as large as they are."
-    blocks: list[Block] = [
-        Paragraph(_first_upper(machine.family.summary)),
-        *_mobility(analysis.mobility),
-        Figure(caption, pictures.portrait(), SHARE, pictures.data if turning else None),
-        _drawing(analysis),
-    ]
-    return Section("The machine", tuple(blocks))
+    return Figure(caption, pictures.portrait(), SHARE, pictures.data if turning else None)
+
+
+def machine_section(analysis: Analysis) -> Section:
+    """Write the section with drawings and mobility."""
+    summary = Paragraph(_first_upper(analysis.machine.family.summary))
+    return Section("The machine", (summary, *_mobility(analysis.mobility), _drawing(analysis)))
 
 
 def _drawing(analysis: Analysis) -> Figure:

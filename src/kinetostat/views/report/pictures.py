@@ -28,7 +28,7 @@ from kinetostat.views.scene.solids import Scene, Solid, as_data, looks_data, sol
 
 SIZE = (1000, 700)
 """Pixels of a picture of the machine: 190 to an inch on A4."""
-SHARE = 0.8
+SHARE = 0.6
 """Width of that picture as a share of the width of the text."""
 FULL = 7.4
 """Width of a drawing that takes the whole width of the text, inches: its letters then have the size of captions."""

@@ -15,10 +15,11 @@ from kinetostat.studies.optimisation.result_data import message
 from kinetostat.studies.report.answers import Answers
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.first_lines import first_lines
-from kinetostat.views.report.content import Paragraph, Points, Section, Table
+from kinetostat.views.report.content import Block, Figure, Paragraph, Points, Section, Table
 from kinetostat.views.report.provenance import verdict
 from kinetostat.views.report.study import gains
 from kinetostat.views.report.typesetting import typeset
+from kinetostat.views.requirement_lines import headline, requirement_lines
 
 MOST_NAMED = 2
 """Number of parts that are named in each direction, at most."""
@@ -26,11 +27,20 @@ NAMED = 0.05
 """Share of a direction's compliance from which a part is named."""
 
 
-def summary_section(answers: Answers, validation: Validation | str) -> Section:
-    """Write the summary."""
+def summary_section(answers: Answers, validation: Validation | str, portrait: Figure) -> Section:
+    """Write the summary, with the requirements and a picture of the machine."""
     points = tuple((typeset(text), "") for text in _findings(answers, validation))
     answer = [Paragraph(typeset(text), f"{label}:") for label, text in first_lines(answers.analysis)]
-    return Section("Summary", (*answer, Points(points), _directions(answers)))
+    return Section("Summary", (*answer, *_requirements(answers), portrait, Points(points), _directions(answers)))
+
+
+def _requirements(answers: Answers) -> tuple[Block, ...]:
+    """What the file demands: how much of it is met, and each requirement with its margin and worst pose."""
+    judged, display = answers.requirements, answers.machine.display
+    if not judged:
+        return ()
+    lines = tuple((typeset(sentence), word) for _, word, sentence in requirement_lines(judged, display))
+    return Paragraph(headline(judged), "Requirements:"), Points(lines)
 
 
 def _findings(answers: Answers, validation: Validation | str) -> Iterator[str]:

@@ -1,0 +1,173 @@
+"""Requirements judged: at every pose that they name, with margin and worst pose. Its table is in `views`.
+
+A pose that has no result fails its requirement: a machine that cannot get there does not meet it.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinetostat.display import Display
+from kinetostat.engine.batch import evaluate
+from kinetostat.engine.points import Array, Axis, Grid, Points, Table
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.machine.machine import Machine, need_machine
+from kinetostat.machine.parameters import POSE, Parameter, find, parameters, shown, values
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.ranges import parse_range
+from kinetostat.spec.requirements import Requirement
+from kinetostat.studies.evaluation.columns import Column, read_columns
+from kinetostat.studies.grid.quantities import refuse_absent
+from kinetostat.studies.workspace.conditions import Condition, parse_condition
+
+MOST_POSES = 5_000_000
+
+
+MANIFOLD = 2.0
+"""Margin beyond which a multiple says more than a percentage."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a machine meets one condition of a requirement.
+
+    Attributes:
+        name: of the requirement.
+        condition: as written, with single spaces.
+        quantity: its name.
+        unit: SI, of the worst value.
+        bound: SI.
+        poses: how many poses it must hold at.
+        where: these poses in words.
+        met: whether it holds at all of them.
+        worst: the worst value, SI; None where the worst pose has no result.
+        margin: share of the bound by which the worst value keeps it, negative where it does not; None where the worst
+            pose has no result, or the bound is 0 or the value infinite.
+        worst_pose: fields that give the worst pose, SI, by path; empty at the pose of the file.
+        place: the worst pose in words; empty at the pose of the file.
+        status: of the worst pose, in a word.
+        failed: at how many poses it does not hold.
+    """
+
+    name: str
+    condition: str
+    quantity: str
+    unit: str
+    bound: float
+    poses: int
+    where: str
+    met: bool
+    worst: float | None
+    margin: float | None
+    worst_pose: Mapping[str, float]
+    place: str
+    status: str
+    failed: int
+
+    def sentence(self, display: Display) -> str:
+        """The condition, where it must hold, what is the case, and by how much.
+
+        Args:
+            display: units and digits.
+        """
+        there = f" at {self.place}" if self.place else ""
+        where = self.where if self.poses == 1 else f"at {self.poses:,} poses {self.where}"
+        if self.worst is None:
+            return f"{self.condition} {where}: there is no result{there} ({self.status.replace('_', ' ')})."
+        worst = display.show(self.worst, self.unit)
+        if self.margin is None:
+            return f"{self.condition} {where}: it is {worst}{there}."
+        spare = f"{abs(100.0 * self.margin):.3g} % " + ("to spare" if self.met else "short")
+        if self.margin > MANIFOLD:
+            spare = f"{1.0 + self.margin:.3g} times as much"
+        return f"{self.condition} {where}: it is {worst}{there}, {spare}."
+
+
+def requirements(machine: Machine) -> tuple[Verdict, ...]:
+    """Judge the requirements of a machine's file, condition by condition.
+
+    Args:
+        machine: with its pose and its requirements.
+
+    Raises:
+        InputError: names the requirement and what is wrong with it: an unknown quantity or field, a bad range or value.
+    """
+    need_machine(machine)
+    judged: list[Verdict] = []
+    for name, requirement in machine.requirements.items():
+        try:
+            judged += _judged(machine, name, requirement)
+        except InputError as error:
+            raise InputError(f"requirements.{name}: {error}") from None
+    return tuple(judged)
+
+
+def _judged(machine: Machine, name: str, requirement: Requirement) -> list[Verdict]:
+    show = machine.display.show
+    conditions = [parse_condition(text, machine.family.component_names) for text in requirement.demand]
+    points, varied, where = _poses(machine, requirement)
+    names = list(dict.fromkeys(condition.quantity for condition in conditions))
+    refuse_absent(machine, names, varied)
+    answer = evaluate(machine, points, names)
+    judged = []
+    for condition in conditions:
+        amounts = answer.values[condition.quantity]
+        i = _worst(condition, amounts)
+        pose = {path: float(column[0]) for path, column in points.columns(i, i + 1).items()} if varied else {}
+        place = ", ".join(f"{field.shown} {show(pose[field.leaves[0]], field.unit)}" for field in varied)
+        worst = None if np.isnan(amounts[i]) else float(amounts[i])
+        holds = condition.holds(amounts)
+        judged.append(
+            Verdict(
+                name, condition.text, condition.quantity, QUANTITIES[condition.quantity].unit, condition.value,
+                points.size, where, bool(holds.all()), worst, _margin(condition, worst), pose, place,
+                Status(int(answer.status[i])).word, int((~holds).sum()),
+            )
+        )  # fmt: skip
+    return judged
+
+
+def _poses(machine: Machine, requirement: Requirement) -> tuple[Points, list[Parameter], str]:
+    """Return the poses, the fields that vary, and the poses in words."""
+    if requirement.over and requirement.poses:
+        raise InputError("it has both over and poses; give one of them, or make two requirements.")
+    if requirement.over:
+        ranges = [parse_range(text) for text in requirement.over]
+        fields = [find(machine.family, span.field) for span in ranges]
+        grid = Grid([Axis(f.leaves, span.values(f.quantity)) for span, f in zip(ranges, fields, strict=True)])
+        if grid.size > MOST_POSES:
+            raise InputError(f"the box has {grid.size:,} poses; at most {MOST_POSES:,} are judged: lower the counts.")
+        if len(set(grid.paths)) < len(grid.paths):
+            raise InputError("a field has two ranges; give it one.")
+        return grid, fields, f"over {', '.join(f.shown for f in fields)}"
+    if requirement.poses:
+        here = values(machine)
+        paths = {name: find(machine.family, name).path for row in requirement.poses for name in row}
+        rows = [{paths[name]: value for name, value in row.items()} for row in requirement.poses]
+        columns = [
+            Column(path, np.array([row.get(path, float(here[path])) for row in rows], object))
+            for path in dict.fromkeys(paths.values())
+        ]
+        read = read_columns(machine, columns, lambda path, i: f"poses.{i}.{shown(path)}")
+        return Table(read.leaves), list(read.fields), "of the list"
+    # One point with the pose as it is: any coordinate of it can be the column that a batch must have.
+    coordinate = next(p for p in parameters(machine.family) if p.path.startswith(POSE))
+    return Table({coordinate.path: np.array([float(values(machine)[coordinate.path])])}), [], "at the pose of the file"
+
+
+def _worst(condition: Condition, amounts: Array) -> int:
+    """Return the number of the worst pose: the first without a result, or the one farthest on the wrong side."""
+    unanswered = np.flatnonzero(np.isnan(amounts))
+    if unanswered.size:
+        return int(unanswered[0])
+    return int(np.argmin(amounts) if condition.comparison.startswith(">") else np.argmax(amounts))
+
+
+def _margin(condition: Condition, worst: float | None) -> float | None:
+    if worst is None or condition.value == 0.0 or not math.isfinite(worst):
+        return None
+    spare = worst - condition.value if condition.comparison.startswith(">") else condition.value - worst
+    return spare / abs(condition.value)
