@@ -93,6 +93,26 @@ def test_a_finger_scrolls_the_page_over_the_picture(page):
     assert canvas.evaluate("canvas => getComputedStyle(canvas).touchAction") == "pan-y"
 
 
+def test_a_path_through_kept_poses_is_played(page):
+    tab, field = page.tab, page.tab.locator(".quantity-text").first
+    tab.get_by_role("button", name="Follow a path of poses").click()
+    tab.get_by_role("button", name="Keep this pose").click()
+    before = field.input_value()
+    field.fill("9 mm")
+    field.press("Enter")
+    page.until_changed(".headline", page.text(".headline"))
+    tab.get_by_role("button", name="Keep this pose").click()
+    tab.get_by_text("A path of 25 poses").wait_for()
+    tab.get_by_role("button", name="Play or pause").click()
+    tab.wait_for_function("parseFloat(document.querySelector('.quantity-text').value) < 9")
+    tab.wait_for_function("document.querySelector('.quantity-text').value === '9 mm'")
+    tab.get_by_role("button", name="Forget the path").click()
+    tab.get_by_role("button", name="Close").click()
+    field.fill(before)
+    field.press("Enter")
+    tab.wait_for_function("before => document.querySelector('.quantity-text').value === before", arg=before)
+
+
 def test_a_slider_moves_the_machine_by_the_keyboard(page):
     before, drawn = page.text(".headline"), page.tab.locator(".machine-view").get_attribute("data-drawn")
     slider = page.tab.get_by_role("slider", name="z", exact=True)

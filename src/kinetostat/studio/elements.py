@@ -128,14 +128,16 @@ def in_quotes(text: str) -> str:
     return text.replace('"', "'").replace("\\", "/")
 
 
-def upload_field(on_upload: Callable[[Any], Any], refuse: Callable[[str], None], mark: str) -> ui.upload:
-    """A hidden field that takes one TOML file from the browser; `pickFiles` of it opens the dialogue."""
-    too_large = f"The file is larger than {LARGEST_FILE >> 20} MiB, the limit for a machine or study file."
+def upload_field(
+    on_upload: Callable[[Any], Any], refuse: Callable[[str], None], mark: str, suffix: str = ".toml"
+) -> ui.upload:
+    """A hidden field that takes one file from the browser, by default TOML; `pickFiles` of it opens the dialogue."""
+    too_large = f"The file is larger than {LARGEST_FILE >> 20} MiB, the limit for a file."
     field = ui.upload(
         on_upload=on_upload, on_rejected=lambda: refuse(too_large), auto_upload=True,
         max_file_size=LARGEST_FILE, max_files=1,
     )  # fmt: skip
-    return field.props('accept=".toml" aria-hidden="true"').classes("unseen").mark(mark)
+    return field.props(f'accept="{suffix}" aria-hidden="true"').classes("unseen").mark(mark)
 
 
 def refuse(message: str) -> None:

@@ -25,6 +25,7 @@ from kinetostat.studio.panels.contributions import ContributionsPanel, Sensitivi
 from kinetostat.studio.panels.link_stiffness import LinkPanel
 from kinetostat.studio.panels.tables import IndicesPanel, LoadsPanel, MatricesPanel
 from kinetostat.studio.parameters_panel import ParametersPanel
+from kinetostat.studio.playback import Playback
 from kinetostat.studio.pulling import free_axes
 from kinetostat.studio.scene_panel import ScenePanel
 from kinetostat.studio.session import Memory, Session
@@ -66,6 +67,8 @@ class StudioPage:
             with ui.element("section").classes("middle").props('aria-label="machine"'):
                 self.scene = ScenePanel(self._exaggerate, lambda: self.session.machine.name)
                 self.handles = Handles(self.session, self.scene.view, self.changed)
+                with self.scene.tools:
+                    self.playback = Playback(self.session, self.changed, lambda: self._pictures.busy)
             with ui.element("section").classes("right").props('aria-label="linked views"'):
                 with ui.element("div").classes("card map-card"):
                     self.map = MapPanel(self.session, self.changed)
@@ -123,6 +126,7 @@ class StudioPage:
         ui.page_title(f"{machine.name} · kinetostat studio")
         self._sizes = proportions_of(machine, respond(self.session.origin).configuration)
         self._axes = free_axes(machine)
+        self.playback.clear()
         self.parameters.fill()
         self.map.fill()
         self.design.renew()

@@ -56,7 +56,7 @@ class ScenePanel:
         self.view = MachineView("the machine in three dimensions; drag, or arrow keys, to turn it").mark("machine")
         with ui.element("div").classes("scene-tools"):
             self.layers = {layer: self._layer(layer, text) for layer, text in LAYERS.items()}
-        with ui.element("div").classes("scene-views"):
+        with ui.element("div").classes("scene-views") as self.tools:
             for view, text in VIEWS.items():
                 button = ui.button(view, on_click=lambda view=view: self.view.run_method("look", view))
                 button.props("flat dense no-caps").tooltip(text).mark(f"view-{view}")

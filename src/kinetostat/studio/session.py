@@ -225,19 +225,20 @@ def file_stem(name: str) -> str:
     return "".join(c if c.isalnum() and c.isascii() else "-" for c in name.lower()).strip("-") or "machine"
 
 
-def sent_text(data: bytes, name: str) -> str:
+def sent_text(data: bytes, name: str, kind: str = "TOML") -> str:
     """Return the text of a file that was sent by a browser; a limit on its size protects the server.
 
     Args:
         data: content of the file.
         name: of the file, for messages.
+        kind: what it should be, for messages.
 
     Raises:
         InputError: it is too large or is not text.
     """
     if len(data) > LARGEST_FILE:
-        raise InputError(f'"{name}" is larger than {LARGEST_FILE >> 20} MiB; the file should be a short TOML text.')
+        raise InputError(f'"{name}" is larger than {LARGEST_FILE >> 20} MiB; the file should be a short {kind} text.')
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
-        raise InputError(f'"{name}" is not text; the file should be TOML, saved as UTF-8.') from None
+        raise InputError(f'"{name}" is not text; the file should be {kind}, saved as UTF-8.') from None
