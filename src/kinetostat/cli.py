@@ -168,7 +168,11 @@ def _parser() -> Parser:
     check = add_command(
         commands, "check", _check, "read a machine or study file and show its values", "kinetostat check mine.toml"
     )
-    takes_machine(check, "a machine or study file, or the name of a bundled one (see `kinetostat list`)")
+    takes_machine(
+        check,
+        "a machine or study file, the name of a bundled one (see `kinetostat list`), or the folder of a long grid or "
+        "search, whose checksums are then compared",
+    )
     analyze = add_command(
         commands, "analyze", _analyze, "compute stiffness, compliance, attribution and indices at a pose",
         'kinetostat analyze mine.toml --set pose.x="5 mm" --json',
@@ -254,10 +258,14 @@ def _schema(options: argparse.Namespace) -> int:
 
 def _check(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
+    from kinetostat.spec.document import exists
     from kinetostat.studies.analysis import analyze
     from kinetostat.studies.bundled import is_study
+    from kinetostat.studies.study_folder import holds_study
     from kinetostat.views.tables import print_machine, terminal
 
+    if exists(Path(options.machine)) and holds_study(Path(options.machine)):
+        return _check_folder(Path(options.machine))
     if is_study(options.machine):
         return _check_study(options)
     machine = load_machine(options)
@@ -274,6 +282,16 @@ def _verdicts(machine: "Machine") -> "tuple[Verdict, ...]":
     from kinetostat.studies.requirements import requirements
 
     return requirements(machine)
+
+
+def _check_folder(folder: Path) -> int:
+    from kinetostat.studies.folder_check import check_folder
+
+    check = check_folder(folder)
+    if not check.whole:
+        return no_answer(check.sentence)
+    print(check.sentence)
+    return DONE
 
 
 def _check_study(options: argparse.Namespace) -> int:

@@ -233,6 +233,23 @@ def give(
     return DONE if answered else NO_ANSWER
 
 
+def note_damage(folder: Path, repaired: str, unchecked: bool) -> None:
+    """Print on stderr what was damaged in the folder of a study and has been computed again.
+
+    Args:
+        folder: of the study.
+        repaired: what it was, in words; empty if nothing was damaged.
+        unchecked: whether the folder was begun without checksums.
+    """
+    if repaired:
+        print(f'kinetostat: "{folder}" had been damaged; computed again: {repaired}.', file=sys.stderr)
+    if unchecked:
+        print(
+            f'kinetostat: "{folder}" was begun without checksums, by an earlier version; damage in it cannot be seen.',
+            file=sys.stderr,
+        )
+
+
 @contextmanager
 def progress_bar(what: str) -> "Iterator[Progress]":
     """Show a bar on stderr with the remaining time; show nothing where stderr is not a terminal."""

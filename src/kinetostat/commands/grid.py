@@ -11,6 +11,7 @@ from kinetostat.commands.common import (
     add_command,
     give,
     load_machine,
+    note_damage,
     progress_bar,
     stopped,
     takes_figures,
@@ -182,6 +183,7 @@ def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) ->
             stored = answer_into(question, options.output, stem, progress, compute, options.resume)
     except KeyboardInterrupt:
         return stopped(f"the results so far are in {options.output}; the same command continues from there.")
+    note_damage(options.output, stored.repaired, stored.unchecked)
     from kinetostat.studies.grid.stored_grid import summary_json
     from kinetostat.views.grid_tables import print_stored
 

@@ -9,6 +9,7 @@ from kinetostat.commands.common import (
     add_command,
     judged,
     no_answer,
+    note_damage,
     print_json,
     search_bar,
     takes_figures,
@@ -101,6 +102,10 @@ def _report(options: argparse.Namespace, result: "Result") -> int:
     from kinetostat.studies.optimisation.result_data import message, write_result
 
     result = result.in_units(options.units) if options.units else result
+    if options.output:
+        log = result.log
+        repaired = f"{log.repaired:,} of {len(log.steps):,} steps" if log.repaired else ""
+        note_damage(options.output, repaired, log.unchecked)
     written = write_result(result, options.output) if options.output else []
     if result.solved and options.output:
         from kinetostat.views.optimisation_figures import pictures

@@ -8,7 +8,7 @@ that wrote it, nor on their order.
 import os
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import prod
 from pathlib import Path
 from types import TracebackType
@@ -22,6 +22,7 @@ import xarray as xr
 
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.storage import KEPT, settle, writing
+from kinetostat.studies.study_folder import checksum
 
 KIND = np.dtype("<f8")
 """Numbers in a file of rows: float64, little-endian."""
@@ -53,8 +54,14 @@ def check_space(folder: Path, points: int, quantities: int) -> None:
         )
 
 
-def create(path: Path, labels: xr.Dataset, dims: Sequence[str], variables: Mapping[str, Mapping[str, Any]]) -> None:
+def create(
+    path: Path, labels: xr.Dataset, dims: Sequence[str], variables: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Any]:
     """Make a file in which no point is computed yet.
+
+    Returns:
+        Its layout, as plain data for `frame_is_whole` and `run_checksum`: points, size, where the block of each
+        variable starts, and the checksum of all that is in no block.
 
     Args:
         path: of the file; one that is there is replaced.
@@ -78,8 +85,11 @@ def create(path: Path, labels: xr.Dataset, dims: Sequence[str], variables: Mappi
         with path.open("r+b") as stream:
             if sys.platform == "linux":
                 os.posix_fallocate(stream.fileno(), 0, path.stat().st_size)
-            _fill_status(stream, _offsets(path)[STATUS], points)
+            offsets = _offsets(path, variables)
+            _fill_status(stream, offsets[STATUS], points)
             settle(stream)
+            layout = {"points": points, "size": path.stat().st_size, "offsets": offsets}
+            return {**layout, "frame": _frame_checksum(stream, layout)}
 
 
 def _try_space(path: Path, size: int) -> None:
@@ -106,22 +116,63 @@ def _fill_status(stream: BinaryIO, offset: int, points: int) -> None:
     )
 
 
-def _offsets(path: Path) -> dict[str, int]:
+def _offsets(path: Path, names: Iterable[str]) -> dict[str, int]:
     """Where the block of each variable starts, bytes."""
     with h5py.File(path) as file:
-        offsets = {name: data.id.get_offset() for name, data in file.items()}
-    return {name: offset for name, offset in offsets.items() if offset is not None}
+        return {name: file[name].id.get_offset() for name in names}
+
+
+def frame_is_whole(path: Path, layout: Mapping[str, Any]) -> bool:
+    """Tell whether all of a file but its numbers is as it was made: its size, names, attributes and coordinates."""
+    try:
+        with path.open("rb") as stream:
+            return path.stat().st_size == layout["size"] and _frame_checksum(stream, layout) == layout["frame"]
+    except OSError:
+        return False
+
+
+def _frame_checksum(stream: BinaryIO, layout: Mapping[str, Any]) -> str:
+    """Return the checksum of all bytes between the blocks."""
+    blocks = sorted((offset, offset + layout["points"] * _width(name)) for name, offset in layout["offsets"].items())
+    result, place = "0", 0
+    for start, end in [*blocks, (layout["size"], layout["size"])]:
+        stream.seek(place)
+        result, place = checksum(stream.read(start - place), result), end
+    return result
+
+
+def run_checksum(stream: BinaryIO, layout: Mapping[str, Any], run: range) -> str:
+    """Return the checksum of a run of points in a file: each variable in the order of its layout, the status last."""
+    result = "0"
+    for name, offset in layout["offsets"].items():
+        stream.seek(offset + run.start * _width(name))
+        result = checksum(stream.read(len(run) * _width(name)), result)
+    return result
+
+
+def copy_run(source: BinaryIO, layout: Mapping[str, Any], target: BinaryIO, run: range) -> None:
+    """Copy a run of points from a file to another one of the same layout."""
+    for name, offset in layout["offsets"].items():
+        place = offset + run.start * _width(name)
+        source.seek(place)
+        target.seek(place)
+        target.write(source.read(len(run) * _width(name)))
+
+
+def _width(name: str) -> int:
+    """Bytes of a value."""
+    return 1 if name == STATUS else KIND.itemsize
 
 
 class ResultFile:
     """An open file, to be filled."""
 
-    def __init__(self, path: Path) -> None:
-        self._offsets = _offsets(path)
+    def __init__(self, path: Path, names: Iterable[str]) -> None:
+        self._offsets = _offsets(path, (*names, STATUS))
         self._path = path
         self._stream = path.open("r+b")
 
-    def write(self, start: int, values: Mapping[str, Array], status: Array) -> None:
+    def write(self, start: int, values: Mapping[str, Array], status: Array) -> str:
         """Write a run of points; when this returns it is on the disk.
 
         The status comes last, so that a point that has one is complete.
@@ -131,14 +182,21 @@ class ResultFile:
             values: of each quantity [points].
             status: codes [points].
 
+        Returns:
+            The checksum of what was written, as `run_checksum`.
+
         Raises:
             InputError: the disk is full or failing.
         """
+        written = "0"
         with writing(self._path, KEPT):
-            for name, data in (*values.items(), (STATUS, status)):
-                self._stream.seek(self._offsets[name] + start * data.itemsize)
-                self._stream.write(np.ascontiguousarray(data).data)
+            for name, offset in self._offsets.items():
+                data = np.ascontiguousarray(status if name == STATUS else values[name])
+                self._stream.seek(offset + start * data.itemsize)
+                self._stream.write(data.data)
+                written = checksum(data.data.cast("B"), written)
             settle(self._stream)
+        return written
 
     def close(self) -> None:
         """Close the file."""
@@ -169,26 +227,29 @@ class RowFile:
     ) -> None:
         self._stream.close()
 
-    def read(self, start: int, count: int) -> Array:
-        """Some rows [count x width], from number `start` on.
+    def read(self, start: int, count: int, check: str | None) -> Array | None:
+        """Return some rows [count x width], from number `start` on; None if they are damaged or not there.
 
-        Raises:
-            InputError: they are not there.
+        Args:
+            start, count: the rows.
+            check: their checksum; None if they were written without it.
         """
         size = self._width * KIND.itemsize
         self._stream.seek(start * size)
         data = self._stream.read(count * size)
-        if len(data) < count * size:
-            raise InputError(f'"{self._path}" has lost rows; remove its folder to begin again.')
+        if len(data) < count * size or check not in (None, checksum(data)):
+            return None
         return np.frombuffer(data, dtype=KIND).reshape(count, self._width).astype(float)
 
-    def write(self, start: int, rows: Array) -> None:
-        """Put rows at number `start`; when this returns they are on the disk.
+    def write(self, start: int, rows: Array) -> str:
+        """Put rows at number `start`, and return their checksum; when this returns they are on the disk.
 
         Raises:
             InputError: the disk is full or failing.
         """
+        data = np.ascontiguousarray(rows, dtype=KIND).data.cast("B")
         with writing(self._path, KEPT):
             self._stream.seek(start * self._width * KIND.itemsize)
-            self._stream.write(np.ascontiguousarray(rows, dtype=KIND).data)
+            self._stream.write(data)
             settle(self._stream)
+        return checksum(data)

@@ -1,13 +1,15 @@
 """The folder of a long study: its question, which chunks of its answer are done, and who is at work. Computes nothing.
 
 `study.json` holds the question, `history.jsonl` one line for each chunk that is done, in the order of time. The lock on
-the history belongs to the process and ends with it, however it ends.
+the history belongs to the process and ends with it, however it ends. The question and every line carry a checksum, and
+a line also that of the numbers it is about: what is damaged is known, and computed again.
 """
 
 import json
 import sys
 import time
-from collections.abc import Iterator
+import zlib
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -19,6 +21,11 @@ QUESTION, HISTORY = "study.json", "history.jsonl"
 
 ATTEMPTS, PAUSE = 20, 0.01
 """How often a lock is tried before it counts as taken, and seconds between: to ask takes it for some microseconds."""
+
+CHECK = "check"
+"""Key of the checksum of a record, its last."""
+DATA = "data"
+"""Key of the checksum of the numbers that a record is about."""
 
 Record = dict[str, Any]
 """What is noted about a chunk; "chunk" is its number."""
@@ -55,14 +62,70 @@ def noted(folder: Path, start: int = 0) -> tuple[list[Record], int]:
     except FileNotFoundError:
         return [], start
     whole = text[: text.rfind(b"\n") + 1]
-    return [json.loads(line) for line in whole.splitlines()], start + len(whole)
+    return [record for record in map(_unsealed, whole.splitlines()) if record is not None], start + len(whole)
+
+
+def read_question(folder: Path) -> Record:
+    """Return the question that a folder answers.
+
+    Raises:
+        InputError: it cannot be read, or is damaged.
+    """
+    path = folder / QUESTION
+    try:
+        question = _unsealed(path.read_bytes(), {})
+    except OSError as error:
+        raise InputError(f'"{path}" cannot be read: {error.strerror}; choose another folder.') from None
+    if question is None:
+        raise InputError(f'"{path}" cannot be read, it is damaged; choose another folder, or remove this one.')
+    return question
+
+
+def has_checksums(question: Record) -> bool:
+    """Tell whether the folder of a question was written with checksums; those of earlier versions were not."""
+    return bool(question.get("checksums"))
+
+
+def checksum(data: bytes | memoryview, before: str = "0") -> str:
+    """Return the CRC-32 of some bytes, or of more bytes after those of another checksum; it sees every damaged bit."""
+    return f"{zlib.crc32(data, int(before, 16)):08x}"
+
+
+def _sealed(record: Record) -> Record:
+    """A record with its checksum."""
+    return {**record, CHECK: checksum(json.dumps(record).encode())}
+
+
+def _unsealed(text: bytes, least: Record | None = None) -> Record | None:
+    """Return the record in a text, without its checksum; None if it is damaged.
+
+    Args:
+        text: JSON.
+        least: keys that it must have; a number of a chunk if None.
+    """
+    try:
+        record = json.loads(text)
+    except ValueError:
+        return None
+    if not isinstance(record, dict) or not (least or {}).keys() <= record.keys():
+        return None
+    if least is None and not (isinstance(record.get("chunk"), int) and record["chunk"] >= 0):
+        return None
+    check = record.pop(CHECK, None)
+    return record if check in (None, checksum(json.dumps(record).encode())) else None
 
 
 class StudyFolder:
-    """A folder in which this process alone is at work."""
+    """A folder in which this process alone is at work.
+
+    Attributes:
+        path: of the folder.
+        damaged: lines of its history that were damaged when it was last read.
+    """
 
     def __init__(self, path: Path, history: BinaryIO) -> None:
         self.path = path
+        self.damaged = 0
         self._history = history
 
     def question(self, wanted: Record) -> Record | None:
@@ -71,11 +134,7 @@ class StudyFolder:
         Raises:
             InputError: it is another one, or cannot be read.
         """
-        path = self.path / QUESTION
-        try:
-            stored: Record | None = json.loads(path.read_text("utf-8")) if path.exists() else None
-        except (OSError, ValueError):
-            raise InputError(f'"{path}" cannot be read; choose another folder, or remove this one.') from None
+        stored = read_question(self.path) if holds_study(self.path) else None
         different = [key for key in wanted if stored is not None and wanted[key] != stored.get(key)]
         if different:
             raise InputError(
@@ -87,22 +146,33 @@ class StudyFolder:
     def begin(self, question: Record) -> None:
         """Note a new question, to which nothing is known yet."""
         self._history.truncate(0)
-        write_text(self.path / QUESTION, json.dumps(question, ensure_ascii=False, indent=1) + "\n")
+        text = json.dumps(_sealed({**question, "checksums": "CRC-32"}), ensure_ascii=False, indent=1)
+        write_text(self.path / QUESTION, f"{text}\n")
 
     def records(self) -> dict[int, Record]:
-        """What was noted about the chunks that are done, by their number; a line cut short is dropped."""
+        """What was noted about the chunks that are done, by their number; a line cut short or damaged is dropped."""
         self._history.seek(0)
         text = self._history.read()
         whole = text[: text.rfind(b"\n") + 1]
         if len(whole) < len(text):
             self._history.truncate(len(whole))
-        records = [json.loads(line) for line in whole.splitlines()]
+        lines = [_unsealed(line) for line in whole.splitlines()]
+        records = [record for record in lines if record is not None]
+        self.damaged = len(lines) - len(records)
         return {record["chunk"]: record for record in records}
+
+    def keep(self, records: Iterable[Record]) -> None:
+        """Forget all that was noted but these records, where others are damaged."""
+        kept = list(records)
+        with writing(self.path / HISTORY, KEPT):
+            self._history.truncate(0)
+        for record in kept:
+            self.note(record)
 
     def note(self, record: Record) -> None:
         """Add a chunk that is done; when this returns it is on the disk."""
         with writing(self.path / HISTORY, KEPT):
-            self._history.write(json.dumps(record).encode() + b"\n")
+            self._history.write(json.dumps(_sealed(record)).encode() + b"\n")
             settle(self._history)
 
 

@@ -19,12 +19,27 @@ from kinetostat.machine.loading import as_toml
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.grid.grid import ABOUT_STATUS, GridQuestion, about
 from kinetostat.studies.plain_data import as_answer
-from kinetostat.studies.result_file import STATUS, UNKNOWN, ResultFile, check_space, create
-from kinetostat.studies.study_folder import Record, StudyFolder, holds_study, study_folder
+from kinetostat.studies.result_file import (
+    STATUS,
+    UNKNOWN,
+    ResultFile,
+    check_space,
+    copy_run,
+    create,
+    frame_is_whole,
+    run_checksum,
+)
+from kinetostat.studies.storage import settle, writing
+from kinetostat.studies.study_folder import DATA, Record, StudyFolder, holds_study, study_folder
 
 MOST_NUMBERS = 10_000_000_000
 """Points times quantities of one grid: 80 GB."""
 STUDY_VERSION = 1
+LAYOUT = "layout"
+"""Key of the layout of the file in the question of a folder."""
+
+Layout = dict[str, Any]
+"""Where the numbers of a file are, and the checksum of all else: plain data from `result_file.create`."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +79,8 @@ class StoredGrid:
         tally: how many points have which status, and the extremes of each quantity.
         chunks: in all.
         computed: how many of them now; the others were there.
+        repaired: what was there, damaged, and has been computed again, in words; empty if nothing.
+        unchecked: whether the folder was begun without checksums.
     """
 
     question: GridQuestion
@@ -71,6 +88,8 @@ class StoredGrid:
     tally: Tally
     chunks: int
     computed: int
+    repaired: str = ""
+    unchecked: bool = False
 
 
 def answer_into(
@@ -103,16 +122,19 @@ def answer_into(
     if not holds_study(folder):
         _check_room(question, final)
     with study_folder(folder) as study:
-        work = _taken_up(question, study, final)
+        work, layout = _taken_up(question, study, final)
+        repaired = "" if layout is None else _without_damage(question, study, final, work, layout)
         known = study.records()
         missing = [number for number in range(work.count) if number not in known]
         if missing:
+            if final.exists():
+                final.replace(_partial(final))
             _compute_missing(work, missing, _partial(final), study, progress, compute)
         if _partial(final).exists():
             _partial(final).replace(final)
         records = study.records()
         summary = combined([records[number] for number in range(work.count)], question.names)
-        return StoredGrid(question, final, summary, work.count, len(missing))
+        return StoredGrid(question, final, summary, work.count, len(missing), repaired, layout is None)
 
 
 def _check_size(question: GridQuestion) -> None:
@@ -134,19 +156,65 @@ def _partial(final: Path) -> Path:
     return final.with_suffix(f".partial{final.suffix}")
 
 
-def _taken_up(question: GridQuestion, study: StudyFolder, final: Path) -> Work:
-    """The work as the folder has it, or new work where the folder has none."""
+def _taken_up(question: GridQuestion, study: StudyFolder, final: Path) -> tuple[Work, Layout | None]:
+    """The work as the folder has it, or new work where it has none, and the layout of its file if it is known."""
     work = in_chunks(question.machine, question.grid, question.names)
     wanted = _as_record(question, final.name)
     stored = study.question(wanted)
     if stored is None:
-        attributes = {**{name: about(name) for name in question.names}, STATUS: _about_status()}
-        create(_partial(final), question.labels, question.dims, attributes)
-        study.begin({**wanted, "chunk": work.chunk})
-        return work
+        layout = _create(question, final)
+        study.begin({**wanted, "chunk": work.chunk, LAYOUT: layout})
+        return work, layout
     if not final.exists() and not _partial(final).exists():
         raise InputError(f'"{final}" was removed from its study; remove the folder "{study.path}" to begin again.')
-    return Work(work.machine, work.points, work.quantities, int(stored["chunk"]))
+    return Work(work.machine, work.points, work.quantities, int(stored["chunk"])), stored.get(LAYOUT)
+
+
+def _create(question: GridQuestion, final: Path) -> Layout:
+    attributes = {**{name: about(name) for name in question.names}, STATUS: _about_status()}
+    return create(_partial(final), question.labels, question.dims, attributes)
+
+
+def _without_damage(question: GridQuestion, study: StudyFolder, final: Path, work: Work, layout: Layout) -> str:
+    """Forget the chunks that are damaged, make the file again where more than its numbers is, and say what it was."""
+    path = final if final.exists() else _partial(final)
+    records = study.records()
+    lost = study.damaged
+    damaged = damaged_chunks(path, layout, records, work.chunk)
+    whole = frame_is_whole(path, layout)
+    if not whole:
+        broken = final.with_suffix(f".damaged{final.suffix}")
+        path.replace(broken)
+        _create(question, final)
+        with writing(path), broken.open("rb") as source, _partial(final).open("r+b") as target:
+            for number in records.keys() - damaged:
+                copy_run(source, layout, target, work.part(number))
+            settle(target)
+    final.with_suffix(f".damaged{final.suffix}").unlink(missing_ok=True)
+    if damaged or lost:
+        study.keep(record for number, record in records.items() if number not in damaged)
+    chunks = len(damaged) + lost
+    return " and ".join(
+        [f"{chunks:,} of {work.count:,} chunks"] * bool(chunks) + ["the structure of its file"] * (not whole)
+    )
+
+
+def damaged_chunks(path: Path, layout: Layout, records: Mapping[int, Record], chunk: int) -> set[int]:
+    """Return the numbers of the chunks whose numbers in a file are not those that were written.
+
+    Args:
+        path: of the file.
+        layout: of it.
+        records: what was noted about chunks.
+        chunk: points of one.
+    """
+    with path.open("rb") as stream:
+        return {
+            number
+            for number, record in records.items()
+            if run_checksum(stream, layout, range(number * chunk, min((number + 1) * chunk, layout["points"])))
+            != record.get(DATA)
+        }
 
 
 def _about_status() -> Mapping[str, Any]:
@@ -180,7 +248,7 @@ def _compute_missing(
     total = work.points.size
     done = total - sum(len(work.part(number)) for number in missing)
     progress(done, total)
-    with closing(ResultFile(path)) as file, ThreadPoolExecutor(1) as writer:
+    with closing(ResultFile(path, work.quantities)) as file, ThreadPoolExecutor(1) as writer:
         pending: Future[None] | None = None
         for number, evaluation in compute(work, missing):
             if pending:
@@ -193,8 +261,8 @@ def _compute_missing(
 
 
 def _keep(file: ResultFile, study: StudyFolder, number: int, start: int, evaluation: Evaluation) -> None:
-    file.write(start, evaluation.values, evaluation.status)
-    study.note({"chunk": number, **tally(evaluation)})
+    written = file.write(start, evaluation.values, evaluation.status)
+    study.note({"chunk": number, **tally(evaluation), DATA: written})
 
 
 def tally(evaluation: Evaluation) -> dict[str, Any]:

@@ -38,13 +38,22 @@ class Step:
 
 
 class Log:
-    """The designs of a search, as rows of one table: genes, objectives, constraints, violation, verdict."""
+    """The designs of a search, as rows of one table: genes, objectives, constraints, violation, verdict.
+
+    Attributes:
+        problem: of the search.
+        count: designs so far.
+        steps: what is noted about each step.
+        repaired: steps that were damaged in their folder and have been computed again.
+        unchecked: whether the folder was begun without checksums.
+    """
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self._sizes = np.cumsum([problem.space.size, len(problem.objectives), len(problem.constraints), 1])
         self._rows: Array = np.empty((0, self.width))
-        self.count = 0
+        self.count = self.repaired = 0
+        self.unchecked = False
         self.steps: list[dict[str, Any]] = []
 
     @property

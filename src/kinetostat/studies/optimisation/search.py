@@ -20,7 +20,15 @@ from kinetostat.studies.optimisation.log import Log, Step, record_of
 from kinetostat.studies.optimisation.problem import Problem, problem_of
 from kinetostat.studies.optimisation.result import Result, result_of
 from kinetostat.studies.result_file import KIND, RowFile
-from kinetostat.studies.study_folder import QUESTION, Record, StudyFolder, holds_study, study_folder
+from kinetostat.studies.study_folder import (
+    DATA,
+    Record,
+    StudyFolder,
+    has_checksums,
+    holds_study,
+    read_question,
+    study_folder,
+)
 
 ROWS = "designs.bin"
 STUDY_VERSION = 1
@@ -143,13 +151,24 @@ def search_into(
     with study_folder(folder) as study:
         log, method = Log(assess.problem), method_of(assess)
         _take_up(assess.problem, study, log)
+        known = study.records()
+        last = max(known, default=-1) + study.damaged
         with RowFile(folder / ROWS, log.width) as file:
-            for record in study.records().values():
-                log.add(file.read(log.count, record["designs"]), record)
             while len(log.steps) < method.steps:
-                start = log.count
+                number, start = len(log.steps), log.count
+                record = known.get(number, {})
+                rows = file.read(start, record["designs"], record.get(DATA)) if record else None
+                if rows is not None:
+                    log.add(rows, record)
+                    if log.repaired:
+                        study.note(record)
+                    continue
+                if number <= last:
+                    if not log.repaired:
+                        study.keep(log.steps)
+                    log.repaired += 1
                 _take(method, log)
-                file.write(start, log.rows[start:])
+                log.steps[-1][DATA] = file.write(start, log.rows[start:])
                 study.note(log.steps[-1])
                 watch(len(log.steps), method.steps, log.steps[-1].get("best"))
                 if stop():
@@ -166,9 +185,11 @@ def _take(method: Method, log: Log) -> None:
 def _take_up(problem: Problem, study: StudyFolder, log: Log) -> None:
     """Check that the folder holds this study, or begin it."""
     question = question_of(problem, log.width)
-    if study.question(question) is None:
+    stored = study.question(question)
+    if stored is None:
         (study.path / ROWS).unlink(missing_ok=True)
         study.begin(question | {"machine file": as_file(problem.machine)})
+    log.unchecked = stored is not None and not has_checksums(stored)
 
 
 def stored_problem(folder: Path) -> Problem:
@@ -177,11 +198,8 @@ def stored_problem(folder: Path) -> Problem:
     Raises:
         InputError: it is not the folder of an optimisation.
     """
-    try:
-        question = json.loads((folder / QUESTION).read_text("utf-8"))
-    except (OSError, ValueError):
-        question = None
-    if not isinstance(question, dict) or not {"optimisation", "machine"} <= question.keys():
+    question = read_question(folder)
+    if not {"optimisation", "machine"} <= question.keys():
         raise InputError(f'"{folder}" is not the folder of an optimisation; give a study file, or such a folder.')
     machine = build(question.get("machine file", question["machine"]), str(folder))
     return problem_of(read_study(question["optimisation"], str(folder)), machine)

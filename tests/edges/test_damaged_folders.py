@@ -1,0 +1,131 @@
+"""Folders of long studies in which something was damaged: it is seen, said, and computed again to the same bits."""
+
+import json
+import shutil
+
+import pytest
+
+from kinetostat.cli import main
+from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
+from kinetostat.engine import chunks
+from kinetostat.engine.batch import NATIVE_SLAB
+from kinetostat.studies.grid import grid
+from studies import SMALL
+
+GRID = [
+    "map",
+    "delta",
+    "--over",
+    "x=-1 cm:1 cm:200",
+    "--over",
+    "y=-1 cm:1 cm:200",
+    "--quantity",
+    "compliance_x",
+    "--json",
+    "-o",
+]
+"""Two chunks."""
+FILES = {"grid": ("map.nc", "history.jsonl", "study.json"), "search": ("designs.bin", "history.jsonl", "study.json")}
+
+
+@pytest.fixture(autouse=True)
+def small_chunks(monkeypatch):
+    monkeypatch.setattr(chunks, "CHUNK_NUMBERS", NATIVE_SLAB)
+    monkeypatch.setattr(grid, "IN_MEMORY", 1000)
+    monkeypatch.setattr("kinetostat.views.optimisation_figures.pictures", lambda *_: {})
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """A grid of two chunks and a search of six steps."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    (folder / "study.toml").write_text(f"{SMALL}\n[optimizer]\npopulation = 8\ngenerations = 5\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(chunks, "CHUNK_NUMBERS", NATIVE_SLAB)
+        patch.setattr(grid, "IN_MEMORY", 1000)
+        assert main([*GRID, str(folder / "grid")]) == DONE
+        patch.setattr("kinetostat.views.optimisation_figures.pictures", lambda *_: {})
+        assert main(["optimize", str(folder / "study.toml"), "-o", str(folder / "search")]) == DONE
+    return folder
+
+
+def again(kind, folder):
+    return main([*GRID, str(folder)] if kind == "grid" else ["optimize", str(folder)])
+
+
+def flipped(path, place):
+    """Flip a bit in the middle, or at another share of a file."""
+    data = bytearray(path.read_bytes())
+    data[int(place * len(data))] ^= 1
+    path.write_bytes(data)
+
+
+def cut(path, place):
+    path.write_bytes(path.read_bytes()[: int(place * path.stat().st_size)])
+
+
+DAMAGES = [
+    ("grid", "map.nc", flipped, 0.0001),
+    ("grid", "map.nc", flipped, 0.2),
+    ("grid", "map.nc", flipped, 0.6),
+    ("grid", "map.nc", flipped, 0.99),
+    ("grid", "map.nc", cut, 0.6),
+    ("grid", "map.nc", cut, 0.01),
+    ("grid", "history.jsonl", flipped, 0.3),
+    ("grid", "history.jsonl", flipped, 0.98),
+    ("search", "designs.bin", flipped, 0.1),
+    ("search", "designs.bin", flipped, 0.5),
+    ("search", "designs.bin", cut, 0.7),
+    ("search", "history.jsonl", flipped, 0.02),
+    ("search", "history.jsonl", flipped, 0.5),
+    ("search", "history.jsonl", flipped, 0.99),
+]
+
+
+@pytest.mark.parametrize(("kind", "file", "damage", "place"), DAMAGES)
+def test_damage_is_seen_said_and_computed_again(kind, file, damage, place, undisturbed, tmp_path, capsys):
+    folder = shutil.copytree(undisturbed / kind, tmp_path / kind)
+    damage(folder / file, place)
+    assert main(["check", str(folder)]) == NO_ANSWER
+    assert "damaged" in capsys.readouterr().err
+    assert again(kind, folder) == DONE
+    assert "computed again: " in capsys.readouterr().err
+    for name in FILES[kind]:
+        mine, whole = ((place / kind / name).read_bytes() for place in (tmp_path, undisturbed))
+        assert sorted(mine.splitlines()) == sorted(whole.splitlines()) if name.endswith("l") else mine == whole, name
+    assert main(["check", str(folder)]) == DONE
+    assert again(kind, folder) == DONE
+    assert capsys.readouterr().err == ""
+    assert not list(folder.glob("*damaged*"))
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_what_is_whole_passes(kind, undisturbed, capsys):
+    assert main(["check", str(undisturbed / kind)]) == DONE
+    assert "all of them are as they were written" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("kind", FILES)
+@pytest.mark.parametrize("place", [0.1, 0.5, 0.95])
+def test_a_damaged_question_is_one_sentence(kind, place, undisturbed, tmp_path, capsys):
+    folder = shutil.copytree(undisturbed / kind, tmp_path / kind)
+    flipped(folder / "study.json", place)
+    for command in (lambda: again(kind, folder), lambda: main(["check", str(folder)])):
+        assert command() == BAD_INPUT
+        error = capsys.readouterr().err
+        assert "is damaged; choose another folder, or remove this one" in error
+        assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_a_folder_from_before_checksums_is_read_and_said(kind, undisturbed, tmp_path, capsys):
+    folder = shutil.copytree(undisturbed / kind, tmp_path / kind)
+    for name in ("study.json", "history.jsonl"):
+        text = (folder / name).read_text()
+        records = [json.loads(line) for line in ([text] if name == "study.json" else text.splitlines())]
+        old = [{k: v for k, v in r.items() if k not in ("check", "checksums", "data", "layout")} for r in records]
+        (folder / name).write_text("".join(f"{json.dumps(record)}\n" for record in old))
+    assert main(["check", str(folder)]) == DONE
+    assert "without checksums" in capsys.readouterr().out
+    assert again(kind, folder) == DONE
+    assert "without checksums" in capsys.readouterr().err
