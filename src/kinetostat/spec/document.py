@@ -53,13 +53,22 @@ def read_text(path: Path) -> str:
         raise InputError(f'"{path}" is a folder; give the machine file in it.') from None
     except OSError as error:
         raise InputError(f'"{path}" cannot be read: {error.strerror}.') from None
+    return parse(text_of(data, str(path)), str(path))
+
+
+def text_of(data: bytes, origin: str, kind: str = "TOML") -> str:
+    """Return the text of a file of bounded size; `origin` names it in messages, and `kind` what it should be.
+
+    Raises:
+        InputError: if it is too large or not text.
+    """
     if len(data) > LARGEST_FILE:
-        raise InputError(f'"{path}" is larger than {LARGEST_FILE >> 20} MiB; it should be a short TOML text.')
+        raise InputError(f'"{origin}" is larger than {LARGEST_FILE >> 20} MiB; it should be a short {kind} text.')
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(
-            f'"{path}" is not text: byte {error.start} is not UTF-8; it must be TOML, saved as UTF-8.'
+            f'"{origin}" is not text: byte {error.start} is not UTF-8; it must be {kind}, saved as UTF-8.'
         ) from None
 
 

@@ -29,6 +29,7 @@ from kinetostat.studio.playback import Playback
 from kinetostat.studio.pulling import free_axes
 from kinetostat.studio.scene_panel import ScenePanel
 from kinetostat.studio.session import Memory, Session
+from kinetostat.studio.uploads import check_upload
 from kinetostat.views.scene.proportions import proportions_of
 
 PANELS: tuple[type[Panel], ...] = (
@@ -178,7 +179,12 @@ class StudioPage:
     async def _open_upload(self, event: events.UploadEventArguments) -> None:
         data = await event.file.read()
         name = event.file.name
-        self._attempt(lambda: self.session.open_bytes(data, name))
+        try:
+            await check_upload("machine", data, name)
+        except InputError as error:
+            refuse(str(error))
+        else:
+            self._attempt(lambda: self.session.open_bytes(data, name))
         self.upload.reset()
 
     def _attempt(self, opening: Callable[[], None]) -> None:

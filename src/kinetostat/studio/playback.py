@@ -13,10 +13,11 @@ from nicegui import events, ui
 
 from kinetostat.engine.points import Array
 from kinetostat.machine.parameters import POSE, values
+from kinetostat.spec.document import text_of
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.evaluation.pose_file import read_poses
 from kinetostat.studio.elements import icon_button, refuse, upload_field
-from kinetostat.studio.session import Session, sent_text
+from kinetostat.studio.session import Session
 
 BETWEEN = 24
 """Poses from one kept pose to the next."""
@@ -76,7 +77,7 @@ class Playback:
         data, name = await event.file.read(), event.file.name
         self.upload.reset()
         try:
-            text = sent_text(data, name, "CSV")
+            text = text_of(data, name, "CSV")
             with tempfile.TemporaryDirectory() as folder:
                 file = Path(folder) / "poses.csv"
                 file.write_text(text, "utf-8")

@@ -12,7 +12,7 @@ from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, values
 from kinetostat.machine.saving import as_file
-from kinetostat.spec.document import LARGEST_FILE
+from kinetostat.spec.document import text_of
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studio.controls import Control, controls
 from kinetostat.studio.typed_value import typed_value
@@ -89,7 +89,7 @@ class Session:
         Raises:
             InputError: it is too large, is not text, or has a mistake; the session stays as it was.
         """
-        self._start(Memory(build(sent_text(data, name), name)))
+        self._start(Memory(build(text_of(data, name), name)))
 
     def take(self, machine: Machine) -> bool:
         """Take another design: as a change that can be undone if it is of the same kind, else as a new machine.
@@ -223,22 +223,3 @@ def read_typed(parameter: Parameter, text: str, shown_unit: str) -> float:
 def file_stem(name: str) -> str:
     """Return the name of a machine as that of a file."""
     return "".join(c if c.isalnum() and c.isascii() else "-" for c in name.lower()).strip("-") or "machine"
-
-
-def sent_text(data: bytes, name: str, kind: str = "TOML") -> str:
-    """Return the text of a file that was sent by a browser; a limit on its size protects the server.
-
-    Args:
-        data: content of the file.
-        name: of the file, for messages.
-        kind: what it should be, for messages.
-
-    Raises:
-        InputError: it is too large or is not text.
-    """
-    if len(data) > LARGEST_FILE:
-        raise InputError(f'"{name}" is larger than {LARGEST_FILE >> 20} MiB; the file should be a short {kind} text.')
-    try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f'"{name}" is not text; the file should be {kind}, saved as UTF-8.') from None

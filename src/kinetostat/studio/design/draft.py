@@ -12,7 +12,7 @@ from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.machine.saving import as_file
-from kinetostat.spec.document import Document, parse
+from kinetostat.spec.document import Document, parse, text_of
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.study import OptimizerTable, StudyFile, read_study
@@ -22,7 +22,6 @@ from kinetostat.studies.optimisation.catalogue import ALONG
 from kinetostat.studies.optimisation.problem import Problem, problem_of, settings_of
 from kinetostat.studio.controls import USUAL_STIFFNESS, Control
 from kinetostat.studio.design.state_folder import slug
-from kinetostat.studio.session import sent_text
 from kinetostat.studio.typed_value import typed_value
 from kinetostat.studio.wording import shown
 from kinetostat.units import UNIT, UnitError
@@ -150,7 +149,7 @@ def sent_draft(data: bytes, name: str, present: Machine) -> Draft:
     Raises:
         InputError: the file is too large, is not text, has a mistake, or does not fit the machine.
     """
-    study = read_study(parse(sent_text(data, name), name), name)
+    study = read_study(parse(text_of(data, name), name), name)
     changes = list(settings_of(study.changes))
     if study.machine in bundled():
         machine: Machine | None = load(study.machine, changes)

@@ -28,6 +28,7 @@ from kinetostat.studio.design.draft import (
 )
 from kinetostat.studio.elements import choice, icon_button, upload_field
 from kinetostat.studio.session import Session
+from kinetostat.studio.uploads import check_upload
 from kinetostat.studio.wording import full_label
 
 Change: TypeAlias = events.ValueChangeEventArguments[Any]
@@ -95,6 +96,7 @@ class StudyForm:
     async def _sent(self, event: events.UploadEventArguments) -> None:
         data = await event.file.read()
         try:
+            await check_upload("study", data, event.file.name)
             self.draft = sent_draft(data, event.file.name, self._session.machine)
         except InputError as error:
             self._refuse(str(error))

@@ -1,0 +1,94 @@
+"""Files that a browser has sent, read first in a process of their own, whose time and memory are limited.
+
+The process is `python -m kinetostat.studio.uploads KIND NAME`, with the file on its standard input. What it can read
+within its limits, the page then reads itself; any other file is refused, and no other page has noticed it.
+"""
+
+import asyncio
+import sys
+
+from kinetostat.machine.loading import build
+from kinetostat.spec.document import parse, text_of
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.study import read_study
+
+WORKER = "kinetostat.studio.uploads"
+SECONDS = 10
+"""Processor time of the process; a usual machine takes one second, nearly all of it to start."""
+PATIENCE = 60.0
+"""Time, s, after which the process is stopped, on a server with much other work as well."""
+MEMORY = 2 << 30
+"""Address space of the process, bytes; its libraries take half a gigabyte."""
+AT_A_TIME = asyncio.Semaphore(1)
+"""Files of all pages that are read at a time, so that one core is left to the pages."""
+REFUSED = 3
+"""Exit code after a refusal, whose sentence is on standard output."""
+
+
+async def check_upload(kind: str, data: bytes, name: str) -> None:
+    """Check that a file can be read, in a bounded time and a bounded memory.
+
+    Args:
+        kind: "machine" or "study".
+        data: content of the file.
+        name: of the file, for messages.
+
+    Raises:
+        InputError: it cannot be read, or not within the limits.
+    """
+    async with AT_A_TIME:
+        process = await asyncio.create_subprocess_exec(
+            sys.executable, "-m", WORKER, kind, name.replace("\0", "?"),
+            stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL,
+        )  # fmt: skip
+        try:
+            answer, _ = await asyncio.wait_for(process.communicate(data), PATIENCE)
+        except TimeoutError:
+            answer = b""
+        finally:
+            if process.returncode is None:
+                process.kill()
+                await process.wait()
+    if process.returncode == REFUSED:
+        raise InputError(answer.decode())
+    if process.returncode != 0:
+        raise InputError(
+            f'"{name}" takes more than {SECONDS} s or {MEMORY >> 30} GiB to read, or ends the reader; a {kind} file '
+            "is a short TOML text: check what is in it."
+        )
+
+
+def read(kind: str, data: bytes, name: str) -> None:
+    """Read a file as a page would.
+
+    Args:
+        kind: "machine" or "study".
+        data: content of the file.
+        name: of the file, for messages.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    text = text_of(data, name)
+    if kind == "study":
+        read_study(parse(text, name), name)
+    else:
+        build(text, name)
+
+
+def _limit() -> None:
+    """Limit the time and the memory of this process, where the system can."""
+    if sys.platform != "win32":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+
+
+if __name__ == "__main__":
+    _limit()
+    try:
+        read(sys.argv[1], sys.stdin.buffer.read(), sys.argv[2])
+    except InputError as refusal:
+        sys.stdout.buffer.write(str(refusal).encode())
+        sys.exit(REFUSED)
