@@ -111,7 +111,7 @@ def dying_write(self, start, values, status):
         half = len(status) // 2
         write(self, start, {{name: data[:half] for name, data in values.items()}}, status[:half])
         die()
-    write(self, start, values, status)
+    return write(self, start, values, status)
 
 def dying_note(self, record):
     if not left[0]:
@@ -173,7 +173,7 @@ def test_ctrl_c_keeps_what_was_computed_and_the_same_command_goes_on(tmp_path, m
     with monkeypatch.context() as patch:
         patch.setattr(chunks, "here", interrupted)
         assert main(command) == STOPPED
-    assert "same command goes on" in capsys.readouterr().err
+    assert "same command continues" in capsys.readouterr().err
     assert history(tmp_path / "study") == [0, 1]
     assert main(command) == DONE
     out = capsys.readouterr().out
