@@ -178,7 +178,7 @@ def test_ctrl_c_keeps_what_was_computed_and_the_same_command_goes_on(tmp_path, m
     assert main(command) == DONE
     out = capsys.readouterr().out
     assert "2 of 4 chunks had been computed before" in out
-    assert "out_of_reach" in out
+    assert "out of reach" in out
     assert main([*command, "--resume", "--json"]) == DONE
     summary = json.loads(capsys.readouterr().out)
     assert summary["points"] == 125_000 == sum(summary["status"].values())

@@ -53,7 +53,7 @@ def read_text(path: Path) -> str:
         raise InputError(f'"{path}" is a folder; give the machine file in it.') from None
     except OSError as error:
         raise InputError(f'"{path}" cannot be read: {error.strerror}.') from None
-    return parse(text_of(data, str(path)), str(path))
+    return text_of(data, str(path))
 
 
 def text_of(data: bytes, origin: str, kind: str = "TOML") -> str:

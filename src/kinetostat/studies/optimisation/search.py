@@ -201,7 +201,7 @@ def stored_problem(folder: Path) -> Problem:
     question = read_question(folder)
     if not {"optimisation", "machine"} <= question.keys():
         raise InputError(f'"{folder}" is not the folder of an optimisation; give a study file, or such a folder.')
-    machine = build(question.get("machine file", question["machine"]), str(folder))
+    machine = build(question.get("machine file") or question["machine"], str(folder))
     return problem_of(read_study(question["optimisation"], str(folder)), machine)
 
 
