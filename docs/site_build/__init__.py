@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 from sphinx.errors import SphinxError
 
@@ -48,6 +49,7 @@ def check_alone(app: Sphinx, error: Exception | None) -> None:
 def setup(app: Sphinx) -> dict[str, bool]:
     """Make Sphinx know all of it."""
     mathematics.add_renderer(app)
+    app.add_lexer("csv", TextLexer)
     app.connect("source-read", fill)
     app.connect("autodoc-process-docstring", reference.as_markup)
     app.connect("autodoc-process-signature", reference.without_signature)

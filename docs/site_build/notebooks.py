@@ -1,4 +1,4 @@
-"""Tutorials as notebooks: pages with programs are their only source, outputs are left to whoever runs them.
+"""Tutorials as notebooks: pages with programs are their only source, and each is stored with what its cells answer.
 
 python docs/site_build/notebooks.py
 """
@@ -6,6 +6,7 @@ python docs/site_build/notebooks.py
 import json
 import re
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
@@ -50,12 +51,26 @@ def _from_examples(link: re.Match[str]) -> str:
 
 
 def written(name: str) -> str:
-    """The text of a notebook's file."""
+    """The text of a notebook's file, without answers."""
     page = (TUTORIALS / f"{name}.md").read_text("utf-8")
     return json.dumps(notebook(page), ensure_ascii=False, indent=1) + "\n"
+
+
+def answered(name: str) -> str:
+    """The text of a notebook's file with the answer of each cell, from a run in an empty folder."""
+    import nbclient
+    import nbformat
+
+    cells: Any = nbformat.reads(written(name), as_version=4)
+    with TemporaryDirectory() as folder:
+        nbclient.NotebookClient(cells, timeout=None, resources={"metadata": {"path": folder}}).execute()
+    for cell in cells.cells:
+        cell.metadata = {}  # times of the run
+    cells.metadata = {"kernelspec": KERNEL}
+    return str(nbformat.writes(cells)) + "\n"
 
 
 if __name__ == "__main__":
     (ROOT / "examples").mkdir(exist_ok=True)
     for name in NOTEBOOKS:
-        (ROOT / "examples" / f"{name}.ipynb").write_text(written(name), "utf-8")
+        (ROOT / "examples" / f"{name}.ipynb").write_text(answered(name), "utf-8")
