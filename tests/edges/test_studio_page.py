@@ -218,6 +218,19 @@ def test_contributions_are_the_attribution():
     on_page(steps)
 
 
+def test_a_click_goes_to_the_worst_pose_of_a_requirement():
+    demand = '\n[requirements]\nstiff = { demand = "free_stiffness_z > 60 N/um", over = ["z=12 cm:14 cm:3"] }\n'
+
+    async def steps(page):
+        await page.upload("mine.toml", (bundled()["hexapod"] + demand).encode())
+        await page.front("Requirements")
+        assert page.one("requirements-headline").text == "1 of 1 requirements is not met."
+        await page.send("worst-stiff", "click")
+        assert "120" in str(page.one("control pose.z")._props)
+
+    on_page(steps)
+
+
 def test_every_view_follows():
     async def steps(page):
         for tab, mark, words in (

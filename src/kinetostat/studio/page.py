@@ -23,6 +23,7 @@ from kinetostat.studio.map_panel import MapPanel
 from kinetostat.studio.panels import Panel
 from kinetostat.studio.panels.contributions import ContributionsPanel, SensitivityPanel
 from kinetostat.studio.panels.link_stiffness import LinkPanel
+from kinetostat.studio.panels.requirements import RequirementsPanel
 from kinetostat.studio.panels.tables import IndicesPanel, LoadsPanel, MatricesPanel
 from kinetostat.studio.parameters_panel import ParametersPanel
 from kinetostat.studio.playback import Playback
@@ -33,7 +34,7 @@ from kinetostat.studio.uploads import check_upload
 from kinetostat.views.scene.proportions import proportions_of
 
 PANELS: tuple[type[Panel], ...] = (
-    ContributionsPanel, MatricesPanel, IndicesPanel, SensitivityPanel, LinkPanel, LoadsPanel,
+    ContributionsPanel, MatricesPanel, IndicesPanel, SensitivityPanel, LinkPanel, LoadsPanel, RequirementsPanel,
 )  # fmt: skip
 """The linked views, in the order of their tabs."""
 ACCENT = "#0b5ea8"
@@ -100,6 +101,8 @@ class StudioPage:
     def _views(self) -> None:
         self.panels: dict[str, Panel] = {}
         made = [panel() for panel in PANELS]
+        for panel in made:
+            panel.changed = self.changed
         with ui.tabs(on_change=self._show_front).classes("panel-tabs").props("dense no-caps") as self.tabs:
             for panel in made:
                 ui.tab(panel.name).mark(f"tab-{panel.name}")

@@ -4,6 +4,7 @@ A panel shows results of `answers`; it holds no formula and knows nothing of the
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 
 from kinetostat.studio.answers import Report
 from kinetostat.studio.session import Session
@@ -17,9 +18,11 @@ class Panel(ABC):
 
     Attributes:
         name: text of the tab.
+        changed: of the page, to be called where the panel has given the session's machine other numbers.
     """
 
     name = ""
+    changed: Callable[[], None]
 
     @abstractmethod
     def build(self) -> None:
