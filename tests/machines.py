@@ -5,7 +5,7 @@ its file. A row of `ROWS` says where one may vary more widely. Stiffnesses need 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import radians
 
@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.limits import Limits
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
@@ -55,8 +56,8 @@ class Case:
 
     @cached_property
     def machine(self) -> Machine:
-        """As bundled."""
-        return load(self.name)
+        """As bundled, without limits: neither K nor C depends on them, and a drawn pose may lie beyond."""
+        return without_limits(load(self.name))
 
     @cached_property
     def ranges(self) -> dict[str, tuple[float, float]]:
@@ -86,6 +87,10 @@ class Case:
     def freedoms(self) -> int:
         """Of the platform when all links are rigid and the actuators free: as many as task coordinates."""
         return sum(path.startswith("pose.") for path in values(self.machine))
+
+
+def without_limits(machine: Machine) -> Machine:
+    return replace(machine, tables={**machine.tables, "limits": Limits()})
 
 
 def degrees(low: float, high: float) -> tuple[float, float]:
