@@ -4,8 +4,8 @@ A bundled machine is in the table by itself: its lengths vary by `SHARE` and its
 its file. A row of `ROWS` says where one may vary more widely. Stiffnesses need no range; each test says which it wants.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import radians
 
@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
-from kinetostat.machine.limits import Limits
-from kinetostat.machine.loading import bundled, load
+from kinetostat.machine.loading import build, bundled
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.spec import document
 
 REGULAR = 0.02
 """Least singularity margin of a drawn pose. Statics solve W; there they lose less than three digits of 16."""
@@ -57,7 +57,7 @@ class Case:
     @cached_property
     def machine(self) -> Machine:
         """As bundled, without limits: neither K nor C depends on them, and a drawn pose may lie beyond."""
-        return without_limits(load(self.name))
+        return load_without_limits(self.name)
 
     @cached_property
     def ranges(self) -> dict[str, tuple[float, float]]:
@@ -89,8 +89,10 @@ class Case:
         return sum(path.startswith("pose.") for path in values(self.machine))
 
 
-def without_limits(machine: Machine) -> Machine:
-    return replace(machine, tables={**machine.tables, "limits": Limits()})
+def load_without_limits(name: str, settings: Sequence[str] = ()) -> Machine:
+    """A bundled machine with those limits alone that the settings give it."""
+    tables = document.parse(bundled()[name], name)
+    return build({key: table for key, table in tables.items() if key != "limits"}, name, settings)
 
 
 def degrees(low: float, high: float) -> tuple[float, float]:

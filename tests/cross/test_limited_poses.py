@@ -11,8 +11,8 @@ from kinetostat.engine.kernel import slab_kernel
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import is_set
-from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import parameters, values, with_values
+from machines import load_without_limits as load
 
 POSES = 300
 LOAD = ("load.force=[200, -100, 500]", "load.moment=[3, 5, -2]")

@@ -11,13 +11,15 @@ from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import pose_status, respond
 from kinetostat.machine.limits import LIMITS
-from kinetostat.machine.loading import as_toml, build, bundled, load
+from kinetostat.machine.loading import as_toml, build, bundled
+from kinetostat.machine.loading import load as load_bundled
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.machine.rods import rods
 from kinetostat.spec import document
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.tolerances import LIMIT_SLACK
+from machines import load_without_limits as load
 
 JUST = 1e-6
 """How far beside a limit a pose is put to be surely within or beyond it."""
@@ -129,8 +131,26 @@ def test_a_machine_without_limits_is_not_checked(name):
 
 
 @pytest.mark.parametrize("name", bundled())
+def test_a_bundled_machine_keeps_its_own_limits_and_says_whether_it_has_any(name):
+    """Those of the paper's machine are not known; K and C of no machine depend on them."""
+    machine, free = load_bundled(name), load(name)
+    answer = analyze(machine)
+    assert answer.status is Status.OK
+    assert answer.stiffness == analyze(free).stiffness
+    assert "No limits are set" in analyze(free).message
+    assert ("No limits are set" in answer.message) == (name in {"zhang-gosselin-4dof", "passive-leg-4dof-driven"})
+
+
+@pytest.mark.parametrize("name", bundled())
 def test_the_straight_legs_are_those_a_family_draws_straight(name):
-    expected = {"hexapod": 6, "hexapod-cubic": 6, "hexapod-rus": 6, "planar-3rpr": 3, "planar-3rrr": 3}
+    expected = {
+        "hexapod": 6,
+        "hexapod-cubic": 6,
+        "hexapod-rus": 6,
+        "hexapod-hardware": 6,
+        "planar-3rpr": 3,
+        "planar-3rrr": 3,
+    }
     expected |= {"delta": 0, "orthoglide": 0, "tripteron": 0, "tricept": 3, "tricept-rus": 3}
     count = expected.get(name, int(name.split("dof")[0][-1]) if "dof" in name else None)
     found = rods(respond(load(name)).configuration.legs)

@@ -10,7 +10,7 @@ from kinetostat.engine.points import Table
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.loading import build, load
+from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec import document
 from kinetostat.spec.errors import InputError
@@ -18,6 +18,7 @@ from kinetostat.studies.workspace.borders import depth
 from kinetostat.studies.workspace.verdicts import BEYOND, INSIDE, Judge
 from kinetostat.studies.workspace.workspace import workspace
 from kinetostat.views.answers import plot
+from machines import load_without_limits as load
 
 ERRORS = 4
 """Standard errors within which an estimate lies all but surely."""

@@ -292,6 +292,11 @@ def limits_set(limits: object) -> list[Limit]:
     return [limit for limit in LIMITS.values() if is_set(getattr(limits, limit.name))]
 
 
+def unlimited(limits: object) -> str:
+    """What an answer must say that rests on no limit: a sentence, or nothing where the table [limits] sets one."""
+    return "" if limits_set(limits) else "No limits are set: strokes, joint angles and loads are not checked."
+
+
 def check_limits(limits: object, parts: Parts, origin: str) -> None:
     """Refuse limits that contradict each other, and limits on parts that the machine does not have.
 

@@ -23,6 +23,7 @@ from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, stiffn
 from kinetostat.kinetostatics.conditioning import twist_condition
 from kinetostat.kinetostatics.internal import InternalLoads, internal_loads
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.limits import unlimited
 from kinetostat.machine.machine import Configuration, Machine, need_machine, springs
 from kinetostat.machine.mass import Mass, moving_masses
 from kinetostat.machine.parameters import parameters, values, with_values
@@ -225,7 +226,7 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     return Analysis(
         machine,
         status,
-        _message(response, rigid, free, stiffness_rows is not None, load),
+        _message(machine, response, rigid, free, stiffness_rows is not None, load),
         components=machine.family.component_names,
         axes=axes,
         platform=_placement(configuration),
@@ -315,7 +316,12 @@ def _rank(statics: Statics, compliance_infinite: bool) -> int:
 
 
 def _message(
-    response: Response, rigid: tuple[str, ...], free: tuple[str, ...], finite: bool, load: LoadCase | None
+    machine: Machine,
+    response: Response,
+    rigid: tuple[str, ...],
+    free: tuple[str, ...],
+    finite: bool,
+    load: LoadCase | None,
 ) -> str:
     """Say what is special about a pose that has been analysed; `finite` tells whether K is finite."""
     sentences = []
@@ -332,7 +338,8 @@ def _message(
             sentences.append(f"Free: {spring.name} has no stiffness, {moves}.")
     if load and load.unheld:
         sentences.append(load.unheld)
-    return " ".join(sentences) or Status.OK.sentence
+    sentences = sentences or [Status.OK.sentence]
+    return " ".join([*sentences, unlimited(machine.tables["limits"])]).strip()
 
 
 def as_json(analysis: Analysis, along: Sequence[Along] = (), requirements: Sequence[object] = ()) -> dict[str, Any]:

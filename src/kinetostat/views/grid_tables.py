@@ -11,6 +11,7 @@ from rich.console import Console
 from kinetostat.display import Display
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
+from kinetostat.machine.limits import Limits, unlimited
 from kinetostat.studies.grid.grid import failures
 from kinetostat.studies.grid.stored_grid import Extremes, StoredGrid
 from kinetostat.studies.workspace.verdicts import INSIDE, phrase
@@ -125,6 +126,8 @@ def _summary(workspace: Workspace) -> Iterator[str]:
         f"({100.0 * volume.share:.4g} % of the box; two random points in each of {volume.cells:,} cells, ± two "
         "standard errors)."
     )
+    if not workspace.limits:
+        yield unlimited(Limits())
     if not workspace.exists:
         yield "No pose of the box is in the workspace; the table shows why."
     elif workspace.connected is None:

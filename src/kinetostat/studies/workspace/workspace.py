@@ -50,6 +50,7 @@ class Workspace:
         demands: ranges of lengths, angles and loads of legs, joints and actuators over the inside nodes.
         conditions: that poses had to meet.
         singularities_divide: whether they divide pose space and the file's pose has an aspect to stay in.
+        limits: names of the limits that the machine's file sets.
     """
 
     dataset: xr.Dataset
@@ -61,6 +62,7 @@ class Workspace:
     demands: tuple[Demand, ...]
     conditions: tuple[Condition, ...]
     singularities_divide: bool
+    limits: tuple[str, ...]
 
     def __repr__(self) -> str:
         of = sum(self.nodes.values())
@@ -114,6 +116,7 @@ def workspace(
         demands(machine, _poses(question, np.flatnonzero(inside)[:: 1 + int(inside.sum()) // MOST_DEMANDS])),
         judge.conditions,
         judge.aspect != 0.0,
+        tuple(judge.limits),
     )
 
 
@@ -240,6 +243,7 @@ def as_json(workspace: Workspace) -> dict[str, Any]:
                 "cells": volume.cells,
                 "method": METHOD,
             },
+            "limits": list(workspace.limits),
             "nodes": workspace.nodes,
             "connected": workspace.connected,
             "singularities_divide": workspace.singularities_divide,
