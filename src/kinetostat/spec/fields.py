@@ -159,7 +159,7 @@ class Quantity:
 
     def __get_pydantic_json_schema__(self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler) -> Any:
         kind = KINDS[self.kind]
-        table = ["object"] if kind.name.endswith("rigidity") else []
+        table = ["object"] if self.stiff else []
         single = {"type": ["number", "string", *table], "examples": [kind.example]}
         rule = f"{self.meaning}; a {kind.name} with its unit, or a bare number in {kind.unit}"
         rule += f', or "{RIGID}"' if self.stiff else ""
@@ -169,7 +169,9 @@ class Quantity:
         many = {"type": "array", "items": single, "minItems": self.count, "maxItems": self.count}
         if self.apart:
             return {**many, "description": f"{rule}; a list of {self.count}"}
-        return {"anyOf": [single, many], "description": f"{rule}; one for all, or a list of {self.count}"}
+        part = {"type": "string", "pattern": r"^\s*[A-Za-z].*\s"}
+        row = [{"type": "array", "items": part, "minItems": 1}] if kind.name.endswith("stiffness") else []
+        return {"anyOf": [single, many, *row], "description": f"{rule}; one for all, or a list of {self.count}"}
 
 
 @dataclass(frozen=True)

@@ -137,4 +137,6 @@ def _field(field: Field) -> dict[str, Any]:
     if count is None:
         return {**QUANTITY, "description": field.quantity.meaning}
     many = {"type": "array", "items": QUANTITY, "minItems": count, "maxItems": count}
+    if field.quantity.kind == "direction":
+        return {"anyOf": [many, {"type": "string"}], "description": f"{field.quantity.meaning}, or a joint's name"}
     return {**many, "description": field.quantity.meaning}
