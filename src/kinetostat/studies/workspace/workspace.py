@@ -41,7 +41,7 @@ class Workspace:
     Attributes:
         dataset: over the nodes of the grid: `status` (`Status` codes), `verdict` (place in `verdicts`), `connected`
             (whether inside and joined to the file's pose), `singularity_margin`, the least translational stiffness, the
-            quantities of the conditions, and along each axis the borders of verdicts (`studies.workspace.borders`).
+            quantities of the conditions, and for each axis at which share of the step to the next node the verdict ends.
         verdicts: what may become of a node, "inside" first; then why not.
         nodes: how many nodes have each verdict.
         volume: of the inside, whether joined to the file's pose or not.
