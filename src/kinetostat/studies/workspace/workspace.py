@@ -41,7 +41,8 @@ class Workspace:
     Attributes:
         dataset: over the nodes of the grid: `status` (`Status` codes), `verdict` (place in `verdicts`), `connected`
             (whether inside and joined to the file's pose), `singularity_margin`, the least translational stiffness, the
-            quantities of the conditions, and for each axis at which share of the step to the next node the verdict ends.
+            quantities of the conditions, and for each axis the share of the step to the next node at which the verdict
+            ends.
         verdicts: what may become of a node, "inside" first; then why not.
         nodes: how many nodes have each verdict.
         volume: of the inside, whether joined to the file's pose or not.
