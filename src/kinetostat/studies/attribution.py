@@ -4,7 +4,7 @@ The formulas are in `kinetostatics.assembly`; tables and bars of the contributio
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from kinetostat.algebra.symmetric import Symmetric6
@@ -85,11 +85,13 @@ class Softest:
         stiffness: N/m or N·m/rad, the other motions free to follow; 0 where the direction is free.
         directions: unit vectors that span all directions with this stiffness, axes of K and C [1 to 3 x 3].
         shares: name and share of each part in the compliance there, the greatest first; empty where it is free.
+        kinds: the same for parts of one kind together, such as "actuator ×6".
     """
 
     stiffness: float
     directions: tuple[tuple[float, ...], ...]
     shares: tuple[tuple[str, float], ...]
+    kinds: tuple[tuple[str, float], ...] = ()
 
 
 def softest(block: PrincipalStiffness, name: str, springs: Sequence[Spring], statics: Statics) -> Softest | None:
@@ -115,8 +117,18 @@ def softest(block: PrincipalStiffness, name: str, springs: Sequence[Spring], sta
         return Softest(least, alike, ())
     rows = ROTATIONS if name == "rotation" else TRANSLATIONS
     parts: dict[str, float] = {}
+    kinds: dict[str, dict[str, float]] = {}
     for spring, share in zip(springs, compliance_shares(statics), strict=True):
         amount = sum(float(share.entry(i, j)) * way[i % 3] * way[j % 3] for way in alike for i in rows for j in rows)
-        part = spring.part or spring.name
-        parts[part] = parts.get(part, 0.0) + amount * least / len(alike)
-    return Softest(least, alike, tuple(sorted(parts.items(), key=lambda item: -round(item[1], EQUAL_SHARES))))
+        parts[spring.of] = parts.get(spring.of, 0.0) + amount * least / len(alike)
+        kinds.setdefault(spring.kind, {})[spring.of] = 0.0
+    together = {
+        f"{kind} ×{len(members)}" if len(members) > 1 else next(iter(members)): sum(parts[part] for part in members)
+        for kind, members in kinds.items()
+    }
+    return Softest(least, alike, _ranked(parts), _ranked(together))
+
+
+def _ranked(shares: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
+    """Sort shares, the greatest first; equal ones keep their order."""
+    return tuple(sorted(shares.items(), key=lambda item: -round(item[1], EQUAL_SHARES)))

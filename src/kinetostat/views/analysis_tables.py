@@ -1,6 +1,7 @@
 """An analysis as tables on a terminal, with units. Nothing is computed but rounding, percent and sums of shares."""
 
 import math
+import textwrap
 from collections.abc import Sequence
 
 from rich.console import Console
@@ -24,6 +25,8 @@ from kinetostat.views.tables import numeric_table, print_doubts
 
 MATRIX_UNITS = {"stiffness": ("N·m/rad", "N/rad", "N/m"), "compliance": ("rad/(N·m)", "rad/N", "m/N")}
 """SI units of the blocks of K and C: rotation, coupling, translation."""
+LABELS = 11
+"""Columns for the labels of the first lines."""
 ROTATION_NAMES = COMPONENTS[:3]
 MOST_NAMED = 4
 """Parts of unknown mass that are named."""
@@ -41,7 +44,8 @@ def print_analysis(
     console.print(Text.assemble((machine.name, "bold"), f"  {analysis.status.word}"))
     answer = Table.grid(padding=(0, 2, 0, 0))
     for label, text in first_lines(analysis):
-        answer.add_row(Text(label, "bold"), text)
+        # Rich would also break a line between a number and its percent sign, at a space that is not for breaking.
+        answer.add_row(Text(label, "bold"), "\n".join(textwrap.wrap(text, console.width - LABELS)))
     console.print(answer)
     if requirements:
         print_requirements(console, requirements, display)

@@ -18,6 +18,8 @@ MOST_NAMED = 3
 """Parts that are named as what makes a direction soft."""
 NAMED = 0.05
 """Share of the compliance from which a part is named."""
+MOST_OF_IT = 0.6
+"""Share that the named parts must have together; otherwise kinds of parts are named."""
 BLOCKS = (("translation", "along", "N/m"), ("rotation", "about", "N·m/rad"))
 
 
@@ -82,7 +84,10 @@ def _vector(way: Sequence[float]) -> str:
 
 
 def _mainly(direction: Softest) -> str:
-    largest = [(name, 100.0 * share) for name, share in direction.shares[:MOST_NAMED] if share >= NAMED]
+    """Name the parts that contribute most; where many parts share the compliance, the kinds of parts."""
+    alone = sum(share for _, share in direction.shares[:MOST_NAMED])
+    shares = direction.shares if alone >= MOST_OF_IT else direction.kinds
+    largest = [(name, 100.0 * share) for name, share in shares[:MOST_NAMED] if share >= NAMED]
     named = [f"{name} {percent:.0f}\N{NO-BREAK SPACE}%" for name, percent in largest]
     return f", mainly from {', '.join(named)}" if named else ""
 
