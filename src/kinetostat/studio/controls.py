@@ -67,7 +67,8 @@ class Control:
         share = min(max(position, 0), STEPS) / STEPS
         if not self.logarithmic:
             return self.low + (self.high - self.low) * share
-        if self.parameter.quantity.stiff and share in (0.0, 1.0):
+        quantity = self.parameter.quantity
+        if quantity.stiff and (share == 1.0 or (share == 0.0 and not quantity.positive)):
             return math.inf if share else 0.0
         return float(f"{self.low * (self.high / self.low) ** share:.4g}")
 
@@ -114,7 +115,7 @@ def _control(parameter: Parameter, present: dict[str, float], length: float) -> 
     if quantity.unset is not None:
         return Control(parameter, panel, group, 0.0, 0.0, False)
     low, high, logarithmic = _range(quantity.kind, quantity.stiff, value, table, length)
-    if quantity.positive:
+    if quantity.positive and not quantity.stiff:
         low = max(low, LEAST_SHARE * high)
     return Control(parameter, panel, group, low, min(high, quantity.most), logarithmic)
 
