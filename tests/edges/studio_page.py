@@ -81,22 +81,22 @@ class Page:
             self.one(mark).value = value
         await self.settled()
 
-    async def another(self) -> "Page":
+    async def another(self, address: str = "/") -> "Page":
         """Another tab of the same browser, on the same server."""
         client = httpx.AsyncClient(transport=httpx.ASGITransport(core.app), base_url="http://test")
-        return await opened(User(client), self.calls)
+        return await opened(User(client), self.calls, address)
 
-    async def again(self) -> None:
+    async def again(self, address: str = "/") -> None:
         """Load the page of this tab again."""
-        await self.user.open("/")
+        await self.user.open(address)
         await self.user.should_see(marker="status")
         await self.settled()
 
     @property
-    def dark(self) -> bool:
-        """Whether it is dark."""
+    def dark(self) -> bool | None:
+        """Whether it is dark; None where the system decides."""
         (mode,) = [e for e in self.user.client.elements.values() if isinstance(e, ui.dark_mode)]
-        return bool(mode.value)
+        return mode.value
 
     def shown(self, what: str, method: str) -> Any:
         """The last argument that a drawing was given."""
@@ -118,10 +118,10 @@ def nothing_fails() -> Iterator[None]:
     assert not failed, failed[0].exc_text or failed[0].getMessage()
 
 
-async def opened(user: User, calls: list[tuple[str, str, Any]]) -> Page:
+async def opened(user: User, calls: list[tuple[str, str, Any]], address: str = "/") -> Page:
     """The page in a new tab, once everything is computed."""
     page = Page(user, calls)
-    await page.again()
+    await page.again(address)
     return page
 
 

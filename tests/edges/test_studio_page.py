@@ -306,7 +306,8 @@ def test_layers_can_be_hidden_and_views_chosen():
         assert page.one("machine")._props["hidden"] == ["ellipsoids"]
         await page.send("view-top", "click")
         assert page.shown("MachineView", "look") == "top"
-        await page.send("theme", "click")
+        assert page.dark is None  # as the system has it
+        await page.send("browser", "theme", True)
         assert page.dark
 
     on_page(steps)
@@ -394,6 +395,52 @@ def test_a_tab_that_is_loaded_again_goes_on_where_it_was():
         await page.again()
         assert page.one("control pose.x")._props["text"] == "20 mm"
         assert page.one("undo").enabled
+
+    on_page(steps)
+
+
+def test_a_link_opens_the_same_machine_at_the_same_pose_in_another_tab():
+    async def steps(page):
+        await page.choose("machines", "hexapod")
+        await page.send("control pose.x", "write", "1/3 mm")
+        await page.send("control geometry.base_angles.1", "write", "12 deg")
+        address = page.one("browser")._props["address"]
+        assert address.startswith("machine=hexapod&geometry.base_angles.1=")
+        other = await page.another(f"/?{address}")
+        assert other.one("machines").value == "hexapod"
+        assert other.one("browser")._props["address"] == address
+        assert other.one("control pose.x")._props["text"] == page.one("control pose.x")._props["text"]
+        assert not page.user.notify.messages
+
+    on_page(steps)
+
+
+def test_a_link_to_a_machine_of_ones_own_holds_its_file():
+    async def steps(page):
+        await page.upload("mine.toml", bundled()["tripteron"].replace('name = "z"', 'name = "up & down"').encode())
+        await page.send("control load.force.2", "write", "-500 N")
+        other = await page.another(f"/?{page.one('browser')._props['address']}")
+        assert other.one("machines").value == "own"
+        assert other.one("control load.force.2")._props["text"] == "-500 N"
+
+    on_page(steps)
+
+
+@pytest.mark.parametrize(
+    ("address", "message"),
+    [
+        ("machine=hexapo", "did you mean"),
+        ("machine=hexapod&pose.x=5 parsnips", "parsnips"),
+        ("machine=hexapod&pose.q=5 mm", "pose.q"),
+        ("file=AAAA", "damaged or too large"),
+        ("pose.x=5 mm", "names no machine"),
+    ],
+)
+def test_a_link_with_a_mistake_is_refused_with_a_reason(address, message):
+    async def steps(page):
+        other = await page.another(f"/?{address}")
+        assert any(message in text for text in other.user.notify.messages)
+        assert other.one("machines").value == MACHINE
 
     on_page(steps)
 

@@ -45,7 +45,16 @@ class MachineView(Labelled, component=RENDERER / "machine_view.js", esm=MODULES)
 
 
 class BrowserLink(Element, component=COMPONENTS / "browser_link.js"):
-    """What the page and the browser around it have in common; events `undo` and `redo` by the keyboard."""
+    """What the page and the browser around it have in common: the address, and whether it is dark.
+
+    Events `undo` and `redo` by the keyboard; `theme` after the method `otherTheme`: dark, light, or None as the system.
+    """
+
+    def put(self, address: str) -> None:
+        """Show this query in the address."""
+        if self._props.get("address") != address:
+            self._props["address"] = address
+            self.update()
 
 
 class MapView(Labelled, component=COMPONENTS / "map_view.js"):

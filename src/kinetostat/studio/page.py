@@ -13,6 +13,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
+from kinetostat.studio.address import address_of
 from kinetostat.studio.answers import Picture, PictureRequest, Report, ReportRequest, picture, report
 from kinetostat.studio.design.design_tab import DesignTab, Workshop
 from kinetostat.studio.elements import BrowserLink, icon_button, refuse, toggle, upload_field
@@ -48,19 +49,21 @@ OTHER = "own"
 class StudioPage:
     """The page of one browser tab, with a session that no other tab shares."""
 
-    def __init__(self, memory: Memory, remember: Callable[[Memory], None], workshop: Workshop) -> None:
+    def __init__(self, memory: Memory, remember: Callable[[Memory, str], None], workshop: Workshop) -> None:
         """Build the page and request its first picture, map and report.
 
         Args:
             memory: state of this tab from which to go on.
-            remember: called with the new state whenever it changes.
+            remember: called with the new state and its address whenever it changes.
             workshop: searches and favourites of the server.
         """
         self.session, self._remember = Session(memory), remember
         self._pictures = Lane(picture, self._show_picture, self._unanswered)
         self._reports = Lane(report, self._show_report, self._unanswered)
         self._latest: Report | None = None
-        self.dark = ui.dark_mode(value=False)
+        self.dark = ui.dark_mode(value=None)
+        self.browser = BrowserLink().on("undo", self._undo).on("redo", self._redo).mark("browser")
+        self.browser.on("theme", lambda event: self.dark.set_value(event.args))
         ui.colors(primary=ACCENT)
         self._header()
         with ui.element("main").classes("studio") as self.main:
@@ -79,7 +82,6 @@ class StudioPage:
             self.design = DesignTab(self.session, workshop, self._take)
         ui.context.client.on_delete(self._close)
         ui.on_exception(lambda error: refuse(f"Something could not be done or shown. {as_sentence(error)}"))
-        BrowserLink().on("undo", self._undo).on("redo", self._redo).mark("browser")
         self._loaded()
 
     def _header(self) -> None:
@@ -96,7 +98,7 @@ class StudioPage:
             icon_button("folder_open", "Open a machine file", lambda: self.upload.run_method("pickFiles"), "open")
             icon_button("download", "Save the machine as a file", self._save, "save")
             self.files = FilesMenu(self.session)
-            icon_button("contrast", "Light or dark", self.dark.toggle, "theme")
+            icon_button("contrast", "Light or dark", lambda: self.browser.run_method("otherTheme"), "theme")
 
     def _views(self) -> None:
         self.panels: dict[str, Panel] = {}
@@ -142,7 +144,14 @@ class StudioPage:
         self.undo.set_enabled(self.session.can_undo)
         self.redo.set_enabled(self.session.can_redo)
         self.reset.set_enabled(self.session.machine is not self.session.origin)
-        self._remember(self.session.memory)
+        self._keep()
+
+    def _keep(self) -> None:
+        """Remember the state of the session, and show it in the address."""
+        memory = self.session.memory
+        address = address_of(memory)
+        self._remember(memory, address)
+        self.browser.put(address)
 
     def _show_picture(self, _request: PictureRequest, drawn: Picture) -> None:
         """Draw, then let a waiting slider go on, then request the figures: the eye follows the picture first."""
@@ -161,7 +170,7 @@ class StudioPage:
     def _exaggerate(self, factor: float | None) -> None:
         """Draw the deflected shape with another factor; None to choose one."""
         self.session.exaggeration = factor
-        self._remember(self.session.memory)
+        self._keep()
         self._report()
 
     def _show_report(self, request: ReportRequest, new: Report) -> None:

@@ -6,18 +6,22 @@ What is on the page is the business of `page`.
 import asyncio
 import socket
 import sys
+from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
+from urllib.parse import parse_qsl
 
-from nicegui import app, background_tasks, core, ui
+from nicegui import app, background_tasks, core, run, ui
 from nicegui.client import ClientConnectionTimeout
 from nicegui.server import Server
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
+from kinetostat.studio.address import memory_of
 from kinetostat.studio.admission import LARGEST_BODY, BoundedBody, OwnOrigin, Paced, timed
 from kinetostat.studio.design.design_tab import Workshop
+from kinetostat.studio.elements import refuse
 from kinetostat.studio.page import StudioPage
 from kinetostat.studio.session import Memory
 
@@ -27,8 +31,10 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 SWITCH = 0.0005
 """Seconds after which a computing thread lets the event loop run: a tenth of Python's default. With many tabs, messages
 would otherwise pile up until browsers take the silence for a lost connection."""
-MEMORY = "machine"
-"""Key under which the work of a tab is remembered while the server runs."""
+MEMORY, ADDRESSES = "machine", "addresses"
+"""Keys under which the work of a tab, and its latest addresses, are remembered while the server runs."""
+REMEMBERED = 60
+"""Addresses that are remembered: the browser shows them with a delay, in which there may be as many."""
 PATIENCE = 30.0
 """Seconds within which a page that has been loaded must open its socket."""
 MARK = (
@@ -106,7 +112,7 @@ def prepare(machine: Machine, name: str, workshop: Workshop, hosts: Sequence[str
     if hosts:
         app.add_middleware(TrustedHostMiddleware, allowed_hosts=[*hosts, "[::1]"])
 
-    @ui.page("/")
+    @ui.page("/", dark=None)
     async def studio() -> None:
         await show(machine, name, workshop)
 
@@ -128,5 +134,19 @@ async def show(machine: Machine, name: str, workshop: Workshop) -> None:
     if client.is_deleted:
         return  # loaded by something that is not a browser, or left at once
     remembered = app.storage.tab
-    memory = remembered.get(MEMORY) or Memory(machine, name)
-    StudioPage(memory, lambda changed: remembered.update({MEMORY: changed}), workshop)
+    query = client.request.url.query
+    known: deque[str] = remembered.setdefault(ADDRESSES, deque(maxlen=REMEMBERED))
+    memory, problem = remembered.get(MEMORY), ""
+    if query and query not in known:  # a link; after a reload, the tab's own memory knows what can be undone, too
+        try:
+            memory = await run.io_bound(memory_of, parse_qsl(query, keep_blank_values=True))
+        except InputError as error:
+            problem = str(error)
+
+    def remember(changed: Memory, address: str) -> None:
+        remembered[MEMORY] = changed
+        known.append(address)
+
+    StudioPage(memory or Memory(machine, name), remember, workshop)
+    if problem:
+        refuse(problem)

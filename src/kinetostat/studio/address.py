@@ -1,0 +1,87 @@
+"""The address of a page: which machine, and what has been changed of it, so that a link opens it at the same pose.
+
+    ?machine=hexapod&pose.z=0.21 m          a bundled machine with changes
+    ?file=eNpt...&pose.z=0.21 m             any other, as a compressed file
+
+It is text from anywhere, and is checked like a file.
+"""
+
+import base64
+import binascii
+import zlib
+from collections.abc import Iterable, Iterator
+from urllib.parse import quote, urlencode
+
+from kinetostat.machine.changing import changed, rebuilt
+from kinetostat.machine.loading import as_toml, build, bundled, load
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import parameters, values
+from kinetostat.spec.document import LARGEST_FILE
+from kinetostat.spec.errors import InputError, choice
+from kinetostat.studio.session import Memory
+
+MACHINE, FILE = "machine", "file"
+"""Keys of a bundled machine's name, and of a compressed machine file."""
+LONGEST = 8000
+"""Characters of an address; browsers and servers take some more. A machine that needs more has no link."""
+
+
+def address_of(memory: Memory) -> str:
+    """Return the query of the address of a page, without the question mark; empty if it would be too long."""
+    origin, machine = memory.origin, memory.now or memory.origin
+    if origin.name != machine.name or origin.family.literals != machine.family.literals:
+        origin = machine
+    bundled_origin = memory.name and origin is memory.origin
+    start = (MACHINE, memory.name) if bundled_origin else (FILE, _packed(as_toml(origin)))
+    query = urlencode([start, *_changes(origin, machine)], quote_via=quote, safe="/*")
+    return query if len(query) <= LONGEST else ""
+
+
+def _changes(origin: Machine, machine: Machine) -> Iterator[tuple[str, str]]:
+    """Yield the fields, or entries of fields, that differ, and their values as text that gives them back exactly."""
+    before, after, done = values(origin), values(machine), set[str]()
+    for parameter in parameters(machine.family):  # a field of several comes before its entries
+        leaves = [leaf for leaf in parameter.leaves if leaf not in done]
+        alike = len({after[leaf] for leaf in parameter.leaves}) == 1
+        if alike and any(after[leaf] != before[leaf] for leaf in leaves):
+            done.update(leaves)
+            yield parameter.path, parameter.quantity.show(after[leaves[0]])
+
+
+def memory_of(query: Iterable[tuple[str, str]]) -> Memory:
+    """Return the state that an address stands for.
+
+    Args:
+        query: its keys and values.
+
+    Raises:
+        InputError: it names no machine, or the machine or a change of it has a mistake.
+    """
+    (key, text), *changes = [*query] or [("", "")]
+    if key == MACHINE:
+        choice(text, bundled(), f"{MACHINE} in the address")
+        name, origin = text, load(text)
+    elif key == FILE:
+        name, origin = "", build(_unpacked(text), "the machine in the address")
+    else:
+        raise InputError(f"the address names no machine; it must begin with ?{MACHINE}=... or ?{FILE}=... .")
+    return Memory(origin, name, rebuilt(changed(origin, dict(changes))) if changes else None)
+
+
+def _packed(text: str) -> str:
+    return base64.urlsafe_b64encode(zlib.compress(text.encode(), 9)).decode().rstrip("=")
+
+
+def _unpacked(packed: str) -> str:
+    """Return the text of a file in an address; a limit keeps a short address from becoming a large text."""
+    try:
+        data = base64.urlsafe_b64decode(packed + "=" * (-len(packed) % 4))
+        reader = zlib.decompressobj()
+        text = reader.decompress(data, LARGEST_FILE)
+        if reader.eof:
+            return text.decode("utf-8")
+    except (binascii.Error, zlib.error, ValueError):
+        pass
+    raise InputError(
+        f"the machine file in the address is damaged or too large; copy the whole address after ?{FILE}= ."
+    )
