@@ -4,6 +4,7 @@ import asyncio
 import io
 import json
 import math
+import re
 import zipfile
 from pathlib import Path
 
@@ -16,12 +17,14 @@ from studio_page import on_page
 
 from kinetostat import export
 from kinetostat.cli import main
-from kinetostat.machine.loading import bundled, load
+from kinetostat.machine.loading import build, bundled, load
 from kinetostat.studies.analysis import analyze
 from kinetostat.studio import answers
 from kinetostat.studio.admission import BoundedBody
+from kinetostat.studio.gallery import about
 from kinetostat.studio.panels.tables import matrix_text
 from kinetostat.studio.serving import LOOPBACK
+from kinetostat.studio.text_pane import explained, reading
 from machines import KINDS
 
 MACHINE = "zhang-gosselin-4dof"
@@ -322,6 +325,89 @@ def test_another_machine_replaces_all_controls():
         assert page.one("map-across").value.startswith("pose.")
 
     on_page(steps)
+
+
+def test_the_text_of_the_machine_is_read_while_it_is_typed():
+    async def steps(page):
+        await page.choose("mode", "Text")
+        text = page.one("text")._props["text"]
+        assert "base_radius" in text
+        wrong = text.replace("base_radius", "base_radios", 1)
+        await page.send("text", "edit", wrong)
+        assert "did you mean base_radius?" in page.one("text-message").content
+        line = page.one("text")._props["line"]
+        assert wrong.splitlines()[line - 1].startswith("[geometry]")
+        assert page.one("status").text == "ok"
+        await page.send("control pose.x", "write", "1 cm")  # the mistake stays to be mended
+        assert page.one("text")._props["text"] == text
+        await page.send("text-back", "click")
+        assert page.one("text")._props["line"] == 0
+        text = page.one("text")._props["text"]
+        assert build(text).tables["pose"].x == 0.01
+        version = page.one("text")._props["version"]
+        for height in ("690 mm", "695 mm"):
+            await page.send("text", "edit", re.sub(r'(?m)^z( *)= ".*?"', f'z\\1= "{height}"', text))
+        assert page.one("text")._props["version"] == version  # what is typed is not written over
+        assert page.one("control pose.z")._props["text"] == "695 mm"
+        assert page.shown("MachineView", "show")
+        await page.send("undo", "click")
+        assert page.one("control pose.z")._props["text"] == "680 mm"
+        assert build(page.one("text")._props["text"]).tables["pose"].z == 0.68
+
+    on_page(steps)
+
+
+def test_the_text_of_another_kind_of_machine_replaces_all_controls():
+    async def steps(page):
+        await page.choose("mode", "Text")
+        await page.send("text", "edit", bundled()["tripteron"])
+        assert page.one("machines").value == "own"
+        assert page.one("status").text == "ok"
+        assert page.one("control pose.y")
+        await page.send("text", "place", 1)
+        assert "shows this text" in page.one("text-message").content
+
+    on_page(steps)
+
+
+@pytest.mark.parametrize(
+    ("machine", "before", "after", "line"),
+    [
+        ("hexapod", "[geometry]", "[geometry", "[geometry"),
+        ("hexapod", '"115 mm"', '"115 parsnips"', "base_radius "),
+        ("hexapod", '"110 deg"', '"x"', "base_angles"),
+        ("tripteron", "stiffness", "stiffnes", "name"),
+    ],
+)
+def test_a_mistake_in_the_text_is_marked_at_its_line(machine, before, after, line):
+    text = bundled()[machine].replace(before, after, 1)
+    result = reading(text)
+    assert result.machine is None
+    assert text.splitlines()[result.line - 1].strip().startswith(line)
+
+
+def test_the_meaning_of_a_field_is_that_of_the_schema():
+    machine = load("hexapod")
+    assert explained(machine, "geometry.base_radius").startswith("<b>base_radius</b>: radius of the base joints")
+    assert explained(machine, "geometry.nothing") == explained(machine, "name") == ""
+
+
+def test_the_gallery_opens_any_bundled_machine():
+    async def steps(page):
+        await page.send("gallery", "click")
+        for name in bundled():
+            assert page.one(f"gallery {name}")
+        await page.send("gallery delta", "click")
+        assert page.one("machines").value == "delta"
+        assert page.one("status").text == "ok"
+
+    on_page(steps)
+
+
+def test_a_machine_file_is_described_by_its_first_sentence():
+    assert about(bundled()["passive-leg-3dof-pu"]).endswith("on the base axis: three freedoms")
+    assert about(bundled()[MACHINE]).startswith("The machine of D. Zhang and C. M. Gosselin,")
+    assert about('name = "mine"') == ""
 
 
 def test_a_file_of_ones_own_opens_and_saves():

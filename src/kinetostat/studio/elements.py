@@ -111,6 +111,25 @@ class QuantityRow(Labelled, component=COMPONENTS / "quantity_row.js"):
             self.update()
 
 
+class TextEditor(Labelled, component=COMPONENTS / "text_editor.js"):
+    """A text with line numbers; events `edit` with the whole text, and `place` with the line of the cursor."""
+
+    def __init__(self, label: str) -> None:
+        super().__init__(label)
+        self._props.update(text="", version=0, line=0)
+
+    def put(self, text: str) -> None:
+        """Show a text in the place of what was typed."""
+        self._props.update(text=text, version=self._props["version"] + 1)
+        self.update()
+
+    def mark_line(self, line: int) -> None:
+        """Mark the line of a mistake; 0 for none."""
+        if self._props["line"] != line:
+            self._props["line"] = line
+            self.update()
+
+
 def choice(
     options: dict[Any, str] | list[str], label: str, on_change: Callable[..., None], mark: str,
     value: Any = None, searchable: bool = False,

@@ -41,8 +41,9 @@ class Lane(Generic[Request, Result]):
             failed: says on the page that `work` has raised an exception; None for the page's own way to say it.
         """
         self._work, self._deliver = work, deliver
-        self._failed = failed or context.client.handle_exception
-        self._share = _share(context.client)
+        self._page = context.client
+        self._failed = failed or self._page.handle_exception
+        self._share = _share(self._page)
         self._waiting: list[Request] = []
         self.busy = False
         self._open = True
@@ -74,11 +75,13 @@ class Lane(Generic[Request, Result]):
             try:
                 result = await asyncio.get_running_loop().run_in_executor(_workers(), self._work, request)
                 if self._open and result is not None:
-                    self._deliver(request, result)
+                    with self._page:
+                        self._deliver(request, result)
             except Exception as error:
                 log.exception("the studio could not compute or show something")
                 if self._open:
-                    self._failed(error)
+                    with self._page:
+                        self._failed(error)
 
 
 def as_sentence(error: Exception) -> str:

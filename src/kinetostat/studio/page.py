@@ -18,6 +18,7 @@ from kinetostat.studio.answers import Picture, PictureRequest, Report, ReportReq
 from kinetostat.studio.design.design_tab import DesignTab, Workshop
 from kinetostat.studio.elements import BrowserLink, icon_button, refuse, toggle, upload_field
 from kinetostat.studio.files_menu import FilesMenu
+from kinetostat.studio.gallery import Gallery
 from kinetostat.studio.handles import Handles
 from kinetostat.studio.lanes import Lane, as_sentence
 from kinetostat.studio.map_panel import MapPanel
@@ -31,6 +32,7 @@ from kinetostat.studio.playback import Playback
 from kinetostat.studio.pulling import free_axes
 from kinetostat.studio.scene_panel import ScenePanel
 from kinetostat.studio.session import Memory, Session
+from kinetostat.studio.text_pane import TextPane
 from kinetostat.studio.uploads import check_upload
 from kinetostat.views.scene.proportions import proportions_of
 
@@ -40,8 +42,9 @@ PANELS: tuple[type[Panel], ...] = (
 """The linked views, in the order of their tabs."""
 ACCENT = "#0b5ea8"
 """Colour of buttons and marks; style.css has it by name."""
-MODES = ("Explore", "Design")
-"""What stands beside the machine: its numbers and linked views, or the design tab."""
+MODES = {"Explore": "studio", "Text": "studio texting", "Design": "studio designing"}
+"""What stands beside the machine: its numbers, the text of its file, or the design tab; and the page's classes."""
+EXPLORE, TEXT, DESIGN = MODES
 OTHER = "own"
 """Key in the list of machines of one that is not bundled."""
 
@@ -69,6 +72,8 @@ class StudioPage:
         with ui.element("main").classes("studio") as self.main:
             with ui.element("section").classes("left").props('aria-label="parameters"'):
                 self.parameters = ParametersPanel(self.session, self.changed, lambda: self._pictures.busy)
+            with ui.element("section").classes("text-pane left").props('aria-label="machine file"'):
+                self.text = TextPane(self.session, lambda machine: self._take(machine, typed=True))
             with ui.element("section").classes("middle").props('aria-label="machine"'):
                 self.scene = ScenePanel(self._exaggerate, lambda: self.session.machine.name)
                 self.handles = Handles(self.session, self.scene.view, self.changed)
@@ -89,10 +94,11 @@ class StudioPage:
             ui.html("kineto<b>stat</b> studio", sanitize=False).classes("wordmark")
             self.machines = ui.select({}, on_change=self._choose).mark("machines")
             self.machines.props('dense options-dense outlined aria-label="machine"').classes("field machine-choice")
+            Gallery(lambda name: self._attempt(lambda: self.session.open(name)))
             self.undo = icon_button("undo", "Undo (Ctrl+Z)", self._undo, "undo")
             self.redo = icon_button("redo", "Redo (Ctrl+Y)", self._redo, "redo")
             self.reset = icon_button("restart_alt", "Back to the machine as it was loaded", self._reset, "restart_alt")
-            self.mode = toggle(MODES, MODES[0], self._to_front, "mode").classes("mode")
+            self.mode = toggle([*MODES], EXPLORE, self._to_front, "mode").classes("mode")
             ui.space()
             self.upload = upload_field(self._open_upload, refuse, "upload")
             icon_button("folder_open", "Open a machine file", lambda: self.upload.run_method("pickFiles"), "open")
@@ -119,6 +125,7 @@ class StudioPage:
         self.map.refresh(time.perf_counter())
         self._pictures.ask(PictureRequest(self.session.machine, self._sizes, self._axes))
         self.parameters.refresh()
+        self.text.refresh()
         self._offer_history()
 
     def _loaded(self) -> None:
@@ -134,6 +141,7 @@ class StudioPage:
         self._axes = free_axes(machine)
         self.playback.clear()
         self.parameters.fill()
+        self.text.renew()
         self.map.fill()
         self.design.renew()
         self._offer_history()
@@ -208,13 +216,14 @@ class StudioPage:
         self._loaded()
 
     def _to_front(self) -> None:
-        designing = self.mode.value == MODES[1]
-        self.main.classes(replace="studio designing" if designing else "studio")
-        self.design.front(designing)
+        mode = str(self.mode.value)
+        self.main.classes(replace=MODES[mode])
+        self.text.front(mode == TEXT)
+        self.design.front(mode == DESIGN)
 
-    def _take(self, machine: Machine) -> None:
-        """Make a design of a search, or a favourite, the machine of this page."""
-        if self.session.take(machine):
+    def _take(self, machine: Machine, typed: bool = False) -> None:
+        """Make a design of a search, a favourite, or what was typed as text the machine of this page."""
+        if self.session.take(machine, typed):
             self.changed()
         else:
             self._loaded()
@@ -236,7 +245,7 @@ class StudioPage:
         self.changed()
 
     def _close(self) -> None:
-        for part in (self._pictures, self._reports, self.handles, self.map, self.files, self.design):
+        for part in (self._pictures, self._reports, self.handles, self.map, self.files, self.text, self.design):
             part.close()
         for panel in self.panels.values():
             panel.close()

@@ -22,6 +22,7 @@ from kinetostat.studio.address import memory_of
 from kinetostat.studio.admission import LARGEST_BODY, BoundedBody, OwnOrigin, Paced, timed
 from kinetostat.studio.design.design_tab import Workshop
 from kinetostat.studio.elements import refuse
+from kinetostat.studio.gallery import serve_pictures
 from kinetostat.studio.page import StudioPage
 from kinetostat.studio.session import Memory
 
@@ -108,6 +109,7 @@ def prepare(machine: Machine, name: str, workshop: Workshop, hosts: Sequence[str
     handlers["event"] = timed(handlers["event"], lambda tab: core.sio.get_environ(tab)["asgi.scope"])
     for middleware in (BoundedBody, Paced, OwnOrigin):
         app.add_middleware(middleware)
+    serve_pictures()
     app.on_shutdown(workshop.close)
     if hosts:
         app.add_middleware(TrustedHostMiddleware, allowed_hosts=[*hosts, "[::1]"])

@@ -19,6 +19,8 @@ from kinetostat.studio.typed_value import typed_value
 from kinetostat.studio.wording import unit_shown
 from kinetostat.units import UnitError
 
+TEXT = "text"
+"""What is noted in the place of a path while the text of the machine is being typed."""
 REMEMBERED = 200
 """Steps that can be undone."""
 
@@ -91,8 +93,12 @@ class Session:
         """
         self._start(Memory(build(text_of(data, name), name)))
 
-    def take(self, machine: Machine) -> bool:
+    def take(self, machine: Machine, typed: bool = False) -> bool:
         """Take another design: as a change that can be undone if it is of the same kind, else as a new machine.
+
+        Args:
+            machine: the design.
+            typed: whether it was typed as text; what is typed without another change in between is one step.
 
         Returns:
             Whether it is of the same kind, so that all controls are still valid.
@@ -100,8 +106,10 @@ class Session:
         same_family = machine.family.name == self.machine.family.name
         alike = same_family and values(machine).keys() == values(self.machine).keys()
         if alike:
-            self._note()
-            self.machine, self._dragged = machine, ()
+            source = (TEXT,) if typed else ()
+            if not typed or self._dragged != source:
+                self._note()
+            self.machine, self._dragged = machine, source
         else:
             self._start(Memory(machine))
         return alike
@@ -130,7 +138,7 @@ class Session:
             InputError: the numbers contradict each other; the machine is again as it was before the drag.
         """
         dragged, self._dragged = self._dragged, ()
-        if any(related(self.machine, path) for path in dragged):
+        if any(path != TEXT and related(self.machine, path) for path in dragged):
             try:
                 self.machine = rebuilt(self.machine)
             except InputError:

@@ -1,0 +1,182 @@
+"""The machine as the text of its file, beside its picture: what is typed is checked at once, and shown if it is right.
+
+Messages are those of `kinetostat`; what a field means comes from the same annotations as the schema.
+"""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from html import escape
+
+from nicegui import ui
+from nicegui.events import GenericEventArguments
+
+from kinetostat.machine.loading import build
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import doubts
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.fields import quantities
+from kinetostat.studio.elements import TextEditor
+from kinetostat.studio.lanes import Lane
+from kinetostat.studio.session import Session, sent_text
+from kinetostat.units import KINDS
+
+NAME = "the text"
+"""Name of the text in messages, where a file would have its path."""
+RIGHT = "The picture shows this text."
+WRONG = "The picture shows the machine before this mistake."
+_HEADER = re.compile(r"\s*\[+\s*([^\]#]+?)\s*\]+")
+_KEY = re.compile(r"\s*([A-Za-z0-9_-]+)\s*=")
+_LINE = re.compile(r"\bline (\d+)")
+_LEG = re.compile(r'leg "([^"]+)"')
+_PATH = re.compile(r"[\w-]+(?:\.[\w-]+)*")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A text that was read: its machine, or the mistake and the line where it is (0 if unknown)."""
+
+    machine: Machine | None
+    mistake: str = ""
+    line: int = 0
+
+
+def reading(text: str) -> Reading:
+    """Read a machine file."""
+    try:
+        return Reading(build(sent_text(text.encode("utf-8", "replace"), NAME), NAME))
+    except InputError as error:
+        message = str(error).removeprefix(f'"{NAME}": ').removeprefix(f'"{NAME}" ')
+        return Reading(None, message, line_of(message, text))
+
+
+def places(text: str) -> list[str]:
+    """Return for each line of a machine file the path of the field that it sets; a table's for its header, else ""."""
+    table, paths = "", []
+    for line in text.splitlines():
+        if header := _HEADER.match(line):
+            table = header[1].replace('"', "").replace(" ", "")
+            paths.append(table)
+        elif key := _KEY.match(line):
+            paths.append(f"{table}.{key[1]}" if table else key[1])
+        else:
+            paths.append("")
+    return paths
+
+
+def line_of(message: str, text: str) -> int:
+    """Return the line that a message is about: the one it names, or that of the field or leg it begins with; else 0."""
+    if named := _LINE.search(message):
+        return int(named[1])
+    if leg := _LEG.match(message):
+        own = re.compile(rf'\s*name\s*=\s*"{re.escape(leg[1])}"')
+        return next((i for i, line in enumerate(text.splitlines(), 1) if own.match(line)), 0)
+    start = _PATH.match(message)
+    wanted, known = start[0] if start else "", places(text)
+    while wanted:
+        if wanted in known:
+            return known.index(wanted) + 1
+        wanted = wanted.rpartition(".")[0]
+    return 0
+
+
+def explained(machine: Machine, path: str) -> str:
+    """Return as HTML what the field of a machine file means, and what it may be; empty if it is not a field."""
+    table, _, field = path.rpartition(".")
+    fields = machine.family.every_table.get(table)
+    quantity = quantities(fields).get(field) if fields else None
+    if quantity is None:
+        return ""
+    kind = KINDS[quantity.kind]
+    entries = f"; one for all, or a list of {quantity.count}" if quantity.count else ""
+    example = f', e.g. "{kind.example}"' if kind.unit else ""
+    return f"<b>{escape(field)}</b>: {escape(quantity.meaning)}; {escape(kind.name)}{escape(example)}{entries}."
+
+
+class TextPane:
+    """The text, its line numbers, and below it a mistake, or the meaning of the field in which the cursor is."""
+
+    def __init__(self, session: Session, load: Callable[[Machine], None]) -> None:
+        """Build the pane, empty until it comes to the front.
+
+        Args:
+            session: whose machine it shows.
+            load: takes a machine that was typed into the session, as one step with those typed before it.
+        """
+        self._session, self._load = session, load
+        self._front = False
+        self._text = ""
+        self._typed: Machine | None = None
+        self._place = 0
+        self._readings = Lane(self._read, self._take)
+        self._texts = Lane(self._write, self._put)
+        self.editor = TextEditor("machine file").mark("text")
+        self.editor.on("edit", self._edit).on("place", self._go)
+        with ui.element("div").classes("text-foot").props('role="status" aria-live="polite"'):
+            self.message = ui.html("", sanitize=False).classes("grow").mark("text-message")
+            self.back = ui.button("Undo the mistake", on_click=self._discard).props("flat dense no-caps")
+            self.back.tooltip("show the text of the machine in the picture").mark("text-back").set_visibility(False)
+
+    def front(self, on: bool) -> None:
+        """Note whether the pane is in front: only then it follows the machine."""
+        self._front = on
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show the text of the present machine, unless it was typed here or a mistake is still to be mended."""
+        if self._front and self._session.machine is not self._typed and not self.back.visible:
+            self._texts.ask(self._session.machine)
+
+    def renew(self) -> None:
+        """Show the text of another machine that has been loaded, whatever was typed before."""
+        if self._session.machine is not self._typed:
+            self._discard()
+
+    def close(self) -> None:
+        for lane in (self._readings, self._texts):
+            lane.close()
+
+    def _write(self, _machine: Machine) -> str:
+        return self._session.as_file()[1].decode()
+
+    def _put(self, machine: Machine, text: str) -> None:
+        self._typed, self._text = machine, text
+        self.editor.put(text)
+        self._say(Reading(machine))
+
+    def _discard(self) -> None:
+        self.back.set_visibility(False)
+        self._typed = None
+        self.refresh()
+
+    def _edit(self, event: GenericEventArguments) -> None:
+        self._text = str(event.args)
+        self._readings.ask(self._text)
+
+    def _read(self, text: str) -> Reading:
+        return reading(text)
+
+    def _take(self, text: str, result: Reading) -> None:
+        if text != self._text:
+            return
+        self.back.set_visibility(result.machine is None)
+        if result.machine is not None:
+            self._typed = result.machine
+            self._load(result.machine)
+        self._say(result)
+
+    def _go(self, event: GenericEventArguments) -> None:
+        self._place = int(event.args)
+        if not self.back.visible:
+            self._say(Reading(self._session.machine))
+
+    def _say(self, result: Reading) -> None:
+        self.editor.mark_line(result.line)
+        if result.machine is None:
+            text = f'<p class="text-problem">{escape(result.mistake)} {WRONG}</p>'
+        else:
+            known = places(self._text)
+            path = known[self._place - 1] if 0 < self._place <= len(known) else ""
+            lines = [explained(result.machine, path) or RIGHT, *map(escape, doubts(result.machine))]
+            text = f'<p class="text-good">{"<br>".join(lines)}</p>'
+        self.message.set_content(text)
