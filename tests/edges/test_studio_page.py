@@ -336,7 +336,7 @@ def test_the_text_of_the_machine_is_read_while_it_is_typed():
         await page.send("text", "edit", wrong)
         assert "did you mean base_radius?" in page.one("text-message").content
         line = page.one("text")._props["line"]
-        assert wrong.splitlines()[line - 1].startswith("[geometry]")
+        assert wrong.splitlines()[line - 1].startswith("base_radios")
         assert page.one("status").text == "ok"
         await page.send("control pose.x", "write", "1 cm")  # the mistake stays to be mended
         assert page.one("text")._props["text"] == text

@@ -38,7 +38,7 @@ def address_of(memory: Memory) -> str:
 
 
 def _changes(origin: Machine, machine: Machine) -> Iterator[tuple[str, str]]:
-    """Yield the fields, or entries of fields, that differ, and their values as text that gives them back exactly."""
+    """List the fields, or entries of fields, that differ, and their values as text that gives them back exactly."""
     before, after, done = values(origin), values(machine), set[str]()
     for parameter in parameters(machine.family):  # a field of several comes before its entries
         leaves = [leaf for leaf in parameter.leaves if leaf not in done]

@@ -225,7 +225,7 @@ def read_typed(parameter: Parameter, text: str, shown_unit: str) -> float:
     try:
         return typed_value(text, quantity.kind, shown_unit)
     except UnitError as error:
-        raise InputError(f"{parameter.path} is {shorten(text)}: {error}.") from None
+        raise InputError(f"{parameter.shown} is {shorten(text)}: {error}.") from None
 
 
 def file_stem(name: str) -> str:

@@ -18,7 +18,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import quantities
 from kinetostat.studio.elements import TextEditor
 from kinetostat.studio.lanes import Lane
-from kinetostat.studio.session import Session, sent_text
+from kinetostat.studio.session import Session
 from kinetostat.units import KINDS
 
 NAME = "the text"
@@ -44,7 +44,7 @@ class Reading:
 def reading(text: str) -> Reading:
     """Read a machine file."""
     try:
-        return Reading(build(sent_text(text.encode("utf-8", "replace"), NAME), NAME))
+        return Reading(build(text, NAME))
     except InputError as error:
         message = str(error).removeprefix(f'"{NAME}": ').removeprefix(f'"{NAME}" ')
         return Reading(None, message, line_of(message, text))
@@ -69,10 +69,10 @@ def line_of(message: str, text: str) -> int:
     if named := _LINE.search(message):
         return int(named[1])
     if leg := _LEG.match(message):
-        own = re.compile(rf'\s*name\s*=\s*"{re.escape(leg[1])}"')
-        return next((i for i, line in enumerate(text.splitlines(), 1) if own.match(line)), 0)
-    start = _PATH.match(message)
-    wanted, known = start[0] if start else "", places(text)
+        line_of_name = re.compile(rf'\s*name\s*=\s*"{re.escape(leg[1])}"')
+        return next((i for i, line in enumerate(text.splitlines(), 1) if line_of_name.match(line)), 0)
+    known, paths = places(text), [path.rstrip(".") for path in _PATH.findall(message)]
+    wanted = next((path for path in paths if "." in path and path in known), paths[0] if paths else "")
     while wanted:
         if wanted in known:
             return known.index(wanted) + 1
