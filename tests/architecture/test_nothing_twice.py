@@ -13,7 +13,6 @@ SMALL = 36
 CALLED_FROM_OUTSIDE = {
     "WITH_CRANKS": "the catalogue takes every family that a module defines",
     "dask_setup": "called by workers of a cluster, by this name",
-    "error": "called by argparse, by this name",
     "_fill_text": "called by argparse, by this name",
     "_split_lines": "called by argparse, by this name",
     "doctype": "called by the parser of XML, by this name",

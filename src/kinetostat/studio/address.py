@@ -7,7 +7,6 @@ It is text from anywhere, and is checked like a file.
 """
 
 import base64
-import binascii
 import zlib
 from collections.abc import Iterable, Iterator
 from urllib.parse import quote, urlencode
@@ -80,7 +79,7 @@ def _unpacked(packed: str) -> str:
         text = reader.decompress(data, LARGEST_FILE)
         if reader.eof:
             return text.decode("utf-8")
-    except (binascii.Error, zlib.error, ValueError):
+    except (ValueError, zlib.error):
         pass
     raise InputError(
         f"the machine file in the address is damaged or too large; copy the whole address after ?{FILE}= ."
