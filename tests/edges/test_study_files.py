@@ -130,11 +130,14 @@ def test_what_memory_cannot_hold_is_refused():
         written(SMALL, grid, *robust)
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"study": 1}'])
-def test_a_folder_that_is_no_optimisation_is_refused(text, tmp_path, capsys):
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("{", "is damaged"), ("[]", "is damaged"), ('{"study": 1}', "not the folder of an optimisation")],
+)
+def test_a_folder_that_is_no_optimisation_is_refused(text, words, tmp_path, capsys):
     (tmp_path / "study.json").write_text(text)
     assert main(["optimize", str(tmp_path)]) == BAD_INPUT
-    assert "not the folder of an optimisation" in capsys.readouterr().err
+    assert words in capsys.readouterr().err
 
 
 def test_a_name_that_no_file_can_have_is_refused(capsys):

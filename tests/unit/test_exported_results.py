@@ -118,3 +118,10 @@ def test_an_unknown_format_is_refused(tmp_path):
         choose("mjfc", None)
     with pytest.raises(InputError, match=r"ends as one of: mjcf \(\.xml\)"):
         choose(None, tmp_path / "machine.sldprt")
+
+
+@pytest.mark.parametrize("name", ['=HYPERLINK("x")', "+sum", "-cmd", "@sum"])
+def test_no_name_becomes_a_formula_of_a_spreadsheet(name, tmp_path):
+    _, path = written("delta", "csv", tmp_path, f"name={name}")
+    row = next(csv.reader(line for line in path.read_text().splitlines() if line.startswith("about,machine")))
+    assert row[2] == f"'{name}"

@@ -36,11 +36,16 @@ def write_csv(analysis: Analysis, path: Path) -> list[Path]:
     writer.writerow(CSV_HEADER)
     dataset = as_dataset(analysis)
     for key in ABOUT:
-        writer.writerow(("about", key, dataset.attrs[key], "", ""))
+        writer.writerow(("about", key, no_formula(str(dataset.attrs[key])), "", ""))
     for quantity, row, column, value, unit in _lines(dataset):
-        writer.writerow((quantity, row, column, "" if value != value else repr(value), unit))
+        writer.writerow((quantity, no_formula(row), no_formula(column), "" if value != value else repr(value), unit))
     write_text(path, text.getvalue())
     return [path]
+
+
+def no_formula(text: str) -> str:
+    """Return a name with an apostrophe before it where a spreadsheet would take it for a formula and compute it."""
+    return f"'{text}" if text.lstrip()[:1] in ("=", "+", "-", "@") else text
 
 
 def _lines(dataset: xr.Dataset) -> Iterator[Line]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.urdf_export import OPPOSITE, TIP
 from kinetostat.exchange.urdf_file import Array, FileJoint, FileLoop, UrdfFile, numbers, read
 from kinetostat.kinematics.mobility import task_coordinates
@@ -79,7 +80,13 @@ def document_of(file: UrdfFile) -> Document:
     point = file.frames[platform][:3, 3]
     given = PLANAR_POSE if space == "planar" else SPATIAL_POSE
     pose = {name: float(point["xyz".index(name)]) if name in "xyz" else 0.0 for name in given}
-    document: Document = {"schema": SCHEMA_VERSION, "name": file.name, "family": NAME, "space": space, "pose": pose}
+    document: Document = {
+        "schema": SCHEMA_VERSION,
+        "name": one_line(file.name)[:80],
+        "family": NAME,
+        "space": space,
+        "pose": pose,
+    }
     document |= {"platform": {"point": point.tolist()}, "legs": legs}
     tool = file.about.get("tool", "tool")
     if tool in file.frames:

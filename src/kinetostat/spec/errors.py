@@ -4,6 +4,8 @@ import difflib
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
+PRINTABLE = r"^[^\u0000-\u001f\u007f-\u009f\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]*$"
+"""Names: no control characters, which would reach terminals, and none that reverse the text after them."""
 SHOWN, WORDED = 5, 100
 """Mistakes of a file that a message shows, and those that are put into words at all: a hostile file has thousands."""
 

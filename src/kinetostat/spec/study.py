@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from kinetostat.spec.document import Document, override
-from kinetostat.spec.errors import InputError, cut, first_mistakes, shorten
+from kinetostat.spec.errors import PRINTABLE, InputError, cut, first_mistakes, shorten
 from kinetostat.spec.requirements import Requirements
 
 MOST_POPULATION = 100_000
@@ -140,7 +140,7 @@ class StudyFile(Table):
     """A study file."""
 
     schema_version: Literal[1] = Field(default=1, alias="schema", description="version of the file format")
-    name: str = Field(description="what people call the study", min_length=1, max_length=80)
+    name: str = Field(description="what people call the study", min_length=1, max_length=80, pattern=PRINTABLE)
     machine: str = Field(description="a bundled machine, or the path of a machine file from this file", min_length=1)
     changes: dict[str, Any] = Field(
         default={}, alias="set", description="fields of the machine that differ from its file"
@@ -192,6 +192,8 @@ def _sentence(mistake: dict[str, Any], document: Document) -> str:
         return f"{name} is not known; " + (f"did you mean {near[0]}?" if near else f"it may be {', '.join(known)}.")
     if mistake["type"] in ("model_type", "model_attributes_type"):
         return f"{name} is {shorten(value)}; it must be a table with the keys {', '.join(_allowed(path))}."
+    if mistake["type"] == "string_pattern_mismatch":
+        return f"{name} is {shorten(value)}; it must be text that can be printed, without control characters."
     message = str(mistake["msg"]).removeprefix("Input ")
     return f"{name} is {shorten(value)}: it {message[0].lower()}{message[1:]}{_hint(path)}."
 

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from kinetostat.display import DIGITS, EXAMPLE, SI
 from kinetostat.spec.document import Document
-from kinetostat.spec.errors import InputError, cut, first_mistakes, shorten
+from kinetostat.spec.errors import PRINTABLE, InputError, cut, first_mistakes, shorten
 from kinetostat.spec.fields import Quantity, optional, quantities
 from kinetostat.units import KINDS
 
@@ -49,7 +49,10 @@ def _file_model(family: str, tables: tuple[tuple[str, type], ...]) -> type[BaseM
             Literal[1],
             Field(alias="schema", description="version of the file format", default=SCHEMA_VERSION),
         ),
-        "name": (str, Field(description="what people call the machine", min_length=1, max_length=80)),
+        "name": (
+            str,
+            Field(description="what people call the machine", min_length=1, max_length=80, pattern=PRINTABLE),
+        ),
         "family": (Literal[family], Field(description="kind of machine, see `kinetostat list`")),
     }
     content["display"] = (dict[str, Any], Field(default={}, json_schema_extra=DISPLAY_SCHEMA))
@@ -132,7 +135,7 @@ def _sentence(mistake: dict[str, Any], document: Document, tables: Mapping[str, 
     if name == "schema":
         return f"schema is {value}; this version reads schema = {SCHEMA_VERSION}."
     if name == "name":
-        return f'name is {value}; it must be text of 1 to 80 characters, e.g. name = "my machine".'
+        return f'name is {value}; it must be text of 1 to 80 characters that can be printed, e.g. name = "my machine".'
     return f"{name} is {value}: {mistake['msg']}."
 
 
