@@ -22,6 +22,7 @@ from kinetostat.kinetostatics.quantities import group_of, spoken
 from kinetostat.studies.grid.grid import failures
 from kinetostat.studies.storage import replacing
 from kinetostat.views.grid_tables import display_of
+from kinetostat.views.lettering import letter
 from kinetostat.views.levels import levels_of
 
 STYLE: Any = {
@@ -158,6 +159,7 @@ def as_svg(figure: Figure) -> str:
 def fix_layout(figure: Figure) -> None:
     """Lay out once, not again for each file format."""
     FigureCanvasAgg(figure)  # without it, each size of a text would be measured by a renderer of its own
+    letter(figure)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
 
