@@ -1,0 +1,114 @@
+"""Attack kinetostat: `python tests/attack --files 100000 --lines 10000 --kills 20`.
+
+Every case has a number, drawn from the seed; `--case KIND:NUMBER` repeats one alone. Findings are printed with their
+cases, one of each sort; the exit code is 1 where there is any.
+"""
+
+import argparse
+import os
+import resource
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from random import Random
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from hostile import file
+from judging import FILES, judged, line_case
+from kills import COMMANDS, kill_and_resume, undisturbed
+from lines import command_line
+
+MEMORY = 3 << 30
+"""Address space of a process, bytes: a case that wants more is a finding, not the end of the computer."""
+BLOCK = 50
+
+
+def attack(kind: str, number: int, seed: int) -> str | None:
+    """Make the case of a number and judge it."""
+    rng = Random(f"{seed} {kind} {number}")
+    if kind == "line":
+        return judged(partial(line_case, command_line(rng)))
+    return judged(partial(FILES[kind], file(rng, kind)))
+
+
+def block(kind: str, seed: int, numbers: range) -> list[tuple[str, int, str]]:
+    """Findings of some cases."""
+    _bound_memory()
+    os.chdir(tempfile.mkdtemp())
+    results = ((kind, number, attack(kind, number, seed)) for number in numbers)
+    return [(kind, number, finding) for kind, number, finding in results if finding]
+
+
+def _bound_memory() -> None:
+    most = resource.getrlimit(resource.RLIMIT_AS)[1]
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY if most < 0 else min(MEMORY, most), most))
+
+
+def blocks(files: int, lines: int) -> Iterator[tuple[str, range]]:
+    """Kinds and numbers of the cases: of the files, six machines to three studies and one URDF."""
+    counts = {"machine": files * 6 // 10, "study": files * 3 // 10, "urdf": files // 10, "line": lines}
+    for kind, count in counts.items():
+        for first in range(0, count, BLOCK):
+            yield kind, range(first, min(first + BLOCK, count))
+
+
+def kills(count: int, seed: int) -> Iterator[str]:
+    """Findings of stopped and resumed commands."""
+    for name in COMMANDS if count else ():
+        with tempfile.TemporaryDirectory() as folder:
+            whole, seconds = undisturbed(name, Path(folder))
+            for number in range(count):
+                rng = Random(f"{seed} {name} {number}")
+                finding = kill_and_resume(rng, name, whole, seconds)
+                if finding:
+                    yield finding
+
+
+def show(kind: str, number: int, seed: int) -> None:
+    """Print a case and how it ends."""
+    rng = Random(f"{seed} {kind} {number}")
+    print(command_line(rng) if kind == "line" else file(rng, kind))
+    print("->", attack(kind, number, seed) or "well answered")
+
+
+def main() -> int:
+    """Run the attack, or one case of it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--files", type=int, default=1000)
+    parser.add_argument("--lines", type=int, default=100)
+    parser.add_argument("--kills", type=int, default=0, help="how often each long command is killed")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--case", metavar="KIND:NUMBER", help="show one case and its end")
+    options = parser.parse_args()
+    if options.case:
+        kind, _, number = options.case.partition(":")
+        show(kind, int(number), options.seed)
+        return 0
+    sorts: Counter[str] = Counter()
+    with ProcessPoolExecutor(options.jobs, get_context("fork")) as pool:
+        drawn = blocks(options.files, options.lines)
+        runs = [pool.submit(block, kind, options.seed, numbers) for kind, numbers in drawn]
+        for run in runs:
+            for kind, number, finding in run.result():
+                last = finding.strip().splitlines()[-1][:160]
+                sorts[f"{kind}: {last}"] += 1
+                if sorts[f"{kind}: {last}"] == 1:
+                    print(f"--case {kind}:{number} --seed {options.seed}\n{finding}\n", flush=True)
+    for finding in kills(options.kills, options.seed):
+        print(finding + "\n", flush=True)
+        sorts[finding] += 1
+    total = sum(sorts.values())
+    cases = f"{options.files} files, {options.lines} command lines, {options.kills} kills of each long command"
+    print(f"{cases}: {total} findings of {len(sorts)} sorts")
+    return 1 if total else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,137 @@
+"""How a hostile case is judged: a clear refusal or an answer without silent NaN, within bounded processor time."""
+
+import contextlib
+import io
+import math
+import signal
+import tempfile
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinetostat.cli import main
+from kinetostat.exchange import urdf_import
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.loading import as_toml, build
+from kinetostat.machine.machine import Machine
+from kinetostat.spec import document as documents
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.study import read_study
+from kinetostat.studies.analysis import analyze
+from kinetostat.studies.optimisation.problem import build_problem
+
+LONGEST = 5.0
+"""Processor time of one case, s."""
+LONGEST_MESSAGE = 4000
+CODES = {0, 1, 2}
+
+
+class TooLong(BaseException):
+    """The case has used up its processor time. No handler of ordinary errors catches it."""
+
+
+@contextlib.contextmanager
+def bounded(seconds: float = LONGEST) -> Iterator[None]:
+    """Stop what takes more processor time; other work on the machine does not count."""
+
+    def stop(*_: Any) -> None:
+        raise TooLong
+
+    previous = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, previous)
+
+
+def judged(case: Callable[[], str | None]) -> str | None:
+    """What is wrong with how a case ended; None where nothing is."""
+    try:
+        with bounded(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return case()
+    except InputError as error:
+        return unclear(str(error))
+    except TooLong:
+        return f"takes more than {LONGEST:g} s"
+    except MemoryError:
+        return "memory is exhausted"
+    except Exception:  # every other one is a finding
+        return traceback.format_exc(limit=-4)
+
+
+def unclear(message: str) -> str | None:
+    """What is wrong with a refusal."""
+    if not message.isprintable():
+        return f"a refusal of several lines, or with control characters: {message[:300]!r}"
+    if len(message) > LONGEST_MESSAGE:
+        return f"a refusal of {len(message)} characters: {message[:300]!r}"
+    return None if message.rstrip()[-1:] in (".", "?", ")", "`") else f"a refusal that does not end: {message!r}"
+
+
+def machine_case(text: str) -> str | None:
+    """A machine file: read, analysed, written, read again."""
+    machine = build(text, "file.toml")
+    return wrong_answer(machine) or _lost_in_writing(machine)
+
+
+def wrong_answer(machine: Machine) -> str | None:
+    """What is wrong with the analysis of a machine."""
+    analysis = analyze(machine)
+    if analysis.status is not Status.OK:
+        return None if analysis.message else f"status {analysis.status} without a reason"
+    for name in ("stiffness", "compliance", "stiffness_diagonal", "compliance_diagonal"):
+        entries = getattr(analysis, name)
+        if entries is not None and np.isnan(np.asarray(entries, dtype=float)).any():
+            return f"NaN in the {name} of a pose that is ok"
+    if all(c == 0.0 for c in analysis.compliance_diagonal) and not analysis.rigid:
+        return "a compliance of zeros, and no spring is rigid"
+    shares = [entry.compliance for entry in analysis.attribution if hasattr(entry, "compliance")]
+    return (
+        "NaN in a share" if any(x is not None and math.isnan(x) for share in shares for x in np.ravel(share)) else None
+    )
+
+
+def _lost_in_writing(machine: Machine) -> str | None:
+    again = build(as_toml(machine), "again.toml")
+    return None if as_toml(again) == as_toml(machine) else "the machine that is written is another one"
+
+
+def study_case(text: str) -> str | None:
+    """A study file, up to the problem that it states."""
+    build_problem(read_study(documents.parse(text, "study.toml"), "study.toml"))
+    return None
+
+
+def urdf_case(text: str) -> str | None:
+    """A URDF file, converted."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "robot.urdf")
+        path.write_bytes(text.encode(errors="surrogatepass"))
+        build(urdf_import.machine_text(path), "robot.toml")
+    return None
+
+
+FILES = {"machine": machine_case, "study": study_case, "urdf": urdf_case}
+
+
+def line_case(arguments: list[str]) -> str | None:
+    """A command line: it ends with a known code, and refusals are one paragraph on standard error."""
+    out, errors = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors):
+        try:
+            code = main(arguments)
+        except SystemExit as stop:
+            code = stop.code if isinstance(stop.code, int) else 2
+    printed = errors.getvalue()
+    if code not in CODES:
+        return f"exit code {code}"
+    if "Traceback" in printed:
+        return f"standard error: {printed[:400]!r}"
+    return f"refused without a word, code {code}" if code == 2 and not printed.strip() else None

@@ -1,0 +1,94 @@
+"""Kill long commands at random moments, damage what they left, and go on: the end must be what it would have been.
+
+Each try runs in processes of its own, with other hash seeds, and compares the folder byte for byte with one that
+nothing disturbed.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from random import Random
+
+SEARCH = ["--set", "optimizer.population=8", "--set", "optimizer.generations=6"]
+COMMANDS = {
+    "search of a family": ["optimize", "zhang-gosselin-2002", *SEARCH],
+    "search leg by leg": ["optimize", "tripteron-weight", *SEARCH],
+    "front": ["pareto", "zhang-gosselin-front", *SEARCH],
+    "map": ["map", "zhang-gosselin-4dof", "--over", "x=-40 cm:40 cm:300", "--over", "z=40 cm:140 cm:300",
+            "--over", "theta5=-70 deg:-50 deg:60", "--quantity", "compliance_x"],
+}  # fmt: skip
+LASTING = ("designs.bin", "history.jsonl", "study.json", "map.nc", "best.toml")
+"""Files of a folder whose bytes are the same however often the work was stopped."""
+
+
+def run(command: list[str], folder: Path, seed: int, wait: float | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a command into a folder; kill it -9 after `wait` seconds where that is given."""
+    line = [sys.executable, "-c", "import sys; from kinetostat.cli import main; sys.exit(main())"]
+    environment = {**os.environ, "PYTHONHASHSEED": str(seed), "MPLBACKEND": "agg"}
+    with subprocess.Popen(
+        [*line, *command, "-o", str(folder)],
+        env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    ) as process:  # fmt: skip
+        if wait is not None:
+            try:
+                process.wait(wait)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+        out, errors = process.communicate()
+    return subprocess.CompletedProcess(command, process.returncode, out, errors)
+
+
+def undisturbed(name: str, folder: Path) -> tuple[Path, float]:
+    """The folder of a command that nothing stopped, and how long it took, s."""
+    start = time.monotonic()
+    done = run(COMMANDS[name], folder / "whole", 0)
+    if done.returncode != 0:
+        raise RuntimeError(f"{name}: exit {done.returncode}: {done.stderr}")
+    return folder / "whole", time.monotonic() - start
+
+
+def bytes_of(folder: Path) -> dict[str, bytes]:
+    """Contents of the files that last."""
+    return {name: (folder / name).read_bytes() for name in LASTING if (folder / name).exists()}
+
+
+def kill_and_resume(rng: Random, name: str, whole: Path, seconds: float) -> str | None:
+    """Kill a command some times, damage a file perhaps, let it end, and compare; what is wrong, or None."""
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / "killed"
+        for _ in range(rng.choice((1, 1, 2, 4))):
+            run(COMMANDS[name], folder, rng.randrange(9), rng.uniform(0.0, 1.1 * seconds))
+        damage = harm(rng, folder) if rng.random() < 0.5 else "nothing"
+        end = run(COMMANDS[name], folder, rng.randrange(9))
+        if "Traceback" in end.stderr or end.returncode not in (0, 2):
+            return f"{name}, damaged: {damage}: exit {end.returncode}: {end.stderr[-600:]}"
+        if end.returncode == 2:
+            clear = damage != "nothing" and end.stderr.count("\n") == 1
+            return None if clear else f"{name}, damaged: {damage}: {end.stderr}"
+        left = [path.name for path in folder.iterdir() if path.name.startswith(".") and path.suffix != ".lock"]
+        if left:
+            return f"{name}: litter is left: {left}"
+        return None if bytes_of(folder) == bytes_of(whole) else f"{name}, damaged: {damage}: another result"
+
+
+def harm(rng: Random, folder: Path) -> str:
+    """Flip a bit of a file of a folder, cut it, empty it, or take it away; what was done."""
+    files = [path for path in sorted(folder.iterdir()) if path.is_file()] if folder.exists() else []
+    if not files:
+        return "nothing"
+    path, action = rng.choice(files), rng.choice(("flipped", "cut", "emptied", "removed"))
+    data = bytearray(path.read_bytes())
+    if action == "removed":
+        path.unlink()
+    elif action == "emptied" or not data:
+        path.write_bytes(b"")
+    elif action == "cut":
+        path.write_bytes(data[: rng.randrange(len(data))])
+    else:
+        data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        path.write_bytes(data)
+    return f"{path.name} {action}"

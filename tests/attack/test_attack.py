@@ -1,0 +1,11 @@
+"""A small attack on every run; `python tests/attack --files 100000 --lines 10000` is the large one."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+
+def test_hostile_files_and_command_lines_are_well_answered():
+    command = [sys.executable, str(Path(__file__).parent), "--files", "600", "--lines", "150", "--seed", "1"]
+    attack = subprocess.run(command, capture_output=True, text=True)
+    assert attack.returncode == 0, attack.stdout + attack.stderr
