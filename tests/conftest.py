@@ -18,6 +18,7 @@ MARKERS = {
     "workers": ("test_workers", "test_hash_seeds", "test_large_sweeps", "test_studio_runs", "test_studio_search"),
     "studio": ("test_studio_design", "test_studio_page"),
     "engines": ("test_validation", "test_mujoco"),
+    "attack": ("test_attack",),
     "packaging": ("test_packaging",),
     "step": ("test_step_file", "test_step_outlines", "test_step_solids"),
 }
