@@ -11,6 +11,7 @@ from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.renamed import current_name
 from kinetostat.spec.study import TermTable
 from kinetostat.studies.grid.quantities import refuse_absent
+from kinetostat.studies.indices import three_numbers
 from kinetostat.studies.optimisation.poses import PoseSet
 from kinetostat.studies.optimisation.terms import PoseTerm, StrokeTerm, Term, VolumeTerm, parse_aggregate
 
@@ -120,14 +121,15 @@ def _direction_weights(
     machine: Machine, matrix: str, first: int, direction: Sequence[float] | None, where: str
 ) -> Mapping[str, float]:
     """n^T C n as a sum of entries of C."""
-    size = math.hypot(*(direction or (0.0,)))
-    if direction is None or size == 0.0:
+    size = math.hypot(*three_numbers(direction)) if direction else 0.0
+    if not direction or size == 0.0:
         raise InputError(f"{where} needs a direction, e.g. direction = [0, 0, 1].")
+    n = [component / size for component in direction]
     rotation = "r" if first == 0 else ""
     weights: dict[str, float] = {}
     for i in range(3):
         for j in range(i, 3):
-            weight = direction[i] * direction[j] / size**2 * (1.0 if i == j else 2.0)
+            weight = n[i] * n[j] * (1.0 if i == j else 2.0)
             parts = [f"{rotation}{AXES[i]}"] if i == j else [f"{rotation}{AXES[i]}", f"{rotation}{AXES[j]}"]
             if weight and not all(part in machine.family.component_names for part in parts):
                 raise InputError(f"{where}.direction leaves the plane of {machine.name}, which has no {parts[-1]}.")
