@@ -8,6 +8,7 @@ from machine_files import GOOD, HUGE_NUMBER, NAME, refusal
 from kinetostat.machine.loading import build, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec import document
+from kinetostat.spec.errors import InputError
 
 TAKEN = [
     (["geometry.base_radius=26 cm"], {"geometry.base_radius": 0.26}),
@@ -57,7 +58,7 @@ REFUSED = [
     ("geometry.base_radius=nan", ["geometry.base_radius", "not a finite number"]),
     ("geometry.base_radios=1", ["geometry.base_radios is not known", "did you mean base_radius"]),
     ("geometri.base_radius=1", ["geometri is not known", "did you mean geometry"]),
-    ("base_radius=1", ["base_radius is not known"]),
+    ("bass_radius=1", ["bass_radius is not known"]),
     ("geometry.base_radius.x=1", ["geometry.base_radius.x", '"22 cm"', "shorter path"]),
     ("geometry.base_radius.x.y=1", ["geometry.base_radius.x.y", '"22 cm"', "shorter path"]),
     ("geometry=3", ["geometry is 3", "must be a table"]),
@@ -128,3 +129,24 @@ def test_the_good_file_is_read_in_si():
     assert found["pose.theta6"] == pytest.approx(2 * math.pi / 3)
     assert [found[f"stiffness.actuator.{i}"] for i in range(4)] == [1000.0] * 4
     assert (found["stiffness.passive_links.0"], found["stiffness.passive_links.1"]) == (math.inf, 1e7)
+
+
+@pytest.mark.parametrize(
+    ("name", "short", "whole"),
+    [
+        ("hexapod", "x=5 mm", "pose.x=5 mm"),
+        ("hexapod", "base_radius=12 cm", "geometry.base_radius=12 cm"),
+        ("hexapod", "base_angles.1=0.5", "geometry.base_angles.1=0.5"),
+        ("hexapod", "geometry_base_angles_1=0.5", "geometry.base_angles.1=0.5"),
+        ("tripteron", "x=5 mm", "pose.x=5 mm"),
+    ],
+)
+def test_a_field_has_the_same_names_everywhere(name, short, whole):
+    machine = load(name, [short])
+    assert machine == load(name, [whole])
+    assert machine.written.settings == (whole,), "a saved file keeps its comments"
+
+
+def test_a_name_that_no_field_has_is_refused_as_it_was_written():
+    with pytest.raises(InputError, match="wrong is not known"):
+        load("hexapod", ["wrong=1"])

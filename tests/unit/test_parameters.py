@@ -66,7 +66,7 @@ def test_a_parameter_is_found_by_its_path_or_the_end_of_it(text, path):
         ("geometry.base_radios", ["did you mean geometry.base_radius"]),
         ("passive_links", ["geometry.passive_links", " or ", "stiffness.passive_links"]),
         ("actuator.4", ["actuator.4", "did you mean"]),
-        ("q", ['"q" is not a field', "pose.theta6"]),
+        ("q", ['"q" is not a field', "are x, z, theta5, theta6"]),
         ("", ["is not a field"]),
         ("adius", ["is not a field"]),
     ],

@@ -19,20 +19,20 @@ from kinetostat.machine.catalogue import families, register_installed
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.limits import Parts, check_limits
 from kinetostat.machine.machine import Family, Machine, Written
-from kinetostat.machine.parameters import check_contrast
+from kinetostat.machine.parameters import POSE, check_contrast, find
 from kinetostat.machine.rigidities import resolve
 from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
 from kinetostat.machine.written import family as written
 from kinetostat.machine.written.checking import check_numbers, completed
 from kinetostat.machine.written.document import by_name, check_paths, separate, with_parts
-from kinetostat.machine.written.plan import NAME, SUMMARY
+from kinetostat.machine.written.plan import NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY
 from kinetostat.machine.written.tables import written_schema
 from kinetostat.spec import document as documents
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.spec.fields import NO_LIMIT, optional, quantities
-from kinetostat.spec.requirements import requirement_lines, requirements_schema, take_requirements
+from kinetostat.spec.requirements import TABLE, requirement_lines, requirements_schema, take_requirements
 from kinetostat.spec.validation import SCHEMA_VERSION, file_model, tables_in, validate
 from kinetostat.units import RIGID, UnitError
 
@@ -86,13 +86,37 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
         InputError: a mistake in the document or an override.
     """
     if isinstance(document, str):
-        machine = build(documents.parse(document, origin), origin, settings)
-        return replace(machine, written=Written(document, tuple(several(settings))))
+        tables = documents.parse(document, origin)
+        overrides = _in_full(tables, settings)
+        return replace(build(tables, origin, overrides), written=Written(document, tuple(overrides)))
     if documents.is_study(document):
         raise InputError(f'"{origin}" {STUDY}')
-    rest, others, required = take_requirements(document, settings, origin)
+    rest, others, required = take_requirements(document, _in_full(document, settings), origin)
     build_kind = _build_written if rest.get("family") == NAME else _build_family
     return replace(build_kind(rest, origin, others), requirements=required)
+
+
+def _in_full(document: Document, settings: Sequence[str]) -> list[str]:
+    """Write overrides with the whole path of their fields: "x=5 mm" as "pose.x=5 mm"; unknown names stay."""
+    pairs = ((setting, *setting.partition("=")) for setting in several(settings))
+    return [f"{_whole_path(document, name.strip())}={value}" if sign else given for given, name, sign, value in pairs]
+
+
+def _whole_path(document: Document, name: str) -> str:
+    kind, head = document.get("family"), name.partition(".")[0]
+    if kind == NAME:
+        return f"{POSE}{name}" if name in (*SPATIAL_POSE, *PLANAR_POSE) else name
+    family = families().get(kind) if isinstance(kind, str) else None
+    if family is None or head in {*KEYS, *document, *(table.partition(".")[0] for table in family.every_table)}:
+        return name
+    try:
+        return find(family, name).path
+    except InputError:
+        return name
+
+
+KEYS = ("schema", "name", "family", "display", "sections", TABLE)
+"""What a file may hold at its top beside the tables of its family."""
 
 
 def _build_family(document: Document, origin: str, settings: Sequence[str]) -> Machine:

@@ -131,7 +131,7 @@ def _find(family: HasFields, text: str) -> Parameter:
     if ends:
         raise InputError(f'"{text}" may be {" or ".join(ends)}; write one of them.')
     near = difflib.get_close_matches(text, [*known, *(path.split(".", 1)[1] for path in known)], 1)
-    pose = ", ".join(path for path in known if path.startswith("pose."))
+    pose = ", ".join(shown(path) for path in known if path.startswith(POSE))
     rest = f"coordinates of its pose are {pose}, and `kinetostat check` shows every field."
     hint = f"did you mean {near[0]}?" if near else rest
     raise InputError(f'"{text}" is not a field of family {family.name}; {hint}')
