@@ -45,6 +45,8 @@ MOST_STEPS, MOST_ITERATIONS, ON_THE_WAY = 200, 40, 2
 FURTHEST_SLIDE, FURTHEST_TURN = 0.15, 0.2
 """Between poses on the way from the home pose: in units of the machine's length, and in rad. Short enough to stay on
 the branch of the home pose."""
+MOST_EVALUATIONS = 60
+"""Of the gaps where the nearest pose is sought: it comes out in eight digits after some 40."""
 CLOSING_WEIGHT = 1e4
 """How much more a gap in a leg counts than one in the pose when the nearest pose is sought, so that the legs close to a
 ten-thousandth of the rest."""
@@ -297,6 +299,8 @@ def nearest_pose(machine: Machine) -> dict[str, float]:
         return np.asarray(-weights[:, None] * gaps_at(chains, joints[None] * units, goal).rates[0])
 
     start = joints_on_the_way(chains, goal)[0] / units
-    best = least_squares(left, start, slopes, xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+    # Gaps weigh so much more than the pose that without scales from the slopes hundreds of steps would be needed.
+    scales = {"x_scale": "jac", "max_nfev": MOST_EVALUATIONS}
+    best = least_squares(left, start, slopes, xtol=1e-15, ftol=1e-15, gtol=1e-15, **scales).x
     coordinates = pose_of(leg_ends(chains, list(best * units))[0].platform)
     return {name: 0.0 if abs(value) < NO_COORDINATE else float(value) for name, value in coordinates.items()}

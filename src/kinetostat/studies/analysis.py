@@ -205,7 +205,9 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     response = respond(machine)
     status = Status(int(response.status))
     configuration = response.configuration
-    nearby = _nearby(machine, float(configuration.length))
+    # Other poses tell what sort of singularity it is; they cost three more ways from the home pose, and reach has none.
+    judged = status in (Status.OK, Status.SINGULAR)
+    nearby = _nearby(machine, float(configuration.length)) if judged else []
     if status is not Status.OK:
         return Analysis(machine, status, why_not(machine, response, nearby), machine.family.component_names)
     turn = IDENTITY if axes == "base" else configuration.platform.rotation.inverse()

@@ -15,13 +15,12 @@ from kinetostat.machine.written.family import chains, place
 from kinetostat.machine.written.joints import JOINT_TYPES
 from kinetostat.machine.written.plan import JointPlan, LegPlan, LinkPlan, Plan
 from kinetostat.spec.errors import InputError
+from kinetostat.tolerances import PARALLEL_AXES
 
 LEAST_AXIS = 1e-9
 """Length below which an axis has no direction."""
 PARALLEL = 1e-6
 """Sine of the angle between the axes of a universal joint below which they are one."""
-INDEPENDENT = 1e-9
-"""Distance from the span of others below which a unit twist depends on them."""
 ELASTIC = ("lumped", "beam", "timoshenko")
 
 
@@ -93,8 +92,9 @@ def _check_link(
 def completed(plan: Plan, tables: Mapping[str, Any]) -> Plan:
     """The plan with what its numbers tell of each leg: a closed form if there is one, and its idle freedoms.
 
-    Freedoms are idle that depend on others. The home pose may be special, so that joints are displaced at random to
-    find them; legs need not close for that.
+    Freedoms are idle that depend on others by form: as the file writes them, up to round-off. Near such a form a leg is
+    nearly locked, and its margin falls to zero with the angle that is left. The home pose may be special, so that
+    joints are displaced at random to find idle freedoms; legs need not close for that.
     """
     home = chains(plan, **tables)
     amounts = np.random.default_rng(1).uniform(-0.4, 0.4, home.size).tolist()
@@ -121,7 +121,7 @@ def _dependent(freedoms: Sequence[Joint], planar: bool, reference: Vector, lengt
     kept: list[int] = []
     for _ in range(rest.shape[1]):
         sizes = np.linalg.norm(rest, axis=0)
-        if sizes.max() < INDEPENDENT:
+        if sizes.max() < PARALLEL_AXES:
             break
         kept.append(int(np.argmax(sizes)))
         axis = rest[:, kept[-1]] / sizes[kept[-1]]
