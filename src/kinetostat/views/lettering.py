@@ -1,4 +1,4 @@
-"""Texts of figures as people wrote them: fonts that have their characters, and dollar signs that are dollar signs."""
+"""Texts of figures in fonts that have their characters; a character that no font has is shown by its number."""
 
 from functools import cache
 
@@ -35,12 +35,9 @@ def drawable(text: str) -> str:
 
 
 def letter(figure: Figure) -> None:
-    """Make all texts of a figure drawable and plain, but the powers of ten that matplotlib itself writes."""
+    """Make all texts of a figure drawable; symbols of quantities, which are mathematics, stay as they are."""
     for text in figure.findobj(Text):
         written = text.get_text()
-        if not written or "\\mathdefault" in written:
-            continue
-        text.set_parse_math(False)
         if not written.isascii():
             text.set_text(drawable(written))
             text.set_fontfamily([*families()])
