@@ -55,7 +55,7 @@ def by_name(document: Document, origin: str) -> Document:
 
 
 def _check_legs(legs: object, origin: str) -> None:
-    """Refuse what is no table of legs by name, whether a file or an override says it."""
+    """Refuse anything but a table of legs by name, whether a file or an override says it."""
     if not isinstance(legs, dict) or not 1 <= len(legs) <= MOST_LEGS:
         given = "" if isinstance(legs, dict | None) else f"legs is {shorten(legs)}; "
         raise InputError(
