@@ -133,9 +133,13 @@ def written(value: float, kind: str, like: object = None) -> str | float:
     if bare or not KINDS[kind].unit:
         return value
     match = _NUMBER.fullmatch(like) if isinstance(like, str) else None
-    texts = [_exactly(value, unit, KINDS[kind]) for unit in ([match[2]] if match else IN_FILES.get(kind, ()))]
-    known = [text for text in texts if text is not None] or [_exactly(value, _ascii(KINDS[kind].unit), KINDS[kind])]
-    return min((text for text in known if text), key=lambda text: sum(c.isdigit() for c in text))
+    usual, si = [match[2]] if match else IN_FILES.get(kind, ()), [_ascii(KINDS[kind].unit)]
+    texts = _texts(value, usual, kind) or _texts(value, si, kind)
+    return min(texts, key=lambda text: sum(c.isdigit() for c in text))
+
+
+def _texts(value: float, units: Iterable[str], kind: str) -> list[str]:
+    return [text for unit in units if (text := _exactly(value, unit, KINDS[kind])) is not None]
 
 
 def _exactly(value: float, unit: str, wanted: Kind) -> str | None:
@@ -181,9 +185,9 @@ def measured(unit: str, known: Iterable[str], example: str) -> tuple[str, float]
         given = _registry().Quantity(1.0, unit.replace("·", "*")).to_root_units() if UNIT.fullmatch(unit) else None
     except (pint.PintError, ValueError):
         given = None
-    for si in known if given is not None else ():
+    for si in known:
         target = _registry().Quantity(1.0, si.replace("·", "*")).to_root_units()
-        if given.units == target.units:
+        if given is not None and given.units == target.units:
             return si, float(given.magnitude / target.magnitude)
     raise UnitError(f'"{unit}" is not a unit of any result; write for example "{example}"')
 

@@ -13,7 +13,7 @@ from kinetostat.display import ENGINEERING, Display, number
 from kinetostat.kinematics.mobility import Kind
 from kinetostat.kinetostatics.eigenscrews import Eigenscrew
 from kinetostat.kinetostatics.indices import PrincipalStiffness
-from kinetostat.studies.analysis import Analysis, Rows
+from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.attribution import by_part
 from kinetostat.studies.indices import Along
 from kinetostat.studies.loads import LoadCase
@@ -79,14 +79,14 @@ def matrix_units(kind: str, display: Display = ENGINEERING) -> str:
 def stiffness_table(analysis: Analysis) -> Table:
     """K, or its diagonal where a direction is rigid."""
     display = analysis.machine.display
-    rows = analysis.stiffness or [analysis.stiffness_diagonal]
+    rows: Sequence[Sequence[float]] = analysis.stiffness or [analysis.stiffness_diagonal]
     return matrix_table("Stiffness K", "stiffness", analysis.components, rows, display, "rigid")
 
 
 def compliance_table(analysis: Analysis) -> Table:
     """C, or its diagonal where a direction is free."""
     display = analysis.machine.display
-    rows = analysis.compliance or [analysis.compliance_diagonal]
+    rows: Sequence[Sequence[float]] = analysis.compliance or [analysis.compliance_diagonal]
     return matrix_table("Compliance C", "compliance", analysis.components, rows, display, "free")
 
 
@@ -94,7 +94,7 @@ def matrix_table(
     title: str,
     kind: str,
     names: Sequence[str],
-    rows: Rows | Sequence[Sequence[float]],
+    rows: Sequence[Sequence[float]],
     display: Display = ENGINEERING,
     endless: str = "∞",
 ) -> Table:

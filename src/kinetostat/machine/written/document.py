@@ -47,15 +47,15 @@ def by_name(document: Document, origin: str) -> Document:
     legs = result.get("legs")
     if isinstance(legs, list):
         result["legs"] = legs = _named(legs, f'"{origin}"', "leg")
-    _check_legs(legs, origin)
-    for name, leg in legs.items():
+    named = _checked_legs(legs, origin)
+    for name, leg in named.items():
         if "joints" in leg:
-            legs[name] = _merged(leg, f'"{origin}": leg "{name}"')
+            named[name] = _merged(leg, f'"{origin}": leg "{name}"')
     return with_parts(result, origin)
 
 
-def _check_legs(legs: object, origin: str) -> None:
-    """Refuse anything but a table of legs by name, whether a file or an override says it."""
+def _checked_legs(legs: object, origin: str) -> dict[str, Document]:
+    """Return the legs, if they are tables by name, whether a file or an override says it."""
     if not isinstance(legs, dict) or not 1 <= len(legs) <= MOST_LEGS:
         given = "" if isinstance(legs, dict | None) else f"legs is {shorten(legs)}; "
         raise InputError(
@@ -66,6 +66,7 @@ def _check_legs(legs: object, origin: str) -> None:
             raise InputError(
                 f'"{origin}": leg "{name}" is {shorten(leg)}; it must be a table with name, joints and links.'
             )
+    return legs
 
 
 def with_parts(document: Document, origin: str) -> Document:
@@ -74,8 +75,7 @@ def with_parts(document: Document, origin: str) -> Document:
     Raises:
         InputError: a part that is not one; names leg and joint.
     """
-    _check_legs(document["legs"], origin)
-    for name, leg in document["legs"].items():
+    for name, leg in _checked_legs(document["legs"], origin).items():
         for key, part in leg.items() if isinstance(leg, dict) else ():
             if isinstance(part, dict) and is_series(part.get("stiffness")):
                 part["stiffness"] = parts(part["stiffness"], f'"{origin}": leg "{name}", joint "{key}": stiffness')
