@@ -1,7 +1,6 @@
 """Nothing in the package is dead, and no function is written twice."""
 
 import ast
-import copy
 import re
 from collections import defaultdict
 
@@ -85,7 +84,8 @@ class Unnamed(ast.NodeTransformer):
 def normal(function):
     """The body of a function without its docstring and the names of what is local to it."""
     body = function.body[1:] if ast.get_docstring(function) else function.body
-    return Unnamed(function).visit(ast.Module([copy.deepcopy(statement) for statement in body], []))
+    # Parsed again rather than copied: libraries hang trees of their own on the singletons that all syntax trees share.
+    return Unnamed(function).visit(ast.parse("\n".join(map(ast.unparse, body))))
 
 
 def size(tree):
