@@ -22,7 +22,8 @@ MARKERS = {
     "packaging": ("test_packaging",),
     "step": ("test_step_file", "test_step_outlines", "test_step_solids"),
 }
-"""Files of tests that plain `pytest` leaves out, because they take long; CI runs them with `-m slow`."""
+"""Files of tests that plain `pytest` leaves out, because they take long; CI runs them with `-m slow`. A single test of
+another file that takes long carries one of these markers itself."""
 
 os.environ.pop("UV_RUN_RECURSION_DEPTH", None)
 os.environ["PATH"] = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", os.defpath)])
@@ -58,4 +59,5 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.path.stem in by_file:
             item.add_marker(by_file[item.path.stem])
+        if not MARKERS.keys().isdisjoint(item.keywords):
             item.add_marker("slow")

@@ -21,6 +21,7 @@ from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.loading import as_toml, build, load
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.spec import document
+from machines import load_without_limits
 from numeric import array, assert_blocks_close, matrix
 
 SAME = 1e-9
@@ -74,7 +75,7 @@ RIGID_LINKS = {
 
 def known(name):
     """A bundled machine without what a file of joints and actuators cannot say."""
-    machine = load(name)
+    machine = load_without_limits(name)
     return with_values(machine, {path: k for path, k in RIGID_LINKS[name].items() if path in values(machine)})
 
 

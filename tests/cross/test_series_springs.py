@@ -7,7 +7,7 @@ import pytest
 
 from kinetostat.kinetostatics.assembly import compliance_shares, stiffness_shares
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.loading import load
+from machines import load_without_limits
 
 NAME = "passive-leg-5dof"
 POSES = [(), ("pose.x=-5 cm", "pose.y=8 cm", "pose.theta6=25 deg"), ("pose.theta5=-30 deg", "pose.z=55 cm")]
@@ -28,7 +28,7 @@ def by_numpy(legs):
 
 @pytest.mark.parametrize("pose", POSES)
 def test_k_and_c_equal_the_sum_over_legs(pose):
-    response = respond(load(NAME, pose))
+    response = respond(load_without_limits(NAME, pose))
     stiffness, compliance = by_numpy(response.legs)
     assert response.status == 0
     np.testing.assert_allclose(np.array(response.stiffness.rows()), stiffness, rtol=1e-9, atol=1e-9 * stiffness.max())
@@ -37,7 +37,7 @@ def test_k_and_c_equal_the_sum_over_legs(pose):
 
 @pytest.mark.parametrize("pose", POSES)
 def test_shares_add_up_to_k_and_c(pose):
-    response = respond(load(NAME, pose))
+    response = respond(load_without_limits(NAME, pose))
     for shares, whole in (
         (stiffness_shares(response.statics), response.stiffness),
         (compliance_shares(response.statics), response.compliance),
@@ -47,19 +47,19 @@ def test_shares_add_up_to_k_and_c(pose):
 
 
 def test_one_rigid_spring_leaves_the_other_to_yield():
-    one = respond(load(NAME, ["stiffness.passive_links.0=rigid"]))
-    near = respond(load(NAME, ["stiffness.passive_links.0=1e18"]))
+    one = respond(load_without_limits(NAME, ["stiffness.passive_links.0=rigid"]))
+    near = respond(load_without_limits(NAME, ["stiffness.passive_links.0=1e18"]))
     assert np.isfinite(np.array(one.stiffness.rows())).all()
     np.testing.assert_allclose(np.array(one.stiffness.rows()), np.array(near.stiffness.rows()), rtol=1e-9, atol=1e-6)
 
 
 def test_two_rigid_springs_hold_and_one_free_spring_lets_go():
-    rigid = respond(load(NAME, ["stiffness.passive_links=rigid"]))
+    rigid = respond(load_without_limits(NAME, ["stiffness.passive_links=rigid"]))
     assert math.isinf(rigid.stiffness.entry(2, 2))
     assert rigid.stiffness.entry(3, 3) == pytest.approx(70.61695587, rel=1e-8)
-    near = respond(load(NAME, ["stiffness.passive_links=1e14"]))
+    near = respond(load_without_limits(NAME, ["stiffness.passive_links=1e14"]))
     np.testing.assert_allclose(rigid.compliance.diagonal(), near.compliance.diagonal(), rtol=1e-9)
-    free = respond(load(NAME, ["stiffness.passive_links.1=0"]))
+    free = respond(load_without_limits(NAME, ["stiffness.passive_links.1=0"]))
     assert all(math.isinf(entry) for entry in free.compliance.diagonal())
     assert np.isfinite(np.array(free.stiffness.rows())).all()
     assert np.linalg.matrix_rank(np.array(free.stiffness.rows()), 1e-6) == 5
@@ -68,8 +68,8 @@ def test_two_rigid_springs_hold_and_one_free_spring_lets_go():
 def test_in_its_own_plane_the_leg_is_that_of_the_4dof_machine():
     """With y = 0 the plane is not tilted: elbow, pitch and reach are those of the paper's passive leg."""
     settings = ["pose.x=0", "pose.z=68 cm", "pose.theta5=-60 deg", "pose.theta6=120 deg"]
-    five = load(NAME, ["pose.y=0", *settings]).configure()
-    four = load("zhang-gosselin-4dof", settings).configure()
+    five = load_without_limits(NAME, ["pose.y=0", *settings]).configure()
+    four = load_without_limits("zhang-gosselin-4dof", settings).configure()
     ends = zip(five.legs[0].path, four.legs[0].path, strict=True)
     for ours, theirs in ends:
         assert ours.components() == pytest.approx(theirs.components(), abs=1e-15)

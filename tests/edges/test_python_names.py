@@ -252,14 +252,14 @@ def test_a_machine_is_exported_as_by_the_command(tmp_path, monkeypatch):
 def test_a_report_of_a_machine_and_of_a_result_say_how_to_have_them_again(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     no_pictures(monkeypatch)
-    machine = load("tripteron", ["pose.x=5 mm"])
+    machine = load("tripteron", ["pose.x=45 cm"])
     page = Page(report(machine, "our-own.html", without=PARTS, author="N. N.").read_text("utf-8"))
     save(machine, "machine.toml")
     assert main(["report", "machine.toml", *LEAST, "--author", "N. N.", "-o", "second.html"]) == DONE
     assert Path("second.html").read_text("utf-8") == Path("our-own.html").read_text("utf-8").replace(
         "our-own.html", "second.html"
     )
-    assert page.results["pose"]["x"] == 0.005
+    assert page.results["pose"]["x"] == 0.45
     better = optimize(load_problem("zhang-gosselin-2002", ["optimizer.generations=2", "optimizer.population=8"]))
     study = Page(report(better, "study.html", without=PARTS).read_text("utf-8"))
     assert study.results["compliance"] == analyze(better.machine).compliance

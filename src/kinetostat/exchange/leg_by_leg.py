@@ -11,6 +11,7 @@ from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.mobility import task_coordinates
@@ -24,6 +25,7 @@ from kinetostat.machine.written.plan import BASE, NAME, PLATFORM, SPATIAL_POSE
 from kinetostat.spec.document import Document, toml_key
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.validation import SCHEMA_VERSION
+from kinetostat.studies.rounding import clean_screw
 
 
 def legs_of(name: str) -> str:
@@ -143,7 +145,7 @@ class _Chain:
         """Add a joint, and before it what deflects since the last one: as its seat, or as the link that it ends."""
         name = self._unused(joint.pop("name", "") or self._name(title) or joint["type"])
         bodies = (self.joints[-1]["joins"][1] if self.joints else BASE), f"body {len(self.joints) + 1}"
-        compliance = _compliance(self.pending, Vector(*joint["point"]))
+        compliance = compliance_at(self.pending, Vector(*joint["point"])).tolist() if self.pending else []
         if compliance and self.joints:
             body = self._unused(self._name(self.pending[0].of))
             self.joints[-1]["joins"] = [self.joints[-1]["joins"][0], body]
@@ -195,11 +197,13 @@ def _parallelogram(element: Parallelogram) -> dict[str, Any]:
     return {"type": "parallelogram", **ends, "width": float(element.width), **bar}
 
 
-def _compliance(springs: Sequence[Spring], point: Vector) -> list[list[float]]:
-    """What springs between two joints deflect at a point, as a 6x6; empty if there are none."""
-    twists = [np.array(spring.joint.twist(point).components(), dtype=float) for spring in springs]
-    total = sum((np.outer(t, t) / s.stiffness for t, s in zip(twists, springs, strict=True)), np.zeros((6, 6)))
-    return total.tolist() if springs else []
+def compliance_at(springs: Sequence[Spring], point: Vector) -> npt.NDArray[np.float64]:
+    """Return the sum of what springs between two bodies deflect at a point [6 x 6], base axes, rx ry rz x y z, SI.
+
+    Components of a spring's twist that are only round-off are left out: a file gives 0 where a link is rigid.
+    """
+    twists = [clean_screw(spring.joint.twist(point), 1.0).components() for spring in springs]
+    return sum((np.outer(t, t) / s.stiffness for t, s in zip(twists, springs, strict=True)), np.zeros((6, 6)))
 
 
 def _stiffness(spring: Spring) -> str:

@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.exchange.formats import one_line
+from kinetostat.exchange.leg_by_leg import compliance_at
 from kinetostat.exchange.results import reference_point
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
@@ -253,16 +254,10 @@ def _compliant(springs: Sequence[Spring], before: Array) -> Iterator[UrdfJoint]:
             continue
         points = [spring.joint.point for spring in part_springs if spring.joint.point is not None]
         at = array(points[0]) if points else before
-        matrix = sum((_dyad(spring, at) for spring in part_springs), np.zeros((6, 6)))
+        matrix = compliance_at(part_springs, Vector(*at.tolist()))
         if np.any(matrix):
             numbers = " ".join(repr(c) for c in matrix.ravel().tolist())
             yield UrdfJoint(part, "fixed", at, None, {"compliance": numbers})
-
-
-def _dyad(spring: Spring, at: Array) -> Array:
-    """What a spring adds to the compliance of its part at a point (base frame, m) [6 x 6]."""
-    twist = np.array([float(c) for c in spring.joint.twist(Vector(*at.tolist())).components()])
-    return np.outer(twist, twist) / float(spring.stiffness)
 
 
 def _parallelogram(piece: Parallelogram) -> Iterator[UrdfJoint]:

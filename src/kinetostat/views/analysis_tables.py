@@ -50,6 +50,8 @@ def print_analysis(
     if requirements:
         print_requirements(console, requirements, display)
     print_doubts(console, machine)
+    if analysis.platform is None:
+        return
     shown = [along_table(along, display), shares_table(analysis, full), principal_table(analysis)]
     if analysis.load:
         shown += [load_table(names, analysis.load, display), actuator_table(analysis.load, display)]

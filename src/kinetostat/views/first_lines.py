@@ -27,7 +27,10 @@ def first_lines(analysis: Analysis) -> list[tuple[str, str]]:
     """Return label and text of each line: pose and verdict, stiffness, softest direction, margin, and the load."""
     pose = pose_of(analysis.machine)
     lines = [("Pose", f"{pose}. {analysis.message}" if pose else analysis.message)]
-    lines.append(("Stiffness", f"{_felt(analysis)} (1/C at the {analysis.machine.reference}, {analysis.axes} axes)."))
+    if analysis.compliance_diagonal:
+        lines.append(
+            ("Stiffness", f"{_felt(analysis)} (1/C at the {analysis.machine.reference}, {analysis.axes} axes).")
+        )
     if analysis.softest:
         lines.append(("Softest", "; ".join(_softest(analysis)) + "."))
     if analysis.mobility:
