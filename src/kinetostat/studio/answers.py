@@ -4,6 +4,7 @@ They run in threads (`lanes`), so they take and return frozen data and touch no 
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -71,9 +72,9 @@ def picture(request: PictureRequest) -> Picture:
 
 
 def _drawable(status: Status, response: Response) -> bool:
-    """Return whether a pose without an answer has a picture: it is singular, but every joint has its place."""
+    """Return whether a pose without an answer has a picture: singular or past a limit, but each joint has its place."""
     points = [c for leg in response.configuration.legs for p in leg.path for c in p.components()]
-    return status is Status.SINGULAR and all(math.isfinite(c) for c in points)
+    return status in (Status.SINGULAR, Status.JOINT_LIMIT) and all(math.isfinite(c) for c in points)
 
 
 def _with_free_twist(scene: Scene, response: Response, sizes: Proportions) -> Scene:
@@ -96,9 +97,17 @@ class ReportRequest:
 
 @dataclass(frozen=True)
 class Report:
-    """An analysis, the solids that show it, and the factor by which deflections are exaggerated (None without load)."""
+    """An analysis and what shows it.
+
+    Attributes:
+        analysis: of the machine at its pose.
+        legs: name of the leg in which each joint or link is.
+        solids: that show the answers in the picture.
+        exaggeration: factor by which deflections are drawn larger; None without a load.
+    """
 
     analysis: Analysis
+    legs: Mapping[str, str]
     solids: list[dict[str, Any]]
     exaggeration: float | None
 
@@ -107,7 +116,9 @@ def report(request: ReportRequest) -> Report:
     """Analyse the machine at its pose and make the solids that are drawn over it."""
     analysis = analyze(request.machine)
     solids, factor = overlays_of(analysis, request.sizes, request.exaggeration)
-    return Report(analysis, [solid_data(solid) for solid in solids], factor)
+    placed = respond(request.machine).configuration.legs
+    legs = {str(spring.of): leg.name for leg in placed for spring in leg.springs}
+    return Report(analysis, legs, [solid_data(solid) for solid in solids], factor)
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,7 @@ class Playback:
                 icon_button("delete_outline", "Forget the path", self.clear, "path-clear")
                 ui.space()
                 icon_button("close", "Close", self.menu.close, "path-close")
-        self._timer = ui.timer(PERIOD, self._step, active=False)
+        self._timer: ui.timer | None = None
         self._show()
 
     @property
@@ -96,28 +96,38 @@ class Playback:
         self._show()
 
     def _show(self) -> None:
-        self._timer.active = False
+        self._pause()
         self.place.props(f"max={max(self.count - 1, 1)}").set_value(0)
         self.place.set_enabled(self.count > 1)
         self.play.set_enabled(self.count > 1)
         kept = f"{len(self._kept)} kept pose{'s' if len(self._kept) > 1 else ''}. " if self._kept else ""
         self.about.set_text(f"{kept}A path of {self.count} poses." if self.count > 1 else kept + EMPTY)
-        self._show_state()
-
-    def _show_state(self) -> None:
-        self.play.props(f"icon={'pause' if self._timer.active else 'play_arrow'}")
 
     def _toggle(self) -> None:
-        self._timer.active = not self._timer.active
-        if self._timer.active and self.place.value >= self.count - 1:
+        if self._timer is None:
+            self._play()
+        else:
+            self._pause()
+
+    def _play(self) -> None:
+        """Start a timer, which lives while the path is played: an idle page asks for nothing."""
+        if self.place.value >= self.count - 1:
             self.place.set_value(0)
-        self._show_state()
+        with self.menu:
+            self._timer = ui.timer(PERIOD, self._step)
+        self.play.props("icon=pause")
+
+    def _pause(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = None
+        self.play.props("icon=play_arrow")
 
     def _step(self) -> None:
         if self._is_busy():
             return
         if self.place.value >= self.count - 1:
-            self._toggle()
+            self._pause()
         else:
             self.place.set_value(int(self.place.value) + 1)
 
@@ -129,8 +139,7 @@ class Playback:
         try:
             self._session.move({path: float(column[at]) for path, column in self._path.items()})
         except InputError as error:
-            self._timer.active = False
-            self._show_state()
+            self._pause()
             refuse(str(error))
         else:
             self._on_change()

@@ -7,7 +7,6 @@ from nicegui import ui
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.parameters import with_leg
-from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.sensitivity import Sensitivity
 from kinetostat.studio.answers import RankingRequest, Report, map_quantities, ranking
 from kinetostat.studio.elements import choice, toggle
@@ -42,16 +41,17 @@ class ContributionsPanel(Panel):
 
     def _draw(self) -> None:
         if self._report is not None and self.component.value in self._report.analysis.components:
-            self.bars.set_content(contributions_text(self._report.analysis, str(self.component.value)))
+            self.bars.set_content(contributions_text(self._report, str(self.component.value)))
 
 
-def contributions_text(analysis: Analysis, component: str) -> str:
+def contributions_text(report: Report, component: str) -> str:
     """Bars of the parts that make one component of the compliance, all springs of a part added up.
 
     Args:
-        analysis: of one pose.
+        report: of one pose.
         component: one of its component names, e.g. "rx".
     """
+    analysis = report.analysis
     index = analysis.components.index(component)
     compliance = analysis.compliance_diagonal[index]
     shares: dict[str, float] = {}
@@ -64,10 +64,9 @@ def contributions_text(analysis: Analysis, component: str) -> str:
     if not rows:
         return paragraph(f"The platform moves freely in {component}: a spring there has no stiffness.")
     unit = QUANTITIES[f"compliance_{component}"].unit
-    legs = {str(spring.of): leg.name for leg in analysis.machine.configure().legs for spring in leg.springs}
     return paragraph(
         f"Compliance in {component}: {engineering(compliance, unit, analysis.machine.display)}", "lead"
-    ) + bars("contributions to the compliance", rows, legs)
+    ) + bars("contributions to the compliance", rows, report.legs)
 
 
 class SensitivityPanel(Panel):
