@@ -5,14 +5,16 @@ A bare number is SI. What a number may mean (its kind) is fixed by the field tha
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cache
 from numbers import Real
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import pint
+if TYPE_CHECKING:
+    from pint import Quantity, UnitRegistry
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,27 @@ KINDS = {
 
 UNITS = Path(__file__).with_name("units.txt")
 """The units that there are."""
+USUAL = {
+    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "nm": 1e-9},
+    "rad": {"rad": 1.0, "deg": 0.017453292519943295, "mrad": 1e-3, "urad": 1e-6},
+    "N": {"N": 1.0, "kN": 1e3},
+    "N*m": {"N*m": 1.0, "kN*m": 1e3},
+    "N/m": {"N/m": 1.0, "N/mm": 1e3, "N/um": 1e6, "kN/mm": 1e6},
+    "N*m/rad": {"N*m/rad": 1.0, "kN*m/rad": 1e3, "N*m/mrad": 1e3, "N*m/urad": 1e6},
+    "N/rad": {"N/rad": 1.0, "N/mrad": 1e3, "N/urad": 1e6},
+    "m/N": {"m/N": 1.0, "mm/N": 1e-3, "um/N": 1e-6},
+    "rad/(N*m)": {"rad/(N*m)": 1.0, "mrad/(N*m)": 1e-3, "urad/(N*m)": 1e-6},
+    "rad/N": {"rad/N": 1.0, "mrad/N": 1e-3, "urad/N": 1e-6},
+    "N*m**2": {"N*m**2": 1.0},
+    "Pa": {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9},
+    "m**2": {"m**2": 1.0, "mm**2": 1e-6, "cm**2": 1e-4},
+    "m**4": {"m**4": 1.0, "cm**4": 1e-8},
+    "kg/m**3": {"kg/m**3": 1.0},
+    "kg/m": {"kg/m": 1.0, "g/m": 1e-3},
+    "kg": {"kg": 1.0, "g": 1e-3},
+}
+"""SI values of the units that most files use, by SI unit. They are pint's to the last bit, which a test compares; pint
+itself takes longer to import than a thousand poses take to compute, and is only asked about all other units."""
 RIGID = "rigid"
 """How people write an infinite stiffness."""
 
@@ -158,8 +181,8 @@ def _exactly(value: float, unit: str, wanted: Kind) -> str | None:
 
 
 def _ascii(unit: str) -> str:
-    """Return a unit of `KINDS` with signs that every keyboard has."""
-    return unit.replace("·", "*")
+    """Return a unit with signs that every keyboard has."""
+    return unit.replace("·", "*").replace("µ", "u").replace("μ", "u")
 
 
 def as_read(value: float, unit: str) -> tuple[float, str]:
@@ -167,7 +190,7 @@ def as_read(value: float, unit: str) -> tuple[float, str]:
     return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
 
 
-def measured(unit: str, known: Iterable[str], example: str) -> tuple[str, float]:
+def measured(unit: str, known: Collection[str], example: str) -> tuple[str, float]:
     """Find which of several SI units a unit is a multiple of.
 
     Args:
@@ -181,13 +204,13 @@ def measured(unit: str, known: Iterable[str], example: str) -> tuple[str, float]
     Raises:
         UnitError: it is a multiple of none of them.
     """
-    try:
-        given = _registry().Quantity(1.0, unit.replace("·", "*")).to_root_units() if UNIT.fullmatch(unit) else None
-    except (pint.PintError, ValueError):
-        given = None
+    usual = [si for si in known if _usual(unit, si)]
+    if usual:
+        return usual[0], _usual(unit, usual[0])
+    given = _in_root_units(unit) if UNIT.fullmatch(unit) else None
     for si in known:
-        target = _registry().Quantity(1.0, si.replace("·", "*")).to_root_units()
-        if given is not None and given.units == target.units:
+        target = _in_root_units(si)
+        if given is not None and target is not None and given.units == target.units:
             return si, float(given.magnitude / target.magnitude)
     raise UnitError(f'"{unit}" is not a unit of any result; write for example "{example}"')
 
@@ -215,9 +238,26 @@ def _allowed(wanted: Kind) -> str:
     return f'{article} {wanted.name} with its unit, e.g. "{wanted.example}"{rigid}, or {bare}'
 
 
+def _usual(unit: str, si: str) -> float:
+    """SI value of one `unit`, where it is one of the usual ones of this SI unit; otherwise 0."""
+    return USUAL.get(_ascii(si), {}).get(_ascii(unit), 0.0)
+
+
 @cache
-def _registry() -> "pint.UnitRegistry[float]":
+def _registry() -> "UnitRegistry[float]":
+    import pint
+
     return pint.UnitRegistry(str(UNITS))
+
+
+def _in_root_units(unit: str) -> "Quantity[float] | None":
+    """Return one `unit` in pint's root units; None if there is no such unit."""
+    from pint import PintError
+
+    try:
+        return _registry().Quantity(1.0, _ascii(unit)).to_root_units()
+    except (PintError, ValueError):
+        return None
 
 
 @cache
@@ -225,11 +265,11 @@ def _factor(unit: str, wanted: Kind) -> float:
     """SI value of one `unit`."""
     if UNIT.fullmatch(unit) is None:
         raise UnitError(f'"{unit}" is not a unit; write {_allowed(wanted)}')
-    try:
-        given = _registry().Quantity(1.0, unit.replace("·", "*")).to_root_units()
-        target = _registry().Quantity(1.0, wanted.unit.replace("·", "*")).to_root_units()
-    except (pint.PintError, ValueError):
-        raise UnitError(f'the unit "{unit}" is unknown; write {_allowed(wanted)}') from None
+    if usual := _usual(unit, wanted.unit):
+        return usual
+    given, target = _in_root_units(unit), _in_root_units(wanted.unit)
+    if given is None or target is None:
+        raise UnitError(f'the unit "{unit}" is unknown; write {_allowed(wanted)}')
     turning = wanted.name == "angle"
     if given.dimensionality != target.dimensionality or (turning and given.units != target.units):
         raise UnitError(f'"{unit}" is not a unit of {wanted.name}; write {_allowed(wanted)}')

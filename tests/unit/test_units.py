@@ -5,7 +5,7 @@ import math
 import pint
 import pytest
 
-from kinetostat.units import KINDS, UNITS, UnitError, parse, write
+from kinetostat.units import KINDS, UNITS, USUAL, UnitError, parse, write
 
 GOOD = [
     ("12 cm", "length", 0.12),
@@ -163,3 +163,11 @@ def test_our_units_are_what_pint_knows_under_these_names():
         mine, theirs = (one.Quantity(1.0, name).to_root_units() for one in (ours, known))
         assert mine.magnitude == pytest.approx(theirs.magnitude, rel=1e-14), name
         assert str(mine.units) == str(theirs.units), name
+
+
+@pytest.mark.parametrize(("si", "unit", "value"), [(si, *row) for si, rows in USUAL.items() for row in rows.items()])
+def test_usual_units_are_those_of_pint_to_the_last_bit(si, unit, value):
+    registry = pint.UnitRegistry(str(UNITS))
+    one, whole = (registry.Quantity(1.0, text).to_root_units() for text in (unit, si))
+    assert one.units == whole.units
+    assert one.magnitude / whole.magnitude == value
