@@ -58,7 +58,9 @@ def row(model: str, diameter: str) -> list[str]:
 
 def main() -> None:
     """Print the table."""
-    header = ("diameter", "model", "softest rotation, rad/(N·m)", "softest translation, m/N", "rotation", "translation")
+    blocks = "rotation", "translation"
+    differences = tuple(f"difference in {block}" for block in blocks)
+    header = ("diameter", "model", "softest rotation, rad/(N·m)", "softest translation, m/N", *differences)
     print(f"| {' | '.join(header)} |\n|---|---|{'---:|' * 4}")
     for diameter in DIAMETERS:
         for model in MODELS:
