@@ -41,6 +41,8 @@ LEAST_NORM_DAMPING = 1e-15
 coordinate that moves nothing."""
 NO_ANGLE_RATES = 1e-9
 """Relative singular value below which roll and yaw have no separate rates (at pitch = +-90 deg)."""
+ROUNDED_ORIENTATION = 1e-3
+"""How far a quaternion or a rotation matrix may be from exact: what numbers rounded to three digits differ by."""
 UNDETERMINED = 1e-4
 """Share of undamped motion above which nothing but the damping determines where the platform is."""
 NO_COORDINATE = 1e-9

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine, need_machine
+from kinetostat.machine.orientation import form_of
 from kinetostat.machine.parameters import Given, find
 from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError, shorten
@@ -36,6 +37,8 @@ def changed(machine: Machine, values: Mapping[str, Given]) -> Machine:
 
 def related(machine: Machine, path: str) -> bool:
     """Whether a field is checked against others: then `rebuilt` has the last word on a change."""
+    if form_of(path):
+        return False
     parameter = find(machine.family, path)
     table = parameter.path.split(".")[0]
     written = machine.family.chains is not None and not parameter.quantity.stiff

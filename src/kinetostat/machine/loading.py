@@ -4,7 +4,7 @@ import difflib
 import json
 import math
 import operator
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, reduce
 from importlib import resources
@@ -19,6 +19,7 @@ from kinetostat.machine.catalogue import families, register_installed
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.limits import Parts, check_limits
 from kinetostat.machine.machine import Family, Machine, Written
+from kinetostat.machine.orientation import ANGLES, form_of, make_room, orientation_schema, with_angles
 from kinetostat.machine.parameters import POSE, check_contrast, find
 from kinetostat.machine.rigidities import resolve
 from kinetostat.machine.rods import driven_slides
@@ -104,6 +105,8 @@ def _in_full(document: Document, settings: Sequence[str]) -> list[str]:
 
 def _whole_path(document: Document, name: str) -> str:
     kind, head = document.get("family"), name.partition(".")[0]
+    if form_of(name) and not name.startswith("pose"):
+        return f"{POSE}{name}"
     if kind == NAME:
         return f"{POSE}{name}" if name in (*SPATIAL_POSE, *PLANAR_POSE) else name
     family = families().get(kind) if isinstance(kind, str) else None
@@ -123,7 +126,8 @@ def _build_family(document: Document, origin: str, settings: Sequence[str]) -> M
     """A machine of a family in closed form."""
     family = _family(document.get("family"), origin)
     named = with_named_parts(document, family, origin)
-    changed = documents.override(named, settings, _counts(family_with_parts(family, named)))
+    counts = _counts(family_with_parts(family, named))
+    changed = _overridden(named, settings, counts, tuple(quantities(family.tables["pose"])), origin)
     changed = with_named_parts(changed, family, origin)
     display = _display(changed, origin)
     resolved = resolve(changed, family, origin)
@@ -138,7 +142,8 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     """A machine written leg by leg."""
     named = by_name(document, origin)
     check_paths(named, settings)
-    changed = with_parts(documents.override(named, settings, {}), origin)
+    coordinates = PLANAR_POSE if named.get("space") == "planar" else SPATIAL_POSE
+    changed = with_parts(_overridden(named, settings, {}, coordinates, origin), origin)
     display = _display(changed, origin)
     plan, numbers = separate(changed, origin)
     machine = _validated(written.family_of(plan), numbers, origin, display)
@@ -150,6 +155,15 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     parts = Parts(legs, chains.home.rotation.z, plan.planar, slides, _unloaded(legs))
     check_limits(machine.tables["limits"], parts, origin)
     return whole
+
+
+def _overridden(
+    document: Document, settings: Sequence[str], counts: Mapping[str, int], coordinates: Sequence[str], origin: str
+) -> Document:
+    """The document with overrides, and with its orientation, however it is written, in the angles of the pose."""
+    ready = {**document, "pose": dict(document["pose"])} if isinstance(document.get("pose"), dict) else document
+    make_room(ready, settings, coordinates, origin)
+    return with_angles(documents.override(ready, settings, counts), coordinates, origin)
 
 
 def _unloaded(legs: Sequence[Leg]) -> list[tuple[Spring, Scalar]]:
@@ -269,6 +283,9 @@ def machine_schema() -> dict[str, Any]:
     files = [kind for kind in (*schema["$defs"].values(), *schema["anyOf"]) if "family" in kind.get("properties", {})]
     for kind in files:
         kind["properties"]["requirements"] = requirements_schema()
+    for table in schema["$defs"].values():
+        if {*ANGLES} <= table.get("properties", {}).keys():
+            table["properties"] |= orientation_schema()
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "kinetostat machine file",

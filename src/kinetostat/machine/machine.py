@@ -17,9 +17,10 @@ from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.machine.leg import Joint, Leg, Spring, Turn
 from kinetostat.machine.limits import Limits
 from kinetostat.machine.links import LinkKind, density_table
+from kinetostat.machine.orientation import numbers_for, single_angles
 from kinetostat.machine.parameters import Given, check_contrast, read_numbers, with_values
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.spec.fields import Quantity, table
+from kinetostat.spec.fields import Quantity, quantities, table
 from kinetostat.spec.renamed import renamed_property
 from kinetostat.spec.requirements import Requirement
 from kinetostat.units import UnitError
@@ -291,13 +292,15 @@ class Machine:
 
         Args:
             values: by name of the field: SI, text with a unit, or for a field with several entries an array or list of
-                one for each.
+                one for each. `quaternion`, `rotation` and `tilt` stand for roll, pitch and yaw, as in a file's [pose].
             fields: the same as keywords; dots in names are written as underscores.
 
         Raises:
             InputError: an unknown field, a value of another kind or out of bounds, or an array of the wrong length.
         """
-        machine = with_values(self, read_numbers(self.family, {**(values or {}), **fields}))
+        coordinates = quantities(self.family.tables["pose"])
+        given = numbers_for(coordinates, {**(values or {}), **fields}, single_angles)
+        machine = with_values(self, read_numbers(self.family, given))
         check_contrast(machine, self.name)
         return machine
 

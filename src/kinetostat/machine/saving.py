@@ -14,6 +14,7 @@ from tomlkit.items import Item
 
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine, Written
+from kinetostat.machine.orientation import ANGLES, FORMS, make_room
 from kinetostat.machine.parameters import values
 from kinetostat.spec.document import setting_value
 from kinetostat.spec.errors import InputError
@@ -43,6 +44,7 @@ def _edited(written: Written, machine: Machine) -> str | None:
     """Return the text with the numbers of the machine; None where editing does not lead to it."""
     try:
         document = tomlkit.parse(written.text)
+        make_room(document, written.settings, tuple(quantities(machine.family.tables["pose"])), machine.name)
         for setting in written.settings:
             path, _, text = setting.partition("=")
             *table, key = path.strip().split(".")
@@ -76,6 +78,8 @@ def _bring(document: Any, present: Machine, machine: Machine) -> None:
         known = present.family.literals.get(table, {})
         for key in (key for key, value in literals.items() if known.get(key) != value):
             _put(_place(document, table.split(".") if table else []), key, literals[key])
+    if any(form in document.get("pose", {}) for form in FORMS) and machine.tables["pose"] != present.tables["pose"]:
+        make_room(document, [f"pose.{name}=" for name in ANGLES], ANGLES, machine.name)
     for table, name, quantity in _fields(machine):
         new = getattr(machine.tables[table], name)
         old = getattr(present.tables.get(table), name, None)

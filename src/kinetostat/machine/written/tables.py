@@ -3,6 +3,7 @@
 from typing import Any
 
 from kinetostat.machine.cross_section import MATERIALS, SHAPE_KINDS, SHAPES
+from kinetostat.machine.orientation import orientation_schema
 from kinetostat.machine.series import label
 from kinetostat.machine.written.joints import AXIS, JOINT_TYPES, SEAT, needs_axis
 from kinetostat.machine.written.plan import LINK_MODELS, NAME, SPATIAL_POSE, SUMMARY, JointPlan, Plan
@@ -76,7 +77,7 @@ def written_schema(version: int) -> dict[str, Any]:
             "family": {"const": NAME, "description": SUMMARY},
             "space": {"enum": ["spatial", "planar"], "description": "planar: the x-y plane"},
             "platform": _table({"point": {**point, "description": "P at the home pose, base frame"}}, ["point"]),
-            "pose": {**_table(dict.fromkeys(SPATIAL_POSE, QUANTITY)), "minProperties": 1},
+            "pose": {**_table({**dict.fromkeys(SPATIAL_POSE, QUANTITY), **orientation_schema()}), "minProperties": 1},
             "sections": {"type": "object", "additionalProperties": _cross_section()},
             "legs": {"type": "array", "minItems": 1, "items": _leg()},
             "tool": {"type": "object"},

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.orientation import angles_of, numbers_for
 from kinetostat.machine.parameters import POSE, parameters
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.fields import quantities
 from kinetostat.studies.evaluation.columns import Column, PoseColumns, read_columns
 from kinetostat.studies.evaluation.pose_file import read_poses
 
@@ -33,7 +35,8 @@ def given_poses(machine: Machine, poses: Any) -> PoseColumns:
     if hasattr(poses, "data_vars"):
         columns, labels = _of_dataset(poses)
     elif isinstance(poses, Mapping):
-        columns = [Column(name, entries) for name, entries in poses.items()]
+        named = numbers_for(quantities(machine.family.tables["pose"]), poses, angles_of)
+        columns = [Column(name, entries) for name, entries in named.items()]
     elif hasattr(poses, "columns"):
         columns = [Column(name, poses[name]) for name in poses.columns]
         labels = {"pose": np.asarray(poses.index)} if hasattr(poses, "index") else {}
