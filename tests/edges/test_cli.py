@@ -30,7 +30,7 @@ ANSWERED = [
     (["sweep", MACHINE, "--vary", "z=60 cm:200 cm:5"], ["2 of 5 points have no result (out of reach)"]),
     (
         ["map", MACHINE, "--over", "x=-2 cm:2 cm:3", "--over", "z=66 cm:70 cm:3"],
-        ["compliance_rx", "pose.x (3) × pose.z (3)"],
+        ["compliance_rx", "x (3) × z (3)"],
     ),
     (["--version"], ["kinetostat 0."]),
     ([], ["commands:", "examples:"]),

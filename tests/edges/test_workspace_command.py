@@ -67,11 +67,11 @@ def test_pictures_name_their_axes_and_colours(tmp_path, capsys):
 def test_the_file_says_what_its_numbers_mean(tmp_path, capsys):
     assert main([*PLANE, "--where", "singularity_margin > 0.3", "-o", str(tmp_path)]) == DONE
     with xr.open_dataset(tmp_path / "workspace.nc", engine="h5netcdf") as found:
-        assert found["verdict"].dims == ("pose.x", "pose.y")
+        assert found["verdict"].dims == ("x", "y")
         meanings = found["verdict"].attrs["flag_meanings"].split()
         assert meanings[0] == "inside"
         assert meanings[-1] == "fails_singularity_margin_>_0.3"
-        assert found["pose.x"].attrs["units"] == "m"
+        assert found["x"].attrs["units"] == "m"
         assert found.attrs["volume_units"] == "m²"
         assert "two random points" in found.attrs["volume_method"]
         joined = found["connected"].values == 1

@@ -14,6 +14,7 @@ from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec import document
 from kinetostat.spec.errors import InputError
+from kinetostat.studies.grid.grid import field_of
 from kinetostat.studies.workspace.borders import depth
 from kinetostat.studies.workspace.verdicts import BEYOND, INSIDE, Judge
 from kinetostat.studies.workspace.workspace import workspace
@@ -66,7 +67,7 @@ def test_two_links_reach_a_ring():
     near(found, math.pi * (0.8**2 - 0.2**2))
     assert found.connected == 1.0
     assert found.nodes["out of reach"] + found.nodes[INSIDE] == 81 * 81
-    radius = np.hypot(*np.meshgrid(found.dataset["pose.x"], found.dataset["pose.y"], indexing="ij"))
+    radius = np.hypot(*np.meshgrid(found.dataset["x"], found.dataset["y"], indexing="ij"))
     inside = found.dataset["verdict"].values == 0
     assert inside[(radius > 0.2 + RIM) & (radius < 0.8 - RIM)].all(), "also beside nodes at the very end of the reach"
     assert not inside[(radius < 0.2 - RIM) | (radius > 0.8 + RIM)].any()
@@ -141,7 +142,7 @@ class TestVerdicts:
         machine, labels = load("hexapod", self.SETTINGS), found.verdicts
         for index in np.ndindex(found.dataset["verdict"].shape):
             pose = {
-                dim: float(found.dataset[dim].values[i])
+                field_of(found.dataset[dim]): float(found.dataset[dim].values[i])
                 for dim, i in zip(found.dataset["verdict"].dims, index, strict=True)
             }
             response = respond(with_values(machine, pose))
@@ -243,8 +244,8 @@ class TestBorders:
         result = workspace(machine, ["pose.x=-8 cm:8 cm:9", "pose.z=14 cm:26 cm:9"], ["free_stiffness_z > 30 N/um"])
         judge = Judge(machine, result.conditions)
         data = result.dataset
-        border = data["border_pose.x"].values
-        verdict, x, z = data["verdict"].values, data["pose.x"].values, data["pose.z"].values
+        border = data["border_x"].values
+        verdict, x, z = data["verdict"].values, data["x"].values, data["z"].values
         nodes = np.argwhere(np.isfinite(border))
         assert len(nodes) > 8
         assert (verdict[:-1] != verdict[1:]).sum() == len(nodes)

@@ -80,8 +80,8 @@ class Parameter:
 
     @property
     def dimension(self) -> str:
-        """Its name in datasets, without dots, so that it can be written as an attribute: x, geometry_base_angles_1."""
-        return self.shown.replace(".", "_")
+        """Its name in datasets; see `dimension`."""
+        return dimension(self.path)
 
 
 POSE = "pose."
@@ -90,6 +90,11 @@ POSE = "pose."
 def shown(path: str) -> str:
     """Return a path as people read it: coordinates of the pose by their names alone (x), all others in full."""
     return path.removeprefix(POSE)
+
+
+def dimension(path: str) -> str:
+    """Return the name of a field in datasets, which has no dots and so can be an attribute: x, geometry_base_angle."""
+    return shown(path).replace(".", "_")
 
 
 def parameters(family: HasFields) -> Iterator[Parameter]:

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from kinetostat.display import Scale, number, with_unit
 from kinetostat.kinetostatics.quantities import group_of, spoken
-from kinetostat.studies.grid.grid import failures
+from kinetostat.studies.grid.grid import failures, field_of
 from kinetostat.studies.storage import replacing
 from kinetostat.views.grid_tables import display_of
 from kinetostat.views.lettering import letter
@@ -189,7 +189,7 @@ def axis_values(dataset: xr.Dataset, name: str) -> tuple[Array, str]:
     """Values of a coordinate as an axis shows them, and its label with the unit."""
     coordinate = dataset[name]
     scale = display_of(dataset).scale(coordinate.attrs["units"])
-    return coordinate.values * scale.factor, scale.label(_plain(name))
+    return coordinate.values * scale.factor, scale.label(_plain(field_of(coordinate)))
 
 
 def _plain(path: str) -> str:

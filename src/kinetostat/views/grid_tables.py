@@ -12,7 +12,8 @@ from kinetostat.display import Display
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.machine.limits import Limits, unlimited
-from kinetostat.studies.grid.grid import failures
+from kinetostat.machine.parameters import dimension, shown
+from kinetostat.studies.grid.grid import failures, field_of
 from kinetostat.studies.grid.stored_grid import Extremes, StoredGrid
 from kinetostat.studies.workspace.verdicts import INSIDE, phrase
 from kinetostat.studies.workspace.workspace import Workspace
@@ -28,7 +29,7 @@ def print_dataset(console: Console, dataset: xr.Dataset, names: Sequence[str]) -
         _print_curve(console, dataset, names)
     else:
         extremes = {name: _extremes(dataset[name]) for name in names}
-        sizes = {str(d): n for d, n in dataset.sizes.items()}
+        sizes = {shown(field_of(dataset[d])): n for d, n in dataset.sizes.items()}
         _print_extremes(console, dataset.attrs["machine"], sizes, extremes, display_of(dataset))
     _print_failures(console, failures(dataset), dataset["status"].size)
 
@@ -41,7 +42,7 @@ def display_of(dataset: xr.Dataset) -> Display:
 def print_stored(console: Console, stored: StoredGrid) -> None:
     """A grid in a file: the extremes of each quantity, and what was there before."""
     question = stored.question
-    sizes = dict(zip(question.dims, question.grid.shape, strict=True))
+    sizes = dict(zip(map(shown, question.fields), question.grid.shape, strict=True))
     _print_extremes(console, question.machine.name, sizes, stored.tally.extremes, question.machine.display)
     failed: dict[Status, int] = {
         status: count for status, count in stored.tally.statuses.items() if status != Status.OK
@@ -66,7 +67,7 @@ def _print_curve(console: Console, dataset: xr.Dataset, names: Sequence[str]) ->
     units = {name: QUANTITIES[name].unit for name in names}
     heads = [f"{spoken(name.removeprefix(f'{group}_'))}\n{_head(display, units[name])}" for name in names]
     unit = coordinate.attrs["units"]
-    table = numeric_table(title, f"{across}\n{_head(display, unit)}", heads)
+    table = numeric_table(title, f"{shown(field_of(coordinate))}\n{_head(display, unit)}", heads)
     for i, value in enumerate(coordinate.values):
         cells = (display.number(float(dataset[name].values[i]), units[name]) for name in names)
         table.add_row(display.number(float(value), unit), *cells)
@@ -144,9 +145,8 @@ def _summary(workspace: Workspace) -> Iterator[str]:
 def _print_extents(console: Console, workspace: Workspace) -> None:
     display = display_of(workspace.dataset)
     table = numeric_table("Extent of the workspace", "", ["from", "to", ""])
-    for dim, ends in workspace.extents.items():
-        coordinate = workspace.dataset[dim]
-        unit = coordinate.attrs["units"]
+    for field, ends in workspace.extents.items():
+        unit = workspace.dataset[dimension(field)].attrs["units"]
         low, high = (display.number(float(end), unit) for end in ends)
-        table.add_row(dim.removeprefix("pose."), low, high, display.scale(unit).unit)
+        table.add_row(shown(field), low, high, display.scale(unit).unit)
     console.print(table)

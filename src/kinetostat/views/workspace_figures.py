@@ -19,6 +19,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy import ndimage
 
 from kinetostat.kinetostatics.quantities import spoken
+from kinetostat.studies.grid.grid import field_of
 from kinetostat.studies.workspace.borders import depth
 from kinetostat.studies.workspace.conditions import Condition
 from kinetostat.studies.workspace.region import surface
@@ -65,7 +66,7 @@ def pictures(dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[Co
         title: over each picture.
     """
     dims = [str(dim) for dim in dataset["verdict"].dims]
-    fixed = {dim: float(dataset.attrs.get(dim, dataset[dim].values.mean())) for dim in dims[3:]}
+    fixed = {dim: float(dataset.attrs.get(field_of(dataset[dim]), dataset[dim].values.mean())) for dim in dims[3:]}
     if fixed:
         dataset = dataset.sel(fixed, method="nearest")
         shown = ", ".join(_at(dataset, dim) for dim in fixed)

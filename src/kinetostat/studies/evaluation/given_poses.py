@@ -51,7 +51,8 @@ def _of_dataset(dataset: Any) -> tuple[list[Column], dict[str, Any]]:
     flat = [np.ravel(array) for array in np.broadcast_arrays(*_like(dataset, names))]
     others = [name for name in dataset.coords if name not in names and dataset[name].dims == tuple(dataset.dims)]
     labels = {str(name): dataset[name].values for name in others}
-    return [Column(str(name), values) for name, values in zip(names, flat, strict=True)], labels
+    fields = [str(dataset[name].attrs.get("field", name)) for name in names]
+    return [Column(field, values) for field, values in zip(fields, flat, strict=True)], labels
 
 
 def _like(dataset: Any, names: Sequence[Any]) -> list[Any]:

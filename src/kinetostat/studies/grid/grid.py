@@ -15,7 +15,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine, need_machine
-from kinetostat.machine.parameters import Parameter, find
+from kinetostat.machine.parameters import Parameter, dimension, find
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.ranges import Range, parse_range
 from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
@@ -35,16 +35,21 @@ class GridQuestion:
     Attributes:
         machine: gives all parameters that do not vary.
         grid: where; one axis for each range.
-        dims: path of the field of each axis.
+        fields: path of the field of each axis.
         names: of quantities.
         labels: coordinates and attributes of the answer, without any variable.
     """
 
     machine: Machine
     grid: Grid
-    dims: tuple[str, ...]
+    fields: tuple[str, ...]
     names: tuple[str, ...]
     labels: xr.Dataset
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """The dimensions of the answer, one for each field."""
+        return tuple(map(dimension, self.fields))
 
     @property
     def fits_memory(self) -> bool:
@@ -88,11 +93,12 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
 
 
 def _coordinates(grid: Grid, pairs: Sequence[tuple[Range, Parameter]]) -> dict[str, Any]:
-    coordinates = {}
+    coordinates: dict[str, Any] = {}
     for axis, (span, parameter) in zip(grid.axes, pairs, strict=True):
         kind = KINDS[parameter.quantity.kind]
-        about = {"units": kind.unit, "long_name": parameter.quantity.meaning, "kind": kind.name}
-        coordinates[parameter.path] = (parameter.path, axis.values, {**about, "log": int(span.logarithmic)})
+        about: dict[str, Any] = {"units": kind.unit, "long_name": parameter.quantity.meaning, "kind": kind.name}
+        about |= {"field": parameter.path, "log": int(span.logarithmic)}
+        coordinates[parameter.dimension] = (parameter.dimension, axis.values, about)
     return coordinates
 
 
@@ -111,7 +117,8 @@ def evaluate_grid(
         progress: receives how far the work is.
 
     Returns:
-        One variable per quantity and `status`, over dimensions named by the fields' paths; units in `attrs`.
+        One variable per quantity and `status`, over dimensions named by the fields: `x` for
+        pose.x, `geometry_base_radius` for geometry.base_radius; units in `attrs`.
         Quantities are NaN where the status is not ok (0).
 
     Raises:
@@ -159,6 +166,11 @@ def _evaluated(question: GridQuestion, progress: Progress, compute: Compute) -> 
     return Evaluation(values, np.concatenate([part.status for part in ordered]))
 
 
+def field_of(coordinate: xr.DataArray) -> str:
+    """Return the path of the field that varies along a coordinate, e.g. "pose.x" of `x`."""
+    return str(coordinate.attrs.get("field", coordinate.name))
+
+
 def failures(dataset: xr.Dataset) -> dict[Status, int]:
     """How many points have each status other than OK."""
     codes, counts = np.unique(dataset["status"].values, return_counts=True)
@@ -186,7 +198,8 @@ def as_json(dataset: xr.Dataset) -> dict[str, Any]:
         {
             "name": dataset.attrs["machine"],
             "coordinates": {
-                str(dim): {"units": dataset[dim].attrs["units"], "values": dataset[dim].values} for dim in dims
+                field_of(dataset[dim]): {"units": dataset[dim].attrs["units"], "values": dataset[dim].values}
+                for dim in dims
             },
             "variables": {
                 name: {"units": data.attrs["units"], "values": data.values} for name, data in variables.items()

@@ -226,9 +226,9 @@ def _as_record(question: GridQuestion, file: str) -> Record:
     """Everything that the numbers depend on: a folder with another record holds another study."""
     attributes = question.labels.attrs
     axes = [
-        {"field": dim, "from": float(axis.values[0]), "to": float(axis.values[-1]), "count": len(axis.values)}
+        {"field": field, "from": float(axis.values[0]), "to": float(axis.values[-1]), "count": len(axis.values)}
         | {"log": question.labels[dim].attrs["log"]}
-        for dim, axis in zip(question.dims, question.grid.axes, strict=True)
+        for dim, field, axis in zip(question.dims, question.fields, question.grid.axes, strict=True)
     ]
     return {
         "study": STUDY_VERSION,
@@ -301,13 +301,13 @@ def summary_json(stored: StoredGrid) -> dict[str, Any]:
     """A grid in a file as plain data: where it is, its axes, counts and extremes."""
     question = stored.question
     coordinates = {
-        dim: {
+        field: {
             "units": question.labels[dim].attrs["units"],
             "from": axis.values[0],
             "to": axis.values[-1],
             "count": len(axis.values),
         }
-        for dim, axis in zip(question.dims, question.grid.axes, strict=True)
+        for dim, field, axis in zip(question.dims, question.fields, question.grid.axes, strict=True)
     }
     return as_answer(
         {

@@ -136,7 +136,7 @@ def guidelines(machine: Machine, ranges: Sequence[str] = (), progress: Progress 
 
 def _grid(machine: Machine, ranges: Sequence[str]) -> Points:
     question = grid_question(machine, ranges, [])
-    for path in question.dims:
+    for path in question.fields:
         if not path.startswith("pose."):
             known = ", ".join(path for path in values(machine) if path.startswith("pose."))
             raise InputError(f"{path} is not a coordinate of the pose; --over takes {known}.")

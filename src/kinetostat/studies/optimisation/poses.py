@@ -97,7 +97,7 @@ def _grid(machine: Machine, table: PosesTable) -> PoseSet:
 
 
 def _box(question: GridQuestion) -> tuple[float, str] | None:
-    if not all(dim.startswith("pose.") for dim in question.dims):
+    if not all(field.startswith("pose.") for field in question.fields):
         return None
     spans = [abs(float(axis.values[-1] - axis.values[0])) for axis in question.grid.axes]
     return prod(spans), unit_product([str(question.labels[dim].attrs["units"]) for dim in question.dims])

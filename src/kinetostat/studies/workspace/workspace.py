@@ -18,7 +18,7 @@ from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.grid.grid import IN_MEMORY, MOST_DIMENSIONS, GridQuestion, answer, grid_question
+from kinetostat.studies.grid.grid import IN_MEMORY, MOST_DIMENSIONS, GridQuestion, answer, field_of, grid_question
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.workspace.borders import Shares, borders
 from kinetostat.studies.workspace.conditions import Condition, parse_condition
@@ -124,19 +124,19 @@ def workspace(
 def _check(question: GridQuestion) -> None:
     """Only coordinates of the pose, evenly spaced, and few enough nodes."""
     poses = [path for path in values(question.machine) if path.startswith("pose.")]
-    for dim in question.dims:
-        if dim not in poses:
+    for dim, field in zip(question.dims, question.fields, strict=True):
+        if field not in poses:
             raise InputError(
-                f"{dim} is not a coordinate of the pose; a workspace extends over {', '.join(poses)}. For other fields "
-                "use `kinetostat map`."
+                f"{field} is not a coordinate of the pose; a workspace extends over {', '.join(poses)}. For other "
+                "fields use `kinetostat map`."
             )
         if question.labels[dim].attrs["log"]:
-            raise InputError(f"{dim}: a workspace needs even spacing; leave out :log.")
+            raise InputError(f"{field}: a workspace needs even spacing; leave out :log.")
     if not 2 <= len(question.dims) <= MOST_DIMENSIONS:
         raise InputError("a workspace needs two to six --over ranges, each of a coordinate of the pose.")
-    for dim, axis in zip(question.dims, question.grid.axes, strict=True):
+    for field, axis in zip(question.fields, question.grid.axes, strict=True):
         if axis.values[0] >= axis.values[-1]:
-            raise InputError(f"{dim}: the range must run upwards; exchange its ends.")
+            raise InputError(f"{field}: the range must run upwards; exchange its ends.")
     if not question.fits_memory:
         raise InputError(
             f"the grid has {question.grid.size:,} nodes; a workspace is kept in memory, at most {IN_MEMORY:,}: lower "
@@ -189,11 +189,11 @@ def connected_to(region: Mask, seed: tuple[int, ...]) -> Mask:
 
 def _extents(question: GridQuestion, inside: Mask) -> dict[str, tuple[float, float]]:
     extents = {}
-    for number, (dim, axis) in enumerate(zip(question.dims, question.grid.axes, strict=True)):
+    for number, (field, axis) in enumerate(zip(question.fields, question.grid.axes, strict=True)):
         others = tuple(i for i in range(inside.ndim) if i != number)
         reached = axis.values[inside.any(axis=others)]
         if reached.size:
-            extents[dim] = float(reached[0]), float(reached[-1])
+            extents[field] = float(reached[0]), float(reached[-1])
     return extents
 
 
@@ -223,12 +223,12 @@ def as_json(workspace: Workspace) -> dict[str, Any]:
     """Volume, counts and ranges as plain data; the nodes themselves are in the NetCDF file."""
     dataset, volume = workspace.dataset, workspace.volume
     coordinates = {
-        str(dim): {
+        field_of(dataset[dim]): {
             "units": dataset[dim].attrs["units"],
             "from": dataset[dim].values[0],
             "to": dataset[dim].values[-1],
             "count": dataset.sizes[dim],
-            "inside": workspace.extents.get(str(dim)),
+            "inside": workspace.extents.get(field_of(dataset[dim])),
         }
         for dim in dataset["verdict"].dims
     }
