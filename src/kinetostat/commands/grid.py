@@ -56,12 +56,12 @@ def add_grid_commands(commands: "Commands") -> None:
         takes_figures(command, "NetCDF and figures")
         command.add_argument(
             "--resume", action="store_true",
-            help="continue the grid in the folder, and refuse if there is none; without this option, the same command "
-            "continues or begins (grids of over 5 million points)",
+            help="for grids of over 5 million points: continue the one in the output folder, and refuse if there "
+            "is none; without this option the command continues or begins",
         )  # fmt: skip
-        who = command.add_mutually_exclusive_group()
-        who.add_argument("--workers", metavar="N", type=_workers, help="compute in N processes on this machine")
-        who.add_argument("--cluster", metavar="ADDRESS", help="compute on a Dask cluster, e.g. tcp://10.0.0.1:8786")
+        where = command.add_mutually_exclusive_group()
+        where.add_argument("--workers", metavar="N", type=_workers, help="compute in N processes on this machine")
+        where.add_argument("--cluster", metavar="ADDRESS", help="compute on a Dask cluster, e.g. tcp://10.0.0.1:8786")
         takes_json(command)
     _add_workspace_command(commands)
 

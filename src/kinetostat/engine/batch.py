@@ -1,6 +1,6 @@
-"""Many points at once: the engine chooses arithmetic, slab size and threads. Holds no formula.
+"""Evaluates a machine at many points: chooses the arithmetic, the slab size and the threads. No formula lives here.
 
-Small batches run through NumPy, because that starts at once; large ones through machine code. Both evaluate the very
+Small batches run through NumPy, because that starts at once; large ones run through machine code. Both evaluate the
 same functions.
 """
 
@@ -27,7 +27,7 @@ NATIVE_FROM = 20_000
 NUMPY_SLAB = 4096
 """Points per NumPy call: intermediates stay in the second cache level."""
 NATIVE_SLAB = 32768
-"""Points per call of machine code: 2 ms of work, so that calls cost little and an interrupt is soon heard."""
+"""Points per call of machine code: 2 ms of work, so that calls cost little and an interrupt takes effect soon."""
 
 Progress = Callable[[int, int], None]
 """Called with (points done, points in all) after each slab."""
@@ -66,14 +66,14 @@ def evaluate(
 
     Args:
         machine: gives all parameters that do not vary.
-        points: where; leaf paths of the machine's family and their values, SI.
+        points: values of the varying parameters by leaf path of the machine's family, SI.
         quantities: names from `kinetostatics.quantities.QUANTITIES`.
         progress: called after each slab.
-        part: only these points; where it starts at a multiple of `NATIVE_SLAB`, results are those of the whole batch
-            bit for bit, because the size of the whole decides the arithmetic, and slabs are the same.
-        threads: slabs under way at once; all processors unless given.
-        repeated: whether the same quantities will be wanted again and again at other numbers, as by a slider: then
-            compiling once pays for few points as well; a thousand poses take a millisecond from then on.
+        part: evaluates only these points. If it starts at a multiple of `NATIVE_SLAB`, its results are those of the
+            whole batch bit for bit, because the size of the whole decides the arithmetic, and the slabs are the same.
+        threads: number of slabs computed at the same time; by default the number of processors.
+        repeated: whether the same quantities will be needed many times at other numbers, as behind a slider. Then it
+            pays to compile for few points as well: a thousand poses take a millisecond from then on.
     """
     method: Method
     if repeated or points.size >= NATIVE_FROM:
@@ -96,11 +96,11 @@ def in_slabs(
     """Compute results [rows x points] and status codes, slab by slab.
 
     Args:
-        points: where.
+        points: the points.
         fill: evaluates a slab.
-        rows: of results.
+        rows: number of rows of the results.
         slab: points of each slab.
-        threads: how many slabs are under way at once.
+        threads: number of slabs computed at the same time.
         progress: called after each slab.
     """
     results, status = np.empty((rows, points.size)), np.empty(points.size, dtype=np.int8)
@@ -118,7 +118,10 @@ def in_slabs(
 
 
 def by_free_springs(machine: Machine, paths: Sequence[str], quantities: Sequence[str], method: Method) -> Fill:
-    """Evaluate points at which a varying stiffness is exactly 0 apart from the others: it is a free joint there."""
+    """Return a fill that evaluates separately the points at which a varying stiffness is exactly 0.
+
+    There the spring is a free joint, which changes the wrenches of its leg and so the formulas that are traced.
+    """
     stiff = {p.path for p in parameters(machine.family) if p.quantity.stiff}
     watched = [path for path in paths if path in stiff]
     ordinary = method(machine, paths, quantities)
@@ -158,7 +161,7 @@ def _program_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[s
 
 
 def _in_threads(task: Callable[[int], int], starts: Sequence[int], threads: int) -> Iterator[int]:
-    """Results of the task over all starts, a few at a time, so that an interrupt stops soon."""
+    """Run the task over all starts, in order. Few tasks wait at a time, so that an interrupt takes effect soon."""
     if threads == 1:
         yield from map(task, starts)
         return
@@ -178,21 +181,21 @@ def available_cores() -> int:
 
 
 def responses(machine: Machine, points: Points) -> Response:
-    """Compute whole responses at all points: every scalar is an array [points] or the same at all of them.
+    """Compute whole responses at all points: every scalar is an array [points], or one number if it does not vary.
 
-    For studies that need more than a few numbers of each of some thousand points. Results are meaningless where the
-    status is not OK.
+    This is for studies that need more than a few numbers at each of some thousand points. Results are meaningless where
+    the status is not OK.
 
     Args:
         machine: gives all parameters that do not vary.
-        points: where; leaf paths of the machine's family and their values, SI.
+        points: values of the varying parameters by leaf path of the machine's family, SI.
     """
     with np.errstate(all="ignore"):
         return respond(with_values(machine, points.columns(0, points.size)))
 
 
 def first_limit_passed(machine: Machine, columns: Mapping[str, Array], fields: Sequence[str]) -> npt.NDArray[np.int64]:
-    """Find the first limit, in the order of the checks, that each point passes: its place in `fields`, or -1.
+    """Find the first limit, in the order of the checks, that each point passes: its index in `fields`, or -1.
 
     Args:
         machine: with its limits.
@@ -212,8 +215,8 @@ def limits_used(machine: Machine, columns: Mapping[str, Array]) -> dict[str, tup
     """Return the least and greatest measure of each limit over some points and all parts, by the limit's name.
 
     Args:
-        machine: all of whose limits that are of interest are set.
-        columns: values of the varying parameters by leaf path, SI [points]; of points that can be reached.
+        machine: a machine with every limit of interest set.
+        columns: values of the varying parameters by leaf path, SI [points]; all points must be within reach.
     """
     ranges: dict[str, tuple[float, float]] = {}
     for _, checks in _checked(machine, columns):

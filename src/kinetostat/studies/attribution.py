@@ -45,7 +45,7 @@ def contributions(
         springs: all springs of the machine, in the order of the statics.
         statics: how they share loads, in the axes of K and C.
         stiffness, compliance: K and C.
-        kept: which of rx ry rz x y z = 0 ... 5 the machine has.
+        kept: the components that the machine has, as indices into rx ry rz x y z.
     """
     parts = zip(springs, compliance_shares(statics), stiffness_shares(statics), strict=True)
     return tuple(
@@ -82,10 +82,10 @@ class Softest:
     """The direction in which a force, or a moment, meets the least stiffness, and what makes it soft.
 
     Attributes:
-        stiffness: N/m or N·m/rad, the other motions free to follow; 0 where the direction is free.
+        stiffness: N/m or N·m/rad, with all other motions free; 0 where nothing resists a motion in this direction.
         directions: unit vectors that span all directions with this stiffness, axes of K and C [1 to 3 x 3].
-        shares: name and share of each part in the compliance there, the greatest first; empty where it is free.
-        kinds: the same for parts of one kind together, such as "actuator ×6".
+        shares: each part and its share of the compliance there, the greatest share first; empty where stiffness is 0.
+        kinds: the same for all parts of one kind together, such as "actuator ×6".
     """
 
     stiffness: float
@@ -101,7 +101,7 @@ def softest(block: PrincipalStiffness, name: str, springs: Sequence[Spring], sta
     of directions among them.
 
     Args:
-        block: principal stiffnesses, the other block free to follow.
+        block: principal stiffnesses, with the motions of the other block free.
         name: "rotation" or "translation".
         springs, statics: as for `contributions`.
 
@@ -120,6 +120,7 @@ def softest(block: PrincipalStiffness, name: str, springs: Sequence[Spring], sta
     kinds: dict[str, dict[str, float]] = {}
     for spring, share in zip(springs, compliance_shares(statics), strict=True):
         amount = sum(float(share.entry(i, j)) * way[i % 3] * way[j % 3] for way in alike for i in rows for j in rows)
+        # The compliance in each of these directions is 1 / least, so this is the spring's share of their sum.
         parts[spring.of] = parts.get(spring.of, 0.0) + amount * least / len(alike)
         kinds.setdefault(spring.kind, {})[spring.of] = 0.0
     together = {
@@ -130,5 +131,5 @@ def softest(block: PrincipalStiffness, name: str, springs: Sequence[Spring], sta
 
 
 def _ranked(shares: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
-    """Sort shares, the greatest first; equal ones keep their order."""
+    """Sort shares, the greatest first; equal shares keep their order."""
     return tuple(sorted(shares.items(), key=lambda item: -round(item[1], EQUAL_SHARES)))

@@ -55,8 +55,11 @@ def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
     pitch = rotation_y(cos(pose.theta1), sin(pose.theta1))
     tip = Vector(0.0, 0.0, pose.z)
     platform = Displacement(pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2)), tip)
+    # A ram that is built in bends at its tip with 3EI/L and twists with GJ/L.
     rigidities = ((stiffness.ram_bending, 3.0), (stiffness.ram_bending, 3.0), (stiffness.ram_torsion, 1.0))
-    built_in = [in_series(k, r, abs(pose.z), n) for k, (r, n) in zip(stiffness.ram, rigidities, strict=True)]
+    built_in = [
+        in_series(k, ei, abs(pose.z), factor) for k, (ei, factor) in zip(stiffness.ram, rigidities, strict=True)
+    ]
     springs = tuple(
         Spring(f"ram {name}", Joint(axis, ZERO), k)
         for name, axis, k in zip(("bending x", "bending y", "torsion"), AXES, built_in, strict=True)

@@ -19,7 +19,7 @@ from kinetostat.studies.grid.grid import evaluate_grid
 from kinetostat.tolerances import EQUAL_DESIGNS
 
 PERCENTILE = 95.0
-"""Of the poses of a grid, the share that is at least as good."""
+"""Percent of the poses of a grid that are at least as good as the value shown."""
 
 
 class Better(StrEnum):
@@ -34,11 +34,11 @@ class Row:
     """One number of every design.
 
     Attributes:
-        group: what rows belong together.
-        name: of the number.
-        unit: SI.
-        better: which is the better one.
-        values: None where a design has none; infinite where it is rigid or free.
+        group: heading under which rows stand together.
+        name: name of the number.
+        unit: unit of the number, SI.
+        better: whether less or more is better.
+        values: the number of each design; None if a design lacks it, infinite where the design is rigid or free.
     """
 
     group: str
@@ -49,7 +49,7 @@ class Row:
 
     @property
     def percents(self) -> tuple[float | None, ...]:
-        """Change against the first design, percent; None where there is no such number."""
+        """Change against the first design, percent; None where the change is undefined."""
         first = self.values[0]
         if first is None or first == 0.0 or not math.isfinite(first):
             return (None,) * len(self.values)
@@ -57,7 +57,7 @@ class Row:
 
     @property
     def best(self) -> tuple[int, ...]:
-        """Places of the best ones; none where all are alike."""
+        """Indices of the best designs; empty where all are equal."""
         known = {i: v for i, v in enumerate(self.values) if v is not None}
         if len(known) < 2:
             return ()
@@ -67,7 +67,7 @@ class Row:
 
 
 def rows_at_poses(analyses: Sequence[Analysis]) -> tuple[Row, ...]:
-    """Collect numbers at each design's pose; rows that no design has are left out."""
+    """Collect numbers at each design's pose; a row for which no design has a number is left out."""
     rows = []
     for group, letter, better in (("compliance", "C", Better.LESS), ("stiffness", "K", Better.MORE)):
         for name in COMPONENTS:
@@ -93,7 +93,7 @@ def _diagonal(analysis: Analysis, group: str, name: str) -> float | None:
 
 
 def _least(analysis: Analysis, block: str) -> float | None:
-    """The least principal stiffness of a block, the other free to follow."""
+    """The least principal stiffness of a block, with the motions of the other block free."""
     blocks = analysis.indices.free if analysis.indices else None
     return {str(name): block_values.stiffnesses[0] for name, block_values in (blocks or {}).items()}.get(block)
 
@@ -110,7 +110,7 @@ def _condition(analysis: Analysis) -> float | None:
 def rows_over(
     machines: Sequence[Machine], ranges: Sequence[str], progress: Progress
 ) -> tuple[tuple[Row, ...], tuple[tuple[int, int], ...]]:
-    """Compute worst, percentile and mean over a grid, and for each design how many of how many poses have an answer.
+    """Compute the worst value, a percentile and the mean over a grid; and for each design (poses answered, all poses).
 
     Raises:
         InputError: a range that one of the machines does not take.
@@ -130,13 +130,13 @@ def rows_over(
         better = Better.MORE if name == "singularity_margin" else Better.LESS
         shown = name.replace("compliance_", "C_").replace("_margin", " margin")
         for k, what in enumerate(("worst", f"{PERCENTILE:g} %", "mean")):
-            own_values = tuple(spread[name][k] if name in spread else None for spread in spreads)
-            rows.append(Row(shown, what, QUANTITIES[name].unit, better, own_values))
+            by_design = tuple(spread[name][k] if name in spread else None for spread in spreads)
+            rows.append(Row(shown, what, QUANTITIES[name].unit, better, by_design))
     return tuple(rows), tuple(poses)
 
 
 def _spread(name: str, row: Array) -> tuple[float, ...]:
-    """Worst, what so many percent of the poses are at least as good as, and mean."""
+    """Return the worst value, the value that `PERCENTILE` percent of the poses reach or better, and the mean."""
     if name == "singularity_margin":
         return float(row.min()), float(np.percentile(row, 100.0 - PERCENTILE)), float(row.mean())
     return float(row.max()), float(np.percentile(row, PERCENTILE)), float(row.mean())

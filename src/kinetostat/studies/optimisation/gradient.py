@@ -116,7 +116,7 @@ class _Descent:
         first = self._at(self.start[self.survey.free])
         if not first.sound:
             return
-        kinked = isinstance(self._term, PoseTerm) and self._term.aggregate.share == 1.0 and first.there.size > 1
+        kinked = isinstance(self._term, PoseTerm) and self._term.aggregate.share == 1.0 and first.reached.size > 1
         kinked = kinked and (self.problem.robust is None or self.problem.robust.share == 1.0)
         scale = abs(self._objective(first)[0]) or 1.0
         genes, value = self.start[self.survey.free], np.inf

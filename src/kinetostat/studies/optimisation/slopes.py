@@ -1,4 +1,7 @@
-"""Exact derivatives of what a design is worth by its continuous genes; choices are held. Nothing is searched here."""
+"""Exact derivatives of the terms of a design by its continuous genes, with all choices held. Nothing is searched here.
+
+A gene is a variable scaled to the range 0 to 1; a term is an objective or a constraint (`problem`, `terms`).
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,59 +21,59 @@ Rows = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Local:
-    """One design and its surroundings, over the machines that manufacture makes of it and their poses.
+    """The values and derivatives of one design at every machine that manufacture may make of it, and at every pose.
 
     Attributes:
-        problem: to which it belongs.
+        problem: the problem to which the design belongs.
         values: quantities by name [machines x poses].
-        there: which poses are reached [machines x poses].
+        reached: which poses are reached [machines x poses].
         slopes: derivatives of each quantity by each continuous gene, by name [genes x machines x poses].
     """
 
     problem: Problem
     values: dict[str, Array]
-    there: Mask
+    reached: Mask
     slopes: dict[str, Array]
 
     @property
     def sound(self) -> bool:
-        """Whether enough poses are reached and everything there is finite."""
-        share = self.there.mean() if self.there.size else 0.0
-        whole = bool(share >= self.problem.poses.required - 1e-12 and self.there.any(axis=-1).all())
+        """Whether enough poses are reached, and all numbers at them are finite."""
+        share = self.reached.mean() if self.reached.size else 0.0
+        enough = bool(share >= self.problem.poses.required - 1e-12 and self.reached.any(axis=-1).all())
         arrays = [*self.values.values(), *self.slopes.values()]
-        return whole and all(bool(np.isfinite(np.where(self.there, array, 0.0)).all()) for array in arrays)
+        return enough and all(bool(np.isfinite(np.where(self.reached, array, 0.0)).all()) for array in arrays)
 
     def term(self, term: Term, high_is_bad: bool) -> tuple[float, Array]:
-        """The number of a term, and its derivatives by the genes: where it has a kink, of the part that decides."""
+        """Compute a term and its derivatives by the genes; at a kink, those of the pose or machine that decides."""
         numbers, slopes = [], []
-        for k, there in enumerate(self.there):
+        for k, reached in enumerate(self.reached):
             at_machine = {name: rows[k] for name, rows in self.values.items()}
-            numbers.append(float(term.values({name: at_machine[name][None] for name in term.names}, there[None])[0]))
-            parts = term.slopes(at_machine, there)
-            slopes.append(sum(np.where(there, self.slopes[name][:, k], 0.0) @ outer for name, outer in parts.items()))
-        made = np.array(numbers)
-        if self.problem.robust is None or len(made) == 1:
-            return made[0], np.asarray(slopes[0])
-        every = np.ones(len(made), dtype=bool)
-        shares = self.problem.robust.weights(made, every, high_is_bad)
-        return float(shares @ made), shares @ np.array(slopes)
+            numbers.append(float(term.values({name: at_machine[name][None] for name in term.names}, reached[None])[0]))
+            parts = term.slopes(at_machine, reached)
+            slopes.append(sum(np.where(reached, self.slopes[name][:, k], 0.0) @ outer for name, outer in parts.items()))
+        at_machines = np.array(numbers)
+        if self.problem.robust is None or len(at_machines) == 1:
+            return at_machines[0], np.asarray(slopes[0])
+        every = np.ones(len(at_machines), dtype=bool)
+        shares = self.problem.robust.weights(at_machines, every, high_is_bad)
+        return float(shares @ at_machines), shares @ np.array(slopes)
 
     def worst(self, term: PoseTerm, most: int) -> Rows:
-        """Numbers of the worst machines and poses of a term, counted through all of them."""
+        """Return where a term is worst, the worst first: at most `most` indices into the flattened machines x poses."""
         at_poses = term.at_poses(self.values)
-        badness = np.where(self.there, at_poses if term.high_is_bad else -at_poses, -np.inf)
-        return np.argsort(-badness, axis=None, kind="stable")[: min(most, int(self.there.sum()))]
+        badness = np.where(self.reached, at_poses if term.high_is_bad else -at_poses, -np.inf)
+        return np.argsort(-badness, axis=None, kind="stable")[: min(most, int(self.reached.sum()))]
 
-    def pieces(self, term: PoseTerm, numbers: Rows) -> tuple[Array, Array]:
-        """A term at some machines and poses, and its derivatives there by the genes [pieces], [pieces x genes]."""
+    def pieces(self, term: PoseTerm, indices: Rows) -> tuple[Array, Array]:
+        """Return a term at indices of `worst` [pieces], and its derivatives by the genes there [pieces x genes]."""
         total = np.sum([weight * self.slopes[name] for name, weight in term.weights], axis=0)
-        slopes = total.reshape(len(total), -1)[:, numbers].T
-        chosen = term.at_poses(self.values).flat[numbers]
+        slopes = total.reshape(len(total), -1)[:, indices].T
+        chosen = term.at_poses(self.values).flat[indices]
         return chosen, -slopes * (chosen * chosen)[:, None] if term.inverse else slopes
 
 
 class Surveyor:
-    """Finds derivatives for designs of one problem; its program is compiled once."""
+    """Computes derivatives for designs of one problem; its program is compiled once."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -83,11 +86,11 @@ class Surveyor:
 
     @property
     def free(self) -> Rows:
-        """Numbers of the searched variables that are continuous."""
+        """Indices of the continuous variables among those searched."""
         return self._free
 
     def _chain(self) -> list[Mapping[str, float]]:
-        """Of each continuous gene, how fast it moves which leaves."""
+        """Return for each continuous gene the scalars of the machine that it changes, each with its rate per gene."""
         searched = self.problem.space.searched
         return [
             {
@@ -99,7 +102,7 @@ class Surveyor:
         ]
 
     def __call__(self, genes: Array) -> Local:
-        """One design [variables], every machine that is made of it, and derivatives."""
+        """Evaluate one design, given by its genes [variables], with derivatives, at every machine made of it."""
         problem = self.problem
         machines = len(next(iter(self._made.values()), (0.0,)))
         columns = problem.space.columns(np.repeat(genes[None], machines, axis=0), self._made)

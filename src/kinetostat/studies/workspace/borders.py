@@ -1,7 +1,7 @@
-"""Where the verdict changes between neighbouring nodes of a workspace, so that its pictures have the true outlines.
+"""Borders of a workspace between the nodes of its grid, so that pictures show the true outline.
 
-Whatever bounds a workspace (reach, a limit, a singularity, a condition), the judge can tell on which side a pose lies.
-Halving the step between two nodes again and again therefore finds the border, without a formula for it.
+A border may come from reach, a limit, a singularity or a condition. In every case the judge can say on which side a
+pose lies, so that halving the step between two nodes again and again finds the border without a formula for it.
 """
 
 from collections.abc import Sequence
@@ -17,37 +17,38 @@ from kinetostat.studies.grid.grid import GridQuestion
 from kinetostat.studies.workspace.verdicts import Codes, Judge, Mask, Numbers, Poses
 
 HALVINGS = 7
-"""After them the border is known to a 128th of a step, finer than a printed line."""
+"""Number of halvings. Seven give the border to a 128th of a step, finer than a printed line."""
 SHOWN = 3
-"""Coordinates over which a workspace is drawn; all others stay at the values of the pose in the file."""
+"""Number of coordinates over which a workspace is drawn; the others keep the values of the pose in the file."""
 NEAR = 1e-3
-"""Least distance of a node from a border, in steps: a border at a node itself would leave no side to it."""
+"""Least distance of a node from a border, in steps. At a distance of 0 a node would lie neither inside nor outside."""
 
 Shares = npt.NDArray[np.float32]
 
 
 def borders(judge: Judge, question: GridQuestion, verdict: Codes, home: Sequence[int]) -> list[Shares]:
-    """Find the borders along the grid's lines.
+    """Find the borders along the lines of the grid.
 
     Args:
-        judge: tells the verdict on a pose.
+        judge: gives the verdict on a pose.
         question: the grid.
-        verdict: of its nodes.
-        home: the node nearest to the pose in the file: borders are sought over the first three coordinates through it.
+        verdict: the verdict on each node of the grid.
+        home: the node nearest to the pose in the file. Only the nodes that differ from it in the first three
+            coordinates alone are searched, because only these are drawn.
 
     Returns:
-        Of each of these axes, an array over the nodes: the share of the step to the next node along the axis at which
-        the verdict of the node ends; NaN where the next node has the same verdict.
+        An array over the nodes for each of the first three axes. Where the next node along the axis has another
+        verdict, the entry is the share of the step to it at which the verdict changes; elsewhere it is NaN.
     """
     axes, ends = question.grid.axes, []
-    apart = tuple(slice(None) if k < SHOWN else slice(home[k], home[k] + 1) for k in range(verdict.ndim))
+    drawn = tuple(slice(None) if k < SHOWN else slice(home[k], home[k] + 1) for k in range(verdict.ndim))
     for k in range(min(SHOWN, verdict.ndim)):
         changes = np.zeros(verdict.shape, dtype=bool)
         lower, upper = _neighbours(verdict, k)
         changes[_all_but(k, slice(None, -1))] = lower != upper
-        seen = np.zeros_like(changes)
-        seen[apart] = True
-        ends.append(np.argwhere(changes & seen))
+        searched = np.zeros_like(changes)
+        searched[drawn] = True
+        ends.append(np.argwhere(changes & searched))
     nodes = np.concatenate(ends)
     axis = np.repeat(np.arange(len(ends)), [len(places) for places in ends])
     shares = _halved(judge, axes, nodes, axis, verdict) if len(nodes) else np.zeros(0)
@@ -60,7 +61,7 @@ def borders(judge: Judge, question: GridQuestion, verdict: Codes, home: Sequence
 
 
 def _halved(judge: Judge, axes: Sequence[Axis], nodes: Numbers, axis: Numbers, verdict: Codes) -> Array:
-    """Halve the step from each node along its axis until the end of its verdict is known."""
+    """Halve the step from each node along its axis, and return the share of the step at which the verdict changes."""
     start = {path: a.values[nodes[:, k]] for k, a in enumerate(axes) for path in a.paths}
     step = {
         path: np.where(axis == k, a.values[np.minimum(nodes[:, k] + 1, len(a.values) - 1)] - a.values[nodes[:, k]], 0.0)
@@ -85,12 +86,12 @@ def _chosen(poses: Poses, numbers: Numbers) -> Poses:
 def depth(region: Mask, shares: Sequence[Shares]) -> Array:
     """Return how far inside a region each node lies, in steps: positive inside, negative outside, at most 1.
 
-    Linear interpolation of it vanishes at the borders. Two distances along lines of the grid give that from a straight
-    border between them: 1/d^2 = 1/a^2 + 1/b^2.
+    Interpolated linearly between the nodes, the depth is zero on the borders. Where a straight border cuts two lines
+    of the grid at the distances a and b from a node, its own distance d follows from 1/d^2 = 1/a^2 + 1/b^2.
 
     Args:
-        region: which nodes belong to it, over the axes of the shares.
-        shares: of `borders`.
+        region: which nodes belong to the region, over the axes of the shares.
+        shares: what `borders` returns, one array for each axis.
     """
     inverse_square = np.zeros(region.shape)
     for k, share in enumerate(shares):
@@ -102,13 +103,14 @@ def depth(region: Mask, shares: Sequence[Shares]) -> Array:
         nearest[first] = along
         back = np.where(parted, 1.0 - share[first], np.inf)
         nearest[second] = np.minimum(nearest[second], back)
+        # A border that was not searched has the share NaN; it is taken to lie half-way.
         inverse_square += np.maximum(np.nan_to_num(nearest, nan=0.5, posinf=np.inf), NEAR) ** -2.0
     distance = np.minimum(np.where(inverse_square > 0.0, inverse_square, 1.0) ** -0.5, 1.0)
     return np.where(region, distance, -distance)
 
 
 def _neighbours(nodes: npt.NDArray[Any], k: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Return the nodes that have a next one along an axis, and these next ones."""
+    """Return all nodes but the last along an axis, and all but the first: each node beside its next neighbour."""
     return nodes[_all_but(k, slice(None, -1))], nodes[_all_but(k, slice(1, None))]
 
 

@@ -34,9 +34,9 @@ class FavouritesPanel:
         """Build the panel.
 
         Args:
-            session: whose machine may be kept.
-            favourites: of the server.
-            load: takes a machine into the session.
+            session: the session of this tab; its machine can be kept.
+            favourites: the favourites that the server keeps for all tabs.
+            load: puts a machine into the session.
         """
         self._session, self._favourites, self._load = session, favourites, load
         self._lane = Lane(_compared, self._show)

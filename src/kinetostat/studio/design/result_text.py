@@ -12,11 +12,11 @@ from kinetostat.studio.design.progress import Progress
 from kinetostat.studio.wording import engineering, gains, heading, paragraph, table
 
 SACRIFICED = 0.01
-"""Share of the stiffness below which the loss in a direction is pointed out."""
+"""A remark says so if a direction keeps less than this share of its initial stiffness."""
 NEGLIGIBLE = 1e-4
-"""Percent per percent below which a 0 is shown."""
+"""A sensitivity below this, in percent per percent, is shown as 0."""
 EXACT = 9
-"""Digits of an objective."""
+"""Digits with which objectives are shown."""
 
 
 def result_text(progress: Progress) -> str:
@@ -71,7 +71,10 @@ def _design(problem: Problem, result: dict[str, Any]) -> str:
             before, after = (variable.shown(v, problem.machine.display) for v in (variable.initial, value))
         percents = slopes.get(path, {}).get("percent_per_percent", [])
         rows.append([path, before, after, bounds.get(path, ""), ", ".join(_percent(p) for p in percents)])
-    note = paragraph("% per %: change of the objective per percent of the variable; of an angle, per 0.01 rad.", "note")
+    note = paragraph(
+        "% per %: by how many percent the objective changes if the variable grows by 1 % (an angle by 0.01 rad).",
+        "note",
+    )
     return heading("Design") + table("Design", ["", "initial", "best", "bound", "% per %"], rows, "design") + note
 
 
@@ -100,7 +103,8 @@ def _remarks(result: dict[str, Any]) -> list[str]:
     for each in result["directions"]:
         if each["gain"] is not None and each["gain"] < SACRIFICED:
             name = each["name"].removeprefix("compliance_")
-            remarks.append(f"In {name}, the best design keeps only {each['gain']:.2g} of the initial stiffness.")
+            gain = f"{each['gain']:.2g}"
+            remarks.append(f"In the direction {name}, the best design keeps only {gain} of the initial stiffness.")
     return remarks + (result["ridges_told"] if result["front"] is None else [])
 
 

@@ -1,4 +1,4 @@
-"""K or C over the stiffness of one part: the curve shows from where on a stiffer part no longer pays.
+"""K or C over the stiffness of one part: the curve shows above which stiffness a stiffer part hardly helps.
 
 The values along the curve are computed by `answers.curves`.
 """
@@ -16,8 +16,8 @@ from kinetostat.studio.session import Session
 from kinetostat.studio.wording import full_label
 from kinetostat.units import KINDS
 
-DECADES = 1e3
-"""Factor by which the range goes up and down from the present value."""
+SPAN = 1e3
+"""The curve runs from the present stiffness divided by this factor to the present stiffness times this factor."""
 BLOCKS = {"C, translation": ("compliance", "xyz"), "C, rotation": ("compliance", "r"),
           "K, translation": ("stiffness", "xyz"), "K, rotation": ("stiffness", "r")}  # fmt: skip
 
@@ -56,7 +56,7 @@ class LinkPanel(Panel):
         matrix, letters = BLOCKS[str(self.block.value)]
         names = [n for n in self._session.machine.family.component_names if (n[0] == "r") == (letters == "r")]
         quantities = tuple(f"{matrix}_{name}" for name in names)
-        ends = Ends(path, middle / DECADES, middle * DECADES)
+        ends = Ends(path, middle / SPAN, middle * SPAN)
         self._lane.ask(CurveRequest(self._session.machine, ends, quantities))
 
     def _draw(self, request: CurveRequest, answer: Curves) -> None:
