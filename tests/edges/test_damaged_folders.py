@@ -113,7 +113,7 @@ def test_a_damaged_question_is_one_sentence(kind, place, undisturbed, tmp_path, 
     for command in (lambda: again(kind, folder), lambda: main(["check", str(folder)])):
         assert command() == BAD_INPUT
         error = capsys.readouterr().err
-        assert "is damaged; choose another folder, or remove this one" in error
+        assert "is damaged and cannot be read; choose another folder, or remove this one" in error
         assert error.count("\n") == 1
 
 

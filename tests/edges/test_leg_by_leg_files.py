@@ -79,7 +79,7 @@ MISTAKES = {
     "a matrix where none belongs": (
         'model = "beam", section',
         'model = "matrix", section',
-        ['link "proximal"', 'belongs to model = "matrix"'],
+        ['link "proximal"', 'model = "matrix" needs compliance'],
     ),
     "a matrix with negative energy": (
         'model = "beam", section = "bar"',

@@ -55,7 +55,7 @@ def test_list_shows_the_studies(capsys):
 
 MISTAKES = {
     'variables.0.to="14 kg"': r"variables\.0 \(geometry\.platform_radius\)\.to .*not a unit of length",
-    'variables.0.to="5 cm"': "from must be less than to",
+    'variables.0.to="5 cm"': "must be less than to, 5 cm",
     "variables.0.to=-1": "greater than 0",
     "variables.0.path=platform_radios": r"not a field of family .*did you mean",
     "variables.1.path=platform_radius": "set by two variables",

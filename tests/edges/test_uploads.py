@@ -45,5 +45,5 @@ def test_what_exceeds_the_limits_is_refused_in_a_sentence(work, tmp_path, monkey
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=":")
     monkeypatch.setattr(uploads, "WORKER", "hog")
-    with pytest.raises(InputError, match="or ends the reader; a machine file is a short TOML text"):
+    with pytest.raises(InputError, match="or stops the program that reads it; a machine file is a short TOML text"):
         sent(b"")

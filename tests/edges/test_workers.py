@@ -120,9 +120,9 @@ class Failing:
 @pytest.mark.parametrize(
     ("error", "arguments", "message"),
     [
-        ("CancelledError", (), r"connection to the cluster was lost\. What was written is kept"),
+        ("CancelledError", (), r"connection to the cluster was lost\. Results that are already in a folder are kept"),
         ("comm.CommClosedError", (), "connection to the cluster was lost"),
-        ("KilledWorker", ("task", "worker", 3), "worker after worker died"),
+        ("KilledWorker", ("task", "worker", 3), "several workers stopped at the same chunk"),
     ],
 )
 def test_a_cluster_that_fails_is_said(error, arguments, message):

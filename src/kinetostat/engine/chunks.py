@@ -75,8 +75,8 @@ def here(work: Work, numbers: Sequence[int]) -> Iterator[tuple[int, Evaluation]]
 
 MISSING = "--workers and --cluster need Dask, which is not installed; install it with `{}`."
 AHEAD = 2
-"""Chunks handed out per thread of the cluster: one in hand and one waiting."""
-GO_ON = "What was written is kept: the same command goes on from there."
+"""Chunks handed out per thread of the cluster: one that is computed and one that waits."""
+GO_ON = "Results that are already in a folder are kept: the same command continues from there."
 PATIENCE = "10 s"
 """How long a cluster may take to answer."""
 
@@ -154,7 +154,10 @@ def _check_versions(client: Any) -> None:
         raise InputError(f"a worker of the cluster lacks kinetostat {ours} ({error}); install it there.") from None
     for worker, theirs in versions.items():
         if theirs != ours:
-            raise InputError(f"worker {worker} runs kinetostat {theirs}, here is {ours}; install the same everywhere.")
+            raise InputError(
+                f"worker {worker} runs kinetostat {theirs}, but this computer runs {ours}; install the same version "
+                "on both."
+            )
 
 
 def _version_here() -> str:
@@ -178,7 +181,7 @@ def _computed(distributed: Any, client: Any, work: Work, numbers: Sequence[int])
             finished.update(hand_out(max(1, _places(client) - finished.count())))
             yield number, evaluation
     except distributed.KilledWorker:
-        raise InputError("worker after worker died over the same chunk; their logs say why. " + GO_ON) from None
+        raise InputError("several workers stopped at the same chunk; their logs say why. " + GO_ON) from None
     except (distributed.CancelledError, OSError):
         raise InputError("the connection to the cluster was lost. " + GO_ON) from None
 

@@ -88,7 +88,10 @@ def choose(name: str | None, path: Path | None) -> Format:
         if suffix in (form.suffix, *form.other_suffixes):
             return form
     names = ", ".join(f"{form.name} ({form.suffix})" for form in KNOWN)
-    raise InputError(f"The format is not clear; give --to, or a file with -o that ends as one of: {names}.")
+    raise InputError(
+        "The format of the export is missing; name it with --to, or give -o a file with one of these suffixes: "
+        f"{names}."
+    )
 
 
 def export(machine: Machine, path: str | Path, to: str | None = None) -> list[Path]:

@@ -194,7 +194,9 @@ def write(analysis: Analysis, path: Path) -> list[Path]:
     text, loops = texts_of(analysis)
     loops_path = path.with_suffix(".yaml")
     if loops_path == path:
-        raise InputError(f'"{path}" is where the closed loops go; give the URDF another suffix, e.g. .urdf.')
+        raise InputError(
+            f'"{path}" is the name of the file of the closed loops; give the URDF another suffix, e.g. .urdf.'
+        )
     with replacing(path) as first, replacing(loops_path) as second:
         first.write_text(text, encoding="utf-8")
         second.write_text(loops, encoding="utf-8")

@@ -151,12 +151,16 @@ class _Reader:
             where = self._where(element)
             parent, child = (self._link(element, end, where) for end in ("parent", "child"))
             if child in parents:
-                raise InputError(f"{where}: link {shorten(child)} hangs on two joints; close the loop with <loop>.")
+                raise InputError(
+                    f"{where}: link {shorten(child)} is the child of two joints; close the loop with <loop>."
+                )
             parents[child] = parent
             children.setdefault(parent, []).append(element)
         roots = [link for link in self._links if link not in parents]
         if len(roots) != 1:
-            raise InputError(f'"{self._origin}" needs one link that hangs on no joint, the base; it has {len(roots)}.')
+            raise InputError(
+                f'"{self._origin}" has {len(roots)} links that are not the child of a joint; it needs one, the base.'
+            )
         frames: dict[str, Array] = {roots[0]: np.eye(4)}
         joints: dict[str, FileJoint] = {}
         pending = [roots[0]]
@@ -168,7 +172,11 @@ class _Reader:
                 pending.append(joint.child)
         if len(frames) < len(self._links):
             lost = next(link for link in self._links if link not in frames)
-            raise InputError(f'"{self._origin}": link {shorten(lost)} hangs on itself; joints must form a tree.')
+            raise InputError(
+                f'"{self._origin}": link {shorten(lost)} is on a closed chain of joints; joints must form a tree, and '
+                "a "
+                "loop is closed with <loop>."
+            )
         loops = tuple(self._loops(frames))
         about = self._robot.find("kinetostat")
         name = self._robot.get("name", "machine")

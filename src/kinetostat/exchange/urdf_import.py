@@ -131,7 +131,7 @@ def _tip(file: UrdfFile, loop: FileLoop, rigid: set[str]) -> str:
             'two revolutes, the second with <mimic multiplier="-1"/>.'
         )
     if loop.kind not in CLOSING:
-        raise InputError(f"{where} is {shorten(loop.kind)}; it may be {', '.join(CLOSING)}.")
+        raise InputError(f"{where} is of type {shorten(loop.kind)}; its type may be {', '.join(CLOSING)}.")
     first, second = loop.frames
     gap = float(np.linalg.norm(first[:3, 3] - second[:3, 3]))
     angle = float(np.linalg.norm(first[:3, :3] - second[:3, :3])) if loop.kind == "fixed" else 0.0
@@ -208,14 +208,14 @@ def _next(row: Sequence[FileJoint], where: str) -> tuple[int, Document]:
     if len(row) > 1 and row[1].mimics is not None:
         return 2, _parallelogram(first, row[1], where)
     if first.mimics is not None:
-        raise InputError(f"{where} follows {shorten(first.mimics[0])}; it may follow the joint before it, or none.")
+        raise InputError(f"{where} mimics {shorten(first.mimics[0])}; it may mimic only the joint before it.")
     if first.kind == "fixed":
         return 1, {"type": "fixed", "compliance": _compliance(first, where)}
     if first.kind == "spherical":
         return 1, {"type": "spherical"}
     if first.kind not in ONE_FREEDOM:
         kinds = ", ".join(ONE_FREEDOM)
-        raise InputError(f"{where} is {shorten(first.kind)}; a leg may have {kinds} and fixed joints.")
+        raise InputError(f"{where} is of type {shorten(first.kind)}; a leg may have {kinds} and fixed joints.")
     hinges = _hinges(row)
     if hinges > 1:
         axes = [joint.axis.tolist() for joint in row[:hinges]]

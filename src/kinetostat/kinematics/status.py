@@ -4,7 +4,7 @@ from enum import IntEnum
 
 
 class Status(IntEnum):
-    """What became of a pose. Only `OK` carries results; the others say why there are none."""
+    """Whether a pose has results. Only `OK` has; the others say why there are none."""
 
     OK = 0
     OUT_OF_REACH = 1
@@ -19,7 +19,7 @@ class Status(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """What it means."""
+        """A sentence for people."""
         return _SENTENCES[self]
 
 
@@ -27,6 +27,6 @@ _SENTENCES = {
     Status.OK: "The pose can be reached and the machine resists every load.",
     Status.OUT_OF_REACH: "A leg is too short or too long to close.",
     Status.JOINT_LIMIT: "A leg, a joint or an actuator is beyond its limit.",
-    Status.SINGULAR: "The machine is singular: some load finds no unique answer in its legs.",
+    Status.SINGULAR: "The machine is singular: in some direction its legs cannot hold the platform or cannot move it.",
     Status.NOT_CONVERGED: "The position of the passive joints could not be computed.",
 }

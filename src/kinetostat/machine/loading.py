@@ -39,10 +39,10 @@ from kinetostat.units import RIGID, UnitError
 
 SUFFIX = ".toml"
 STUDY = (
-    "is a study, and here a machine is wanted; `kinetostat check`, `optimize` and `report` take studies, and the "
-    "machine that it is about stands in it as machine = ..."
+    "is a study, but this command takes a machine; name the machine that the study gives as machine = ..., or use "
+    "`kinetostat check`, `optimize` or `report`, which take studies."
 )
-"""What is said of a study in the place of a machine."""
+"""The message for a study in the place of a machine."""
 
 
 @cache
@@ -270,7 +270,9 @@ def template(family: str) -> str:
     simplest = sorted(bundled().items(), key=lambda item: len(item[0]))
     texts = [text for _, text in simplest if documents.parse(text, "")["family"] == wanted]
     if not texts:
-        raise InputError(f'kinetostat has no file of family "{wanted}"; its own package may bring one.')
+        raise InputError(
+            f'kinetostat has no example file of the family "{wanted}"; look in the package that registers it.'
+        )
     return texts[0]
 
 

@@ -134,7 +134,7 @@ def _find(family: HasFields, text: str) -> Parameter:
     if len(ends) == 1:
         return known[ends[0]]
     if ends:
-        raise InputError(f'"{text}" may be {" or ".join(ends)}; write one of them.')
+        raise InputError(f'"{text}" may mean {" or ".join(ends)}; write one of them.')
     near = difflib.get_close_matches(text, [*known, *(path.split(".", 1)[1] for path in known)], 1)
     pose = ", ".join(shown(path) for path in known if path.startswith(POSE))
     rest = f"coordinates of its pose are {pose}, and `kinetostat check` shows every field."

@@ -57,8 +57,8 @@ def _densities(family: Family, resolved: Mapping[str, Densities], origin: str) -
         for density in known.values():
             if not np.allclose(density, heavy.setdefault(kind.name, density), rtol=SAME, atol=0.0):
                 raise InputError(
-                    f'"{origin}": stiffness.{" and stiffness.".join(known)} are of the same {kind.name}, but their '
-                    "cross-sections differ in mass; give them one, or one of them as a number."
+                    f'"{origin}": stiffness.{" and stiffness.".join(known)} describe the same {kind.name}, but '
+                    "their cross-sections differ in mass; give both the same cross-section, or one of them as a number."
                 )
     return heavy
 
@@ -92,7 +92,8 @@ def _rigidity(table: Mapping[str, object], which: str, where: str) -> tuple[floa
             f"{', '.join(SHAPES[shape])}, material and density."
         )
     if shape == "tube" and not numbers["inner_diameter"] < numbers["outer_diameter"]:
-        raise InputError(f"{where}: inner_diameter must be less than outer_diameter.")
+        inner, outer = numbers["inner_diameter"], numbers["outer_diameter"]
+        raise InputError(f"{where}: inner_diameter is {inner:g} m; it must be less than outer_diameter, {outer:g} m.")
     data = SimpleNamespace(**numbers)
     return float(getattr(rigidity_of(shape, data, shear=False), which)), float(linear_density_of(shape, data))
 

@@ -40,7 +40,10 @@ class Range:
         """
         start, end = self._end(self.start, quantity), self._end(self.end, quantity)
         if not np.isfinite([start, end]).all():
-            raise InputError(f'{self.field}: a range cannot end at "rigid"; use a large value, or analyse it apart.')
+            raise InputError(
+                f'{self.field}: a range cannot end at "rigid"; write a large value, and analyse the rigid machine '
+                "separately."
+            )
         if not self.logarithmic:
             return np.linspace(start, end, self.count)
         if start <= 0 or end <= 0:

@@ -99,8 +99,8 @@ def stiffness_along(
                 values[name + kind] = None
     if all(value is None for value in values.values()):
         raise InputError(
-            f"The direction {shorten(direction)} is none of this machine, because it is zero or lies out of its plane; "
-            "give three numbers, e.g. (0, 0, 1), on the command line --along 0,0,1."
+            f"The direction {shorten(direction)} is zero, or perpendicular to the plane of this machine; give three "
+            "numbers, e.g. (1, 0, 0), on the command line --along 1,0,0."
         )
     return Along(direction, **values)
 

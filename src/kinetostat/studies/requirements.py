@@ -140,8 +140,9 @@ def _poses(machine: Machine, requirement: Requirement) -> tuple[Points, list[Par
         grid = Grid([Axis(f.leaves, span.values(f.quantity)) for span, f in zip(ranges, fields, strict=True)])
         if grid.size > MOST_POSES:
             raise InputError(f"the box has {grid.size:,} poses; at most {MOST_POSES:,} are judged: lower the counts.")
-        if len(set(grid.paths)) < len(grid.paths):
-            raise InputError("a field has two ranges; give it one.")
+        for path in grid.paths:
+            if list(grid.paths).count(path) > 1:
+                raise InputError(f"{path} has two ranges; give it one.")
         return grid, fields, f"over {', '.join(f.shown for f in fields)}"
     if requirement.poses:
         here = values(machine)

@@ -28,7 +28,7 @@ ABANDONED = 24 * 3600.0
 """Age, s, from which a temporary folder is abandoned where folders have no locks."""
 UNLOCKED = -1
 """In the place of a handle where folders have no locks."""
-KEPT = "what was written before is kept, and the same command goes on from there"
+KEPT = "what was written before is kept, and the same command continues from there"
 """What is there after a failure to write into the file of a long study."""
 REASONS = {
     errno.ENOSPC: "the disk is full; make room, or choose another place",

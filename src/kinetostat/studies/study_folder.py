@@ -77,7 +77,7 @@ def read_question(folder: Path) -> Record:
     except OSError as error:
         raise InputError(f'"{path}" cannot be read: {error.strerror}; choose another folder.') from None
     if question is None:
-        raise InputError(f'"{path}" cannot be read, it is damaged; choose another folder, or remove this one.')
+        raise InputError(f'"{path}" is damaged and cannot be read; choose another folder, or remove this one.')
     return question
 
 

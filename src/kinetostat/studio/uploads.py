@@ -53,8 +53,8 @@ async def check_upload(kind: str, data: bytes, name: str) -> None:
         raise InputError(answer.decode())
     if process.returncode != 0:
         raise InputError(
-            f'"{name}" takes more than {SECONDS} s or {MEMORY >> 30} GiB to read, or ends the reader; a {kind} file '
-            "is a short TOML text: check what is in it."
+            f'"{name}" takes more than {SECONDS} s or {MEMORY >> 30} GiB to read, or stops the program that reads it; '
+            f"a {kind} file is a short TOML text: check what is in it."
         )
 
 

@@ -222,8 +222,10 @@ def _our_compliance(response: Response) -> Array:
     ours = np.array(response.compliance.rows(), dtype=float)
     if not np.all(np.isfinite(ours)):
         raise InputError(
-            "A spring without stiffness leaves the platform free, so that there is no finite compliance to compare."
+            "A spring without stiffness leaves the platform free, so that there is no finite compliance to compare; "
+            "give "
+            "every spring a stiffness with --set."
         )
     if not np.any(ours):
-        raise InputError("Every part is rigid: C is 0 in any engine, and there is nothing to compare.")
+        raise InputError("Every part is rigid: C is 0 in any engine; give a part a finite stiffness with --set.")
     return ours

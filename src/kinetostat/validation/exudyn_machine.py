@@ -242,7 +242,10 @@ def _beam(model: Multibody, beam: Beam, bodies: Sequence[Body], plane: Plane | N
     compliance = end_compliance(beam)
     moving = ALL if plane is None else in_plane(beam, plane.frame.rotation.z)
     if not any(moving):
-        raise InputError(f'The cross-section of "{beam.name}" is askew to the plane of the planar machine.')
+        raise InputError(
+            f'An axis of the cross-section of "{beam.name}" must lie in the plane of the planar machine; change its '
+            "`up`."
+        )
     flexible = [i for i in range(6) if moving[i] and compliance[i, i] > 0.0]
     constrained = [moving[i] and i not in flexible for i in range(6)]
     matrix = np.zeros((6, 6))

@@ -108,7 +108,11 @@ def moves_in(plane: Plane, piece: Piece) -> bool:
     joint, normal = joint_of(piece), array(plane.frame.rotation.z)
     along = abs(float(array(joint.axis) @ normal))
     if COINCIDENT < along < 1.0 - COINCIDENT:
-        raise InputError(f'"{joint.name or piece.name}" is askew to the plane of a planar machine.')
+        raise InputError(
+            f'The axis of "{joint.name or piece.name}" must lie in the plane of the planar machine or be '
+            "perpendicular to "
+            "it; turn it."
+        )
     return (along > 0.5) != (joint.point is None)
 
 

@@ -191,7 +191,9 @@ def _writers(what: object) -> dict[str, Writer]:
             }
     data = kind_of(what).data
     if data is None:
-        raise InputError(f"A {type(what).__name__} cannot be saved.")
+        raise InputError(
+            f"A result of type {type(what).__name__} has no file format; save its tables or figures instead."
+        )
     written: dict[str, Writer] = {".json": lambda path: write_json(path, data(what))}
     match what:
         case xr.Dataset():

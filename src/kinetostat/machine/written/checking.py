@@ -69,7 +69,7 @@ def _check_plane(joint: JointPlan, data: Any, where: str) -> None:
     if not sizes[JOINT_TYPES[joint.kind].in_plane] < PARALLEL * math.hypot(*axis):
         raise InputError(
             f"{where}: in a planar machine joints are revolute about z, prismatic in the x-y plane, or fixed; "
-            'mend its axis, or write space = "spatial".'
+            'change its axis or its type, or write space = "spatial".'
         )
 
 
@@ -81,7 +81,8 @@ def _check_link(
     span = ends[1] - ends[0]
     if np.linalg.norm(span) < LEAST_AXIS:
         raise InputError(
-            f'{where} has no length: joints "{near.name}" and "{far.name}" share a point; move one, or make it rigid.'
+            f'{where} has no length: joints "{near.name}" and "{far.name}" share a point; move one joint, or make the '
+            "link rigid."
         )
     if link.up is None and shape in ("rectangle", "own"):
         raise InputError(f"{where}: its cross-section has two axes; say where z points, e.g. up = [0, 0, 1].")

@@ -232,12 +232,15 @@ def _seat(kind: str, part: dict[str, Any], has_matrix: bool, where: str) -> tupl
     for way in seat:
         if way not in allowed:
             fields = ", ".join(f"stiffness_{each}" for each in allowed) or "none of these fields"
-            raise InputError(f"{where}: a {kind} joint has no stiffness_{way}, as it moves so; it may have {fields}.")
+            raise InputError(
+                f"{where}: a {kind} joint cannot have stiffness_{way}, because it moves in that direction; it may have "
+                f"{fields}."
+            )
     if seat and has_matrix:
-        raise InputError(f"{where}: compliance and stiffness_{seat[0]} are both of its bearings; leave one out.")
+        raise InputError(f"{where}: compliance and stiffness_{seat[0]} both describe the bearings; leave one out.")
     if seat and needs_axis(kind) and "axis" not in part:
         raise InputError(
-            f"{where}: stiffness_{seat[0]} counts from an axis; add the axis of its bearing, e.g. axis = [0, 0, 1]."
+            f"{where}: stiffness_{seat[0]} refers to an axis; add the axis of the bearing, e.g. axis = [0, 0, 1]."
         )
     return seat
 
@@ -255,8 +258,8 @@ def _check_chain(joints: tuple[JointPlan, ...], where: str) -> None:
             )
         if far in seen or (far == PLATFORM and i < len(joints) - 1):
             raise InputError(
-                f'{where}, joint "{joint.name}" leads to "{far}" too early; a leg passes each body once and the '
-                "platform last."
+                f'{where}, joint "{joint.name}" leads to "{far}" too early; a leg passes each body once and '
+                "ends at the platform."
             )
         at, seen = far, {*seen, far}
     if at != PLATFORM:
@@ -276,7 +279,9 @@ def _link(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str]
         raise InputError(f"{where}: up is {shorten(up)}; give a direction as three numbers, e.g. [0, 0, 1].")
     compliance = _matrix(part.pop("compliance", []), where)
     if (model == "matrix") != bool(compliance):
-        raise InputError(f'{where}: a compliance matrix belongs to model = "matrix", and to it alone.')
+        raise InputError(
+            f'{where}: model = "matrix" needs compliance, and no other model may have it; add it or leave it out.'
+        )
     for key in part:
         raise InputError(f"{where}: {key} is not known; a link has model, section, up and compliance.")
     return LinkPlan(name, model, section, (float(up[0]), float(up[1]), float(up[2])) if up else None, compliance)

@@ -78,7 +78,7 @@ def read_columns(
             not finite, of another kind or not allowed.
     """
     if not columns:
-        raise InputError("poses has no columns; name the field that each column holds, as x.")
+        raise InputError("poses has no columns; name the field that each column holds, e.g. x.")
     fields = [_field(machine, column.name) for column in columns]
     given = [leaf for field in fields for leaf in field.leaves]
     for leaf in given:
@@ -95,14 +95,14 @@ def read_columns(
         raise InputError("poses has no rows; give at least one pose.")
     if count > MOST_POSES:
         raise InputError(
-            f"there are {count:,} poses, and at most {MOST_POSES:,} are evaluated at once; give parts of them."
+            f"there are {count:,} poses, and at most {MOST_POSES:,} are evaluated at once; evaluate them in parts."
         )
     return PoseColumns(tuple(fields), tuple(np.broadcast_to(array, count) for array in values), labels or {})
 
 
 def _field(machine: Machine, name: object) -> Parameter:
     if not isinstance(name, str):
-        raise InputError(f"a column of the poses is called {shorten(name)}; name a field of the machine, as x.")
+        raise InputError(f"a column of the poses is called {shorten(name)}; name a field of the machine, e.g. x.")
     try:
         return find(machine.family, name)
     except InputError as error:
@@ -139,7 +139,7 @@ def _entries(column: Column) -> Any:
     except ValueError:  # rows of several lengths
         entries = np.empty((0, 0))
     if entries.ndim > 1:
-        raise InputError(f"column {column.name} of the poses is a table of its own; give one value for each pose.")
+        raise InputError(f"column {column.name} of the poses has several columns; give one value for each pose.")
     return entries
 
 

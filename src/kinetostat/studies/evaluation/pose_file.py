@@ -81,5 +81,5 @@ def _head(text: str) -> tuple[str, str]:
     """Return the name and the unit in a heading, "x [mm]" or "x (mm)"."""
     match = _HEAD.fullmatch(text.strip())
     if match is None:
-        raise InputError(f"a column of the poses is called {shorten(text)}; name a field of the machine, as x [mm].")
+        raise InputError(f"a column of the poses is called {shorten(text)}; name a field of the machine, e.g. x [mm].")
     return match[1], match[2] or match[3] or ""

@@ -148,7 +148,7 @@ def _check_size(question: GridQuestion) -> None:
 
 def _check_room(question: GridQuestion, final: Path) -> None:
     if final.exists():
-        raise InputError(f'"{final}" is there already; choose another folder with -o, or remove it.')
+        raise InputError(f'"{final}" exists already; choose another folder with -o, or remove the file.')
     check_space(final.parent, question.grid.size, len(question.names))
 
 

@@ -21,10 +21,10 @@ from kinetostat.studies.optimisation.variables import Space, read_space
 from kinetostat.studies.workspace.conditions import value_of
 
 MACHINE = (
-    "is a machine, and here a study is wanted, which says what may change and what is better; `kinetostat new study` "
-    "prints one to start from, and machine = ... in it names the machine."
+    "is a machine, but this command takes a study, which names the machine and says what may change and what is "
+    "better; `kinetostat new study` prints a study to start from."
 )
-"""What is said of a machine in the place of a study."""
+"""The message for a machine in the place of a study."""
 NOMINAL = "nominal"
 MOST_EVALUATIONS = 5_000_000
 """Designs of one study: their table then fits in half a gigabyte."""
@@ -176,7 +176,7 @@ def problem_of(study: StudyFile, machine: Machine) -> Problem:
     )
     labels = [item.term.label for item in objectives]
     if len(set(labels)) < len(labels):
-        raise InputError("two objectives are the same; leave one out, or take it differently over the poses.")
+        raise InputError("two objectives are the same; leave one out, or change its `over`.")
     problem = Problem(study, machine, space, poses, objectives, constraints, _robust(study, space), _method(study))
     _check(problem)
     return problem

@@ -178,7 +178,7 @@ def _variable(machine: Machine, table: VariableTable, where: str) -> Variable:
     else:
         low, high = (_bound(end, fields[0].quantity, f"{name}.{key}") for key, end in _ends(table, name))
         if low >= high:
-            raise InputError(f"{name}: from must be less than to; exchange or widen them.")
+            raise InputError(f"{name}: from is {table.start} and must be less than to, {table.end}; exchange them.")
     return Variable(fields, ratios, low, high, None, (), table.fixed, _tolerance(table, fields[0], name), initial)
 
 

@@ -100,7 +100,7 @@ class Favourites:
         """
         name, note = _printable(name), _printable(note)
         if not name or len(name) > LONGEST_NAME:
-            raise InputError(f"the name of a favourite must have 1 to {LONGEST_NAME} characters.")
+            raise InputError(f"the name has {len(name)} characters; the name of a favourite has 1 to {LONGEST_NAME}.")
         if len(note) > LONGEST_NOTE:
             raise InputError(f"the note has {len(note)} characters; it may have at most {LONGEST_NOTE}.")
         present = numbered(self._folder)
