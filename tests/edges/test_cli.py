@@ -101,7 +101,7 @@ def test_the_wrong_kind_of_file_is_told_in_one_sentence(tmp_path, capsys):
     for command, file, kind in (("analyze", study, "is a study"), ("optimize", machine, "is a machine")):
         assert main([command, str(file)]) == BAD_INPUT
         message = capsys.readouterr().err
-        assert f'"{file}" {kind}, and here ' in message
+        assert f'"{file}" {kind}, but this command ' in message
         assert "missing" not in message
     assert main(["check", str(study), "--set", "variables.0.to=9 m"]) == DONE
     assert " 9000 mm " in capsys.readouterr().out
