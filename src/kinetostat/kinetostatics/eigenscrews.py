@@ -14,14 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinetostat.kinetostatics.indices import Array, Matrix, finite
+from kinetostat.spec.immutable import Immutable
 from kinetostat.tolerances import PURE_COUPLE, ZERO_EIGENSCREW
 
 ROTATION, TRANSLATION = slice(0, 3), slice(3, 6)
 MOMENT, FORCE = ROTATION, TRANSLATION
 
 
-@dataclass(frozen=True)
-class Eigenscrew:
+@dataclass(frozen=True, eq=False)
+class Eigenscrew(Immutable):
     """A screw on which a twist causes a wrench on the same screw.
 
     Attributes:

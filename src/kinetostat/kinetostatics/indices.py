@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.spec.immutable import Immutable
 from kinetostat.tolerances import AT_RIGHT_ANGLES, ROUND_OFF_OF_COMPLEMENT, ROUND_OFF_OF_EIGENVALUE
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -32,8 +33,8 @@ PLANAR = (2, 3, 4)
 """Components of a machine that moves in the x-y plane: rz x y."""
 
 
-@dataclass(frozen=True)
-class Principal:
+@dataclass(frozen=True, eq=False)
+class Principal(Immutable):
     """Principal compliances of one block, the other free, in increasing order.
 
     Attributes:
@@ -45,8 +46,8 @@ class Principal:
     directions: list[list[float]]
 
 
-@dataclass(frozen=True)
-class PrincipalStiffness:
+@dataclass(frozen=True, eq=False)
+class PrincipalStiffness(Immutable):
     """Principal stiffnesses of one block, in increasing order: the semi-axes of its stiffness ellipsoid.
 
     Attributes:

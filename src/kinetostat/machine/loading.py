@@ -15,12 +15,13 @@ from pydantic import TypeAdapter
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.display import ENGINEERING, Display, read_display
+from kinetostat.machine import pickling as _pickling  # noqa: F401  # machines that are loaded can be pickled
 from kinetostat.machine.catalogue import families, register_installed
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.limits import Parts, check_limits
 from kinetostat.machine.machine import Family, Machine, Written
 from kinetostat.machine.orientation import ANGLES, form_of, make_room, orientation_schema, with_angles
-from kinetostat.machine.parameters import POSE, check_contrast, find
+from kinetostat.machine.parameters import POSE, check_contrast, find, with_values
 from kinetostat.machine.rigidities import resolve
 from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
@@ -33,6 +34,7 @@ from kinetostat.spec import document as documents
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.spec.fields import NO_LIMIT, optional, quantities
+from kinetostat.spec.immutable import FixedDict
 from kinetostat.spec.requirements import TABLE, requirement_lines, requirements_schema, take_requirements
 from kinetostat.spec.validation import SCHEMA_VERSION, file_model, tables_in, validate
 from kinetostat.units import RIGID, UnitError
@@ -50,7 +52,7 @@ def bundled() -> dict[str, str]:
     """The text of every bundled machine file by name, in alphabetical order."""
     known_families = (resources.files("kinetostat.machine") / "bundled").iterdir()
     files = sorted((f for f in known_families if f.name.endswith(SUFFIX)), key=lambda f: f.name)
-    return {f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files}
+    return FixedDict({f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files})
 
 
 def load(machine: str | Path, settings: Sequence[str] = ()) -> Machine:
@@ -148,7 +150,8 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     plan, numbers = separate(changed, origin)
     machine = _validated(written.family_of(plan), numbers, origin, display)
     check_numbers(plan, machine.tables, origin)
-    whole = replace(machine, family=written.family_of(completed(plan, machine.family_tables)))
+    family = written.family_of(completed(plan, machine.family_tables))
+    whole = with_values(replace(machine, family=family), {})  # its tables are then those of this family
     chains = whole.chains()
     legs = [Leg(leg.name, tuple(s.element for s in steps)) for leg, steps in zip(plan.legs, chains.legs, strict=True)]
     slides = [(leg.name, 0.0) for leg in legs for _ in driven_slides(leg.chain)]

@@ -21,6 +21,7 @@ from kinetostat.machine.orientation import numbers_for, single_angles
 from kinetostat.machine.parameters import Given, check_contrast, read_numbers, with_values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, quantities, table
+from kinetostat.spec.immutable import FixedDict, Immutable, fixed
 from kinetostat.spec.renamed import renamed_property
 from kinetostat.spec.requirements import Requirement
 from kinetostat.units import UnitError
@@ -203,6 +204,8 @@ class Family:
         literals: what its machine files say beside numbers, by table.
         links: those with a mass, of a family in closed form.
         members: of a machine written leg by leg, from the tables to all links that can move.
+        recipe: of a family that is made while the program runs, a function and its arguments that make it again
+            elsewhere; other families are pickled by name.
     """
 
     name: str
@@ -214,6 +217,11 @@ class Family:
     literals: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     links: tuple[LinkKind, ...] = ()
     members: Callable[..., list[Member]] | None = None
+    recipe: tuple[Callable[..., "Family"], tuple[Any, ...]] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tables", fixed(self.tables))
+        object.__setattr__(self, "literals", fixed(self.literals))
 
     @property
     def components(self) -> tuple[int, ...]:
@@ -229,7 +237,7 @@ class Family:
     def every_table(self) -> dict[str, type]:
         """Its own tables and the common ones."""
         densities = {"linear_density": density_table(self.links)} if self.links else {}
-        return {**self.tables, **densities, **COMMON}
+        return FixedDict({**self.tables, **densities, **COMMON})
 
 
 @dataclass(frozen=True)
@@ -245,8 +253,8 @@ class Written:
     settings: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Machine:
+@dataclass(frozen=True, eq=False)
+class Machine(Immutable):
     """A machine of some family with its reference pose; never modified, only replaced.
 
     Attributes:

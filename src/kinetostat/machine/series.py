@@ -156,7 +156,12 @@ def _family_with_parts(family: Family, series: tuple[tuple[str, tuple[str, ...]]
         for field, keys in series
     }
     tables = {**family.tables, "stiffness": made_table("Stiffness", rest), **rows}
-    return replace(family, tables=tables, configure=partial(_configured, family, series))
+    return replace(
+        family,
+        tables=tables,
+        configure=partial(_configured, family, series),
+        recipe=(_family_with_parts, (family, series)),
+    )
 
 
 class Row(tuple[tuple[str, Scalar], ...]):

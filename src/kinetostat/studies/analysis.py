@@ -28,6 +28,7 @@ from kinetostat.machine.machine import Configuration, Machine, need_machine, spr
 from kinetostat.machine.mass import Mass, moving_masses
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.spec.errors import InputError, choice
+from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import Contribution, Softest, by_part, contributions, softest
 from kinetostat.studies.indices import Along, Indices, indices_json, indices_of, stiffness_along
@@ -50,8 +51,8 @@ NEARBY = 0.03
 
 
 @former_names(shares="attribution", internal="internal_loads", length="characteristic_length", mass="moving_mass")
-@dataclass(frozen=True)
-class Analysis:
+@dataclass(frozen=True, eq=False)
+class Analysis(Immutable):
     """Stiffness of a machine at one pose; matrices at the tool point T (P itself unless there is a tool), SI.
 
     Attributes:

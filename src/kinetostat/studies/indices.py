@@ -28,6 +28,7 @@ from kinetostat.kinetostatics.indices import (
     principal_compliances,
 )
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 
 Rows = Sequence[Sequence[float]]
@@ -37,8 +38,8 @@ LONGEST = 1e100
 
 
 @former_names(principal="principal_compliances", condition="stiffness_condition")
-@dataclass(frozen=True)
-class Indices:
+@dataclass(frozen=True, eq=False)
+class Indices(Immutable):
     """Indices of a pose, at T and in the axes of K and C.
 
     Attributes:

@@ -17,6 +17,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import POSE, Parameter, find, parameters, shown, values
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.ranges import parse_range
 from kinetostat.spec.requirements import Requirement
 from kinetostat.studies.evaluation.columns import Column, read_columns
@@ -30,8 +31,8 @@ MANIFOLD = 2.0
 """Margin beyond which a multiple says more than a percentage."""
 
 
-@dataclass(frozen=True)
-class Verdict:
+@dataclass(frozen=True, eq=False)
+class Verdict(Immutable):
     """Whether a machine meets one condition of a requirement.
 
     Attributes:

@@ -18,6 +18,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import Parameter, parameters, shown, values
+from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
@@ -116,8 +117,8 @@ class Influence:
     none="without_influence",
     skipped="without_derivative",
 )
-@dataclass(frozen=True)
-class Sensitivity:
+@dataclass(frozen=True, eq=False)
+class Sensitivity(Immutable):
     """Sensitivities at one pose, ranked.
 
     Attributes:

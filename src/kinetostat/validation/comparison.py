@@ -21,6 +21,7 @@ from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Configuration, Machine, need_machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.installation import adding
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.rounding import clean_matrix
@@ -97,8 +98,8 @@ KNOWN = (
 """Every engine in which a machine can be rebuilt; the first can build any machine."""
 
 
-@dataclass(frozen=True)
-class Validation:
+@dataclass(frozen=True, eq=False)
+class Validation(Immutable):
     """Compliance of a machine by kinetostat and by an independent engine, at T, base axes, order rx ry rz x y z, SI.
 
     Attributes:

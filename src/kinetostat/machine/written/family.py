@@ -35,6 +35,7 @@ def family_of(plan: Plan) -> Family:
         partial(chains, plan),
         literals(plan),
         members=partial(members, plan),
+        recipe=(family_of, (plan,)),
     )
 
 

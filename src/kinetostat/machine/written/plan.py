@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kinetostat.machine.machine import Inverse
+from kinetostat.spec.immutable import Immutable
 
 NAME = "legs"
 """As machine files name this kind."""
@@ -74,8 +75,8 @@ class LinkPlan:
     compliance: Matrix
 
 
-@dataclass(frozen=True)
-class Copies:
+@dataclass(frozen=True, eq=False)
+class Copies(Immutable):
     """What a file says about the copies of a leg.
 
     Attributes:
@@ -89,8 +90,8 @@ class Copies:
     mirrored: bool
 
 
-@dataclass(frozen=True)
-class LegPlan:
+@dataclass(frozen=True, eq=False)
+class LegPlan(Immutable):
     """A leg: its joints from base to platform, and those of its links that are flexible, by name.
 
     Attributes:
@@ -117,8 +118,8 @@ class LegPlan:
         return f"legs.{self.written or self.name}.{part}"
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, eq=False)
+class Plan(Immutable):
     """A machine written leg by leg.
 
     Attributes:

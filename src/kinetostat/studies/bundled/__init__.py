@@ -7,6 +7,7 @@ from pathlib import Path
 
 from kinetostat.machine.loading import bundled
 from kinetostat.spec import document as documents
+from kinetostat.spec.immutable import FixedDict
 from kinetostat.spec.study import StudyFile, read_study
 
 SUFFIX = ".toml"
@@ -18,7 +19,7 @@ def bundled_studies() -> dict[str, str]:
     """The text of every bundled study file by name, in alphabetical order."""
     entries = resources.files("kinetostat.studies.bundled").iterdir()
     files = sorted((f for f in entries if f.name.endswith(SUFFIX)), key=lambda f: f.name)
-    return {f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files}
+    return FixedDict({f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files})
 
 
 def is_study(name: str) -> bool:

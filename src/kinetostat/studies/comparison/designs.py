@@ -21,6 +21,7 @@ from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find, parameters, values
 from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.ranges import parse_range
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.comparison.design_rows import Row, rows_at_poses, rows_over
@@ -84,8 +85,8 @@ class SoftDirection:
     shares: tuple[tuple[str, float], ...]
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, eq=False)
+class Comparison(Immutable):
     """Designs side by side.
 
     Attributes:

@@ -21,6 +21,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.grid.grid import grid_question
 from kinetostat.studies.guidelines.moves import Move, axes_left_out, designed, moves_at, with_signs
@@ -39,8 +40,8 @@ MOST_POSES = 10_000
     idle="without_influence",
     skipped="left_out",
 )
-@dataclass(frozen=True)
-class Guidelines:
+@dataclass(frozen=True, eq=False)
+class Guidelines(Immutable):
     """Design guidelines.
 
     Attributes:

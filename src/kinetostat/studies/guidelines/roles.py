@@ -20,6 +20,7 @@ from kinetostat.kinetostatics.elements import (
 )
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
+from kinetostat.spec.immutable import Immutable
 from kinetostat.tolerances import NO_ROLE
 
 EXCESS = 0.01
@@ -28,8 +29,8 @@ EXCESS = 0.01
 Array = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Roles:
+@dataclass(frozen=True, eq=False)
+class Roles(Immutable):
     """What each element does to each direction, pose by pose; NaN where the direction is rigid, free or has no pose.
 
     Attributes:

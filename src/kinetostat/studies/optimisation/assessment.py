@@ -14,6 +14,7 @@ import numpy.typing as npt
 from kinetostat.engine.points import Array
 from kinetostat.engine.population import Evaluator, Population
 from kinetostat.kinematics.status import Status
+from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.optimisation.problem import Problem
 
 AT_ONCE = 1 << 20
@@ -49,8 +50,8 @@ class Verdict(IntEnum):
         )
 
 
-@dataclass(frozen=True)
-class Outcome:
+@dataclass(frozen=True, eq=False)
+class Outcome(Immutable):
     """Objectives, constraints and verdicts of designs.
 
     Attributes:

@@ -64,7 +64,16 @@ class Log:
     @property
     def rows(self) -> Array:
         """All rows [designs x width]."""
-        return self._rows[: self.count]
+        rows = self._rows[: self.count]
+        rows.setflags(write=False)
+        return rows
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Log):
+            return NotImplemented
+        return self.problem == other.problem and self.steps == other.steps and np.array_equal(self.rows, other.rows)
+
+    __hash__ = None  # type: ignore[assignment]  # it grows
 
     @property
     def kept(self) -> Rows:

@@ -10,6 +10,7 @@ from kinetostat.engine.points import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find, values
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.study import PosesTable
 from kinetostat.studies.grid.grid import GridQuestion, grid_question
 from kinetostat.studies.workspace.region import unit_product
@@ -19,8 +20,8 @@ from kinetostat.units import UnitError
 MOST_POSES = 1_000_000
 
 
-@dataclass(frozen=True)
-class PoseSet:
+@dataclass(frozen=True, eq=False)
+class PoseSet(Immutable):
     """Where designs are judged.
 
     Attributes:

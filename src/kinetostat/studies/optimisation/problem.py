@@ -11,6 +11,7 @@ from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import current_name
 from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, read_study
 from kinetostat.studies.bundled import bundled_studies, study_of
@@ -68,8 +69,8 @@ class Constraint:
         return abs(self.bound) or 1.0
 
 
-@dataclass(frozen=True)
-class Problem:
+@dataclass(frozen=True, eq=False)
+class Problem(Immutable):
     """What is optimised.
 
     Attributes:

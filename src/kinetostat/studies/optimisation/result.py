@@ -14,6 +14,7 @@ from kinetostat.engine.points import Array, Table
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values
+from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.optimisation.assessment import Assessor, Outcome, Verdict
 from kinetostat.studies.optimisation.log import Log, Rows, best_feasible, front_of, knee_of
 from kinetostat.studies.optimisation.problem import Problem
@@ -60,8 +61,8 @@ class Influence:
     bound: str
 
 
-@dataclass(frozen=True)
-class Result:
+@dataclass(frozen=True, eq=False)
+class Result(Immutable):
     """What a study found.
 
     Attributes:

@@ -13,6 +13,7 @@ import xarray as xr
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
+from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.grid.grid import evaluate_grid
 from kinetostat.studies.optimisation.problem import load_problem
 from kinetostat.studies.optimisation.result import Result
@@ -38,8 +39,8 @@ CONVERGED = 1e-4
 """Distance of the population's mean from the final optimum, relative to it, that cannot be seen in Fig. 6."""
 
 
-@dataclass(frozen=True)
-class Reproduction:
+@dataclass(frozen=True, eq=False)
+class Reproduction(Immutable):
     """The statements of the paper, each compared with the result of this program.
 
     Attributes:

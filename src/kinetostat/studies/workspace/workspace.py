@@ -17,6 +17,7 @@ from kinetostat.engine.points import Cells
 from kinetostat.machine.machine import Machine, need_machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.grid.grid import IN_MEMORY, MOST_DIMENSIONS, GridQuestion, answer, field_of, grid_question
 from kinetostat.studies.plain_data import as_answer
@@ -34,8 +35,8 @@ MOST_DEMANDS = 200_000
 
 
 @former_names(found="exists", counts="nodes", joined="connected", divided="singularities_divide")
-@dataclass(frozen=True)
-class Workspace:
+@dataclass(frozen=True, eq=False)
+class Workspace(Immutable):
     """Where a machine can work.
 
     Attributes:
