@@ -10,6 +10,7 @@ from pathlib import Path
 
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.studies.analysis import Analysis, analyze
 
@@ -94,6 +95,7 @@ def choose(name: str | None, path: Path | None) -> Format:
     )
 
 
+@checked
 def export(machine: Machine, path: str | Path, to: str | None = None) -> list[Path]:
     """Write a machine, or its results at its pose, in the format of another program, whole or not at all.
 

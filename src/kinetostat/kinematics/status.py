@@ -2,6 +2,8 @@
 
 from enum import IntEnum
 
+from kinetostat.spec.errors import InputError, shorten
+
 
 class Status(IntEnum):
     """Whether a pose has results. Only `OK` has; the others say why there are none."""
@@ -11,6 +13,11 @@ class Status(IntEnum):
     JOINT_LIMIT = 2
     SINGULAR = 3
     NOT_CONVERGED = 4
+
+    @classmethod
+    def _missing_(cls, value: object) -> "Status":
+        known = ", ".join(f"{int(status)} ({status.word})" for status in cls)
+        raise InputError(f"there is no status {shorten(value)}; choose from {known}.")
 
     @property
     def word(self) -> str:

@@ -4,16 +4,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from kinetostat.machine.loading import as_toml, build
-from kinetostat.machine.machine import Machine, need_machine
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.orientation import form_of
 from kinetostat.machine.parameters import Given, find
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.document import parse
-from kinetostat.spec.errors import InputError, shorten
 
 INDEPENDENT = ("pose", "tool", "load")
 """Tables whose numbers need only be checked by themselves."""
 
 
+@checked
 def changed(machine: Machine, values: Mapping[str, Given]) -> Machine:
     """The machine with some fields, or entries of fields, at other values, checked as a file would be.
 
@@ -28,9 +29,6 @@ def changed(machine: Machine, values: Mapping[str, Given]) -> Machine:
         InputError: an unknown field, no quantity, a value out of bounds, a list of the wrong length, or numbers that
             contradict each other.
     """
-    need_machine(machine)
-    if not isinstance(values, Mapping):
-        raise InputError(f'values is {shorten(values)}; give a value for each field, e.g. {{"pose.z": "12 cm"}}.')
     new = machine.with_values(values)
     return rebuilt(new) if any(related(machine, name) for name in values) else new
 

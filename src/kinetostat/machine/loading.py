@@ -31,6 +31,7 @@ from kinetostat.machine.written.document import by_name, check_paths, separate, 
 from kinetostat.machine.written.plan import NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY
 from kinetostat.machine.written.tables import written_schema
 from kinetostat.spec import document as documents
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.spec.fields import NO_LIMIT, optional, quantities
@@ -47,6 +48,7 @@ STUDY = (
 """The message for a study in the place of a machine."""
 
 
+@checked
 @cache
 def bundled() -> dict[str, str]:
     """The text of every bundled machine file by name, in alphabetical order."""
@@ -55,6 +57,7 @@ def bundled() -> dict[str, str]:
     return FixedDict({f.name.removesuffix(SUFFIX): f.read_text(encoding="utf-8") for f in files})
 
 
+@checked
 def load(machine: str | Path, settings: Sequence[str] = ()) -> Machine:
     """A machine from a file, or a bundled one by its name.
 
@@ -77,6 +80,7 @@ def load(machine: str | Path, settings: Sequence[str] = ()) -> Machine:
     return build(documents.read_text(path), name, settings)
 
 
+@checked
 def build(document: str | Document, origin: str = "the machine", settings: Sequence[str] = ()) -> Machine:
     """A machine from what a machine file says.
 

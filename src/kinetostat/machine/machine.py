@@ -19,7 +19,8 @@ from kinetostat.machine.limits import Limits
 from kinetostat.machine.links import LinkKind, density_table
 from kinetostat.machine.orientation import numbers_for, single_angles
 from kinetostat.machine.parameters import Given, check_contrast, read_numbers, with_values
-from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Quantity, quantities, table
 from kinetostat.spec.immutable import FixedDict, Immutable, fixed
 from kinetostat.spec.renamed import renamed_property
@@ -279,6 +280,7 @@ class Machine(Immutable):
     def __repr__(self) -> str:
         return f"<Machine {self.name!r}, family {self.family.name}>"
 
+    @checked
     def in_units(self, units: str) -> "Machine":
         """The machine with results shown in other units, as `--units` and [display] take them.
 
@@ -295,6 +297,7 @@ class Machine(Immutable):
         placed = {"joints": joints} if self.family.chains else {}
         return self.family.configure(**self.family_tables, **placed)
 
+    @checked
     def with_values(self, values: Mapping[str, Given] | None = None, **fields: Given) -> "Machine":
         """The machine with other numbers, each checked by itself: machine.with_values(x="5 mm", base_radius=0.26).
 
@@ -315,7 +318,7 @@ class Machine(Immutable):
     def chains(self) -> Chains:
         """Its legs at the home pose, where the family has no closed form."""
         if self.family.chains is None:
-            raise ValueError(f"family {self.family.name} places its joints in closed form")
+            raise InputError(f"family {self.family.name} places its joints in closed form and has no chains.")
         return self.family.chains(**self.family_tables)
 
     @property
@@ -337,16 +340,6 @@ class Machine(Immutable):
     def tool_point(self, platform: Displacement) -> Vector:
         """The tool point T in the base frame, m: P itself unless the file has a table [tool]."""
         return platform.apply(Vector(*self.tables["tool"].offset))
-
-
-def need_machine(given: object) -> None:
-    """Refuse anything but a machine.
-
-    Raises:
-        InputError: says how to get one.
-    """
-    if not isinstance(given, Machine):
-        raise InputError(f"machine is {shorten(given)}; give a machine, as load(...) and build(...) return one.")
 
 
 def springs(configuration: Configuration) -> list[Spring]:

@@ -27,7 +27,7 @@ class _Fixed:
         return _hashed(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self._plain(self),)  # type: ignore[call-arg]
+        return type(self), (self._plain(self),)
 
 
 class FixedDict(_Fixed, dict[K, V]):  # type: ignore[misc]

@@ -24,9 +24,10 @@ from kinetostat.kinetostatics.conditioning import twist_condition
 from kinetostat.kinetostatics.internal import InternalLoads, internal_loads
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.limits import unlimited
-from kinetostat.machine.machine import Configuration, Machine, need_machine, springs
+from kinetostat.machine.machine import Configuration, Machine, springs
 from kinetostat.machine.mass import Mass, moving_masses
 from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
@@ -138,6 +139,7 @@ class Analysis(Immutable):
         array.setflags(write=False)
         return array
 
+    @checked
     def shares_of(self, component: str, matrix: str = "C") -> dict[str, float]:
         """Shares of the joints and links in one diagonal entry of C or K by name, the greatest first; their sum is 1.
 
@@ -156,6 +158,7 @@ class Analysis(Immutable):
             raise InputError(f"{matrix}_{component} is zero or infinite here and has no shares. {self.message}")
         return dict(sorted(((part, sum(shares)) for part, shares in known.items()), key=lambda pair: -pair[1]))
 
+    @checked
     def to_pandas(self, which: str = "attribution") -> "pd.DataFrame":
         """Return a table of pandas, SI.
 
@@ -178,6 +181,7 @@ class Analysis(Immutable):
         names = pd.Index([spring.spring for spring in self.attribution], name="spring")
         return pd.DataFrame(rows, names, ["part", "stiffness", *shares])
 
+    @checked
     def along(self, direction: Sequence[float]) -> Along:
         """Stiffness along and about a direction, in the axes of K and C.
 
@@ -189,6 +193,7 @@ class Analysis(Immutable):
         return stiffness_along(direction, self.stiffness, self.compliance, self.machine.family.components)
 
 
+@checked
 def analyze(machine: Machine, axes: str = "base") -> Analysis:
     """Analyse a machine at its pose: K, C, attribution, indices, mobility and loads.
 
@@ -201,7 +206,6 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     Raises:
         InputError: if `axes` is neither "base" nor "platform", or `machine` is not a machine.
     """
-    need_machine(machine)
     choice(axes, AXES, "axes")
     response = respond(machine)
     status = Status(int(response.status))

@@ -14,8 +14,9 @@ from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Array, Axis, Grid, Points, Table
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.machine.machine import Machine, need_machine
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, Parameter, find, parameters, shown, values
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.ranges import parse_range
@@ -87,6 +88,7 @@ class Verdict(Immutable):
         return f"{self.condition} {where}: it is {worst}{there}, {spare}."
 
 
+@checked
 def requirements(machine: Machine) -> tuple[Verdict, ...]:
     """Judge the requirements of a machine's file, condition by condition.
 
@@ -96,7 +98,6 @@ def requirements(machine: Machine) -> tuple[Verdict, ...]:
     Raises:
         InputError: names the requirement and what is wrong with it: an unknown quantity or field, a bad range or value.
     """
-    need_machine(machine)
     judged: list[Verdict] = []
     for name, requirement in machine.requirements.items():
         try:

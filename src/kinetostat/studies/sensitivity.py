@@ -16,8 +16,10 @@ from kinetostat.engine.points import Array, Table
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
-from kinetostat.machine.machine import Machine, need_machine
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, parameters, shown, values
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.analysis import analyze
@@ -155,6 +157,7 @@ class Sensitivity(Immutable):
         return f"<Sensitivity of {self.machine.name!r}: {self.status.word}, {len(self.parameters)} parameters>"
 
 
+@checked
 def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -> Sensitivity:
     """Compute how indices of a machine at its pose depend on each design parameter and pose coordinate.
 
@@ -167,8 +170,9 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     Raises:
         InputError: an unknown quantity, or one that the machine cannot have.
     """
-    need_machine(machine)
     names = tuple(resolve_quantities(quantities, machine.family.component_names))
+    if not names:
+        raise InputError("quantities names none; give at least one quantity or group.")
     refuse_absent(machine, names)
     candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(p, names)]
     here = values(machine)

@@ -18,8 +18,9 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
-from kinetostat.machine.machine import Configuration, Machine, need_machine
+from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import values
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.installation import adding
@@ -179,6 +180,7 @@ def choose(name: str | None) -> Engine:
     return named[0]
 
 
+@checked
 def validate(machine: Machine, engine: str | None = None) -> Validation:
     """Rebuild a machine in an independent engine and compare the compliances at its tool point.
 
@@ -189,7 +191,6 @@ def validate(machine: Machine, engine: str | None = None) -> Validation:
     Raises:
         InputError: if there is no such engine, no compliance to compare, or a part that the engine cannot have.
     """
-    need_machine(machine)
     chosen = choose(engine)
     response = respond(machine)
     ours = _our_compliance(response)

@@ -16,6 +16,7 @@ from rich.console import Console
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.studies import analysis, sensitivity
 from kinetostat.studies.analysis import Analysis
@@ -134,6 +135,7 @@ def kind_of(answer: object) -> Kind:
     return kind_of_answer
 
 
+@checked
 def plot(answer: object, which: str | None = None) -> Figure:
     """Draw a figure of a result; a notebook displays it, `save` writes it.
 
@@ -156,6 +158,7 @@ def plot(answer: object, which: str | None = None) -> Figure:
 Writer = Callable[[Path], None]
 
 
+@checked
 def save(what: object, path: str | Path) -> Path:
     """Write a machine, a result or a figure to a file, completely or not at all; its suffix gives the format.
 

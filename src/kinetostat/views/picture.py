@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from kinetostat.machine.machine import Machine
-from kinetostat.spec.errors import InputError, choice, shorten
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError, choice, several, shorten
 from kinetostat.views.rendering.camera import VIEWS, Camera, camera_on
 from kinetostat.views.rendering.ground import SIDE, Ground, veil_over
 from kinetostat.views.rendering.light import Light, encoded, light_on, shaded
@@ -72,6 +73,7 @@ PAPERS: dict[str, Paper] = {
 }
 
 
+@checked
 def machine_picture(
     machine: Machine,
     size: tuple[int, int] = (1600, 1200),
@@ -121,6 +123,7 @@ def picture(
     """
     _check_size(size)
     paper = PAPERS[choice(theme, PAPERS, "theme")]
+    hidden = several(hidden)
     for layer in hidden:
         choice(layer, LAYERS, "hidden")
     solids = [solid for solid in scene.solids if solid.layer not in hidden]

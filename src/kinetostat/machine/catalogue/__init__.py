@@ -7,7 +7,8 @@ from importlib.metadata import entry_points
 
 from kinetostat.machine.machine import Family
 from kinetostat.machine.written.plan import NAME
-from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError
 
 ENTRY_POINTS = "kinetostat.families"
 """The group in which an installed package names its families, so that the command line knows them as well."""
@@ -26,6 +27,7 @@ def _of_this_package() -> dict[str, Family]:
     return {value.name: value for module in modules for value in vars(module).values() if isinstance(value, Family)}
 
 
+@checked
 def register(family: Family) -> Family:
     """Add a family of machines to those that files may name, until the program ends.
 
@@ -41,8 +43,6 @@ def register(family: Family) -> Family:
     Raises:
         InputError: it is not a family, or kinetostat itself has one of that name.
     """
-    if not isinstance(family, Family):
-        raise InputError(f"family is {shorten(family)}; give a Family, as docs/extending.md shows.")
     if family.name in {*_of_this_package(), NAME}:
         raise InputError(f'family "{family.name}" belongs to kinetostat; choose another name.')
     _REGISTERED[family.name] = family

@@ -7,7 +7,7 @@ printed or drawn is in `views`.
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from kinetostat.algebra.screw import COMPONENTS
@@ -20,6 +20,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find, parameters, values
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.ranges import parse_range
@@ -143,15 +144,16 @@ def read_design(text: str, settings: Sequence[str] = ()) -> Design:
     return Design(text, machine, analyze(machine))
 
 
+@checked
 def compare(
-    designs: Sequence[Design | Machine | str] | Mapping[str, Machine],
+    designs: Sequence[Design | Machine | str] | Mapping[str, Machine | str],
     ranges: Sequence[str] = (),
     progress: Progress = silent,
 ) -> Comparison:
     """Compare designs, each at its own pose and, where ranges are given, all over the same grid.
 
     Args:
-        designs: two or more; machines, with names of your choice if you like, or texts, "NAME" or
+        designs: two or more; machines, by names of your choice if you like, or texts, "NAME" or
             "NAME:path=value;path=value".
         ranges: "FIELD=from:to:count", of fields that all of them have.
         progress: receives how far the work is.
@@ -188,7 +190,7 @@ def _refuse_absent(design: Design, ranges: Sequence[str]) -> None:
             raise InputError(f"{design.label}: {error}") from None
 
 
-def _designs(given: Sequence[Design | Machine | str] | Mapping[str, Machine]) -> Iterator[Design]:
+def _designs(given: Sequence[Design | Machine | str] | Mapping[str, Machine | str]) -> Iterator[Design]:
     """The designs that were given, analysed; machines without a name are numbered."""
     named = (
         given.items() if isinstance(given, Mapping) else ((f"design {n}", design) for n, design in enumerate(given, 1))
@@ -197,7 +199,8 @@ def _designs(given: Sequence[Design | Machine | str] | Mapping[str, Machine]) ->
         if isinstance(design, Machine):
             yield Design(name, design, analyze(design))
         else:
-            yield read_design(design) if isinstance(design, str) else design
+            read = read_design(design) if isinstance(design, str) else design
+            yield replace(read, label=name) if isinstance(given, Mapping) else read
 
 
 def _differences(designs: Sequence[Design]) -> tuple[Difference, ...]:

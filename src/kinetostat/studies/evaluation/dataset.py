@@ -9,7 +9,8 @@ import xarray as xr
 
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.machine.loading import as_toml
-from kinetostat.machine.machine import Machine, need_machine
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.arguments import checked
 from kinetostat.studies.evaluation.evaluation import MATRICES, PoseAnswers, answers_at
 from kinetostat.studies.evaluation.given_poses import given_poses
 from kinetostat.studies.grid.grid import ABOUT_STATUS, about
@@ -17,6 +18,7 @@ from kinetostat.studies.setting import frame_of, pose_of
 from kinetostat.units import KINDS
 
 
+@checked
 def evaluate(
     machine: Machine,
     poses: Any,
@@ -41,7 +43,6 @@ def evaluate(
         InputError: names the argument and what is wrong with it: poses that are not a table, an unknown field or
             quantity, a value that is not finite or not allowed.
     """
-    need_machine(machine)
     return as_dataset(answers_at(machine, given_poses(machine, poses), quantities, progress))
 
 

@@ -14,8 +14,9 @@ from kinetostat.engine.points import Axis, Grid
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.loading import as_toml
-from kinetostat.machine.machine import Machine, need_machine
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, dimension, find
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.ranges import Range, parse_range
 from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
@@ -64,7 +65,6 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
         InputError: an unknown field or quantity, one that the machine cannot have, a bad range, a field twice, or more
             than six dimensions.
     """
-    need_machine(machine)
     ranges = several(ranges)
     if len(ranges) > MOST_DIMENSIONS:
         raise InputError(
@@ -102,6 +102,7 @@ def _coordinates(grid: Grid, pairs: Sequence[tuple[Range, Parameter]]) -> dict[s
     return coordinates
 
 
+@checked
 def evaluate_grid(
     machine: Machine,
     ranges: Sequence[str],

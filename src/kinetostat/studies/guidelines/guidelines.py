@@ -20,6 +20,7 @@ from kinetostat.kinetostatics.elements import (
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
@@ -89,6 +90,7 @@ class Guidelines(Immutable):
         return next(alike, None)
 
 
+@checked
 def guidelines(machine: Machine, ranges: Sequence[str] = (), progress: Progress = silent) -> Guidelines:
     """Derive what the stiffness of a machine depends on, at its pose and over a grid.
 

@@ -10,6 +10,7 @@ from typing import Any
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.spec import document as documents
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import current_name
@@ -122,6 +123,7 @@ class Problem(Immutable):
         return *self.space.paths, *self.poses.columns
 
 
+@checked
 def load_problem(study: str | Path, settings: Sequence[str] = ()) -> Problem:
     """The problem of a study file, or of a bundled study by its name.
 

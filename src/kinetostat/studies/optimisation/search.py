@@ -11,6 +11,7 @@ import numpy as np
 
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.saving import as_file
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.study import read_study
 from kinetostat.studies.optimisation.assessment import Assessor
@@ -97,9 +98,10 @@ def method_of(assess: Assessor) -> Method:
     return Genetic(assess)
 
 
+@checked
 def optimize(
     problem: Problem,
-    folder: Path | None = None,
+    folder: str | Path | None = None,
     watch: Watch = unwatched,
     resume: bool = False,
     stop: Stop = never,
@@ -116,8 +118,10 @@ def optimize(
     Raises:
         InputError: another study or another process in the folder, nothing to resume, a full disk.
     """
+    if resume and folder is None:
+        raise InputError("resume is True, but there is no folder; give the folder of the search that was stopped.")
     assess = Assessor(problem)
-    log = search(assess, watch) if folder is None else search_into(assess, folder, watch, resume, stop)
+    log = search(assess, watch) if folder is None else search_into(assess, Path(folder), watch, resume, stop)
     return result_of(assess, log)
 
 

@@ -13,6 +13,7 @@ import xarray as xr
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.grid.grid import evaluate_grid
 from kinetostat.studies.optimisation.problem import load_problem
@@ -87,6 +88,7 @@ class Reproduction(Immutable):
         }
 
 
+@checked
 def reproduce(progress: Progress = silent) -> Reproduction:
     """Reproduce the whole paper; `progress` gets the number of steps done and of all steps, after each."""
     machine = load(printed.MACHINE)

@@ -14,8 +14,9 @@ from scipy import ndimage
 
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import Cells
-from kinetostat.machine.machine import Machine, need_machine
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
@@ -76,6 +77,7 @@ class Workspace(Immutable):
         return self.volume.value > 0.0 or self.nodes[INSIDE] > 0
 
 
+@checked
 def workspace(
     machine: Machine, ranges: Sequence[str], conditions: Sequence[str] = (), progress: Progress = silent, seed: int = 0
 ) -> Workspace:
@@ -89,12 +91,13 @@ def workspace(
         ranges: "FIELD=from:to:count", two to six coordinates of the pose.
         conditions: "QUANTITY > VALUE".
         progress: receives how far the work is.
-        seed: of the random points for the volume.
+        seed: of the random points for the volume; a whole number from 0.
 
     Raises:
         InputError: a field that is not a coordinate of the pose, a bad range or condition, too many points.
     """
-    need_machine(machine)
+    if seed < 0:
+        raise InputError(f"seed is {seed}; give a whole number from 0.")
     judge = Judge(machine, tuple(parse_condition(text, machine.family.component_names) for text in several(conditions)))
     question = grid_question(machine, ranges, [*dict.fromkeys(["singularity_margin", SOFTEST, *judge.quantities])])
     _check(question)

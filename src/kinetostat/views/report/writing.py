@@ -13,6 +13,7 @@ from kinetostat.engine.batch import Progress, silent
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import as_json
 from kinetostat.studies.optimisation.result import Result
@@ -54,6 +55,7 @@ class Wanted:
         return [word for name, values in pairs for value in values for word in (name, value)]
 
 
+@checked
 def report(
     about: Machine | Result,
     path: str | Path,

@@ -1,0 +1,178 @@
+"""What Python programs give to public functions: each argument is of the kind that its annotation says, or is refused.
+
+What an argument means, and whether its value is allowed, is the business of the function.
+"""
+
+import difflib
+import inspect
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence, Set
+from functools import wraps
+from numbers import Integral, Real
+from os import PathLike
+from pathlib import Path
+from types import UnionType
+from typing import Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
+
+from kinetostat.spec.errors import InputError, shorten
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+CLASSES = {
+    "Machine": "a machine, as load(...) and build(...) return one",
+    "Problem": "a problem, as load_problem(...) returns one",
+    "Family": "a Family, as docs/extending.md shows",
+    "bool": "True or False",
+}
+"""What to give, by the name of the class in the annotation."""
+WORDS = {
+    "machine": "the name of a bundled machine, or the path of a file",
+    "settings": 'overrides as texts, e.g. ["pose.x=5 mm"]',
+    "document": "the text of a machine file, or its tables as a dictionary",
+    "origin": "a name for messages",
+    "values": 'a dictionary with a value for each field, e.g. {"pose.z": "12 cm"}',
+    "units": 'units as a text, e.g. "mm, deg, N/um"',
+    "axes": '"base" or "platform"',
+    "component": 'the name of a row of K and C, e.g. "x"',
+    "matrix": '"C" or "K"',
+    "direction": "three numbers, e.g. (0, 0, 1)",
+    "quantities": 'names of quantities as texts, e.g. ["compliance_z"]',
+    "ranges": 'ranges as texts, e.g. ["x=-1 cm:1 cm:11"]',
+    "conditions": 'conditions as texts, e.g. ["stiffness_z > 1 N/um"]',
+    "seed": "a whole number from 0",
+    "progress": "a function of the steps done and of all steps",
+    "designs": "two or more designs in a list, each a machine or a text, or a dictionary of machines by name",
+    "study": "the name of a bundled study, or the path of a file",
+    "folder": "the path of a folder",
+    "watch": "a function of the steps done, of all steps, and of the best objective",
+    "stop": "a function that returns True or False",
+    "engine": 'the name of an engine, e.g. "exudyn"',
+    "size": "width and height in pixels, e.g. (1600, 1200)",
+    "view": '"iso", "front", "side", "top", or three numbers',
+    "hidden": 'layers as texts, e.g. ["frames", "labels"]',
+    "which": "the name of one of its tables or figures",
+    "path": "the path of a file",
+    "about": "a machine, or the result of a study",
+    "without": 'parts as texts, e.g. ["maps", "validation"]',
+    "author": "a text",
+    "date": 'a text, e.g. "2026-05-31"',
+    "to": 'the name of a format, e.g. "mjcf"',
+}
+"""What to give, by the name of the argument, which means the same in every function."""
+ACCEPTED: Mapping[type, tuple[type, ...]] = {Path: (str, PathLike), int: (Integral,), float: (Real,)}
+"""Classes that stand for the one that an annotation names."""
+FREE = (Any, object, inspect.Parameter.empty)
+"""Annotations that allow anything."""
+
+
+def checked(function: Callable[P, R]) -> Callable[P, R]:
+    """Decorate a public function: arguments that are missing, unknown or of another kind are refused by their names.
+
+    Annotations say the kinds. Where one is a sequence, a generator is read into a list. Names of classes in quotes,
+    `Any` and literal choices are left to the function.
+    """
+    signature = inspect.signature(function)
+
+    @wraps(function)
+    def call(*given: P.args, **named: P.kwargs) -> R:
+        try:
+            bound = signature.bind(*given, **named)
+        except TypeError as error:
+            raise InputError(_unbound(function.__name__, signature, named, str(error))) from None
+        for name, value in bound.arguments.items():
+            parameter = signature.parameters[name]
+            if parameter.kind is not parameter.VAR_KEYWORD:
+                bound.arguments[name] = _taken(value, parameter)
+        return function(*bound.args, **bound.kwargs)
+
+    return call
+
+
+def _unbound(name: str, signature: inspect.Signature, named: Mapping[str, Any], reason: str) -> str:
+    """Say which argument is unknown or missing, and what there is."""
+    known = [argument for argument in signature.parameters if argument != "self"]
+    takes = f"{name} takes {', '.join(known) or 'no argument'}."
+    for unknown in (argument for argument in named if argument not in known):
+        near = difflib.get_close_matches(unknown, known, 1)
+        return f"{name} has no argument {unknown}; " + (f"did you mean {near[0]}?" if near else takes)
+    return f"{name}: {reason}; {takes}"
+
+
+def _taken(value: Any, parameter: inspect.Parameter) -> Any:
+    """Return an argument, from a generator as a list.
+
+    Raises:
+        InputError: it is not of the kind that the annotation says.
+    """
+    kind, name = parameter.annotation, parameter.name
+    if isinstance(value, Iterator) and any(_is_list(part) for part in _parts(kind)):
+        value = list(value)
+    misfit = _misfit(value, kind, name)
+    if misfit is not None:
+        place, wrong = misfit
+        optional = ", or leave it out" if value is None and parameter.default is not parameter.empty else ""
+        raise InputError(f"{place} is {shorten(wrong)}; give {words_of(parameter)}{optional}.")
+    return value
+
+
+def words_of(parameter: inspect.Parameter) -> str:
+    """Return what to give for a parameter of a public function."""
+    return CLASSES.get(getattr(parameter.annotation, "__name__", ""), "") or WORDS[parameter.name]
+
+
+Misfit = tuple[str, object] | None
+"""Where something is not of its kind, and what is there."""
+
+
+def _misfit(value: Any, kind: Any, name: str) -> Misfit:
+    """Return what is not of a kind: an entry, where the whole is; None where all is."""
+    parts = _parts(kind)
+    misfits = [_misfit_of(value, part, name) for part in parts]
+    if None in misfits:
+        return None
+    inner = [misfit for misfit in misfits if misfit is not None and misfit[0] != name]
+    return inner[0] if inner else (name, value)
+
+
+def _misfit_of(value: Any, kind: Any, name: str) -> Misfit:
+    """Return what is not of a kind without alternatives."""
+    origin, inside = get_origin(kind), get_args(kind)
+    here = name, value
+    if kind in FREE or isinstance(kind, str | TypeVar) or origin is Literal:
+        return None
+    if origin is Callable:
+        return None if callable(value) else here
+    if _is_list(kind):
+        if isinstance(value, str) and str in _parts(inside[0]):
+            return None  # a text alone stands for a list of it
+        if not _is_row(value, len(inside) if origin is tuple else None, origin is Collection):
+            return here
+        return _first(_misfit(entry, inside[0], f"{name}[{place}]") for place, entry in enumerate(value))
+    if origin is not None:
+        if not isinstance(value, Mapping):
+            return here
+        keys = (_misfit(key, str, f"a key of {name}") for key in value)
+        return _first(keys) or _first(_misfit(entry, inside[1], f"{name}[{key!r}]") for key, entry in value.items())
+    if kind is not bool and (isinstance(value, bool) or type(value).__name__ == "bool_"):
+        return here
+    return None if isinstance(value, ACCEPTED.get(kind, kind)) else here
+
+
+def _first(misfits: Iterable[Misfit]) -> Misfit:
+    return next((misfit for misfit in misfits if misfit is not None), None)
+
+
+def _is_row(value: object, count: int | None, any_order: bool) -> bool:
+    """Return whether a value has entries in an order, and so many of them if a count is given."""
+    if not isinstance(value, Iterable) or isinstance(value, str | bytes | Mapping):
+        return False
+    return (any_order or not isinstance(value, Set)) and (count is None or len(list(value)) == count)
+
+
+def _parts(kind: Any) -> tuple[Any, ...]:
+    """Return the alternatives of an annotation."""
+    return get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
+
+
+def _is_list(kind: Any) -> bool:
+    return get_origin(kind) in (Sequence, Collection, Iterable, tuple)
