@@ -20,6 +20,7 @@ CALLED_FROM_OUTSIDE = {
     "to_pandas": "tables of pandas, for programs",
     "engines": "what is installed, for tests and benchmarks",
     "_repr_png_": "called by notebooks, by this name",
+    "_missing_": "Python, of an enumeration that lacks a value",
 }
 """Names that nothing in the package uses, and who does."""
 
