@@ -86,7 +86,8 @@ def main() -> None:
     used = {"Exudyn": "exudyn", "PyNite": "PyNiteFEA", "NumPy": "numpy", "SciPy": "scipy"}
     versions = ", ".join(f"{name} {version(package)}" for name, package in used.items())
     print(f"{versions}, Python {platform.python_version()}.\n")
-    header = ("machine", "pose (mm)", "Exudyn, linearised", "loads 1e-3", "1e-4", "1e-5", "PyNite", "its uncertainty")
+    loads = ("Exudyn, loads 1e-3", "loads 1e-4", "loads 1e-5")
+    header = ("machine", "pose (mm)", "Exudyn, linearised", *loads, "PyNite", "PyNite's uncertainty")
     print(f"| {' | '.join(header)} |\n|---|---|{'---:|' * 6}")
     worst = {engine.name: 0.0 for engine in KNOWN}
     for name in bundled():
