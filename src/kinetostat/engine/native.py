@@ -1,8 +1,8 @@
-"""A traced graph as machine code: one loop of SIMD vectors over points, compiled by LLVM in memory. Knows no machine.
+"""Compiles a traced graph to machine code: one loop of SIMD vectors over points, by LLVM in memory. Knows no machine.
 
-What depends on fixed inputs alone is computed before the loop. No optimisation passes are run: the graph is already
-free of repetitions, and measured on the 4-dof machine (1300 operations) they gain nothing over the code generator
-alone, which takes 50 ms. The order of tracing beats an order by depth: a tenth fewer values wait in memory.
+Values that depend on fixed inputs alone are computed before the loop. No optimisation passes are run: the graph has no
+repetitions, and on the 4-dof machine (1300 operations) passes gained nothing over the code generator alone, which takes
+50 ms. Operations stay in the order of tracing: compared with an order by depth, a tenth fewer values wait in memory.
 """
 
 import ctypes
@@ -19,7 +19,7 @@ from kinetostat.engine.trace import Array, Body, Codes, Condition, Node, Operand
 
 
 class Program:
-    """Machine code for a body, and the memory that it lives in."""
+    """Machine code for a body, with the memory that holds it."""
 
     def __init__(self, body: Body) -> None:
         self._lanes = host_lanes()
@@ -31,7 +31,7 @@ class Program:
         self._call = signature(self._engine.get_function_address(NAME))
 
     def run(self, fixed: Array, columns: Sequence[Array], results: Array, codes: Codes) -> None:
-        """Evaluate points; other threads run meanwhile.
+        """Evaluate points; the interpreter is released, so that other threads can run.
 
         Args:
             fixed: values of the fixed inputs.
@@ -66,7 +66,7 @@ def _address(array: npt.NDArray[Any]) -> int:
 
 @cache
 def _target_maker() -> Callable[[], Any]:
-    """Makes target machines for the processor at hand."""
+    """Return a function that makes target machines for this processor."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     target = llvm.Target.from_default_triple()
@@ -76,7 +76,7 @@ def _target_maker() -> Callable[[], Any]:
 
 @cache
 def host_lanes() -> int:
-    """How many float64 fit one register of the processor at hand."""
+    """Return how many float64 fit into one register of this processor."""
     features = llvm.get_host_cpu_features()
     if features.get("avx512f"):
         return 8
@@ -88,7 +88,7 @@ VECTOR_SETS = ("sse2", "avx", "avx2", "fma", "avx512f", "neon", "sve")
 
 
 def host_features() -> tuple[str, ...]:
-    """Which of `VECTOR_SETS` the processor at hand has."""
+    """Return which of `VECTOR_SETS` this processor has."""
     features = llvm.get_host_cpu_features()
     return tuple(name for name in VECTOR_SETS if features.get(name))
 
@@ -146,12 +146,12 @@ def source(body: Body, lanes: int) -> str:
 
 
 def _vector(operand: Operand, lanes: int) -> str:
-    """The name of a value in all lanes."""
+    """Return the name of the vector that has a value in each lane."""
     return f"%s{operand.number}" if isinstance(operand, Node) and operand.fixed else name_of(operand, lanes)
 
 
 def _spread(node: Node, lanes: int) -> list[str]:
-    """A fixed value in all lanes of a vector; code for those that no vector needs is dropped by LLVM."""
+    """Copy a fixed value to all lanes of a vector; LLVM drops the code for those that no vector needs."""
     number, many, name = type_of(type(node), 1), type_of(type(node), lanes), f"%s{node.number}"
     return [
         f"{name}.first = insertelement {many} poison, {number} %v{node.number}, i64 0",
@@ -190,7 +190,10 @@ def line(node: Node, names: Sequence[str], lanes: int) -> str:
 
 
 def _relaxed(node: Node) -> str:
-    """No fusion in a difference of two products: it must vanish where they are equal, so both must be rounded."""
+    """Return the flag that lets LLVM fuse an operation, except for a difference of two products.
+
+    This difference must be exactly zero where the products are equal, so both must be rounded in the same way.
+    """
     products = [isinstance(operand, Node) and operand.operation == "mul" for operand in node.operands]
     return "" if node.operation == "sub" and all(products) else f" {FUSIBLE}"
 

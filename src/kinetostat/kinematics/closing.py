@@ -1,7 +1,7 @@
-"""The conditions under which the legs of a machine close at its pose: what links can bridge, and equations for joints.
+"""The conditions under which the legs of a machine close at its pose: the span of links, and equations for joints.
 
-They are stated here once, over any scalar, with their rates from the joints' screws. Nothing is solved here: `closure`
-finds the joint coordinates, and their derivatives follow from the same equations (`engine.derivatives`).
+The conditions are stated here once, over any scalar, with their rates from the joints' screws. Nothing is solved here:
+`closure` finds the joint coordinates, and `engine.derivatives` differentiates the same equations.
 
 Source: theory section 4 for links that meet, theory (19)-(21) for equations, (23) for legs of three revolutes;
 placements are in the base frame.
@@ -44,21 +44,21 @@ def why_out_of_reach(configuration: Configuration) -> str:
     """Say which legs do not close, a sentence each, with the lengths in m and what to change."""
     sentences = []
     for closure in configuration.closures:
-        # A part of a leg whose beginning does not close has no place, and no span to tell.
+        # If the first part of a leg does not close, its next part has no place, and so its span is NaN.
         if clearance(closure) >= 0.0 or isnan(closure.span):
             continue
         far = closure.span > closure.longest
         limit = f"at most {closure.longest:.6g} m" if far else f"at least {closure.shortest:.6g} m"
-        advice = "move the platform nearer or lengthen" if far else "move the platform away or make more equal"
+        nearer = "move the platform nearer or lengthen its links"
+        advice = nearer if far else "move the platform away or make its links more equal in length"
         sentences.append(
-            f"The {closure.leg} would have to span {closure.span:.6g} m, but its links bridge {limit}; "
-            f"{advice} its links."
+            f"The {closure.leg} would have to span {closure.span:.6g} m, but its links can span {limit}; {advice}."
         )
     return " ".join(sentences) or "The legs cannot reach the platform at this pose; move it nearer to the home pose."
 
 
 def platform_placement(chains: Chains) -> Displacement:
-    """Place the platform at the pose; coordinates that the pose does not give are those of the home pose."""
+    """Place the platform at the pose; missing positions are those of the home pose, and missing angles are 0."""
     given, home = chains.pose, chains.home.translation
     roll, pitch, yaw = (given.get(name, 0.0) for name in ANGLES)
     turn = rotation_z(cos(yaw), sin(yaw)) @ rotation_y(cos(pitch), sin(pitch)) @ rotation_x(cos(roll), sin(roll))
@@ -70,8 +70,9 @@ class LegEnd:
     """Where a leg takes the platform.
 
     Attributes:
-        platform: its placement, base frame.
-        movers: the freedoms of the leg's joints there, in order; their unit twists are the rates of the placement.
+        platform: placement of the platform, base frame.
+        movers: the freedoms of the leg's joints in this placement, in order from the base; their unit twists are the
+            rates of the placement.
     """
 
     platform: Displacement
@@ -83,7 +84,7 @@ def leg_ends(chains: Chains, coordinates: Sequence[Scalar]) -> list[LegEnd]:
 
     Args:
         chains: the legs at the home pose.
-        coordinates: of their joints leg by leg, from the home pose, rad or m.
+        coordinates: joint coordinates leg by leg, from the home pose, rad or m.
     """
     remaining = iter(coordinates)
     return [leg_end(steps, chains.home, remaining) for steps in chains.legs]
@@ -96,26 +97,26 @@ def leg_end(steps: Sequence[Step], home: Displacement, coordinates: Iterator[Sca
 
 
 def closing_equations(chains: Chains, coordinates: Sequence[Scalar]) -> list[Scalar]:
-    """Return what vanishes where all legs take the platform to one placement and that placement has the given pose.
+    """Return residuals that are zero where all legs put the platform in one placement, and this has the given pose.
 
-    Exact to first order there: rotations are half the sum of r x r' over their columns, the rotation vector between
-    two placements that all but agree. So there is no arc function, and formulas can be traced; see `gaps_at` for
-    what Newton's method needs further away.
+    Near that placement they are exact to first order: the rotation from one placement to another is half the sum of
+    r x r' over their columns, which is the rotation vector if the two nearly agree. This needs no arc function, so the
+    formulas can be traced. `gaps_at` has the residuals that Newton's method needs further away.
 
     Args:
         chains: the legs at the home pose, and the pose.
-        coordinates: of their joints leg by leg, from the home pose, rad or m.
+        coordinates: joint coordinates leg by leg, from the home pose, rad or m.
 
     Returns:
-        Six numbers for each leg after the first, then one for each pose coordinate; m, rotations (rad) times the
-        machine's length.
+        Six numbers for each leg after the first, then one for each pose coordinate, all in m: rotations (rad) are
+        multiplied by the machine's length.
     """
     ends = leg_ends(chains, coordinates)
     return [*_between_legs(ends, chains.length), *_off_pose(chains, ends[0].platform)]
 
 
 def _between_legs(ends: Sequence[LegEnd], length: Scalar) -> list[Scalar]:
-    """The displacements from where the other legs take the platform to where the first one takes it."""
+    """Return the displacement of the platform from its placement by each other leg to that by the first leg."""
     first = ends[0].platform
     return [gap for end in ends[1:] for gap in _apart(end.platform, first, length)]
 
@@ -133,7 +134,7 @@ def _turned(start: Rotation, end: Rotation, length: Scalar) -> list[Scalar]:
 
 
 def _off_pose(chains: Chains, end: Displacement) -> list[Scalar]:
-    """What is left from a placement to the pose, for each coordinate that is given."""
+    """Return the difference between a placement and the pose, for each coordinate that the pose gives."""
     given = chains.pose
     gaps = [given[name] - getattr(end.translation, name) for name in POINT if name in given]
     if all(name in given for name in ANGLES):
@@ -153,7 +154,7 @@ def _sides(turn: Rotation) -> dict[str, tuple[Scalar, Scalar]]:
 
 
 def squared_distance(start: Displacement, end: Displacement, length: Scalar) -> Scalar:
-    """Square how far two placements differ, rad and units of the length; 0 only where they are the same."""
+    """Return the squared distance between two placements, in rad and units of the length; 0 only if they are equal."""
     shift = (end.translation - start.translation) * (1.0 / length)
     turns = ((start.rotation.x, end.rotation.x), (start.rotation.y, end.rotation.y), (start.rotation.z, end.rotation.z))
     square: Scalar = shift.dot(shift)
@@ -167,9 +168,10 @@ class Gaps:
     """How far a machine is from closed and from its pose, in rad and in units of the machine's length [n x rows].
 
     Attributes:
-        closure, pose: what is left to do.
-        closure_rates, pose_rates: how joint coordinates, slides in those units, reduce it [n x rows x coordinates].
-        platform: its placement, where the first leg takes it.
+        closure, pose: the gaps between the legs, and those to the pose.
+        closure_rates, pose_rates: reduction of the gaps per unit of each joint coordinate, slides in units of the
+            machine's length [n x rows x coordinates].
+        platform: placement of the platform by the first leg.
         platform_rates: twist of the platform per unit of each joint coordinate, in the same units [n x 6 x
             coordinates].
     """
@@ -183,31 +185,31 @@ class Gaps:
 
     @property
     def left(self) -> Array:
-        """All that is left to do [n x rows]."""
+        """All gaps [n x rows]."""
         return np.hstack([self.closure, self.pose])
 
     @property
     def rates(self) -> Array:
-        """How joint coordinates reduce it [n x rows x coordinates]."""
+        """The reduction of all gaps per unit of each joint coordinate [n x rows x coordinates]."""
         return np.concatenate([self.closure_rates, self.pose_rates], axis=1)
 
     @property
     def largest(self) -> Array:
-        """The largest of all that is left to do [n]."""
+        """The largest gap [n]."""
         return np.asarray(np.max(np.abs(self.left), axis=1, initial=0.0))
 
 
 def gaps_at(chains: Chains, coordinates: Array, goal: Array) -> Gaps:
     """Evaluate the closing equations and their rates at arrays of poses.
 
-    Rates come from the joints' screws instead of differences. Angles of the pose are compared as angles, not by a sine
-    as in `closing_equations`: on the way from the home pose they may be far apart, and a sine vanishes half a turn away
-    as well.
+    The rates come from the joints' screws, not from differences. Angles of the pose are compared as angles, not by a
+    sine as in `closing_equations`: on the way from the home pose they may differ much, and a sine is also zero at half
+    a turn.
 
     Args:
         chains: the legs at the home pose.
-        coordinates: of their joints [n x coordinates], rad or m.
-        goal: coordinates of the pose, in the order of the chains' pose [n x given], rad or m.
+        coordinates: joint coordinates [n x coordinates], rad or m.
+        goal: pose coordinates to reach, in the order of the chains' pose [n x given], rad or m.
     """
     count = len(coordinates)
     length = np.broadcast_to(np.asarray(chains.length, dtype=float), (count,))
@@ -221,13 +223,13 @@ def gaps_at(chains: Chains, coordinates: Array, goal: Array) -> Gaps:
 
 
 def units_of(chains: Chains, length: Array) -> Array:
-    """Return the unit of each joint coordinate: 1 rad, or the machine's length of a slide, m [n x coordinates]."""
+    """Return the unit of each joint coordinate: 1 rad for a joint that turns, the machine's length (m) for a slide."""
     slides = np.array([step.element.mover.point is None for steps in chains.legs for step in steps if step.moves])
     return np.where(slides, length[:, None], 1.0)
 
 
 def _platform_twists(ends: Sequence[LegEnd], count: int) -> list[Array]:
-    """Of each leg, the platform's twist per unit of every joint coordinate: 0 for those of other legs [n x 6 x all]."""
+    """Return for each leg the platform's twist per unit of every joint coordinate [n x 6 x all]; 0 for other legs."""
     blocks, first = [], 0
     size = sum(len(end.movers) for end in ends)
     for end in ends:

@@ -1,4 +1,4 @@
-"""Singularities and the Jacobian of a pose from its screws: locked legs, free twists, motion by the actuators.
+"""Singularities and the Jacobian at a pose, from its screws: locked legs, free twists, motion by the actuators.
 
 Source: theory (3) and sections 2 and 8; screws are at one reference point, in base axes.
 """
@@ -16,29 +16,29 @@ Array = npt.NDArray[np.float64]
 
 
 def columns(screws: Sequence[Screw], rotational_scale: float, translational_scale: float) -> Array:
-    """Return screws as columns [6 x n], scaled so that rotations and translations compare."""
+    """Return screws as columns [6 x n], with both halves scaled so that rotations and translations are comparable."""
     rows = [screw.components() for screw in screws]
     scale = np.repeat([rotational_scale, translational_scale], 3)
     return np.array(rows, dtype=float).T * scale[:, None]
 
 
 def conditioning(legs: Sequence[LegScrews], length: float, guide: Sequence[Wrench] = ()) -> Array:
-    """Return the singular values of W with moments divided by `length` (m), decreasing: their ratio is dimensionless.
+    """Return the singular values of W with moments divided by `length` (m), the largest first.
 
     Args:
-        legs: at one reference point, base axes.
+        legs: screws of the legs at one reference point, base axes.
         length: characteristic length, m.
-        guide: of a planar machine, the wrenches against twists that do not exist there.
+        guide: wrenches of a planar machine against the twists that do not exist in the plane.
 
     Returns:
-        As many as the smaller of 6 and the number of wrenches [n].
+        The singular values, N; there are 6, or fewer if there are fewer wrenches [n].
     """
     wrenches = [*(wrench for leg in legs for wrench in leg.wrenches), *guide]
     return np.asarray(np.linalg.svd(columns(wrenches, 1.0 / length, 1.0), compute_uv=False), dtype=float)
 
 
 def independent(screws: Sequence[Screw], translational_scale: float, tolerance: float) -> int:
-    """Count how many of the screws are independent, each taken at unit size (rank at a relative `tolerance`)."""
+    """Return the number of independent screws: the rank of the screws at unit size, at a relative `tolerance`."""
     if not screws:
         return 0
     matrix = columns(screws, 1.0, translational_scale)
@@ -48,10 +48,10 @@ def independent(screws: Sequence[Screw], translational_scale: float, tolerance: 
 
 
 def free_twist(legs: Sequence[LegScrews], length: float) -> list[float]:
-    """Return the twist that the wrenches of all legs resist least: at a singularity, the twist they leave free.
+    """Return the twist that the wrenches of all legs resist least; at a singularity they leave it free.
 
     Returns:
-        [omega; v] at P in base axes: of 1 rad, or of 1 m where it is a pure translation.
+        [omega; v] at P in base axes, with a rotation of 1 rad, or of 1 m if it is a pure translation.
     """
     wrenches = [wrench for leg in legs for wrench in leg.wrenches]
     left, _, _ = np.linalg.svd(columns(wrenches, 1.0 / length, 1.0))
@@ -65,10 +65,10 @@ def why_singular(names: Sequence[str], legs: Sequence[LegScrews], length: float,
     """Name the causes of a singularity, a sentence each.
 
     Args:
-        names: of the legs.
-        legs: their screws at P, base axes.
+        names: names of the legs.
+        legs: screws of the legs at P, base axes.
         length: characteristic length, m.
-        tolerance: singularity margin below which a leg counts as locked.
+        tolerance: a leg counts as locked if its singularity margin is at most this.
     """
     locked = [name for name, leg in zip(names, legs, strict=True) if not leg.singularity_margin > tolerance]
     if locked:
@@ -77,7 +77,7 @@ def why_singular(names: Sequence[str], legs: Sequence[LegScrews], length: float,
             "so that the leg loses a freedom; move the pose away from this limit."
         )
     motion = describe(free_twist(legs, length), ("rad", "m"))
-    return f"With all actuators locked the platform can still move, by the twist {motion}; move the pose or the joints."
+    return f"With all actuators locked the platform can still move by the twist {motion}; change the pose or joints."
 
 
 def describe(screw: Sequence[float], units: tuple[str, str]) -> str:
@@ -94,22 +94,23 @@ def describe(screw: Sequence[float], units: tuple[str, str]) -> str:
 def actuator_jacobian(
     legs: Sequence[LegScrews], springs: Sequence[Sequence[Spring]], length: float, guide: Sequence[Wrench] = ()
 ) -> Array:
-    """Return the platform's twist per unit rate of actuators, W^T t = (J_e^T W)^T rates with rates of actuators alone.
+    """Return the platform's twist t per unit rate of each actuator, from W^T t = (J_e^T W)^T r with all other rates 0.
 
-    Where legs impose constraints twice, the equations agree for rates that the machine can have.
+    If legs impose the same constraint twice, there are more equations than unknowns. They agree for rates that the
+    machine can have; for others the twist is the one of least squares.
 
     Args:
-        legs: their screws at one reference point, base axes.
-        springs: of each leg, in the order of its screws.
-        length: characteristic length, m; compares moments with forces where equations do not agree.
-        guide: of a planar machine, the wrenches against twists that do not exist there.
+        legs: screws of the legs at one reference point, base axes.
+        springs: springs of each leg, in the order of its screws.
+        length: characteristic length, m; it weighs moments against forces in the least squares.
+        guide: wrenches of a planar machine against the twists that do not exist in the plane.
 
     Returns:
         Twists [6 x actuators] at that point: rad and m per rad or m of the actuator.
     """
     wrenches = [*(wrench for leg in legs for wrench in leg.wrenches), *guide]
     rates = []
-    at = 0
+    at = 0  # the first row of the leg
     for leg, leg_springs in zip(legs, springs, strict=True):
         for spring, loads in zip(leg_springs, leg.loads, strict=True):
             if spring.actuated and float(spring.stiffness) > 0.0:

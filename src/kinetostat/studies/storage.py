@@ -1,7 +1,7 @@
-"""The one place through which files are written: whole or not at all, and never over what is not a plain file.
+"""Writes all files of the program: whole or not at all, and never over anything but a plain file.
 
-A file is written in a temporary folder beside its place, `.kinetostat-...`, and then moved there. The process holds the
-lock of that folder, so that the next writer knows a folder whose process was killed, and removes it.
+A file is written in a temporary folder beside its place, `.kinetostat-...`, and then moved there. The process holds a
+lock on that folder. If the process is killed, the lock is released, and the next writer removes the folder.
 """
 
 import errno
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 PREFIX = ".kinetostat-"
 """How the names of temporary folders begin."""
 ABANDONED = 24 * 3600.0
-"""Age, s, from which a temporary folder is abandoned where folders have no locks."""
+"""Age, s, after which a temporary folder counts as abandoned on systems without locks on folders."""
 UNLOCKED = -1
-"""In the place of a handle where folders have no locks."""
+"""Takes the place of a handle on systems without locks on folders."""
 KEPT = "what was written before is kept, and the same command continues from there"
-"""What is there after a failure to write into the file of a long study."""
+"""Says what remains after a failure to write into the file of a long study."""
 REASONS = {
     errno.ENOSPC: "the disk is full; make room, or choose another place",
-    errno.EDQUOT: "your share of the disk is used up; make room, or choose another place",
+    errno.EDQUOT: "your quota of the disk is used up; make room, or choose another place",
     errno.EFBIG: "it would exceed the largest size of a file that is allowed here; raise that limit (ulimit -f)",
-    errno.EEXIST: "a file is there, and a folder is needed; choose another place",
-    errno.ENOTDIR: "a part of its path is a file, and a folder is needed; choose another place",
+    errno.EEXIST: "a file is in the place of a folder; choose another place",
+    errno.ENOTDIR: "a part of its path is a file, not a folder; choose another place",
     errno.EROFS: "the disk can only be read; choose another place",
     errno.ELOOP: "it is a link that leads back to itself; choose another place",
     errno.ENAMETOOLONG: "its name is too long; choose a shorter one",
@@ -45,11 +45,11 @@ REASONS = {
 
 @contextmanager
 def writing(path: Path, remains: str = "nothing of it was written") -> Iterator[None]:
-    """Turn failures of the system to write into one sentence.
+    """Turn a failure of the system to write into one sentence.
 
     Args:
-        path: named in the sentence.
-        remains: what is there after the failure.
+        path: the path that the sentence names.
+        remains: says what remains after the failure.
 
     Raises:
         InputError: the disk is full or failing, or may not be written.
@@ -83,12 +83,13 @@ def place_of(path: Path) -> Path:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary path of the same name that takes the place of `path` when the block ends without error.
+    """Provide a temporary path of the same name, which takes the place of `path` if the block ends without error.
 
-    A link stays, and the file that it leads to is replaced. Folders that had to be made are removed after a failure.
+    If `path` is a link, it stays, and the file that it leads to is replaced. Folders that were made are removed after a
+    failure.
 
     Raises:
-        InputError: what is there is not replaced (see `place_of`), or the disk is full or may not be written.
+        InputError: `path` may not be replaced (see `place_of`), or the disk is full or may not be written.
     """
     place = place_of(path)
     with _folders(place.parent, path), writing(path), scratch(place.parent) as folder:
@@ -102,7 +103,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def _folders(folder: Path, path: Path) -> Iterator[None]:
-    """Make a folder and those above it; remove those that were made if the block fails."""
+    """Make a folder and the missing folders above it; if the block fails, remove those that were made."""
     missing = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         with writing(path):
@@ -117,7 +118,7 @@ def _folders(folder: Path, path: Path) -> Iterator[None]:
 
 @contextmanager
 def scratch(parent: Path) -> Iterator[Path]:
-    """A temporary folder in `parent`, removed at the end; so are those of processes that were killed."""
+    """Provide a temporary folder in `parent`, and remove it and those of killed processes."""
     for abandoned in parent.glob(f"{PREFIX}*"):
         _remove_abandoned(abandoned)
     while True:

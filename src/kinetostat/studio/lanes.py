@@ -1,4 +1,4 @@
-"""Work in threads, so that the page answers meanwhile; only the latest request is computed, older ones are dropped.
+"""Work in threads, so that the page keeps responding. Only the latest request is computed; older ones are dropped.
 
 A lane knows neither machines nor elements: it gets the function to run and the function that shows the result.
 """
@@ -38,7 +38,7 @@ class Lane(Generic[Request, Result]):
         Args:
             work: computes the result of a request, in a thread; it must not touch the page.
             deliver: shows the result, on the event loop.
-            failed: says on the page that `work` has raised an exception; None for the page's own way to say it.
+            failed: says on the page that `work` has raised an exception; by default the page's exception handler.
         """
         self._work, self._deliver = work, deliver
         self._page = context.client
@@ -49,14 +49,14 @@ class Lane(Generic[Request, Result]):
         self._open = True
 
     def ask(self, request: Request) -> None:
-        """Compute this next, in place of the request that is waiting."""
+        """Compute this request next, in the place of the one that is waiting."""
         self._waiting = [request]
         if not self.busy and self._open:
             self.busy = True
             background_tasks.create(self._run(), name="studio lane")
 
     def close(self) -> None:
-        """Deliver nothing any more, because the page is gone; what is in progress ends unseen."""
+        """Stop delivering, because the page is gone. A computation in progress ends, but its result is dropped."""
         self._open = False
         self._waiting.clear()
 
@@ -85,8 +85,8 @@ class Lane(Generic[Request, Result]):
 
 
 def as_sentence(error: Exception) -> str:
-    """Return what a page says about an error that nobody foresaw."""
-    return f"This is a mistake of the program, please report it ({type(error).__name__}: {error})."
+    """Return what a page says about an unexpected error."""
+    return f"This is an error of the program; please report it ({type(error).__name__}: {error})."
 
 
 @cache
@@ -95,7 +95,7 @@ def _shares() -> "WeakKeyDictionary[Client, asyncio.Semaphore]":
 
 
 def _share(page: Client) -> asyncio.Semaphore:
-    """Return what limits the threads of a page."""
+    """Return the semaphore that limits the threads of a page."""
     return _shares().setdefault(page, asyncio.Semaphore(SHARE))
 
 

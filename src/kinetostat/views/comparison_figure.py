@@ -17,16 +17,16 @@ from kinetostat.studies.setting import frame_of
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout, set_title
 
 WIDE = 30.0
-"""Ratio of the largest to the least bar from which an axis is logarithmic."""
+"""An axis is logarithmic if the largest bar exceeds the least by more than this factor."""
 LONGEST = 100
-"""Characters of a design's name in the legend, at most."""
+"""Greatest number of characters of a design's name in the legend."""
 
 
 def comparison_figure(comparison: Comparison) -> Figure:
-    """Draw compliance, singularity margin and mass of each design; over a grid bars are means and dots the worst.
+    """Draw the compliance, singularity margin and mass of each design; over a grid, bars are means and dots the worst.
 
-    Bars start at 0. Where the numbers of a panel are too far apart for that, its axis is logarithmic, and marks take
-    the place of bars, whose length would have no meaning.
+    Bars start at 0. If the numbers of a panel differ too much for that, its axis is logarithmic, and marks take the
+    place of bars, because the length of a bar has no meaning there.
     """
     grid = bool(comparison.ranges)
     rows = comparison.over if grid else comparison.rows
@@ -57,7 +57,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
 
 
 Bars = list[tuple[str, Row, Row | None]]
-"""Label, heights of the bars, and of the dots if there are any."""
+"""For each group of bars: its label, the row of the bars, and the row of the dots if there are any."""
 
 
 def _compliance(rows: Sequence[Row], grid: bool) -> list[tuple[str, Bars]]:
@@ -90,11 +90,11 @@ def _bars(panel: Axes, title: str, bars: Bars, count: int, display: Display) -> 
     scale = display.scale(unit)
     heights, dots = heights * scale.factor, dots * scale.factor
     width = 0.8 / count
-    seen = heights[np.isfinite(heights) & (heights > 0.0)]
-    apart = bool(seen.size) and seen.max() > WIDE * seen.min()
+    positive = heights[np.isfinite(heights) & (heights > 0.0)]
+    logarithmic = bool(positive.size) and positive.max() > WIDE * positive.min()
     for i in range(count):
         places = np.arange(len(bars)) + (i - (count - 1) / 2) * width
-        if apart:
+        if logarithmic:
             panel.plot(places, heights[:, i], "D", color=_colour(i), markersize=5.0)
         else:
             panel.bar(places, heights[:, i], width * 0.92, color=_colour(i))
@@ -102,7 +102,7 @@ def _bars(panel: Axes, title: str, bars: Bars, count: int, display: Display) -> 
         for place, (_, row, _) in zip(places, bars, strict=True):
             _say_missing(panel, float(place), row, i)
     panel.set_xlim(-0.5, len(bars) - 0.5)
-    if apart:
+    if logarithmic:
         panel.set_yscale("log")
         panel.margins(y=0.15)
     panel.set_xticks(range(len(bars)), [label for label, _, _ in bars])
@@ -116,8 +116,8 @@ def _say_missing(panel: Axes, place: float, row: Row, i: int) -> None:
     """Write why a design has no bar: its mass is not known, it lacks the direction, or it is free there."""
     value = row.values[i]
     if value is None or not math.isfinite(value):
-        none = "not known" if row.unit == "kg" else "none"
-        text = none if value is None or math.isnan(value) else "infinite"
+        absent = "not known" if row.unit == "kg" else "none"
+        text = absent if value is None or math.isnan(value) else "infinite"
         where = panel.get_xaxis_transform()
         panel.text(place, 0.02, text, transform=where, rotation=90, ha="center", fontsize=6.5, color="#666666")
 

@@ -1,7 +1,8 @@
-"""Ridges: paths through the design space along which the best objective stays the same, so that other reasons decide.
+"""Ridges: paths through the design space along which the objective keeps its best value, so that other reasons decide.
 
-At a best design the derivatives by all variables that are free to move vanish; along a ridge the second ones vanish as
-well. From there the ridge is followed, back to its ground after each step, until it meets a bound or rises.
+At a best design the first derivatives by all variables that are free to move are zero; along a ridge the second
+derivatives are zero as well. A ridge is followed step by step, with a correction across it after each step, until it
+meets a bound or the objective changes.
 """
 
 from collections.abc import Sequence
@@ -15,31 +16,31 @@ from kinetostat.studies.optimisation.slopes import Surveyor
 from kinetostat.studies.optimisation.terms import PoseTerm
 
 AT_BOUND = 1e-6
-"""Gene within which a variable is at its bound."""
+"""A variable is at its bound if its gene is within this distance of it."""
 DIFFERENCE = 1e-4
-"""Gene over which exact derivatives are differenced: the error of second ones is its square."""
+"""Step of a gene over which first derivatives are differenced; the error of the second ones falls with its square."""
 STATIONARY = 1e-3
-"""Relative derivative of the objective, by a gene, up to which a design counts as a best one."""
+"""Greatest derivative of the objective by a gene, relative to the objective, at which a design counts as a best one."""
 FLAT = 1e-4
-"""Second derivative, likewise, below which a direction is flat: over the whole range, 0.005 % of the objective."""
+"""Relative second derivative below which a direction is flat: 0.005 % of the objective over the range of a gene."""
 STEP = 0.02
-"""Genes from one point of a ridge to the next."""
+"""Length of a step along a ridge, in genes."""
 LONGEST = 150
-"""Points of a ridge to each side."""
+"""Greatest number of steps along a ridge in each direction."""
 SAME = 1e-6
-"""Relative change of the objective that is none."""
+"""Greatest relative change at which the objective counts as the same."""
 SHARE = 0.02
-"""Of a ridge's direction, below which a variable takes no part in it."""
+"""A variable belongs to a ridge if it moves by more than this share of the variable that moves most."""
 
 
 @dataclass(frozen=True)
 class Ridge:
-    """A way along which the objective stays the same.
+    """A path along which the objective stays the same.
 
     Attributes:
-        names: of the variables that change along it.
-        start, end: their values at its ends, SI [variables].
-        change: greatest relative change of the objective along it.
+        names: names of the variables that change along the ridge.
+        start, end: values of these variables at the two ends, SI [variables].
+        change: greatest relative change of the objective along the ridge.
     """
 
     names: tuple[str, ...]
@@ -49,36 +50,39 @@ class Ridge:
 
 
 def at_bounds(problem: Problem, genes: Array) -> list[str]:
-    """Of each searched variable, "lower" or "upper" if it is at that bound, else nothing."""
-    sides = []
+    """Return "lower" or "upper" for each searched variable that is at this bound, and "" for every other."""
+    bounds = []
     for gene, count in zip(genes, problem.space.catalogue, strict=True):
         at = "lower" if gene <= AT_BOUND else "upper" if gene >= 1.0 - AT_BOUND else ""
-        sides.append("" if count else at)
-    return sides
+        bounds.append("" if count else at)
+    return bounds
 
 
 def find_ridges(problem: Problem, survey: Surveyor, genes: Array) -> tuple[list[Ridge], str]:
-    """The ridges through a best design, and why none could be looked for.
+    """Find the ridges through a best design.
 
     Args:
-        problem: with one objective.
-        survey: its derivatives.
-        genes: the design [variables].
+        problem: a problem with one objective.
+        survey: computes the derivatives of the problem.
+        genes: genes of the best design [variables].
+
+    Returns:
+        The ridges, and a sentence that says why none could be sought, or "".
     """
     term = problem.objectives[0].term
     if isinstance(term, PoseTerm) and problem.poses.count > 1 and not term.aggregate.smooth:
-        return [], "The objective has kinks where the order of poses changes; ridges are not looked for."
+        return [], "No ridges are sought, because the objective has kinks where another pose becomes the worst."
     if problem.constraints or problem.robust is not None:
-        return [], "Ridges are looked for only without constraints and for the nominal machine."
+        return [], "No ridges are sought, because the study has constraints or tolerances."
     bounds = at_bounds(problem, genes)
     free = np.array([k for k, number in enumerate(survey.free) if not bounds[number]], dtype=int)
     if not free.size:
-        return [], "No variable is free to move: all are at bounds or are choices."
+        return [], "No ridges are sought, because every variable is a choice or is at a bound."
     ground = _Ground(problem, survey, genes, free)
     at = genes[survey.free][free]
     slope = ground.slope(at)
     if np.abs(slope).max() > STATIONARY:
-        return [], "The search has not come to rest, so that no ridge can be seen; refine it with method = hybrid."
+        return [], "No ridges are sought, because the search has not converged; refine it with method = hybrid."
     at = ground.settled(at)
     values, vectors = np.linalg.eigh(ground.curvature(at))
     flat = vectors[:, np.abs(values) < FLAT]
@@ -86,7 +90,7 @@ def find_ridges(problem: Problem, survey: Surveyor, genes: Array) -> tuple[list[
 
 
 def _aligned(flat: Array) -> Array:
-    """The same directions, turned so that each has as few variables as possible: reduced by columns."""
+    """Return a basis of the same directions in which each changes few variables, by reduction of columns."""
     directions = flat.copy()
     for k in range(directions.shape[1]):
         pivot = int(np.argmax(np.abs(directions[:, k:]).max(axis=1) * (np.abs(directions[:, :k]).sum(axis=1) < 1e-12)))
@@ -101,7 +105,7 @@ def _aligned(flat: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Ground:
-    """The objective over the variables that are free to move, in units of its size at the best design."""
+    """The objective over the variables that are free to move, with relative derivatives."""
 
     problem: Problem
     survey: Surveyor
@@ -122,12 +126,12 @@ class _Ground:
         return self._local(at)[0]
 
     def slope(self, at: Array) -> Array:
-        """Relative derivatives."""
+        """Derivatives by the genes, relative to the objective."""
         value, slope = self._local(at)
         return slope / (abs(value) or 1.0)
 
     def curvature(self, at: Array) -> Array:
-        """Relative second derivatives."""
+        """Second derivatives by the genes, relative to the objective."""
         rows = []
         for k in range(len(at)):
             step = np.zeros(len(at))
@@ -137,7 +141,7 @@ class _Ground:
         return np.nan_to_num(0.5 * (matrix + matrix.T))
 
     def settled(self, at: Array) -> Array:
-        """The nearest lowest point across the ridge: Newton's method in directions that are not flat."""
+        """Return to the best point across the ridge, by Newton's method in the directions that are not flat."""
         for _ in range(3):
             values, vectors = np.linalg.eigh(self.curvature(at))
             steep = np.abs(values) >= FLAT
@@ -146,7 +150,7 @@ class _Ground:
         return np.clip(at, 0.0, 1.0)
 
     def ridge(self, at: Array, way: Array) -> Ridge | None:
-        """Follow a ridge both ways; None where it is only a point."""
+        """Follow a ridge in both directions; None if it is only a point."""
         level = self.value(at)
         first_end, first = self._followed(at, -way, level)
         second_end, second = self._followed(at, way, level)
@@ -164,7 +168,7 @@ class _Ground:
         return Ridge(names, tuple(ends[0].tolist()), tuple(ends[1].tolist()), float(max(first, second)))
 
     def _followed(self, at: Array, way: Array, level: float) -> tuple[Array, float]:
-        """The last point of the ridge to one side, and the greatest relative change up to there."""
+        """Return the last point of the ridge in one direction, and the greatest relative change up to there."""
         greatest = 0.0
         for _ in range(LONGEST):
             step = STEP * _room(at, way)
@@ -181,7 +185,7 @@ class _Ground:
 
 
 def _room(at: Array, way: Array) -> float:
-    """Which share of a step stays within the bounds."""
+    """Return the share of a step that stays within the bounds."""
     with np.errstate(divide="ignore", invalid="ignore"):
         limits = np.where(way > 0.0, (1.0 - at) / way, np.where(way < 0.0, -at / way, np.inf)) / STEP
     return float(np.clip(limits.min(initial=1.0), 0.0, 1.0))
@@ -198,6 +202,7 @@ def ridge_sentences(ridges: Sequence[Ridge], problem: Problem) -> list[str]:
         ]
         how = f", together with {', '.join(ways[1:])}" if ways[1:] else ""
         sentences.append(
-            f"Ridge: {ways[0]}{how} leaves the objective as it is (to {ridge.change:.0e}); choose freely there."
+            f"Ridge: {ways[0]}{how} changes the objective by no more than {ridge.change:.0e} of its value; choose by "
+            "other reasons."
         )
     return sentences

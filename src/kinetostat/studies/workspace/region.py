@@ -15,14 +15,15 @@ POWERS = {1: "", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶"}
 
 @dataclass(frozen=True)
 class Volume:
-    """Volume (area) of a region of pose space.
+    """The volume of a region of pose space; over two coordinates, its area.
 
     Attributes:
-        value: product of the coordinates' units, SI.
-        standard_error: of the value, in the same unit.
-        unit: of both, e.g. "m³" or "m²·rad".
+        value: the volume, in the product of the SI units of the coordinates.
+        standard_error: standard error of the value, in the same unit.
+        unit: the unit of both, e.g. "m³" or "m²·rad".
         box: volume of all cells together.
-        cells, divided: how many there are, and in how many of them one point is inside and the other outside.
+        cells: number of cells.
+        divided: number of cells in which one point is inside and the other outside.
     """
 
     value: float
@@ -41,17 +42,17 @@ METHOD = "stratified sampling, two random points in each cell of the grid; error
 
 
 def estimate_volume(inside: npt.NDArray[np.bool_], sizes: Sequence[float], units: Sequence[str]) -> Volume:
-    """The volume of a region from whether two independent, uniform points of each cell lie in it.
+    """Estimate the volume of a region from two independent, uniform random points in each cell of a grid.
 
-    The mean over both points is without bias, whatever the region. Cells are independent, and the mean of two points
-    has the variance that a quarter of their squared difference has on average: so the standard error is the volume of a
-    cell times half the square root of the number of divided cells. It falls as the power -(d + 1)/(2 d) of the number
-    of cells in d dimensions.
+    The mean over both points is unbiased for any region. Cells are independent, and the variance of the mean of two
+    points is the expectation of a quarter of their squared difference. So the standard error is the volume of a cell
+    times half the square root of the number of divided cells. It falls with the number of cells to the power
+    -(d + 1)/(2 d) in d dimensions.
 
     Args:
-        inside: cell by cell, its points one after the other [2 x cells].
-        sizes: of the box along each axis, SI.
-        units: of the axes.
+        inside: whether each point lies in the region; the two points of a cell follow one another [2 x cells].
+        sizes: size of the box along each axis, SI.
+        units: units of the axes.
 
     Source: W. G. Cochran, Sampling Techniques (1977), section 5.3, for the variance of a stratified mean.
     """
@@ -64,7 +65,7 @@ def estimate_volume(inside: npt.NDArray[np.bool_], sizes: Sequence[float], units
 
 
 def unit_product(units: Sequence[str]) -> str:
-    """The product of some units as people read it, e.g. "m²·rad"."""
+    """Write the product of some units, e.g. "m²·rad"."""
     return "·".join(f"{unit}{POWERS[count]}" for unit, count in Counter(units).items())
 
 
@@ -74,11 +75,11 @@ CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 TETRAHEDRA = np.array([[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]])
 """Corners of the six tetrahedra about the diagonal of a cell."""
 EVERYWHERE = 2
-"""Nodes outside that are added around the region, so that its surface closes at the ends of the axes."""
+"""Layers of nodes outside the region that are added at the ends of the axes, so that its surface closes there."""
 
 
 def surface(depth: Array, axes: Sequence[Array]) -> Array:
-    """Triangles around a region, their corners turning to the left as seen from outside [n x 3 x 3].
+    """Triangulate the surface of a region by marching tetrahedra; corners run counter-clockwise seen from outside.
 
     Args:
         depth: positive at nodes inside, negative outside, 0 on the surface between [nx x ny x nz].
@@ -97,7 +98,7 @@ def surface(depth: Array, axes: Sequence[Array]) -> Array:
 
 
 def _mixed_cells(field: Array) -> npt.NDArray[np.int64]:
-    """Lowest corners of the cells through which the surface passes [n x 3]."""
+    """Return the lowest corner of each cell through which the surface passes [n x 3]."""
     high = field > 0.0
     size = [n - 1 for n in field.shape]
     counts = np.zeros(size, dtype=int)
@@ -107,14 +108,15 @@ def _mixed_cells(field: Array) -> npt.NDArray[np.int64]:
 
 
 def _cut(nodes: Array, values: Array) -> list[Array]:
-    """Triangles in tetrahedra with given corners [n x 4 x 3] and values there [n x 4]."""
+    """Return the triangles in tetrahedra with given corners [n x 4 x 3] and values there [n x 4]."""
     order = np.argsort(values <= 0.0, axis=1, kind="stable")  # corners inside first
     nodes, values = np.take_along_axis(nodes, order[..., None], 1), np.take_along_axis(values, order, 1)
     count = (values > 0.0).sum(axis=1)
-    sides = {1: [((0, 1), (0, 2), (0, 3))], 3: [((0, 3), (1, 3), (2, 3))]}
-    sides[2] = [((0, 2), (0, 3), (1, 3)), ((0, 2), (1, 3), (1, 2))]
+    # By the number of corners inside: the edges on which the corners of each triangle lie.
+    cut_edges = {1: [((0, 1), (0, 2), (0, 3))], 3: [((0, 3), (1, 3), (2, 3))]}
+    cut_edges[2] = [((0, 2), (0, 3), (1, 3)), ((0, 2), (1, 3), (1, 2))]
     triangles_of = []
-    for inner, triangles in sides.items():
+    for inner, triangles in cut_edges.items():
         chosen = count == inner
         corners, at = nodes[chosen], values[chosen]
         outward = corners[:, inner:].mean(axis=1) - corners[:, :inner].mean(axis=1)

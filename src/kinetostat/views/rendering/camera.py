@@ -1,4 +1,4 @@
-"""Perspective camera: where a picture is taken from, and where points of the base frame fall on it.
+"""The perspective camera: its place, and the pixels to which it projects points of the base frame.
 
 Nothing here knows solids, light or colours.
 """
@@ -27,10 +27,10 @@ class Camera:
     """A camera without distortion.
 
     Attributes:
-        eye: base frame, m.
-        axes: to the right, down and forward in the picture, base axes, [3 x 3] by rows.
-        focal: pixels per unit of slope.
-        width, height: of the picture, pixels.
+        eye: place of the camera, base frame, m.
+        axes: unit vectors to the right, down and forward in the picture, base axes [3 x 3, by rows].
+        focal: focal length in pixels: displacement in the picture per tangent of the angle to the optical axis.
+        width, height: size of the picture, pixels.
     """
 
     eye: Array
@@ -40,14 +40,14 @@ class Camera:
     height: int
 
     def project(self, points: Array) -> tuple[Array, Array]:
-        """Points [n x 3] (m) as pixels [n x 2] from the upper left corner, and the inverse of their depth [n], 1/m."""
+        """Project points [n x 3] (m) to pixels [n x 2] from the upper left corner; also 1 / depth [n], 1/m."""
         seen = (points - self.eye) @ self.axes.T
         nearness = 1.0 / seen[:, 2]
         centre = (0.5 * self.width, 0.5 * self.height)
         return seen[:, :2] * (self.focal * nearness)[:, None] + centre, nearness
 
     def rays(self, x: Array, y: Array) -> Array:
-        """Vectors [... x 3] from the eye through points of the picture (pixels), each long enough for a depth of 1."""
+        """Return vectors [... x 3] from the eye through points of the picture (pixels), scaled to a depth of 1 m."""
         right, down = (x - 0.5 * self.width) / self.focal, (y - 0.5 * self.height) / self.focal
         return np.stack([right, down, np.ones_like(right)], axis=-1) @ self.axes
 
@@ -71,9 +71,9 @@ def camera_on(points: Array, direction: Sequence[float], width: int, height: int
     or farther until it fits, which converges in a few steps.
 
     Args:
-        points: of all that has to be visible.
-        direction: from there to the camera, base axes.
-        width, height: of the picture, pixels.
+        points: points of everything that has to be visible.
+        direction: direction from the machine to the camera, base axes.
+        width, height: size of the picture, pixels.
     """
     axes = axes_towards(-np.array(direction, dtype=float))
     half = math.tan(0.5 * FIELD) * np.array([width, height]) / min(width, height)

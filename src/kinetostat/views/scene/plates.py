@@ -1,4 +1,4 @@
-"""Base and platform as plates behind the joints of the legs, with pedestals between. No leg is drawn here."""
+"""Base and platform as plates behind the joints of the legs, joined to them by pedestals. No leg is drawn here."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ from kinetostat.views.scene.polygon import rounded_hull
 from kinetostat.views.scene.solids import Extruded, Solid, unit, upright
 
 CLEARANCE = 2.3
-"""Distance of a plate from the joint centres, in radii of a leg: the room that a fork takes."""
+"""Distance of a plate from the joint centres, in radii of a leg: enough room for the fork of a joint."""
 COINCIDENT = 1.0
-"""Spread of joints below which a hub takes the place of a plate, in radii of a leg."""
+"""If the joints spread less than this, in radii of a leg, a hub takes the place of the plate."""
 MARGIN = {"base": 3.6, "platform": 2.9}
-"""Width of a plate beyond its joints, in radii of a leg."""
+"""How far a plate extends beyond its joints, in radii of a leg."""
 THICKNESS = {"base": 1.7, "platform": 1.3}
 """Thickness of a plate, in radii of a leg."""
 
@@ -26,10 +26,10 @@ class Plate:
 
     Attributes:
         name: base or platform.
-        place: z towards the joints, origin amid them in their mean plane, base frame.
-        joints: their centres, base frame, m.
-        radius: of a leg, m.
-        hub: whether it is a block around the joints, because they are close together.
+        place: frame with z towards the joints and the origin in their middle, in their mean plane, base frame.
+        joints: centres of the joints, base frame, m.
+        radius: radius of a leg, m.
+        hub: whether the plate is a block around the joints, because they are close together.
     """
 
     name: str
@@ -40,17 +40,17 @@ class Plate:
 
     @property
     def normal(self) -> Vector:
-        """From the plate to the joints."""
+        """Direction from the plate to the joints, base axes."""
         return self.place.rotation.z
 
     @property
     def surface(self) -> float:
-        """Height of the plate's face below the joints' mean plane, along its z, m: below every joint."""
+        """Coordinate of the plate's face along its z, m; it lies below every joint."""
         lowest = min((joint - self.place.translation).dot(self.normal) for joint in self.joints)
         return lowest - CLEARANCE * self.radius
 
     def solids(self) -> list[Solid]:
-        """The plate and its pedestals."""
+        """Make the plate and its pedestals."""
         if self.hub:
             return [self._hub()]
         thick = THICKNESS[self.name] * self.radius
@@ -81,7 +81,7 @@ class Plate:
 
 
 def _to_1_nm(number: float) -> float:
-    """A length (m) to 1 nm, so that coincident points do not become two corners by round-off."""
+    """Round a length (m) to 1 nm, so that round-off does not make two corners of coincident points."""
     return round(number, 9)
 
 
@@ -92,11 +92,11 @@ def plate_behind(
 
     Args:
         name: base or platform.
-        joints: their centres, base frame, m.
+        joints: centres of the joints, base frame, m.
         links: vector from each joint into its leg, base axes.
-        radius: of a leg, m.
-        frame: of the body, base frame: gives the plane where the joints do not.
-        side: direction from the plate to the joints, used where the links lie in the plane of the joints.
+        radius: radius of a leg, m.
+        frame: frame of the body, base frame; its z is the normal if the joints do not span a plane.
+        side: direction from the plate to the joints, used if the links lie in the plane of the joints.
     """
     points = np.array([joint.components() for joint in joints], dtype=float)
     centre = Vector(*points.mean(axis=0).tolist())
@@ -106,7 +106,7 @@ def plate_behind(
     normal = Vector(*axes[2].tolist()) if flat else frame.rotation.z
     inward = unit(Vector(*np.sum([unit(link).components() for link in links], axis=0).tolist()))
     lean = inward.dot(normal)
-    # Links in the plane of the joints do not tell which side is free: then `side` decides.
+    # Links in the plane of the joints do not say on which side the plate has room; then `side` decides.
     normal = normal if (lean if abs(lean) > 0.05 else side.dot(normal)) > 0.0 else -normal
     hub = float(sizes[0]) < COINCIDENT * radius and len(points) > 1
     return Plate(name, upright(centre, normal, frame.rotation.x), tuple(joints), radius, hub)
