@@ -242,7 +242,7 @@ def test_without_the_renderer_a_page_shows_the_picture_and_says_so(monkeypatch):
     page = Page(quick(load(MACHINE)))
     assert "live-data" not in page.attached
     assert "img" in page.tags
-    assert f"make the report after: {adding('report')}" in page.text
+    assert f"run this before you make the report: {adding('report')}" in page.text
 
 
 def test_a_report_that_is_stopped_leaves_the_old_file(tmp_path, capsys, monkeypatch):

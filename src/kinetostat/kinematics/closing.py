@@ -223,7 +223,7 @@ def gaps_at(chains: Chains, coordinates: Array, goal: Array) -> Gaps:
 
 
 def units_of(chains: Chains, length: Array) -> Array:
-    """Return the unit of each joint coordinate: 1 rad for a joint that turns, the machine's length (m) for a slide."""
+    """Return the unit of each joint coordinate [n x coordinates]: 1 rad, or for a slide the machine's length, m."""
     slides = np.array([step.element.mover.point is None for steps in chains.legs for step in steps if step.moves])
     return np.where(slides, length[:, None], 1.0)
 

@@ -100,7 +100,7 @@ def _loaded(analysis: Analysis, load: LoadCase) -> str:
     display = analysis.machine.display
     turned, moved = math.hypot(*load.deflection[:3]), math.hypot(*load.deflection[3:])
     sentence = (
-        f"Under it the {analysis.machine.reference} moves {display.show_deflection(moved, 'm')} and turns "
+        f"Under the load the {analysis.machine.reference} moves {display.show_deflection(moved, 'm')} and turns "
         f"{display.show_deflection(turned, 'rad')}"
     )
     most = []

@@ -169,7 +169,7 @@ def _histogram(panel: Axes, scatter: Scatter, display: Display) -> None:
     samples = scatter.samples[np.isfinite(scatter.samples)]
     scale = display.scale(scatter.unit)
     panel.hist(samples * scale.factor, bins=BINS, color=COLOURS[5], edgecolor="white", linewidth=0.3)
-    marks = (("nominal", scatter.nominal, "-"), ("95 % within", scatter.usual, "--"), ("worst", scatter.worst, ":"))
+    marks = (("nominal", scatter.nominal, "-"), ("reached by 95 %", scatter.usual, "--"), ("worst", scatter.worst, ":"))
     for (label, value, dash), colour in zip(marks, ("#222222", COLOURS[0], COLOURS[1]), strict=True):
         panel.axvline(value * scale.factor, color=colour, linestyle=dash, label=f"{label}: {value * scale.factor:.6g}")
     panel.set(xlabel=scale.label(scatter.label), ylabel="machines")

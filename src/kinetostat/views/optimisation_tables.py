@@ -29,7 +29,7 @@ def print_study(console: Console, problem: Problem) -> None:
         console.print(aim, highlight=False)
     console.print(bounds_table(problem))
     if fixed := not_searched(problem):
-        console.print(f"Not searched, as these have a tolerance only: {fixed}.", highlight=False)
+        console.print(f"Not searched, because only a tolerance is given: {fixed}.", highlight=False)
 
 
 def aims(problem: Problem) -> list[str]:
@@ -116,7 +116,7 @@ def variable_table(result: Result) -> Table:
     objectives = result.problem.objectives
     heads = ["% per %"] if len(objectives) == 1 else [f"% per % ({k + 1})" for k in range(len(objectives))]
     table = numeric_table(
-        "Variables (% per %: change of the objective per 1 % more; of an angle, per 0.01 rad more)",
+        "Variables (% per %: change of the objective if the variable grows by 1 %, an angle by 0.01 rad)",
         "variable",
         ["initial", "best", "at bound", *heads],
     )
@@ -149,7 +149,7 @@ def scatter_table(robustness: Robustness, display: Display = ENGINEERING) -> Tab
     """Return the scatter of the objectives under the tolerances."""
     title = f"Under the tolerances: {robustness.machines:,} random machines"
     title += f" and {robustness.corners:,} corners (every tolerance at an end)" if robustness.corners else ""
-    table = numeric_table(title, "", ["nominal", "mean", "std. dev.", "95 % within", "worst", "unit"])
+    table = numeric_table(title, "", ["nominal", "mean", "std. dev.", "reached by 95 %", "worst", "unit"])
     for scatter in robustness.scatters:
         scale = display.scale(scatter.unit)
         nominal, mean, usual, worst = (

@@ -39,9 +39,9 @@ dl dt { font-weight: 600; margin-top: 1rem; } dl dd { margin: .15rem 0 0 0; max-
 
 CAPTIONS = {
     "machine": "Four U-P-S legs (blue, thick: cylinder) and the passive leg (orange) that leaves four freedoms. The "
-    "paper's figures are lost in the text this program was made from; the geometry is a reconstruction that the "
-    "printed numbers fix completely.",
-    "figure-4": "K_rz and K_y grow with the passive links, the other four do not depend on them at this pose.",
+    "text from which this program was made has no figures; the geometry is a reconstruction that the printed numbers "
+    "determine completely.",
+    "figure-4": "K_rz and K_y grow with the passive links; the other four do not depend on them at this pose.",
     "figure-5": "The paper's cut through the workspace. The machine itself cannot move along y: there, y shifts the "
     "plane of its passive leg, and the platform with it.",
     "figure-6": "The paper's search again, with other random numbers. The right panel shows how far "

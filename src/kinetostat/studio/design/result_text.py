@@ -94,7 +94,7 @@ def _robustness(result: dict[str, Any]) -> str:
         [label, *(_exact(spread[key], digits=6) for key in keys)] for label, spread in scatter["objectives"].items()
     ]
     title = f"With tolerances: {scatter['machines']:,} machines"
-    return heading(title) + table(title, ["", "nominal", "mean", "95 % within", "worst"], rows)
+    return heading(title) + table(title, ["", "nominal", "mean", "reached by 95 %", "worst"], rows)
 
 
 def _remarks(result: dict[str, Any]) -> list[str]:

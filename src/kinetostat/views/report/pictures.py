@@ -35,7 +35,7 @@ FULL = 7.4
 LOADED = ("load", "deflection")
 """Layers of a loaded machine."""
 SCRIPT = Path(__file__).with_name("live.js")
-WITHOUT = " For a machine that turns under the mouse, make the report after: {}."
+WITHOUT = " To get a machine that you can turn with the mouse, run this before you make the report: {}."
 """Sentence of a page that cannot show the scene, because the renderer's libraries are not installed."""
 
 
