@@ -52,7 +52,8 @@ def variations(case, count):
 @each_engine
 @each_machine
 def test_other_designs_and_poses_agree_too(case, engine):
-    for machine in variations(case, 2):
+    large = case.name == "hexapod-hardware"  # a minute for each design
+    for machine in variations(case, 1 if large else 2):
         validation = validate(machine, engine)
         assert validation.difference < REACHED[engine], validation.differences
 
@@ -158,7 +159,7 @@ def test_a_missing_engine_says_how_to_install_it(monkeypatch):
     monkeypatch.setattr(comparison, "find_spec", lambda _: None)
     assert engines() == {}
     for asked in (None, "pynite"):
-        with pytest.raises(InputError, match=r"kinetostat\[validate\]"):
+        with pytest.raises(InputError, match=r"Install it with .*exudyn"):
             validate(load("hexapod"), asked)
 
 

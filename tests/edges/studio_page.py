@@ -22,6 +22,8 @@ from kinetostat.studio.design.design_tab import Workshop
 from kinetostat.studio.serving import show
 
 KINDS = (elements.MachineView, elements.MapView, elements.CurveView, elements.FrontView)
+PATIENCE = 300
+"""Tenths of a second in which a page appears, on a busy machine."""
 """What is drawn in the browser."""
 
 
@@ -89,7 +91,7 @@ class Page:
     async def again(self, address: str = "/") -> None:
         """Load the page of this tab again."""
         await self.user.open(address)
-        await self.user.should_see(marker="status")
+        await self.user.should_see(marker="status", retries=PATIENCE)
         await self.settled()
 
     @property

@@ -162,7 +162,7 @@ def test_two_processes_are_not_at_work_in_one_folder(tmp_path, capsys):
 
 def test_a_folder_holds_one_study(tmp_path, capsys):
     assert main(["optimize", PAPER, *QUICK, "-o", str(tmp_path), "--resume"]) == BAD_INPUT
-    assert "no study that could be resumed" in capsys.readouterr().err
+    assert "does not hold a study that could be resumed" in capsys.readouterr().err
     assert main(["optimize", PAPER, *QUICK, "-o", str(tmp_path)]) == DONE
     capsys.readouterr()
     assert main(["optimize", PAPER, *QUICK, "--set", "optimizer.seed=2", "-o", str(tmp_path)]) == BAD_INPUT

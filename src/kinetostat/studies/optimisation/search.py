@@ -151,7 +151,7 @@ def search_into(
         InputError: another study or another process in the folder, nothing to resume, a full disk.
     """
     if resume and not holds_study(folder):
-        raise InputError(f'"{folder}" holds no study that could be resumed; check -o, or leave out --resume.')
+        raise InputError(f'"{folder}" does not hold a study that could be resumed; check -o, or leave out --resume.')
     with study_folder(folder) as study:
         log, method = Log(assess.problem), method_of(assess)
         _take_up(assess.problem, study, log)
