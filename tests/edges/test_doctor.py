@@ -126,7 +126,7 @@ def test_wrong_numbers_are_found(monkeypatch):
     assert "Table III, row 1, rx: 0.5 for 0.52371" in found["paper"].detail
     assert "1.0e-06" in found["machine code"].detail
     assert "1.0178894" in found["search"].detail
-    assert "not what is read" in found["files"].detail
+    assert "differs when it is read again" in found["files"].detail
     failed = {name for name, check in found.items() if check.state is State.FAILED and check.fix}
     assert failed == {"paper", "machine code", "search", "files"}
 

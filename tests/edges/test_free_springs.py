@@ -1,4 +1,4 @@
-"""Springs without stiffness under a load: what moves without end is said, and everything else keeps its number."""
+"""Springs without stiffness under a load: what moves without limit is said, and everything else keeps its number."""
 
 import json
 import math
@@ -36,7 +36,7 @@ def test_a_load_on_free_actuators_says_what_it_moves(name):
         assert "Actuators are missing" in analysis.message
         return
     assert any(map(math.isinf, analysis.load.deflection))
-    assert "Nothing holds the load: it moves the platform without end in " in analysis.message
+    assert "Nothing holds the load: it moves the platform without limit in " in analysis.message
 
 
 @pytest.mark.parametrize("name", ["hexapod", "orthoglide", "delta", "zhang-gosselin-4dof"])

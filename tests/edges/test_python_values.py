@@ -139,11 +139,11 @@ def test_what_belongs_to_the_program_cannot_be_changed():
             lambda m=mapping: m.update(x=1),
             lambda m=mapping: m.__ior__({}),
         ):
-            with pytest.raises(TypeError, match=r"cannot be changed; take dict\(\.\.\.\) of it"):
+            with pytest.raises(TypeError, match=r"cannot be changed; copy it with dict\(\.\.\.\)"):
                 change()
         assert mapping == before
     analysis = analyze(machine)
-    with pytest.raises(TypeError, match=r"cannot be changed; take list\(\.\.\.\) of it"):
+    with pytest.raises(TypeError, match=r"cannot be changed; copy it with list\(\.\.\.\)"):
         analysis.stiffness[0][0] = 1.0
     assert [list(row) for row in analysis.stiffness] == analysis.stiffness
 

@@ -18,7 +18,9 @@ class _Fixed:
 
     def _refuse(self, *_: Any, **__: Any) -> NoReturn:
         kind = self._plain.__name__
-        raise TypeError(f"this {kind} belongs to a machine or an answer and cannot be changed; take {kind}(...) of it")
+        raise TypeError(
+            f"this {kind} belongs to a machine or an answer and cannot be changed; copy it with {kind}(...)"
+        )
 
     __setitem__ = __delitem__ = __ior__ = __iadd__ = __imul__ = clear = pop = popitem = setdefault = update = _refuse
     append = extend = insert = remove = reverse = sort = _refuse

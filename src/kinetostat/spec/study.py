@@ -39,7 +39,7 @@ class VariableTable(Table):
     paths: list[Path] | None = Field(
         default=None, description="several fields tied together", min_length=1, max_length=100
     )
-    ratios: list[float] | None = Field(default=None, description="of each of `paths` to the variable; 1 unless given")
+    ratios: list[float] | None = Field(default=None, description="ratios of `paths` to the variable (default: 1)")
     start: Written | None = Field(default=None, alias="from", description="least value, with its unit")
     end: Written | None = Field(default=None, alias="to", description="greatest value")
     choices: list[Written | list[Written]] | None = Field(
@@ -52,7 +52,7 @@ class VariableTable(Table):
     fixed: bool = Field(
         default=False, description="held at the machine's value: it is not searched, but has its tolerance"
     )
-    tolerance: Written | None = Field(default=None, description="how far manufacture may miss it, plus and minus")
+    tolerance: Written | None = Field(default=None, description="tolerance of manufacture, plus and minus")
 
     @property
     def fields(self) -> list[str]:
@@ -61,16 +61,16 @@ class VariableTable(Table):
 
 
 class TermTable(Table):
-    """What objectives and constraints have in common: a quantity, and how it is taken over the poses."""
+    """A quantity, and whether its worst value, mean or a percentile over all poses is taken."""
 
     quantity: Path = Field(
         description="e.g. compliance_sum, stiffness_z, frobenius_condition; docs/design.md lists all"
     )
-    weights: list[float] | None = Field(default=None, description="of a weighted sum, one for each of rx ry rz x y z")
+    weights: list[float] | None = Field(default=None, description="weights of a sum, one for each of rx ry rz x y z")
     direction: Annotated[list[float], Field(min_length=3, max_length=3)] | None = Field(
-        default=None, description="of a quantity along a direction: x, y, z in base axes"
+        default=None, description="direction for a quantity that needs one: x, y, z in base axes"
     )
-    over: str = Field(default="worst", description=f"how it is taken over the poses: {OVER}")
+    over: str = Field(default="worst", description=f"what is taken over all poses: {OVER}")
 
 
 class ObjectiveTable(TermTable):
@@ -119,7 +119,7 @@ class OptimizerTable(Table):
     generations: int = Field(
         default=100, description="generations, the first random one included", ge=1, le=MOST_GENERATIONS
     )
-    starts: int = Field(default=16, description="of the gradient method: from how many designs", ge=1, le=MOST_STARTS)
+    starts: int = Field(default=16, description="number of starts of the gradient method", ge=1, le=MOST_STARTS)
     seed: int = Field(default=1, description="of the random numbers", ge=0, lt=2**32)
 
 
@@ -131,7 +131,7 @@ class RobustnessTable(Table):
         default="uniform", description="within the tolerance; normal: the tolerance is three standard deviations"
     )
     objective: str = Field(
-        default="nominal", description=f"what is optimised: nominal, or {OVER} of what manufacture makes"
+        default="nominal", description=f"what is optimised: nominal, or {OVER} of the machines that manufacture makes"
     )
     search_samples: int = Field(default=16, description="machines around each design during the search", ge=1, le=1000)
 

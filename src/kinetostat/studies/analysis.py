@@ -333,7 +333,7 @@ def _message(
     """Say what is special about a pose that has been analysed; `finite` tells whether K is finite."""
     sentences = []
     if not finite and not rigid:
-        sentences.append("At this pose one leg is rigid against some load: K is infinite against it, C is exact.")
+        sentences.append("At this pose a leg is rigid against some load: K is infinite against it, and C is exact.")
     if rigid:
         sentences.append(f"Rigid: {', '.join(rigid)}; K is infinite in the directions that they hold, C is exact.")
     all_springs = springs(response.configuration)

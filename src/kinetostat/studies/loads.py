@@ -66,8 +66,10 @@ class LoadCase:
         free = [name for name, motion in zip(COMPONENTS, self.deflection, strict=True) if math.isinf(motion)]
         exact = "; the deflection is exact in all other components" if any(map(math.isfinite, self.deflection)) else ""
         return (
-            f"Nothing holds the load: it moves the platform without end in {', '.join(free)}, because springs without "
-            f"stiffness would have to bear it ({needed}). Loads and reactions are those with these springs held{exact}."
+            f"Nothing holds the load: it moves the platform without limit in {', '.join(free)}, because springs "
+            "without "
+            f"stiffness would have to carry it ({needed}). Loads and reactions are those with these springs "
+            f"held{exact}."
         )
 
 

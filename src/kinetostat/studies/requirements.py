@@ -29,7 +29,7 @@ MOST_POSES = 5_000_000
 
 
 MANIFOLD = 2.0
-"""Margin beyond which a multiple says more than a percentage."""
+"""Margin from which a multiple of the bound is shown instead of a percentage."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +37,12 @@ class Verdict(Immutable):
     """Whether a machine meets one condition of a requirement.
 
     Attributes:
-        name: of the requirement.
-        condition: as written, with single spaces.
-        quantity: its name.
-        unit: SI, of the worst value.
-        bound: SI.
-        poses: how many poses it must hold at.
+        name: name of the requirement.
+        condition: the condition as written, with single spaces.
+        quantity: name of its quantity.
+        unit: unit of the worst value, SI.
+        bound: the bound, SI.
+        poses: number of poses at which the condition must hold.
         where: these poses in words.
         met: whether it holds at all of them.
         worst: the worst value, SI; None where the worst pose has no result.
@@ -50,8 +50,8 @@ class Verdict(Immutable):
             pose has no result, or the bound is 0 or the value infinite.
         worst_pose: fields that give the worst pose, SI, by path; empty at the pose of the file.
         place: the worst pose in words; empty at the pose of the file.
-        status: of the worst pose, in a word.
-        failed: at how many poses it does not hold.
+        status: status of the worst pose, in a word.
+        failed: number of poses at which it does not hold.
     """
 
     name: str
@@ -82,10 +82,10 @@ class Verdict(Immutable):
         worst = display.show(self.worst, self.unit)
         if self.margin is None:
             return f"{self.condition} {where}: it is {worst}{there}."
-        spare = f"{abs(100.0 * self.margin):.3g} % " + ("to spare" if self.met else "short")
+        distance = f"{abs(100.0 * self.margin):.3g} % {'better' if self.met else 'worse'} than the bound"
         if self.margin > MANIFOLD:
-            spare = f"{1.0 + self.margin:.3g} times as much"
-        return f"{self.condition} {where}: it is {worst}{there}, {spare}."
+            distance = f"{1.0 + self.margin:.3g} times the bound"
+        return f"{self.condition} {where}: it is {worst}{there}, {distance}."
 
 
 @checked

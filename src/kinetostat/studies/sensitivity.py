@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 WITHOUT_INFLUENCE = ("load", "limits")
 """Tables of a machine file on which no index depends."""
 MOST_NAMED = 12
-"""Parameters without influence that are named."""
+"""Greatest number of parameters without influence that are named."""
 
-PER = "percent per percent, of an angle per 0.01 rad"
-"""What the numbers are. No percent of an angle is taken: where it is zero, and how often it winds, is a convention."""
+PER = "percent per percent, for an angle per 0.01 rad"
+"""Says what the numbers mean. A percent of an angle has no meaning, because the zero of an angle is a convention."""
 
 RIGID = "because rigid (a relative change is undefined)"
 FREE = "because free (C is infinite, or does not depend on it)"
@@ -283,13 +283,13 @@ def as_json(answer: Sensitivity) -> dict[str, Any]:
 
 
 def notes(answer: Sensitivity) -> Iterator[str]:
-    """Explain the percentages: what a percent is of, and which parameters are omitted, in sentences."""
+    """Explain in sentences what the percentages refer to, and which parameters are omitted."""
     used = {parameter.measure for parameter in answer.parameters}
     length = answer.machine.display.show(answer.characteristic_length, "m")
     meanings = {
-        "length": f"where a length is 0, a percent is one of the characteristic length, {length}",
-        "radian": "of an angle, a percent is 0.01 rad (0.57 deg), whatever its value",
-        "axis": "of a direction, a percent is one of its length",
+        "length": f"for a length of 0, one percent is that of the characteristic length, {length}",
+        "radian": "for an angle of any value, one percent is 0.01 rad (0.57 deg)",
+        "axis": "for a component of a direction, one percent is that of the length of the direction",
     }
     explained = [meaning for measure, meaning in meanings.items() if measure in used]
     yield "; ".join(["Percent of the result per percent of the parameter", *explained]) + "."

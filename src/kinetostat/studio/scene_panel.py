@@ -28,7 +28,7 @@ LAYERS = {
     "handles": "handles to pull",
 }
 """Layers of the picture that can be hidden, and their names on the page."""
-GHOST = "Keep the machine as it is as a ghost, to compare it with what comes; once more to remove it"
+GHOST = "Keep the present machine as a ghost behind later changes; click again to remove it"
 EXAGGERATION = "factor by which the deflected shape is drawn larger than it is: a number, or auto"
 KEPT = "The picture and the figures still show the last good pose."
 VIEWS = {"iso": "view from the corner", "front": "front view", "side": "side view", "top": "view from above"}

@@ -101,7 +101,7 @@ def results_file() -> str:
         write_dataset(path, grid)
         with xr.open_dataset(path, engine="h5netcdf") as again:
             if not again.equals(grid):
-                raise UnsoundError("a sweep that was written as NetCDF is not what is read")
+                raise UnsoundError("a sweep that was written as NetCDF differs when it is read again")
     return "a sweep written as NetCDF and read again, the same"
 
 

@@ -155,7 +155,7 @@ def _explained(assess: Assessor, result: Result) -> Result:
     problem = assess.problem
     survey = Surveyor(problem) if problem.differentiable else None
     ridges: list[Ridge] = []
-    reason = "The objective has no derivatives, or too many poses for them; ridges are not looked for."
+    reason = "No ridges are sought, because the objective has no derivatives, or too many poses for them."
     if survey is not None and len(problem.objectives) == 1:
         ridges, reason = find_ridges(problem, survey, result.genes)
     return replace(

@@ -206,13 +206,13 @@ def _link_length() -> Claim:
     always = throughout[0] & throughout[1]
     rising = "; ".join(
         f"{way} {', '.join(_course(i, stiffness) for i in range(6) if not falls[i])}"
-        for way, stiffness, falls in zip(("z fixed:", "z growing alike:"), (fixed, grown), throughout, strict=True)
+        for way, stiffness, falls in zip(("z fixed:", "z in proportion:"), (fixed, grown), throughout, strict=True)
     )
     return Claim(
         "Further fact (i)",
         "For a given platform, longer links make every stiffness smaller.",
         f"Links 64 to 68 to 72 cm: with z fixed, K falls in {_count(steps[0][0])} then {_count(steps[0][1])} of six "
-        f"directions; with z growing alike, in {_count(throughout[1])} of six throughout.",
+        f"directions; with z in proportion to the links, in {_count(throughout[1])} of six throughout.",
         _judge(bool(always.all()), bool(always.any())),
         f"Holds for {', '.join(COMPONENTS[i] for i in range(6) if always[i])} either way; fails with {rising}. Beyond "
         "the reference design, at fixed z, the platform pitches; with a higher machine the legs stand steeper.",
@@ -241,9 +241,9 @@ def _platform_size() -> Claim:
         "For given links, a larger platform (within a range) is stiffer about x and y and softer along x and z.",
         f"Rp from 7 to 18 cm: K_rx {k[0, 0]:.3g} to {k[-1, 0]:.3g}, K_ry {k[0, 1]:.3g} to "
         f"{k[-1, 1]:.3g} N·m/rad; K_x {k[0, 3]:.4g} to {k[-1, 3]:.4g}, K_z {k[0, 5]:.4g} to "
-        f"{k[-1, 5]:.4g} N/m, all without a turn.",
+        f"{k[-1, 5]:.4g} N/m; each only rises or only falls.",
         _judge(up and down),
-        "Holds from 7 to 18 cm, our range: below 7 cm K_z turns, above 19 cm K_x does.",
+        "Holds from 7 to 18 cm, our range: below 7 cm K_z rises with Rp instead, above 19 cm K_x does.",
     )
 
 
