@@ -74,3 +74,29 @@ def test_without_the_extra_it_says_how_to_install_it(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "nicegui", None)
     assert main(["studio", "hexapod"]) == BAD_INPUT
     assert f"install it with `{adding('studio')}`" in capsys.readouterr().err
+
+
+def test_a_state_folder_that_cannot_be_read_is_refused(served, tmp_path, monkeypatch, capsys):
+    (tmp_path / "file").touch()
+    (tmp_path / "good" / "runs").mkdir(parents=True)
+
+    def state(folder):
+        return main(["studio", "hexapod", "--no-browser", "--state", str(tmp_path / folder)]), capsys.readouterr().err
+
+    code, message = state("file")
+    assert (code, len(served)) == (BAD_INPUT, 0)
+    assert "file" in message
+    assert "choose another folder with --state" in message
+    assert state("good")[0] == state("none yet")[0] == DONE
+    listed = Path.iterdir
+
+    def forbidden(path):
+        if path.name == "runs":
+            raise PermissionError(13, "Permission denied")
+        return listed(path)
+
+    monkeypatch.setattr(Path, "iterdir", forbidden)
+    code, message = state("good")
+    assert code == BAD_INPUT
+    assert "runs" in message
+    assert "cannot be read: Permission denied" in message

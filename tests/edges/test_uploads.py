@@ -8,10 +8,11 @@ import pytest
 from kinetostat.machine.loading import bundled
 from kinetostat.spec.errors import InputError
 from kinetostat.studio import uploads
+from kinetostat.studio.turns import Turns
 
 
 def sent(data, kind="machine"):
-    asyncio.run(uploads.check_upload(kind, data, "mine.toml"))
+    asyncio.run(uploads.check_upload(kind, data, "mine.toml", "tab"))
 
 
 def test_a_machine_passes():
@@ -29,6 +30,7 @@ def test_a_refusal_is_that_of_the_reader(kind, data, words):
 HOG = """
 import sys
 from kinetostat.studio import uploads
+from kinetostat.studio.turns import Turns
 uploads._limit()
 taken = []
 while True:
@@ -47,3 +49,48 @@ def test_what_exceeds_the_limits_is_refused_in_a_sentence(work, tmp_path, monkey
     monkeypatch.setattr(uploads, "WORKER", "hog")
     with pytest.raises(InputError, match="or stops the program that reads it; a machine file is a short TOML text"):
         sent(b"")
+
+
+def test_a_tab_that_sends_many_files_is_refused_and_others_do_not_stand_behind_it(monkeypatch):
+    """One tab sends ten files at once, then another tab one: two files are read, and nine are refused at once."""
+    read = []
+    monkeypatch.setattr(uploads, "READING", Turns(1, "one after the other."))
+    whole = asyncio.create_subprocess_exec
+
+    async def noted(*words, **more):
+        read.append(words[-1])
+        return await whole(*words, **more)
+
+    monkeypatch.setattr(asyncio, "create_subprocess_exec", noted)
+
+    async def sent_by(tab, name):
+        try:
+            await uploads.check_upload("machine", b"a = 1", name, tab)
+        except InputError as refusal:
+            return str(refusal)
+
+    async def all_at_once():
+        return await asyncio.gather(
+            *(sent_by("hostile", f"{n}.toml") for n in range(10)), sent_by("other", "mine.toml")
+        )
+
+    *hostile, other = asyncio.run(all_at_once())
+    assert read == ["0.toml", "mine.toml"]
+    assert hostile[1:] == ["one after the other."] * 9
+    assert "mine.toml" in other
+
+
+def test_turns_go_in_order_and_a_tab_may_ask_again_after_its_turn():
+    done, turns = [], Turns(1, "wait.")
+
+    async def works(tab):
+        async with turns.turn(tab):
+            done.append(tab)
+            await asyncio.sleep(0)
+
+    async def twice():
+        for _ in range(2):
+            await asyncio.gather(*map(works, "abc"))
+
+    asyncio.run(twice())
+    assert done == list("abcabc")

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import sys
 from operator import attrgetter
 
@@ -93,6 +94,27 @@ def test_a_worker_that_dies_is_survived():
             assert number not in found
             found[number] = part
     assert_same(found, dict(chunks.here(work, range(work.count))))
+
+
+INTERRUPTED = """
+import os, signal, sys
+import distributed
+from kinetostat.cli import main
+whole = distributed.Nanny.start_unsafe
+async def start(nanny):
+    os.kill(os.getpid(), signal.SIGINT)
+    return await whole(nanny)
+distributed.Nanny.start_unsafe = start
+sys.exit(main(["sweep", "zhang-gosselin-4dof", "--vary", "x=-1 cm:1 cm:1000", "--workers", "2"]))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals of this kind")
+def test_ctrl_c_while_workers_start_is_obeyed_without_a_traceback():
+    done = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True)
+    assert done.returncode == 130
+    assert done.stderr.strip() == "kinetostat: stopped; files that had been written are complete."
+    assert done.stdout == ""
 
 
 def test_workers_started_here_leave_ctrl_c_to_the_one_that_gives_orders():

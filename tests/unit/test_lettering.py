@@ -36,3 +36,17 @@ def test_a_name_is_drawn_without_a_warning_and_symbols_stay_mathematics():
         fix_layout(figure)
     assert figure.get_suptitle().startswith("a$\\frac$b ")
     assert axes.title.get_parse_math()
+
+
+def test_a_name_with_dollar_signs_is_no_mathematics_in_a_legend_either():
+    figure = Figure()
+    axes = figure.subplots()
+    axes.set_xscale("log")
+    axes.plot([1.0, 1e5], [0.0, 1.0], label="leg $\\frac$ 1")
+    axes.plot([1.0, 1e5], [1.0, 1.0], label="compliance $C_{\\mathrm{x}}$ (µm/N)")
+    legend = axes.legend()
+    axes.set_ylabel("$a$ and $b$")
+    fix_layout(figure)  # a fraction without numbers is an error where it is read as mathematics
+    assert [text.get_parse_math() for text in legend.get_texts()] == [False, True]
+    assert not axes.yaxis.label.get_parse_math()
+    assert all(label.get_parse_math() for label in axes.get_xticklabels())

@@ -57,9 +57,11 @@ def _studio(options: argparse.Namespace) -> int:
     machine = load_machine(options)
     if find_spec(EXTRA) is None:
         raise InputError(f"the studio is not installed; install it with `{adding('studio')}`.")
-    from kinetostat.studio.design.state_folder import usual_state
+    from kinetostat.studio.design.state_folder import check_state, usual_state
     from kinetostat.studio.serving import serve
 
+    state = options.state or usual_state()
+    check_state(state)
     if options.host not in LOCAL:
         print(
             f"kinetostat: --host {options.host} lets everyone who can reach this computer open the studio, without "
@@ -67,5 +69,5 @@ def _studio(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     name = options.machine if options.machine in bundled() and not (options.settings or options.units) else ""
-    serve(machine, name, options.host, options.port, not options.no_browser, options.state or usual_state())
+    serve(machine, name, options.host, options.port, not options.no_browser, state)
     return DONE

@@ -6,8 +6,9 @@ that dies loses only the chunk in hand, which Dask gives to another.
 """
 
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import version
@@ -128,16 +129,36 @@ def _client(distributed: Any, crew: Crew) -> Iterator[Any]:
         with client:
             yield client
         return
-    cluster = distributed.LocalCluster(
-        n_workers=crew.workers,
-        threads_per_worker=1,
-        memory_limit=0,
-        dashboard_address="127.0.0.1:0",
-        silence_logs="CRITICAL",
-        preload=__name__,
-    )
-    with cluster, distributed.Client(cluster) as client:
+    with ExitStack() as started:
+        with _interrupted_later():
+            cluster = distributed.LocalCluster(
+                n_workers=crew.workers,
+                threads_per_worker=1,
+                memory_limit=0,
+                dashboard_address="127.0.0.1:0",
+                silence_logs="CRITICAL",
+                preload=__name__,
+            )
+            client = started.enter_context(distributed.Client(started.enter_context(cluster)))
         yield client
+
+
+@contextmanager
+def _interrupted_later() -> Iterator[None]:
+    """Keep Ctrl-C waiting, because Dask cannot end workers half started; processes that start here never hear of it."""
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    waiting: list[int] = []
+    handler = signal.signal(signal.SIGINT, lambda number, _: waiting.append(number))
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which processes inherit
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        signal.signal(signal.SIGINT, handler)
+    if waiting:
+        raise KeyboardInterrupt
 
 
 def dask_setup(_worker: Any) -> None:

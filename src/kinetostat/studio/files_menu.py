@@ -16,6 +16,7 @@ from nicegui import background_tasks, ui
 from kinetostat.exchange.formats import KNOWN
 from kinetostat.studio.elements import icon_button, refuse
 from kinetostat.studio.session import Session
+from kinetostat.studio.turns import Turns, make_modest
 
 REPORTS = (
     ("report, page", ".html", "for a design review, with the machine in three dimensions"),
@@ -23,6 +24,8 @@ REPORTS = (
 )
 """Name, suffix and description of each kind of report."""
 BUSY = "Another file is being written; wait until it is done."
+WRITING = Turns(2, BUSY)
+"""Files of all tabs that are written at a time."""
 
 
 class FilesMenu:
@@ -65,7 +68,8 @@ class FilesMenu:
         try:
             with TemporaryDirectory() as folder:
                 (Path(folder) / name).write_bytes(machine)
-                reason = await self._run(Path(folder), [words[0], name, *words[1:], "-o", target])
+                async with WRITING.turn(self._button.client.id):
+                    reason = await self._run(Path(folder), [words[0], name, *words[1:], "-o", target])
                 (Path(folder) / name).unlink()  # so that only files that the command has written remain
                 files = [(path.name, path.read_bytes()) for path in sorted(Path(folder).iterdir())]
         finally:
@@ -85,6 +89,7 @@ class FilesMenu:
             sys.executable, "-m", "kinetostat", *words, cwd=folder,
             stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.PIPE,
         )  # fmt: skip
+        make_modest(self._process.pid)
         _, message = await self._process.communicate()
         text = message.decode("utf-8", "replace").removeprefix("kinetostat: ").strip()
         return text or "The file could not be written."

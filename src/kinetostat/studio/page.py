@@ -200,7 +200,7 @@ class StudioPage:
         data = await event.file.read()
         name = event.file.name
         try:
-            await check_upload("machine", data, name)
+            await check_upload("machine", data, name, self.upload.client.id)
         except InputError as error:
             refuse(str(error))
         else:

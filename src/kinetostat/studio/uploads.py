@@ -6,11 +6,13 @@ within its limits, the page then reads itself; any other file is refused, and no
 
 import asyncio
 import sys
+from collections.abc import Hashable
 
 from kinetostat.machine.loading import build
 from kinetostat.spec.document import parse, text_of
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.study import read_study
+from kinetostat.studio.turns import Turns, make_modest
 
 WORKER = "kinetostat.studio.uploads"
 SECONDS = 10
@@ -19,28 +21,30 @@ PATIENCE = 60.0
 """Time, s, after which the process is stopped, on a server with much other work as well."""
 MEMORY = 2 << 30
 """Address space of the process, bytes; its libraries take half a gigabyte."""
-AT_A_TIME = asyncio.Semaphore(1)
-"""Files of all pages that are read at a time, so that one core is left to the pages."""
+READING = Turns(1, "The file that this tab has sent before is still being read; wait for it, then send the next one.")
+"""One file of all tabs is read at a time, so that a core is left to the pages."""
 REFUSED = 3
 """Exit code after a refusal, whose sentence is on standard output."""
 
 
-async def check_upload(kind: str, data: bytes, name: str) -> None:
+async def check_upload(kind: str, data: bytes, name: str, tab: Hashable) -> None:
     """Check that a file can be read, in a bounded time and a bounded memory.
 
     Args:
         kind: "machine" or "study".
         data: content of the file.
         name: of the file, for messages.
+        tab: that has sent it.
 
     Raises:
-        InputError: it cannot be read, or not within the limits.
+        InputError: it cannot be read, or not within the limits, or the tab's file before is still being read.
     """
-    async with AT_A_TIME:
+    async with READING.turn(tab):
         process = await asyncio.create_subprocess_exec(
             sys.executable, "-m", WORKER, kind, name.replace("\0", "?"),
             stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL,
         )  # fmt: skip
+        make_modest(process.pid)
         try:
             answer, _ = await asyncio.wait_for(process.communicate(data), PATIENCE)
         except TimeoutError:

@@ -1,10 +1,13 @@
 """Texts of figures in fonts that have their characters; a character that no font has is shown by its number."""
 
+import re
 from functools import cache
 
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager, get_font
 from matplotlib.text import Text
+
+from kinetostat.kinetostatics.quantities import QUANTITIES
 
 USUAL = "DejaVu Sans"
 WIDE = (
@@ -13,6 +16,9 @@ WIDE = (
     "Malgun Gothic", "Hiragino Sans", "PingFang SC", "Arial Unicode MS", "Unifont",
 )  # fmt: skip
 """Fonts that have Chinese, Japanese and Korean characters; those that are installed stand behind the usual font."""
+MATHEMATICS = re.compile(r"\$[^$]*\$")
+POWER = r"\mathdefault"
+"""What Matplotlib writes for numbers on an axis."""
 
 
 @cache
@@ -34,10 +40,22 @@ def drawable(text: str) -> str:
     return "".join(c if c.isspace() or ord(c) in _known() else f"[U+{ord(c):04X}]" for c in text)
 
 
+@cache
+def _symbols() -> frozenset[str]:
+    return frozenset(part for quantity in QUANTITIES.values() for part in MATHEMATICS.findall(quantity.symbol))
+
+
+def is_mathematics(text: str) -> bool:
+    """Return whether all that stands between two dollar signs is a symbol or a power of ten, and not part of a name."""
+    return all(part in _symbols() or POWER in part for part in MATHEMATICS.findall(text))
+
+
 def letter(figure: Figure) -> None:
-    """Make all texts of a figure drawable; symbols of quantities, which are mathematics, stay as they are."""
+    """Make all texts of a figure drawable: symbols of quantities are mathematics, names with dollar signs are not."""
     for text in figure.findobj(Text):
         written = text.get_text()
+        if not is_mathematics(written):
+            text.set_parse_math(False)
         if not written.isascii():
             text.set_text(drawable(written))
             text.set_fontfamily([*families()])

@@ -20,7 +20,8 @@ from kinetostat.studies.optimisation.result_data import write_result
 from kinetostat.studies.optimisation.search import begin_search, optimize, stored_problem
 from kinetostat.studies.storage import write_text
 from kinetostat.studies.study_folder import QUESTION, in_use, noted
-from kinetostat.studio.design.state_folder import numbered, slug
+from kinetostat.studio.design.state_folder import RUNS, numbered, slug
+from kinetostat.studio.turns import make_modest
 
 MOST_RUNNING = 2
 """Searches at a time; each of them uses all cores."""
@@ -74,7 +75,7 @@ class Runs:
 
     def __init__(self, state: Path) -> None:
         """Searches below `state`; nothing is written before the first one."""
-        self._folder = state / "runs"
+        self._folder = state / RUNS
         self._processes: dict[Path, subprocess.Popen[bytes]] = {}
         self._names: dict[Path, str] = {}
         self._lock = threading.Lock()
@@ -193,6 +194,7 @@ class Runs:
         self._processes[folder] = subprocess.Popen(
             words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
+        make_modest(self._processes[folder].pid)
 
     def _stage(self, folder: Path) -> Stage:
         process = self._processes.get(folder)

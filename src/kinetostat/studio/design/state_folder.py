@@ -18,6 +18,8 @@ from kinetostat.studies.storage import write_text
 MOST = 100
 """Machines that are kept."""
 LONGEST_NAME, LONGEST_NOTE = 80, 400
+RUNS, FAVOURITES = "runs", "favourites"
+"""Folders of searches and of machines that are kept, in the state folder."""
 REMARK = "# Note:"
 """The beginning of the first line of a favourite; files of earlier versions have the bare note as a comment."""
 
@@ -34,6 +36,23 @@ def usual_state() -> Path:
     return base / "kinetostat" / "studio"
 
 
+def check_state(folder: Path) -> None:
+    """Check that a state folder can be read, or is not there yet.
+
+    Raises:
+        InputError: a file is in its place, or the folder or its runs may not be read.
+    """
+    for path in (folder, folder / RUNS, folder / FAVOURITES):
+        try:
+            next(path.iterdir(), None)
+        except FileNotFoundError:
+            continue
+        except OSError as error:
+            raise InputError(
+                f'"{path}" cannot be read: {error.strerror}; choose another folder with --state.'
+            ) from None
+
+
 def slug(name: str, otherwise: str) -> str:
     """Return a name as part of a file name: letters, digits and single hyphens; `otherwise` if none are left."""
     kept = "".join(c if c.isalnum() and c.isascii() else "-" for c in name.lower())
@@ -41,8 +60,14 @@ def slug(name: str, otherwise: str) -> str:
 
 
 def numbered(folder: Path) -> dict[int, Path]:
-    """Return the entries of a folder whose names begin with a number of four digits, the latest first."""
-    paths = folder.iterdir() if folder.is_dir() else ()
+    """Return the entries of a folder whose names begin with a number of four digits, the latest first.
+
+    A folder that is not there has none, and one that cannot be read shows none.
+    """
+    try:
+        paths = list(folder.iterdir())
+    except OSError:
+        paths = []
     known = {int(path.name[:4]): path for path in paths if path.name[:4].isdecimal() and path.name[4:5] == "-"}
     return dict(sorted(known.items(), reverse=True))
 
@@ -77,7 +102,7 @@ class Favourites:
 
     def __init__(self, state: Path) -> None:
         """Favourites below `state`; nothing is written before the first one."""
-        self._folder = state / "favourites"
+        self._folder = state / FAVOURITES
 
     def every(self) -> list[Favourite]:
         """All favourites, the latest first; files that cannot be read are left out."""

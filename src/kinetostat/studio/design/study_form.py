@@ -96,7 +96,7 @@ class StudyForm:
     async def _sent(self, event: events.UploadEventArguments) -> None:
         data = await event.file.read()
         try:
-            await check_upload("study", data, event.file.name)
+            await check_upload("study", data, event.file.name, self.upload.client.id)
             self.draft = sent_draft(data, event.file.name, self._session.machine)
         except InputError as error:
             self._refuse(str(error))
