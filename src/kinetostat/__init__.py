@@ -16,6 +16,7 @@ _HOMES = {
     "bundled": "kinetostat.machine.loading",
     "changed": "kinetostat.machine.changing",
     "analyze": "kinetostat.studies.analysis",
+    "forward": "kinetostat.studies.assembly",
     "evaluate": "kinetostat.studies.evaluation.dataset",
     "evaluate_grid": "kinetostat.studies.grid.grid",
     "workspace": "kinetostat.studies.workspace.workspace",
@@ -40,6 +41,7 @@ _HOMES = {
 _SHOWN = {
     "Machine": "kinetostat.machine.machine",
     "Analysis": "kinetostat.studies.analysis",
+    "Forward": "kinetostat.studies.assembly",
     "Workspace": "kinetostat.studies.workspace.workspace",
     "Sensitivity": "kinetostat.studies.sensitivity",
     "Guidelines": "kinetostat.studies.guidelines.guidelines",
@@ -51,8 +53,8 @@ _SHOWN = {
 
 __all__ = [
     "InputError", "Machine", "Status", "analyze", "build", "bundled", "changed", "compare", "evaluate", "evaluate_grid",
-    "export", "guidelines", "load", "load_problem", "machine_picture", "optimize", "plot", "register", "report",
-    "reproduce",
+    "export", "forward", "guidelines", "load", "load_problem", "machine_picture", "optimize", "plot", "register",
+    "report", "reproduce",
     "requirements", "save", "sensitivity", "validate", "workspace",
 ]  # fmt: skip
 

@@ -12,6 +12,7 @@ from kinetostat.machine.loading import load as load
 from kinetostat.machine.machine import Machine as Machine
 from kinetostat.spec.errors import InputError as InputError
 from kinetostat.studies.analysis import analyze as analyze
+from kinetostat.studies.assembly import forward as forward
 from kinetostat.studies.comparison.designs import compare as compare
 from kinetostat.studies.evaluation.dataset import evaluate as evaluate
 from kinetostat.studies.grid.grid import evaluate_grid as evaluate_grid

@@ -30,6 +30,7 @@ from kinetostat.commands.common import (
 )
 from kinetostat.commands.compare import add_compare_commands
 from kinetostat.commands.doctor import add_doctor_command
+from kinetostat.commands.forward import add_forward_command
 from kinetostat.commands.grid import add_grid_commands
 from kinetostat.commands.influence import add_influence_commands
 from kinetostat.commands.optimize import add_optimize_commands
@@ -49,6 +50,7 @@ EXAMPLES = """examples:
   kinetostat list
   kinetostat analyze zhang-gosselin-4dof
   kinetostat analyze zhang-gosselin-4dof --set stiffness.passive_links=rigid --json
+  kinetostat forward hexapod --actuators "leg 1=96 mm"
   kinetostat path    hexapod poses.csv -o stiffness.csv -o stiffness.png
   kinetostat sweep   zhang-gosselin-4dof --vary "stiffness.passive_links=1e3:1e10:8:log"
   kinetostat map     zhang-gosselin-4dof --over "x=-2 cm:2 cm:41" --over "z=66 cm:70 cm:41" -o maps
@@ -190,6 +192,7 @@ def _parser() -> Parser:
     )  # fmt: skip
     analyze.add_argument("--full", action="store_true", help="also show eigenscrews and every single spring")
     takes_json(analyze)
+    add_forward_command(commands)
     add_path_command(commands)
     add_grid_commands(commands)
     add_influence_commands(commands)

@@ -45,6 +45,11 @@ ROUNDED_ORIENTATION = 1e-3
 """How far a quaternion or a rotation matrix may be from exact: what numbers rounded to three digits differ by."""
 UNDETERMINED = 1e-4
 """Share of undamped motion above which nothing but the damping determines where the platform is."""
+ONE_PLACEMENT = 1e-5
+"""Distance of two solutions of forward kinematics, rad and in units of the machine's length, up to which they are one:
+near a double solution each comes out in half of the digits."""
+UNDRIVEN = 1e-9
+"""Share of the largest rate below which joints that are not driven change no equation."""
 NO_COORDINATE = 1e-9
 """Coordinates of a pose below this, m or rad, are round-off of zero when they are offered to a reader."""
 PURE_TRANSLATION = 1e-9

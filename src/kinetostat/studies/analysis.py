@@ -16,6 +16,7 @@ import numpy.typing as npt
 from kinetostat.algebra.screw import COMPONENTS, Screw
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import IDENTITY, Rotation
+from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.mobility import Mobility, mobility
 from kinetostat.kinematics.singularity import actuator_jacobian, conditioning, describe, independent
 from kinetostat.kinematics.status import Status
@@ -23,6 +24,7 @@ from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, stiffn
 from kinetostat.kinetostatics.conditioning import twist_condition
 from kinetostat.kinetostatics.internal import InternalLoads, internal_loads
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.limits import unlimited
 from kinetostat.machine.machine import Configuration, Machine, springs
 from kinetostat.machine.mass import Mass, moving_masses
@@ -31,6 +33,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
+from kinetostat.studies.assembly import actuators_at
 from kinetostat.studies.attribution import Contribution, Softest, by_part, contributions, softest
 from kinetostat.studies.indices import Along, Indices, indices_json, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
@@ -75,6 +78,7 @@ class Analysis(Immutable):
         internal_loads: statically indeterminate loads.
         load: effects of the machine's [load], None where it has none.
         masses: mass of each moving part.
+        actuators: where they stand: length of the leg, position, travel or angle, as each says; `forward` takes them.
         wrench_condition: ratio of the extreme singular values of W, moments divided by the characteristic length.
         jacobian_condition: condition number of the actuators' Jacobian, angles multiplied by the characteristic length;
             None where some actuators are rotary and others linear, or where there is no actuator.
@@ -101,6 +105,7 @@ class Analysis(Immutable):
     internal_loads: InternalLoads | None = None
     load: LoadCase | None = None
     masses: tuple[Mass, ...] = ()
+    actuators: tuple[Actuator, ...] = ()
     wrench_condition: float | None = None
     jacobian_condition: float | None = None
     characteristic_length: float | None = None
@@ -207,7 +212,8 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
         InputError: if `axes` is neither "base" nor "platform", or `machine` is not a machine.
     """
     choice(axes, AXES, "axes")
-    response = respond(machine)
+    joints = solve_joints(machine) if machine.family.chains else None
+    response = respond(machine, joints)
     status = Status(int(response.status))
     configuration = response.configuration
     # Other poses tell what sort of singularity it is; they cost three more ways from the home pose, and reach has none.
@@ -251,6 +257,7 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
         internal_loads=internal_loads([leg.name for leg in configuration.legs], response.legs, length, response.guide),
         load=load,
         masses=tuple(moving_masses(machine, configuration)),
+        actuators=actuators_at(machine, joints),
         wrench_condition=float(extremes[0] / extremes[-1]),
         jacobian_condition=_jacobian_condition(response, length),
         characteristic_length=length,
@@ -381,6 +388,7 @@ def as_json(analysis: Analysis, along: Sequence[Along] = (), requirements: Seque
         "mobility": analysis.mobility and _mobility_json(analysis.mobility),
         "internal_loads": analysis.internal_loads,
         "load": analysis.load,
+        "actuators": analysis.actuators,
         "moving_mass": analysis.moving_mass,
         "masses": {part.name: part.mass for part in analysis.masses},
         "attribution": [

@@ -19,6 +19,7 @@ from kinetostat.studies.indices import Along
 from kinetostat.studies.loads import LoadCase
 from kinetostat.studies.requirements import Verdict
 from kinetostat.tolerances import EQUAL_STIFFNESSES, ROUND_OFF_OF_ENTRY
+from kinetostat.views.assembly_tables import actuator_coordinates
 from kinetostat.views.first_lines import first_lines
 from kinetostat.views.requirement_lines import print_requirements
 from kinetostat.views.tables import numeric_table, print_doubts
@@ -62,6 +63,8 @@ def print_analysis(
     about = f"Components {' '.join(names)} at the {machine.reference}, {analysis.axes} axes. Rank {analysis.rank}."
     console.print(about, style="dim", highlight=False)
     shown = [stiffness_table(analysis), compliance_table(analysis)]
+    if full:
+        shown.append(actuator_coordinates(analysis.actuators, display))
     if full and analysis.indices:
         shown.append(eigenscrew_table(analysis.indices.eigenscrews, machine.reference, display))
     _print_tables(console, shown)

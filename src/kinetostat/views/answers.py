@@ -18,8 +18,9 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.studies import analysis, sensitivity
+from kinetostat.studies import analysis, assembly, sensitivity
 from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.assembly import Forward
 from kinetostat.studies.comparison import designs
 from kinetostat.studies.comparison.designs import Comparison
 from kinetostat.studies.grid import grid
@@ -36,6 +37,7 @@ from kinetostat.validation import comparison as validation
 from kinetostat.validation.comparison import Validation
 from kinetostat.views import optimisation_figures, workspace_figures
 from kinetostat.views.analysis_tables import print_analysis
+from kinetostat.views.assembly_tables import print_forward
 from kinetostat.views.comparison_figure import comparison_figure
 from kinetostat.views.comparison_tables import print_comparison, print_validation
 from kinetostat.views.drawing import three_views
@@ -95,6 +97,7 @@ def _sensitivity_figures(sensitivity: Sensitivity) -> Drawings:
 KINDS = (
     Kind(Machine, print_machine, _views),
     Kind(Analysis, print_analysis, data=analysis.as_json),
+    Kind(Forward, print_forward, data=assembly.as_json),
     Kind(
         xr.Dataset,
         lambda console, dataset: print_dataset(console, dataset, _names(dataset)),

@@ -1,0 +1,332 @@
+"""Forward kinematics: the poses that a machine can take while its actuators stand at given coordinates.
+
+The equations are those of the inverse way. A family in closed form says where its actuators stand at a pose, and its
+pose is sought at which they stand right; legs written joint by joint must close while their actuated joints are held.
+Both are solved from many starts at once by damped least squares (Levenberg and Marquardt), whose steps are Newton's
+near a solution. One set of coordinates may have several solutions, the assembly modes; the present one is followed from
+the pose of the machine.
+
+Source: theory section 6, (19) for legs that close. In the base frame.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from kinetostat.algebra.vector import Displacement
+from kinetostat.kinematics.closing import ANGLES, Array, gaps_at, leg_ends, pose_of, squared_distance, stacked, units_of
+from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import POSE, parameters, values, with_values
+from kinetostat.tolerances import CLOSED, NEWTON_SETTLED, ONE_PLACEMENT, UNDRIVEN
+
+MOST_ITERATIONS = 60
+"""Of damped least squares: a start that has not arrived by then is in no solution's reach."""
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-14, 1e6
+"""Shares of the mean square of the rates."""
+FINEST = 1e-6
+"""Step of central differences, rad or in units of the machine's length: the half of all digits that steps need."""
+STRIDE, MOST_STRIDES = 0.05, 400
+"""How far the actuators move at a time on the way from the pose of the machine, rad or in units of its length, and in
+how many steps at most."""
+LEAP = 0.5
+"""Change of an unknown in one of these steps that shows a jump to another solution."""
+
+
+@dataclass(frozen=True)
+class AssemblyMode:
+    """A pose at which the actuators stand at the given coordinates.
+
+    Attributes:
+        pose: the coordinates of the machine's [pose], m and rad.
+        placement: of the platform, base frame.
+        residual: the largest difference of an actuator from its coordinate, or gap of a leg, rad or in units of the
+            machine's length.
+        joints: its joint coordinates, of a machine written leg by leg: m and rad from the home pose.
+        present: whether the machine comes to it from its own pose if its actuators move evenly, without passing a
+            singularity.
+        by_pose: whether the machine at this `pose` has its actuators there. A machine written leg by leg stays in the
+            assembly mode of its home pose, and a pose may belong to another one.
+    """
+
+    pose: dict[str, float]
+    placement: Displacement
+    residual: float
+    joints: Joints | None = None
+    present: bool = False
+    by_pose: bool = True
+
+
+class System(Protocol):
+    """Equations whose solutions are assembly modes; unknowns are in rad and in units of the machine's length."""
+
+    length: float
+    here: Array
+    actuators: Sequence[Actuator]
+
+    def left(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
+        """What is left of the equations [n x m], and how the unknowns reduce it [n x m x unknowns]."""
+
+    def placements(self, unknowns: Array, goal: Array, /) -> list[Displacement]:
+        """Where the platform is at unknowns [n x unknowns] and actuators [actuators]."""
+
+    def mode(self, unknowns: Array, goal: Array) -> AssemblyMode:
+        """What the unknowns [unknowns] of one solution mean; goal [actuators]."""
+
+    def by_pose(self, poses: Sequence[Mapping[str, float]], goal: Array, /) -> list[bool]:
+        """Whether the machine at each of these poses has its actuators at their coordinates [actuators]."""
+
+    def drift(self) -> Array:
+        """How the platform moves per unknown at the pose of the machine [6 x unknowns]."""
+
+
+class ByPose:
+    """A family in closed form: unknown are the coordinates of its pose.
+
+    Attributes:
+        length: of the machine, m.
+        here: the unknowns at its pose.
+        actuators: where they stand there.
+    """
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine, configuration = machine, machine.configure()
+        self.length = float(configuration.length)
+        self.kinds = {p.path: p.quantity.kind for p in parameters(machine.family) if p.path.startswith(POSE)}
+        self.units = np.array([self.length if kind == "length" else 1.0 for kind in self.kinds.values()])
+        self.actuators: Sequence[Actuator] = actuators_of(configuration)
+        self.slides = np.array([actuator.slides for actuator in self.actuators], dtype=bool)
+        given = values(machine)
+        self.here = np.array([float(given[path]) for path in self.kinds]) / self.units
+
+    def _placed(self, unknowns: Array) -> Machine:
+        return with_values(self.machine, dict(zip(self.kinds, (unknowns * self.units).T, strict=True)))
+
+    def _off(self, unknowns: Array, goal: Array) -> Array:
+        """What the actuators lack of their coordinates [n x actuators]; NaN where a leg does not reach."""
+        measured = actuators_of(self._placed(unknowns).configure())
+        off = goal - stacked([actuator.coordinate for actuator in measured], len(unknowns))
+        return np.where(self.slides, off / self.length, np.arctan2(np.sin(off), np.cos(off)))
+
+    def left(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
+        """See `System`; the rates [n x actuators x unknowns] are central differences, all of them in one batch."""
+        count, size = unknowns.shape
+        ways = FINEST * np.concatenate([np.zeros((1, size)), np.eye(size), -np.eye(size)])
+        off = self._off((unknowns[:, None] + ways).reshape(-1, size), goal).reshape(count, len(ways), -1)
+        rates = (off[:, size + 1 :] - off[:, 1 : size + 1]) / (2.0 * FINEST)
+        return off[:, 0], np.swapaxes(rates, 1, 2)
+
+    def placements(self, unknowns: Array, _goal: Array) -> list[Displacement]:
+        """See `System` [n x unknowns]."""
+        poses = [dict(zip(self.kinds, row.tolist(), strict=True)) for row in unknowns * self.units]
+        return [with_values(self.machine, pose).configure().platform for pose in poses]
+
+    def mode(self, unknowns: Array, goal: Array) -> AssemblyMode:
+        """See `System` [unknowns]; of angles that give one orientation, the smallest are chosen."""
+        (placement,) = self.placements(unknowns[None], goal)
+        pose = {path.removeprefix(POSE): float(q) for path, q in zip(self.kinds, unknowns * self.units, strict=True)}
+        angles = [path.removeprefix(POSE) for path, kind in self.kinds.items() if kind == "angle"]
+        pose |= {name: float(np.arctan2(np.sin(pose[name]), np.cos(pose[name]))) for name in angles}
+        if set(ANGLES) <= pose.keys():
+            turned = pose_of(placement)
+            pose |= {name: float(turned[name]) for name in ANGLES}
+        return AssemblyMode(pose, placement, float(np.abs(self._off(unknowns[None], goal)).max(initial=0.0)))
+
+    def by_pose(self, poses: Sequence[Mapping[str, float]], _goal: Array) -> list[bool]:
+        """See `System`, [actuators]: there is one assembly mode of the legs for each pose."""
+        return [True] * len(poses)
+
+    def drift(self) -> Array:
+        """See `System` [6 x unknowns]: no coordinate of a pose leaves the platform where it is."""
+        return np.eye(self.here.size)
+
+
+class LegByLeg:
+    """A machine written leg by leg: unknown are its passive joint coordinates.
+
+    Attributes:
+        length: of the machine, m.
+        here: the unknowns at its pose, or at its home pose where the legs cannot close.
+        actuators: where they stand there.
+    """
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine, self.chains = machine, machine.chains()
+        self.length = float(self.chains.length)
+        self.driven = joint_actuators(self.chains, leg_names(machine))
+        self.slides = np.array([actuator.slides for actuator in self.driven], dtype=bool)
+        places = [actuator.place for actuator in self.driven]
+        self.free = np.array([i for i in range(self.chains.size) if i not in places], dtype=int)
+        self.units = units_of(self.chains, np.array([self.length]))[0][self.free]
+        joints = solve_joints(machine)
+        closes = int(joints.status) in (Status.OK, Status.SINGULAR)
+        self.joints = np.array(joints.coordinates if closes else [0.0] * self.chains.size, dtype=float)
+        self.actuators: Sequence[Actuator] = [actuator.at(self.joints.tolist()) for actuator in self.driven]
+        self.here = self.joints[self.free] / self.units
+
+    def _whole(self, unknowns: Array, goal: Array) -> Array:
+        """All joint coordinates, m and rad [n x coordinates]."""
+        joints = np.empty((len(unknowns), self.chains.size))
+        joints[:, self.free] = unknowns * self.units
+        for actuator, coordinate in zip(self.driven, goal.tolist(), strict=True):
+            joints[:, actuator.place] = actuator.joint_coordinate(coordinate)
+        return joints
+
+    def left(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
+        """See `System`; the rates [n x gaps x unknowns] are the twists of the passive joints."""
+        gaps = gaps_at(self.chains, self._whole(unknowns, goal), np.zeros((len(unknowns), len(self.chains.pose))))
+        return gaps.closure, gaps.closure_rates[:, :, self.free]
+
+    def placements(self, unknowns: Array, goal: Array) -> list[Displacement]:
+        """See `System` [n x unknowns]."""
+        return [leg_ends(self.chains, row.tolist())[0].platform for row in self._whole(unknowns, goal)]
+
+    def mode(self, unknowns: Array, goal: Array) -> AssemblyMode:
+        """See `System` [unknowns]."""
+        joints, (placement,) = self._whole(unknowns[None], goal)[0], self.placements(unknowns[None], goal)
+        every = pose_of(placement)
+        pose = {name: float(every[name]) for name in self.chains.pose}
+        gap, _ = self.left(unknowns[None], goal)
+        residual = float(np.abs(gap).max(initial=0.0))
+        at = Joints(tuple(joints.tolist()), int(Status.OK))
+        return AssemblyMode(pose, placement, residual, at)
+
+    def by_pose(self, poses: Sequence[Mapping[str, float]], goal: Array) -> list[bool]:
+        """See `System` [actuators]."""
+        columns = {f"{POSE}{name}": np.array([pose[name] for pose in poses]) for name in self.chains.pose}
+        there = solve_joints(with_values(self.machine, columns))
+        amounts = [actuator.at(there.coordinates).coordinate for actuator in self.driven]
+        off = goal - stacked(amounts, len(poses))
+        off = np.where(self.slides, off / self.length, np.arctan2(np.sin(off), np.cos(off)))
+        close = np.abs(off).max(axis=1, initial=0.0) < ONE_PLACEMENT
+        return [bool(same) for same in close & (np.asarray(there.status) == Status.OK)]
+
+    def drift(self) -> Array:
+        """See `System` [6 x unknowns]."""
+        gaps = gaps_at(self.chains, self.joints[None], np.zeros((1, len(self.chains.pose))))
+        return np.asarray(gaps.platform_rates[0][:, self.free])
+
+
+def leg_names(machine: Machine) -> list[str]:
+    """The names of the legs of a machine written leg by leg, in order."""
+    return [leg.name for leg in machine.configure((0.0,) * machine.chains().size).legs]
+
+
+def system_of(machine: Machine) -> System:
+    """The equations of a machine; its pose is where the search begins."""
+    return LegByLeg(machine) if machine.family.chains else ByPose(machine)
+
+
+def stand(machine: Machine, joints: Joints | None = None) -> list[Actuator]:
+    """Where the actuators of a machine stand at its pose: the inverse of forward kinematics.
+
+    Args:
+        machine: with its pose.
+        joints: where its joints are, if it is written leg by leg and they are known.
+    """
+    if machine.family.chains is None:
+        return actuators_of(machine.configure())
+    at = (joints or solve_joints(machine)).coordinates
+    return [actuator.at(at) for actuator in joint_actuators(machine.chains(), leg_names(machine))]
+
+
+def undriven(system: System) -> bool:
+    """Whether the platform can move at the pose of the machine while all actuators stand still."""
+    goal = np.array([actuator.coordinate for actuator in system.actuators], dtype=float)
+    rates = system.left(system.here[None], goal)[1][0]
+    size, full = rates.shape[1], np.isfinite(rates).all()
+    if not full or size == 0:
+        return False
+    _, sizes, ways = np.linalg.svd(rates, full_matrices=True)
+    weights = np.concatenate([sizes, np.zeros(size - len(sizes))]) if size > len(sizes) else sizes
+    idle = ways[weights < UNDRIVEN * max(weights.max(), 1.0)]
+    return bool(np.abs(system.drift() @ idle.T).max(initial=0.0) > UNDRIVEN)
+
+
+def assembly_modes(system: System, goal: Array, starts: int, spread: float) -> list[AssemblyMode]:
+    """Search for the assembly modes near the pose of a machine.
+
+    Args:
+        system: the equations of the machine.
+        goal: coordinates of its actuators [actuators], m and rad.
+        starts: how many there are beside the pose itself.
+        spread: how far from it they lie at most, rad and in units of the machine's length.
+
+    Returns:
+        Each mode once, the present one first, then in the order of their distance from the pose of the machine.
+    """
+    around = np.random.default_rng(0).uniform(-spread, spread, (starts, system.here.size))
+    with np.errstate(all="ignore"):
+        followed = _followed(system, goal)
+        first = [system.here] if followed is None else [followed, system.here]
+        unknowns, largest = _least_squares(system, np.concatenate([first, system.here + around]), goal)
+    sound = unknowns[largest < CLOSED]
+    places = system.placements(sound, goal)
+    (here,) = system.placements(system.here[None], _coordinates(system))
+    order = np.argsort([squared_distance(place, here, system.length) for place in places], kind="stable")
+    kept: list[int] = [] if followed is None else [0]
+    for i in order.tolist():
+        if all(squared_distance(places[i], places[k], system.length) > ONE_PLACEMENT**2 for k in kept):
+            kept.append(i)
+    modes = [system.mode(sound[i], goal) for i in kept]
+    kinds = zip(modes, system.by_pose([mode.pose for mode in modes], goal) if modes else [], strict=True)
+    return [replace(mode, present=followed is not None and i == 0, by_pose=by) for i, (mode, by) in enumerate(kinds)]
+
+
+def _coordinates(system: System) -> Array:
+    return np.array([actuator.coordinate for actuator in system.actuators], dtype=float)
+
+
+def _followed(system: System, goal: Array) -> Array | None:
+    """The solution to which the machine comes from its pose if all actuators move evenly; None past a singularity."""
+    start = _coordinates(system)
+    scale = np.array([system.length if actuator.slides else 1.0 for actuator in system.actuators])
+    if not np.isfinite(start).all():
+        return None
+    steps = int(np.clip(np.ceil(np.abs((goal - start) / scale).max(initial=0.0) / STRIDE), 1, MOST_STRIDES))
+    at, hand = system.here, 0.0
+    for step in range(steps + 1):
+        unknowns, largest = _least_squares(system, at[None], start + (goal - start) * (step / steps))
+        rates = system.left(unknowns, goal)[1][0]
+        turn = float(np.sign(np.linalg.det(rates))) if rates.shape[0] == rates.shape[1] else 0.0
+        if largest[0] > CLOSED or np.abs(unknowns[0] - at).max(initial=0.0) > LEAP or turn * hand < 0.0:
+            return None
+        at, hand = unknowns[0], turn
+    return at
+
+
+def _least_squares(system: System, starts: Array, goal: Array) -> tuple[Array, Array]:
+    """Solve from many starts at once: unknowns [n x unknowns], and the largest of what is left of the equations [n]."""
+    best = starts.copy()
+    left, rates = system.left(best, goal)
+    damping = np.full(len(best), FIRST_DAMPING)
+    going = np.asarray(np.isfinite(left).all(axis=1) & np.isfinite(rates).all(axis=(1, 2)))
+    for _ in range(MOST_ITERATIONS):
+        active = np.flatnonzero(going)
+        if not active.size or not best.shape[1]:
+            break
+        moved = best[active] + _steps(left[active], rates[active], damping[active])
+        new_left, new_rates = system.left(moved, goal)
+        better = (new_left**2).sum(axis=1) < (left[active] ** 2).sum(axis=1)
+        better &= np.isfinite(new_rates).all(axis=(1, 2))
+        won = active[better]
+        best[won], left[won], rates[won] = moved[better], new_left[better], new_rates[better]
+        damping[active] = np.clip(damping[active] * np.where(better, 0.1, 10.0), LEAST_DAMPING, MOST_DAMPING)
+        arrived = np.abs(left[active]).max(axis=1, initial=0.0) <= NEWTON_SETTLED
+        # Near a solution a step that no longer improves has reached round-off.
+        close = np.abs(left[active]).max(axis=1, initial=0.0) < CLOSED
+        going[active] = ~arrived & (better | ~close) & (damping[active] < MOST_DAMPING)
+    return best, np.where(np.isfinite(left).all(axis=1), np.abs(left).max(axis=1, initial=0.0), np.inf)
+
+
+def _steps(left: Array, rates: Array, damping: Array) -> Array:
+    """Damped least-squares steps [n x unknowns]."""
+    square = np.swapaxes(rates, 1, 2) @ rates
+    size = np.trace(square, axis1=1, axis2=2) / square.shape[1] + 1e-300
+    square = square + (damping * size)[:, None, None] * np.eye(square.shape[1])
+    work = np.swapaxes(rates, 1, 2) @ left[:, :, None]
+    return np.asarray(np.linalg.solve(square, work)[:, :, 0])

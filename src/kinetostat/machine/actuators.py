@@ -1,0 +1,167 @@
+"""The coordinates of actuators: how long, how far along and how far turned the actuated joints of a placed machine are.
+
+An actuated slide between two passive joints has the length of its leg. All other actuators of machines written leg by
+leg count from the home pose; those of families, which have no home pose, have a position or an angle in the base frame.
+Nothing is solved here. Points and axes are in the base frame.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinetostat.algebra.scalar import Scalar
+from kinetostat.algebra.vector import Vector
+from kinetostat.machine.leg import Joint, Leg, Spring, Turn
+from kinetostat.machine.machine import Chains, Configuration
+from kinetostat.machine.rods import rods
+from kinetostat.tolerances import NO_LINK, PARALLEL_AXES
+
+LENGTH, POSITION = "length of the leg", "position along its axis from the base origin"
+ELEVATION, BEARING = "angle of the crank above the x-y plane", "angle of the crank from x"
+TRAVEL, TURNED = "travel from the home pose", "turn from the home pose"
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """An actuator and where it stands.
+
+    Attributes:
+        name: of the joint that it drives, e.g. "leg 1 actuator".
+        leg: name of its leg.
+        meaning: what its coordinate counts.
+        coordinate: m, or rad.
+        slides: whether it is linear.
+    """
+
+    name: str
+    leg: str
+    meaning: str
+    coordinate: Scalar
+    slides: bool
+
+    @property
+    def kind(self) -> str:
+        """Kind of its coordinate's quantity."""
+        return "length" if self.slides else "angle"
+
+    @property
+    def unit(self) -> str:
+        """SI unit of its coordinate."""
+        return "m" if self.slides else "rad"
+
+
+def actuators_of(configuration: Configuration) -> list[Actuator]:
+    """Measure the actuators of a placed machine of a family, over floats or columns.
+
+    A rotary actuator has the angle of its crank above the x-y plane, from the horizontal direction that points away
+    from the z axis (towards +x or +y where none does); about a vertical axis, the angle from x, counter-clockwise.
+
+    Args:
+        configuration: of a machine in closed form.
+    """
+    lengths = {rod.leg: rod.length for rod in rods(configuration.legs) if rod.telescopic}
+    result = []
+    for leg in configuration.legs:
+        for place, spring in enumerate(leg.chain):
+            if not (isinstance(spring, Spring) and spring.actuated):
+                continue
+            slides = spring.joint.point is None
+            if slides and leg.name in lengths:
+                meaning, coordinate = LENGTH, lengths[leg.name]
+            elif slides:
+                meaning, coordinate = POSITION, _next_point(leg, place).dot(spring.joint.axis)
+            else:
+                meaning, coordinate = _crank_angle(spring.joint, leg, place)
+            result.append(Actuator(name_of(spring), leg.name, meaning, coordinate, slides))
+    return result
+
+
+def name_of(spring: Spring) -> str:
+    """The name of the joint that an actuator drives, or of the part that it is where the joint has none."""
+    return spring.joint.name or spring.of
+
+
+def _next_point(leg: Leg, place: int, away: Vector | None = None) -> Vector:
+    """The first point of a leg after an element, further than nothing away from another point."""
+    for element in leg.chain[place + 1 :]:
+        for point in element.path:
+            if away is None or np.nanmax(np.asarray((point - away).norm(), dtype=float), initial=0.0) > NO_LINK:
+                return point
+    raise ValueError(f"{leg.name} has no point after its actuator")
+
+
+def _crank_angle(joint: Joint, leg: Leg, place: int) -> tuple[str, Scalar]:
+    centre, axis = joint.point, joint.axis
+    if centre is None:
+        raise ValueError("a slide has no crank")
+    crank = _next_point(leg, place, centre) - centre
+    if np.abs(np.asarray(axis.z, dtype=float)).max() > 1.0 - PARALLEL_AXES:
+        return BEARING, np.arctan2(crank.y, crank.x)
+    level = np.hypot(axis.x, axis.y)
+    outward = Vector(axis.y / level, -axis.x / level, 0.0)
+    radial = np.asarray(outward.dot(centre), dtype=float)
+    tangential = np.abs(radial) < NO_LINK
+    east = np.where(np.abs(outward.x) > NO_LINK, outward.x, outward.y)
+    outward = outward * np.where(np.where(tangential, east, radial) < 0.0, -1.0, 1.0)
+    upward = Vector(-axis.x * axis.z / level, -axis.y * axis.z / level, level)
+    return ELEVATION, np.arctan2(crank.dot(upward), crank.dot(outward))
+
+
+@dataclass(frozen=True)
+class JointActuator:
+    """An actuated joint of a machine written leg by leg.
+
+    Attributes:
+        name, leg, meaning, slides: see `Actuator`.
+        place: of its coordinate among the joint coordinates.
+        offset, sign: its coordinate is offset + sign times the joint coordinate; m or rad.
+    """
+
+    name: str
+    leg: str
+    meaning: str
+    slides: bool
+    place: int
+    offset: float
+    sign: float
+
+    def at(self, joints: Sequence[Scalar | Turn]) -> Actuator:
+        """The actuator at given joint coordinates (m, and rad or turns)."""
+        amount = joints[self.place]
+        angle = np.arctan2(amount.sine, amount.cosine) if isinstance(amount, Turn) else amount
+        return Actuator(self.name, self.leg, self.meaning, self.offset + self.sign * angle, self.slides)
+
+    def joint_coordinate(self, coordinate: float) -> float:
+        """The joint coordinate (m or rad from the home pose) at a coordinate of the actuator."""
+        return (coordinate - self.offset) * self.sign
+
+
+def joint_actuators(chains: Chains, names: Sequence[str]) -> list[JointActuator]:
+    """The actuated joints of a machine written leg by leg, in the order of its joint coordinates.
+
+    Args:
+        chains: its legs at the home pose; floats.
+        names: of the legs.
+    """
+    result, place = [], 0
+    for name, steps in zip(names, chains.legs, strict=True):
+        leg = Leg(name, tuple(step.element for step in steps))
+        rod = next((rod for rod in rods([leg]) if rod.telescopic), None)
+        for step in steps:
+            if not step.moves:
+                continue
+            if isinstance(step.element, Spring) and step.element.actuated:
+                slides = step.element.joint.point is None
+                offset, sign, meaning = 0.0, 1.0, TRAVEL if slides else TURNED
+                if slides and rod is not None and abs(_along(rod.span, step.element.joint.axis)) > 1.0 - PARALLEL_AXES:
+                    sign = float(np.sign(_along(rod.span, step.element.joint.axis)))
+                    offset, meaning = float(rod.length), LENGTH
+                result.append(JointActuator(name_of(step.element), name, meaning, slides, place, offset, sign))
+            place += 1
+    return result
+
+
+def _along(span: Vector, axis: Vector) -> float:
+    """The cosine between a span and a unit vector."""
+    return float(span.dot(axis) / span.norm())

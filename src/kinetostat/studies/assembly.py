@@ -1,0 +1,204 @@
+"""Poses from actuator coordinates: which assembly modes a machine has near its pose, and what each of them is worth.
+
+The equations are solved in `kinematics.forward`; the command is `forward`.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from kinetostat.kinematics.closure import Joints
+from kinetostat.kinematics.forward import AssemblyMode, System, assembly_modes, stand, system_of, undriven
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.actuators import Actuator
+from kinetostat.machine.machine import Machine, need_machine
+from kinetostat.machine.parameters import POSE, with_values
+from kinetostat.spec.errors import InputError, choice, shorten
+from kinetostat.spec.fields import Quantity
+from kinetostat.studies.plain_data import as_answer
+from kinetostat.units import UnitError
+
+MOST_STARTS = 10_000
+"""Starts of a search: more take minutes, and the modes near a pose are known long before."""
+
+
+@dataclass(frozen=True)
+class ForwardPose:
+    """One assembly mode: a pose at which the actuators stand at the given coordinates.
+
+    Attributes:
+        pose: coordinates of the machine's [pose] by name, m and rad: `machine.with_values(pose.pose)` takes them.
+        status: of the machine there: OK, JOINT_LIMIT or SINGULAR.
+        residual: the largest difference of an actuator from its coordinate, or gap of a leg, rad or in units of the
+            machine's length.
+        present: whether the machine comes to it from its own pose if its actuators move evenly, without passing a
+            singularity.
+        by_pose: whether the machine at this `pose` has its actuators there; if not, the pose belongs to another
+            assembly mode of the legs than that of the home pose.
+        position: of P, base frame, m.
+        rotation: rows of the rotation matrix of the platform, base frame.
+    """
+
+    pose: dict[str, float]
+    status: Status
+    residual: float
+    present: bool
+    by_pose: bool
+    position: tuple[float, ...]
+    rotation: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class Forward:
+    """What is known of a machine whose actuators stand at given coordinates.
+
+    Attributes:
+        machine: whose pose the search began at.
+        actuators: with the coordinates that they have.
+        poses: one for each assembly mode, the present one first, then by distance from the pose of the machine.
+        message: how many there are, or why there is none; one paragraph.
+    """
+
+    machine: Machine
+    actuators: tuple[Actuator, ...]
+    poses: tuple[ForwardPose, ...]
+    message: str
+
+    def __repr__(self) -> str:
+        return f"<Forward kinematics of {self.machine.name!r}: {_counted(len(self.poses))}>"
+
+    @property
+    def present(self) -> ForwardPose | None:
+        """The pose in the assembly mode that the machine is in; None where a singularity lies on the way."""
+        return next((pose for pose in self.poses if pose.present), None)
+
+
+def forward(
+    machine: Machine, actuators: Mapping[str, float | str] | None = None, starts: int = 100, spread: float = 1.0
+) -> Forward:
+    """Compute the poses of a machine from the coordinates of its actuators: its assembly modes near its pose.
+
+    The coordinate of an actuated slide between two passive joints is the length of its leg. Others count from the home
+    pose where a machine is written leg by leg; in families a slide has a position along its axis from the base origin,
+    and a crank an angle above the x-y plane. `analyze(machine).actuators` shows them at the pose.
+
+    Args:
+        machine: its pose is where the search begins.
+        actuators: coordinates by name of the actuator, or of its leg: SI, or text with a unit. Those that are not given
+            stay as they are at the pose.
+        starts: how many starts there are beside the pose itself; more of them find more modes.
+        spread: how far from the pose they lie at most, rad and in units of the machine's length.
+
+    Raises:
+        InputError: an unknown actuator, a value of another kind, a machine that its actuators do not determine, or an
+            argument out of bounds.
+    """
+    need_machine(machine)
+    _check_search(starts, spread)
+    system = system_of(machine)
+    driven = _driven(system, actuators or {}, machine)
+    if undriven(system):
+        raise InputError(
+            f"{machine.name}: the actuators do not determine the pose: the platform can move while they stand still. "
+            "The machine has fewer actuators than freedoms, or its pose is singular: begin at another pose."
+        )
+    goal = np.array([actuator.coordinate for actuator in driven], dtype=float)
+    modes = assembly_modes(system, goal, starts, spread)
+    poses = tuple(_judged(machine, mode) for mode in modes)
+    return Forward(machine, driven, poses, _message(modes, machine, len(goal)))
+
+
+def _check_search(starts: object, spread: object) -> None:
+    if not isinstance(starts, int) or isinstance(starts, bool) or not 0 <= starts <= MOST_STARTS:
+        raise InputError(f"starts is {shorten(starts)}; give a whole number from 0 to {MOST_STARTS}.")
+    if isinstance(spread, bool) or not isinstance(spread, int | float) or not 0.0 < spread <= math.pi:
+        raise InputError(f"spread is {shorten(spread)}; give a number greater than 0 and at most pi.")
+
+
+def _driven(system: System, given: object, machine: Machine) -> tuple[Actuator, ...]:
+    """The actuators at the coordinates that are given, or where they stand."""
+    if not isinstance(given, Mapping):
+        raise InputError(f'actuators is {shorten(given)}; give a coordinate by name, e.g. {{"leg 1": "31 cm"}}.')
+    if not system.actuators:
+        raise InputError(f"{machine.name} has no actuator; forward kinematics needs one for each freedom.")
+    names = _names(system)
+    at: dict[str, Actuator] = {}
+    for name, value in given.items():
+        actuator = names[choice(name, names, "the name of an actuator")]
+        if actuator.name in at:
+            raise InputError(f'the actuator "{actuator.name}" is given twice; leave one of its coordinates out.')
+        try:
+            coordinate = Quantity(actuator.kind, actuator.meaning).number(value)
+        except UnitError as error:
+            raise InputError(f'actuator "{name}" is {shorten(value)}: {error}.') from None
+        at[actuator.name] = replace(actuator, coordinate=coordinate)
+    driven = tuple(at.get(actuator.name, actuator) for actuator in system.actuators)
+    unplaced = [actuator.name for actuator in driven if not math.isfinite(float(actuator.coordinate))]
+    if unplaced:
+        raise InputError(
+            f"{machine.name} cannot be placed at its pose, so that {', '.join(unplaced)} has no coordinate there; give "
+            "it, or change the pose."
+        )
+    return driven
+
+
+def _names(system: System) -> dict[str, Actuator]:
+    """The actuators by all their names: that of the leg where it has one actuator, and their own."""
+    legs = [actuator.leg for actuator in system.actuators]
+    alone = {actuator.leg: actuator for actuator in system.actuators if legs.count(actuator.leg) == 1}
+    return {**alone, **{actuator.name: actuator for actuator in system.actuators}}
+
+
+def _judged(machine: Machine, mode: AssemblyMode) -> ForwardPose:
+    """An assembly mode with the status that the machine has there."""
+    there = with_values(machine, {f"{POSE}{name}": value for name, value in mode.pose.items()})
+    status = Status(int(respond(there, mode.joints).status))
+    turn = mode.placement.rotation
+    rows = zip(*([float(c) for c in axis.components()] for axis in (turn.x, turn.y, turn.z)), strict=True)
+    position = tuple(float(c) for c in mode.placement.translation.components())
+    return ForwardPose(mode.pose, status, mode.residual, mode.present, mode.by_pose, position, tuple(rows))
+
+
+def _counted(count: int) -> str:
+    return f"{count} assembly mode{'' if count == 1 else 's'}"
+
+
+def _message(modes: list[AssemblyMode], machine: Machine, actuators: int) -> str:
+    if not modes:
+        redundant = actuators > len(vars(machine.tables["pose"]))
+        more = " It has more actuators than coordinates, and these must agree." if redundant else ""
+        return (
+            f"No pose near that of {machine.name} has these actuator coordinates; give others, begin nearer, or search "
+            f"further away (spread).{more}"
+        )
+    there = "there is" if len(modes) == 1 else "there are"
+    first = f"Near the pose {there} {_counted(len(modes))} with these actuator coordinates."
+    if not any(mode.present for mode in modes):
+        return (
+            f"{first} Moved evenly, the actuators do not lead to any of them: the present mode ends on the way, at a "
+            "singularity or where a leg no longer reaches."
+        )
+    return first if len(modes) == 1 else f"{first} The first is the one that the machine is in."
+
+
+def actuators_at(machine: Machine, joints: Joints | None = None) -> tuple[Actuator, ...]:
+    """Where the actuators of a machine stand at its pose; see `kinematics.forward.stand`."""
+    return tuple(replace(actuator, coordinate=float(actuator.coordinate)) for actuator in stand(machine, joints))
+
+
+def as_json(answer: Forward) -> dict[str, Any]:
+    """Return the answer as plain data, SI."""
+    poses = [{**vars(pose), "status": pose.status.word} for pose in answer.poses]
+    return as_answer(
+        {
+            "name": answer.machine.name,
+            "family": answer.machine.family.name,
+            "message": answer.message,
+            "actuators": answer.actuators,
+            "poses": poses,
+        }
+    )
