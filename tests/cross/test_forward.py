@@ -190,3 +190,9 @@ def test_an_analysis_shows_where_the_actuators_stand():
     analysis = analyze(machine)
     assert {actuator.name: actuator.coordinate for actuator in analysis.actuators} == stand(machine)
     assert as_json(analysis)["actuators"][0]["meaning"] == "length of the leg"
+
+
+def test_a_slide_at_the_end_of_its_leg_has_the_position_of_the_platform():
+    machine = load_without_limits("tricept").with_values({"stiffness.tube_actuator": 1e8})
+    (tube,) = (actuator for actuator in actuators_at(machine) if actuator.leg == "tube")
+    assert tube.coordinate == pytest.approx(machine.tables["pose"].length, abs=1e-15)

@@ -61,7 +61,7 @@ def actuators_of(configuration: Configuration) -> list[Actuator]:
         configuration: of a machine in closed form.
     """
     lengths = {rod.leg: rod.length for rod in rods(configuration.legs) if rod.telescopic}
-    result = []
+    result, end = [], configuration.platform.translation
     for leg in configuration.legs:
         for place, spring in enumerate(leg.chain):
             if not (isinstance(spring, Spring) and spring.actuated):
@@ -70,9 +70,9 @@ def actuators_of(configuration: Configuration) -> list[Actuator]:
             if slides and leg.name in lengths:
                 meaning, coordinate = LENGTH, lengths[leg.name]
             elif slides:
-                meaning, coordinate = POSITION, _next_point(leg, place).dot(spring.joint.axis)
+                meaning, coordinate = POSITION, _next_point(leg, place, end).dot(spring.joint.axis)
             else:
-                meaning, coordinate = _crank_angle(spring.joint, leg, place)
+                meaning, coordinate = _crank_angle(spring.joint, leg, place, end)
             result.append(Actuator(name_of(spring), leg.name, meaning, coordinate, slides))
     return result
 
@@ -82,20 +82,18 @@ def name_of(spring: Spring) -> str:
     return spring.joint.name or spring.of
 
 
-def _next_point(leg: Leg, place: int, away: Vector | None = None) -> Vector:
-    """The first point of a leg after an element, further than nothing away from another point."""
-    for element in leg.chain[place + 1 :]:
-        for point in element.path:
-            if away is None or np.nanmax(np.asarray((point - away).norm(), dtype=float), initial=0.0) > NO_LINK:
-                return point
-    raise ValueError(f"{leg.name} has no point after its actuator")
+def _next_point(leg: Leg, place: int, end: Vector, away: Vector | None = None) -> Vector:
+    """The first point of a leg after an element that is not at another point; at the latest the platform's, its end."""
+    points = (point for element in leg.chain[place + 1 :] for point in element.path)
+    apart = (p for p in points if away is None or not (np.asarray((p - away).norm(), dtype=float) <= NO_LINK).all())
+    return next(apart, end)
 
 
-def _crank_angle(joint: Joint, leg: Leg, place: int) -> tuple[str, Scalar]:
+def _crank_angle(joint: Joint, leg: Leg, place: int, end: Vector) -> tuple[str, Scalar]:
     centre, axis = joint.point, joint.axis
     if centre is None:
         raise ValueError("a slide has no crank")
-    crank = _next_point(leg, place, centre) - centre
+    crank = _next_point(leg, place, end, centre) - centre
     if np.abs(np.asarray(axis.z, dtype=float)).max() > 1.0 - PARALLEL_AXES:
         return BEARING, np.arctan2(crank.y, crank.x)
     level = np.hypot(axis.x, axis.y)
