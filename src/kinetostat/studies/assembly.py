@@ -15,10 +15,12 @@ from kinetostat.kinematics.forward import AssemblyMode, System, assembly_modes, 
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.actuators import Actuator
-from kinetostat.machine.machine import Machine, need_machine
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, with_values
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import Quantity
+from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.units import UnitError
 
@@ -26,8 +28,8 @@ MOST_STARTS = 10_000
 """Starts of a search: more take minutes, and the modes near a pose are known long before."""
 
 
-@dataclass(frozen=True)
-class ForwardPose:
+@dataclass(frozen=True, eq=False)
+class ForwardPose(Immutable):
     """One assembly mode: a pose at which the actuators stand at the given coordinates.
 
     Attributes:
@@ -52,8 +54,8 @@ class ForwardPose:
     rotation: tuple[tuple[float, ...], ...]
 
 
-@dataclass(frozen=True)
-class Forward:
+@dataclass(frozen=True, eq=False)
+class Forward(Immutable):
     """What is known of a machine whose actuators stand at given coordinates.
 
     Attributes:
@@ -77,6 +79,7 @@ class Forward:
         return next((pose for pose in self.poses if pose.present), None)
 
 
+@checked
 def forward(
     machine: Machine, actuators: Mapping[str, float | str] | None = None, starts: int = 100, spread: float = 1.0
 ) -> Forward:
@@ -97,7 +100,6 @@ def forward(
         InputError: an unknown actuator, a value of another kind, a machine that its actuators do not determine, or an
             argument out of bounds.
     """
-    need_machine(machine)
     _check_search(starts, spread)
     system = system_of(machine)
     driven = _driven(system, actuators or {}, machine)
@@ -112,17 +114,15 @@ def forward(
     return Forward(machine, driven, poses, _message(modes, machine, len(goal)))
 
 
-def _check_search(starts: object, spread: object) -> None:
-    if not isinstance(starts, int) or isinstance(starts, bool) or not 0 <= starts <= MOST_STARTS:
+def _check_search(starts: int, spread: float) -> None:
+    if not 0 <= starts <= MOST_STARTS:
         raise InputError(f"starts is {shorten(starts)}; give a whole number from 0 to {MOST_STARTS}.")
-    if isinstance(spread, bool) or not isinstance(spread, int | float) or not 0.0 < spread <= math.pi:
+    if not 0.0 < spread <= math.pi:
         raise InputError(f"spread is {shorten(spread)}; give a number greater than 0 and at most pi.")
 
 
-def _driven(system: System, given: object, machine: Machine) -> tuple[Actuator, ...]:
+def _driven(system: System, given: Mapping[str, float | str], machine: Machine) -> tuple[Actuator, ...]:
     """The actuators at the coordinates that are given, or where they stand."""
-    if not isinstance(given, Mapping):
-        raise InputError(f'actuators is {shorten(given)}; give a coordinate by name, e.g. {{"leg 1": "31 cm"}}.')
     if not system.actuators:
         raise InputError(f"{machine.name} has no actuator; forward kinematics needs one for each freedom.")
     names = _names(system)
