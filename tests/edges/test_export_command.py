@@ -79,7 +79,7 @@ def test_step_says_which_library_of_the_system_it_lacks(tmp_path, monkeypatch, c
     [
         ([MACHINE], BAD_INPUT, "give --to"),
         ([MACHINE, "--to", "iges"], BAD_INPUT, "choose from mjcf, urdf"),
-        ([MACHINE, "-o", "a.docx"], BAD_INPUT, "ends as one of"),
+        ([MACHINE, "-o", "a.docx"], BAD_INPUT, "one of these suffixes"),
         (["nope", "--to", "csv"], BAD_INPUT, "neither a file nor a bundled machine"),
         ([MACHINE, "--to", "csv", "--set", "pose.z=3 m"], NO_ANSWER, "span 3 m"),
         ([MACHINE, "--to", "ansys", "--set", "stiffness.passive_links=rigid"], BAD_INPUT, "K is not finite"),

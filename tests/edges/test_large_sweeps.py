@@ -214,7 +214,7 @@ def test_a_small_grid_does_not_take_the_place_of_a_large_one(undisturbed, monkey
 
 def test_a_large_grid_does_not_take_the_place_of_a_small_one(question, tmp_path):
     (tmp_path / "map.nc").write_text("precious")
-    with pytest.raises(InputError, match=r"map\.nc\" is there already"):
+    with pytest.raises(InputError, match=r"map\.nc\" exists already"):
         answer_into(question, tmp_path, "map")
     assert (tmp_path / "map.nc").read_text() == "precious"
 

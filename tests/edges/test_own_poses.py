@@ -94,7 +94,7 @@ def test_a_pose_without_a_result_has_a_status():
         ({"x": [0, "1 kg"]}, r"poses\['x'\]\[1\] is \"1 kg\": \"kg\" is not a unit of length"),
         ({"x": [0, float("nan")]}, r"poses\['x'\]\[1\] is nan, which is not a finite number"),
         ({"x": [0, None]}, r"poses\['x'\]\[1\] is None: it must be a length"),
-        ({"x": [[1, 2], [3]]}, "column x of the poses is a table"),
+        ({"x": [[1, 2], [3]]}, "column x of the poses has several columns"),
         ({"x": 1, "pose.x": 2}, "pose.x is given by two columns"),
         ({1: 2}, "a column of the poses is called 1"),
         ({"base_radius": [0.1, -1]}, r"poses\['base_radius'\]\[1\] is -1.0 m: it must be greater than 0"),

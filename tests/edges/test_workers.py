@@ -159,7 +159,7 @@ def test_another_version_on_a_worker_is_refused():
         def run(self, _function):
             return {"tcp://somewhere": "0.0.0"}
 
-    with pytest.raises(InputError, match=r"tcp://somewhere runs kinetostat 0\.0\.0, here is"):
+    with pytest.raises(InputError, match=r"tcp://somewhere runs kinetostat 0\.0\.0, but this computer runs"):
         chunks._check_versions(Client())
 
 

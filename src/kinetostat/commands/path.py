@@ -64,7 +64,7 @@ def _path(options: argparse.Namespace) -> int:
 
 
 def _write_csv(path: Path, answers: "PoseAnswers") -> None:
-    from kinetostat.studies.evaluation.answer_file import as_csv
+    from kinetostat.studies.evaluation.evaluation import as_csv
     from kinetostat.studies.storage import write_text
 
     write_text(path, as_csv(answers))

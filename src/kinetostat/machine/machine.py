@@ -316,7 +316,11 @@ class Machine(Immutable):
         return machine
 
     def chains(self) -> Chains:
-        """Its legs at the home pose, where the family has no closed form."""
+        """The legs at the home pose, for a family without closed form.
+
+        Raises:
+            InputError: the family places its joints in closed form.
+        """
         if self.family.chains is None:
             raise InputError(f"family {self.family.name} places its joints in closed form and has no chains.")
         return self.family.chains(**self.family_tables)

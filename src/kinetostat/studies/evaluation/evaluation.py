@@ -1,5 +1,8 @@
-"""Quantities of a machine at poses of the user's own, as arrays. `dataset` makes a labelled dataset of them."""
+"""Quantities of a machine at poses of the user's own: arrays, plain data and CSV; `dataset` labels them for Python."""
 
+import csv
+import io
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -27,10 +30,10 @@ class PoseAnswers:
 
     Attributes:
         machine: gives all fields that the poses do not name.
-        poses: where.
-        names: of the quantities that are asked for; matrices are not among them.
+        poses: the poses.
+        names: names of the quantities that were requested, without the matrices.
         matrices: "K", "C", both or none.
-        values: by quantity, the entries of the matrices included [poses]; NaN where the status is not OK.
+        values: values by quantity, with the entries of the matrices [poses]; NaN where the status is not OK.
         status: `Status` codes [poses].
     """
 
@@ -54,7 +57,7 @@ class PoseAnswers:
 
 
 def entry_name(matrix: str, row: str, column: str) -> str:
-    """Return the quantity that is one entry of a matrix: of "K", "x" and "rz", stiffness_rz_x."""
+    """Return the name of the quantity that is one entry of a matrix: for "K", "x" and "rz", "stiffness_rz_x"."""
     first, last = sorted((row, column), key=COMPONENTS.index)
     return "_".join([MATRICES[matrix], *dict.fromkeys((first, last))])
 
@@ -66,9 +69,9 @@ def answers_at(
 
     Args:
         machine: gives all fields that the poses do not name.
-        poses: where.
+        poses: the poses.
         quantities: names of quantities, groups, or "K" and "C".
-        progress: receives how far the work is.
+        progress: called with the number of points done and of all points.
 
     Raises:
         InputError: an unknown quantity, or one that the machine cannot have.
@@ -99,3 +102,26 @@ def as_json(answers: PoseAnswers) -> dict[str, Any]:
             "status": words,
         }
     )
+
+
+def as_csv(answers: PoseAnswers) -> str:
+    """Write answers as CSV in SI, which `kinetostat path` can read again.
+
+    A row has the number of the pose (from 1), its fields, its status in a word, and its quantities. A quantity is
+    empty where the status is not ok; infinity, of a rigid or a free direction, is "inf".
+    """
+    columns: dict[str, Sequence[Any]] = {"pose": range(1, answers.poses.count + 1)}
+    for field, values in zip(answers.poses.fields, answers.poses.values, strict=True):
+        columns[_head(field.shown, field.unit)] = values.tolist()
+    columns["status"] = [Status(code).word for code in answers.status.tolist()]
+    for name, values in answers.values.items():
+        columns[_head(name, QUANTITIES[name].unit)] = ["" if math.isnan(value) else value for value in values.tolist()]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    return text.getvalue()
+
+
+def _head(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit not in ("", "1") else name
