@@ -36,11 +36,19 @@ CLOSED = 1e-10
 below what a micrometre is to a machine of a metre."""
 NEWTON_SETTLED = 1e-14
 """Gap, in the same units, at which nothing but round-off is left and Newton's method ends."""
+LEAST_GAP_SETTLED = 1e-6
+"""Slope of the squared gap, as a share of the gap, at which it has its least value: half of the digits
+are lost there."""
+NEAREST_SETTLED = 1e-7
+"""Slope of the squared distance from a pose, as a share of the distance, at which the nearest pose is reached: it is
+written in five digits."""
+SURELY_APART = 1e-9
+"""Share of the machine's length by which a leg must miss its platform, so that this shows it to be out of reach."""
+SAME_CENTRE = 1e-9
+"""Distance, m, below which the centres of joints in a row coincide as written in a file."""
 LEAST_NORM_DAMPING = 1e-15
 """Damping as a share of the trace of the squared rates: far below what a regular direction weighs, enough for a joint
 coordinate that moves nothing."""
-NO_ANGLE_RATES = 1e-9
-"""Relative singular value below which roll and yaw have no separate rates (at pitch = +-90 deg)."""
 ROUNDED_ORIENTATION = 1e-3
 """How far a quaternion or a rotation matrix may be from exact: what numbers rounded to three digits differ by."""
 UNDETERMINED = 1e-4

@@ -1,4 +1,4 @@
-"""Closing equations: zero where the legs meet at the pose, and their rates those of the joints' screws (`gaps_at`)."""
+"""Closing equations: zero where the legs meet at the pose; gaps of legs and their rates."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.vector import IDENTITY, Displacement, Vector
-from kinetostat.kinematics.closing import closing_equations, gaps_at, pose_of, units_of
+from kinetostat.kinematics.closing import closing_equations, leg_end
 from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinematics.leg_gaps import free_coordinates, problems_of
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Chains, Step
@@ -16,12 +17,6 @@ from kinetostat.machine.machine import Chains, Step
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 STEP = 1e-5
 HALF = 0.5 * STEP
-
-
-def in_metres(chains, rates):
-    """Rates of gaps in rad and in units of the length as rates in m, per rad or m of each joint coordinate."""
-    length = float(chains.length)
-    return rates * length / units_of(chains, np.array([length]))[0]
 
 
 def arm(lean):
@@ -43,28 +38,38 @@ def rates(chains, found):
     return np.array([np.subtract(*pair) for pair in pairs], dtype=float).T / STEP
 
 
+def placed(chains, found):
+    """Coordinates of the platform where the first leg takes it."""
+    end = leg_end(chains.legs[0], HOME, iter(found)).platform
+    turn, point = end.rotation, end.translation
+    flat = float(np.hypot(turn.x.x, turn.x.y))
+    angles = np.arctan2(turn.y.z, turn.z.z), np.arctan2(-turn.x.z, flat), np.arctan2(turn.x.y, turn.x.x)
+    return dict(zip(COORDINATES, (point.x, point.y, point.z, *map(float, angles)), strict=True))
+
+
 @pytest.mark.parametrize("given", [c for n in (1, 2, 3, 6) for c in combinations(COORDINATES, n)], ids="-".join)
-def test_pose_equations_vanish_and_change_as_the_pose_does(given):
-    found = np.random.default_rng(3).uniform(-0.4, 0.4, 6)
+def test_pose_equations_vanish_and_fix_as_much_as_is_given(given):
+    found = np.random.default_rng(3).uniform(-0.4, 0.4, 6).tolist()
     one = replace(ARMS, legs=ARMS.legs[:1])
-    reached = pose_of(gaps_at(replace(one, pose={"x": 0.0}), found[None], np.zeros((1, 1))).platform)
-    placed = replace(one, pose={name: float(reached[name][0]) for name in given})
-    assert np.array(closing_equations(placed, found)) == pytest.approx(0.0, abs=1e-15)
-    own = rates(placed, found)
-    theirs = in_metres(placed, gaps_at(placed, found[None], np.array([list(placed.pose.values())])).pose_rates[0])
-    rank = np.linalg.matrix_rank(theirs)
-    assert rank == len(given)
-    assert np.linalg.matrix_rank(np.vstack([own, theirs]), tol=1e-7) == rank, "they fix the same motions"
-    assert np.linalg.matrix_rank(own, tol=1e-7) == rank
+    reached = placed(one, found)
+    there = replace(one, pose={name: reached[name] for name in given})
+    assert np.array(closing_equations(there, found)) == pytest.approx(0.0, abs=1e-15)
+    assert np.linalg.matrix_rank(rates(there, np.array(found)), tol=1e-7) == len(given)
 
 
-def test_gaps_of_legs_change_by_the_difference_of_their_screws():
-    chains = replace(ARMS, pose={"x": 0.5})
-    found = np.zeros(12)
-    gaps = gaps_at(chains, found[None], np.array([[0.5]]))
-    assert np.array(closing_equations(chains, found)) == pytest.approx(0.0, abs=1e-15)
-    assert rates(chains, found)[:6] == pytest.approx(-in_metres(chains, gaps.closure_rates[0]), abs=1e-9)
-    assert rates(chains, found)[6] == pytest.approx(-in_metres(chains, gaps.pose_rates[0])[0], abs=1e-9)
+@pytest.mark.parametrize("given", [COORDINATES, ("x", "y", "z"), ("y", "roll"), ("x", "pitch", "yaw")], ids="-".join)
+def test_gaps_change_at_their_rates(given):
+    """By differences, near the home pose where the sine of an angle changes as the angle."""
+    chains = replace(ARMS, pose=dict.fromkeys(given, 0.0))
+    free = free_coordinates(chains)
+    assert set(free) == set(COORDINATES) - set(given)
+    for problems in problems_of(chains, 1, free):
+        goal, here = problems.at_home(), np.zeros((1, problems.size))
+        gaps, slopes = problems.gaps(here, goal)
+        assert gaps == pytest.approx(0.0, abs=1e-15)
+        for k, step in enumerate(np.eye(problems.size) * HALF):
+            change = problems.gaps(here + step, goal)[0] - problems.gaps(here - step, goal)[0]
+            assert -change / STEP == pytest.approx(np.atleast_2d(slopes[..., k]), abs=1e-9)
 
 
 @pytest.mark.parametrize("pose", [(0.5, 0.5, 0.5), (0.4, 0.62, 0.35)])

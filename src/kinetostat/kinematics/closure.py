@@ -4,7 +4,7 @@ The ways to find them meet here and nowhere else: closed forms of the legs where
 along the way from the home pose for the rest. They serve families whose `configure` does not place the joints itself.
 Nothing here knows stiffness.
 
-Source: theory (22) for Newton's method, (23) for closed forms, section 6 for the nearest pose.
+Source: theory (22) for Newton's method, (23) for closed forms.
 """
 
 from dataclasses import dataclass
@@ -14,42 +14,24 @@ import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.kinematics.closing import (
-    ANGLES,
-    POINT,
     Array,
     clearance,
-    gaps_at,
     leg_end,
-    leg_ends,
     platform_placement,
-    pose_of,
     squared_distance,
     stacked,
-    units_of,
 )
+from kinetostat.kinematics.following import follow
+from kinetostat.kinematics.leg_gaps import free_coordinates, goal_of, problems_of, undetermined
+from kinetostat.kinematics.leg_span import too_far_or_near
 from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.ways import some
 from kinetostat.machine.column import column
 from kinetostat.machine.leg import Turn
 from kinetostat.machine.machine import Chains, Machine
-from kinetostat.tolerances import (
-    CLOSED,
-    LEAST_NORM_DAMPING,
-    NEWTON_SETTLED,
-    NO_COORDINATE,
-    UNDETERMINED,
-)
+from kinetostat.tolerances import CLOSED
 
 Codes = npt.NDArray[np.int64]
-
-MOST_STEPS, MOST_ITERATIONS, ON_THE_WAY = 200, 40, 2
-FURTHEST_SLIDE, FURTHEST_TURN = 0.15, 0.2
-"""Between poses on the way from the home pose: in units of the machine's length, and in rad. Short enough to stay on
-the branch of the home pose."""
-MOST_EVALUATIONS = 60
-"""Of the gaps where the nearest pose is sought: it comes out in eight digits after some 40."""
-CLOSING_WEIGHT = 1e4
-"""How much more a gap in a leg counts than one in the pose when the nearest pose is sought, so that the legs close to a
-ten-thousandth of the rest."""
 
 
 @dataclass(frozen=True)
@@ -142,8 +124,7 @@ class Newton:
     def __call__(self, task: Task) -> Joints:
         """The joints, all by iteration."""
         with np.errstate(all="ignore"):
-            coordinates = joints_on_the_way(task.chains, task.goal)
-            return task.joints(coordinates, _status(task.chains, coordinates, task.goal))
+            return task.joints(*followed(task.chains, task.goal))
 
 
 class ClosedForms:
@@ -163,13 +144,30 @@ class ClosedForms:
             if left.all():
                 return NEWTON(task)
             # Out of reach a coordinate is NaN, which would spoil the linear algebra of the other poses.
-            reached = np.where(np.isnan(coordinates), 0.0, coordinates)
-            status = np.where(status == Status.OK, _status(task.chains, reached, task.goal), status)
+            status = self._checked(task, np.where(np.isnan(coordinates), 0.0, coordinates), status)
             if left.any():
                 rest = NEWTON(task)
                 coordinates = np.where(left[:, None], stacked(rest.coordinates, count), coordinates)
                 status = np.where(left, rest.status, status)
         return task.joints(coordinates, status)
+
+    @staticmethod
+    def _checked(task: Task, coordinates: Array, status: Codes) -> Codes:
+        """The status with poses that do not determine where the platform is."""
+        free = free_coordinates(task.chains)
+        here = np.flatnonzero(status == Status.OK)
+        if not free or not here.size:
+            return status
+        (problems,) = problems_of(task.chains, len(status), free)
+        unknowns = np.zeros((len(status), problems.size))
+        for part in problems.parts:
+            units = np.where(part.build.slides, problems.lengths[:, None, None], 1.0)
+            unknowns[:, part.columns] = coordinates[:, part.build.places] / units
+        goal = goal_of(problems, task.goal)
+        open_end = undetermined(problems.take(here), unknowns[here], some(goal, here))
+        status = status.copy()
+        status[here[open_end]] = int(Status.SINGULAR)
+        return status
 
     @staticmethod
     def over_scalars(chains: Chains) -> Joints:
@@ -202,105 +200,34 @@ def _angle(amount: Scalar | Turn) -> Scalar:
     return np.arctan2(amount.sine, amount.cosine) if isinstance(amount, Turn) else amount
 
 
-def joints_on_the_way(chains: Chains, goal: Array) -> Array:
-    """Return the coordinates [n x coordinates] that come nearest to closing the legs at poses [n x given].
+def followed(chains: Chains, goal: Array) -> tuple[Array, Codes]:
+    """Follow the joint coordinates of a machine from the home pose to its poses.
 
-    The pose moves from the home pose to its goal in steps short enough to stay on the branch of the home pose, with a
-    few iterations at each, and is refined at the goal alone.
+    Args:
+        chains: the machine.
+        goal: coordinates of the poses, in the order of the chains' pose [n x given], rad or m.
+
+    Returns:
+        Joint coordinates, rad or m [n x coordinates], and `Status` codes [n].
     """
-    start = stacked(_home_pose(chains), len(goal))
-    coordinates = np.zeros((len(goal), chains.size))
-    steps = _steps(goal - start, chains)
-    for step in range(1, steps):
-        coordinates = _newton(chains, coordinates, start + (goal - start) * (step / steps), ON_THE_WAY)
-    return _newton(chains, coordinates, goal, MOST_ITERATIONS)
-
-
-def _home_pose(chains: Chains) -> list[Scalar]:
-    return [getattr(chains.home.translation, name) if name in POINT else 0.0 for name in chains.pose]
-
-
-def _steps(way: Array, chains: Chains) -> int:
-    units = [FURTHEST_TURN if name in ANGLES else FURTHEST_SLIDE * float(np.min(chains.length)) for name in chains.pose]
-    far = np.abs(way) / np.array(units)
-    longest = np.max(far, where=np.isfinite(far), initial=0.0)
-    return int(np.clip(np.ceil(longest), 1, MOST_STEPS))
-
-
-def _newton(chains: Chains, coordinates: Array, goal: Array, most: int) -> Array:
-    """Take Gauss-Newton steps of least norm, and return the best coordinates on the way."""
-    units = units_of(chains, np.broadcast_to(chains.length, (len(coordinates),)))
-    best, least = coordinates, np.full(len(coordinates), np.inf)
-    for _ in range(most):
-        gaps = gaps_at(chains, coordinates, goal)
-        better = gaps.largest < least
-        best, least = np.where(better[:, None], coordinates, best), np.where(better, gaps.largest, least)
-        # A pose that no longer improves has reached round-off, or cannot be closed.
-        if np.all((gaps.largest <= NEWTON_SETTLED) | ~better):
-            break
-        coordinates = coordinates + _least_norm(gaps.rates, gaps.left) * units
-    return best
-
-
-def _least_norm(rates: Array, left: Array) -> Array:
-    """Least-squares solutions of rates x = left, all but least in norm, pose by pose; zero where nothing is finite."""
-    sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(left).all(axis=1)
-    steps = np.zeros((len(rates), rates.shape[2]))
-    if sound.any():
-        work = np.swapaxes(rates[sound], 1, 2) @ left[sound][:, :, None]
-        steps[sound] = np.linalg.solve(_damped_square(rates[sound]), work)[:, :, 0]
-    return steps
-
-
-def _damped_square(rates: Array) -> Array:
-    """rates^T rates, made regular by a trace of damping that only directions without effect feel."""
-    square = np.swapaxes(rates, 1, 2) @ rates
-    trace = np.trace(square, axis1=1, axis2=2)[:, None, None]
-    return np.asarray(square + LEAST_NORM_DAMPING * (trace + 1e-300) * np.eye(rates.shape[2]))
-
-
-def _status(chains: Chains, coordinates: Array, goal: Array) -> Codes:
-    gaps = gaps_at(chains, coordinates, goal)
-    closed = gaps.largest <= CLOSED
-    status = np.where(np.isfinite(gaps.largest), int(Status.OUT_OF_REACH), int(Status.NOT_CONVERGED))
-    free = _undetermined(gaps.rates[closed], gaps.platform_rates[closed])
-    status[closed] = np.where(free, int(Status.SINGULAR), int(Status.OK))
-    return status
-
-
-def _undetermined(rates: Array, platform_rates: Array) -> npt.NDArray[np.bool_]:
-    """Whether the platform can move without opening a leg or changing a pose coordinate.
-
-    The damped inverse of what determines it is then as large as the damping is small.
-    """
-    square = _damped_square(rates)
-    damping = LEAST_NORM_DAMPING * np.trace(square, axis1=1, axis2=2)
-    freedom = platform_rates @ np.linalg.solve(square, np.swapaxes(platform_rates, 1, 2))
-    return np.asarray(np.trace(freedom, axis1=1, axis2=2) * damping > UNDETERMINED)
-
-
-def nearest_pose(machine: Machine) -> dict[str, float]:
-    """Return all coordinates (m, rad) of an admissible pose near a pose that the legs cannot take.
-
-    Distance is that of the pose coordinates given, angles times the machine's characteristic length. It is found by
-    least squares in the joint coordinates, from where Newton's method came to, on the branch of the home pose.
-    """
-    from scipy.optimize import least_squares  # a third of a second to load, for a refusal alone
-
-    chains = machine.chains()
-    goal = np.array([list(chains.pose.values())], dtype=float)
-    units = units_of(chains, np.array([float(chains.length)]))[0]
-    weights = np.repeat([CLOSING_WEIGHT, 1.0], [6 * (len(chains.legs) - 1), len(chains.pose)])
-
-    def left(joints: Array) -> Array:
-        return np.asarray(weights * gaps_at(chains, joints[None] * units, goal).left[0])
-
-    def slopes(joints: Array) -> Array:
-        return np.asarray(-weights[:, None] * gaps_at(chains, joints[None] * units, goal).rates[0])
-
-    start = joints_on_the_way(chains, goal)[0] / units
-    # Gaps weigh so much more than the pose that without scales from the slopes hundreds of steps would be needed.
-    scales = {"x_scale": "jac", "max_nfev": MOST_EVALUATIONS}
-    best = least_squares(left, start, slopes, xtol=1e-15, ftol=1e-15, gtol=1e-15, **scales).x
-    coordinates = pose_of(leg_ends(chains, list(best * units))[0].platform)
-    return {name: 0.0 if abs(value) < NO_COORDINATE else float(value) for name, value in coordinates.items()}
+    count, free = len(goal), free_coordinates(chains)
+    coordinates, status = np.zeros((count, chains.size)), np.full(count, int(Status.OK))
+    stated = [(problems, goal_of(problems, goal)) for problems in problems_of(chains, count, free)]
+    if not free:
+        for problems, there in stated:
+            status[problems.poses[too_far_or_near(problems, there)]] = int(Status.OUT_OF_REACH)
+    for whole, everywhere in stated:
+        tried = np.flatnonzero(status[whole.poses] == Status.OK)
+        problems, there = whole.take(tried), some(everywhere, tried)
+        unknowns, codes = follow(problems, there)
+        if free:
+            closed = np.flatnonzero(codes == Status.OK)
+            loose = undetermined(problems.take(closed), unknowns[closed], some(there, closed))
+            codes[closed[loose]] = int(Status.SINGULAR)
+        for part in problems.parts:
+            units = np.where(part.build.slides, problems.lengths[:, None, None], 1.0)
+            coordinates[problems.poses[:, None, None], part.build.places[part.legs]] = unknowns[:, part.columns] * units
+        # Of the legs of a pose, one that is shown to be out of reach decides.
+        for code in (Status.SINGULAR, Status.NOT_CONVERGED, Status.OUT_OF_REACH):
+            status[problems.poses[codes == code]] = int(code)
+    return coordinates, status

@@ -35,5 +35,7 @@ _SENTENCES = {
     Status.OUT_OF_REACH: "A leg is too short or too long to close.",
     Status.JOINT_LIMIT: "A leg, a joint or an actuator is beyond its limit.",
     Status.SINGULAR: "The machine is singular: in some direction its legs cannot hold the platform or cannot move it.",
-    Status.NOT_CONVERGED: "The position of the passive joints could not be computed.",
+    Status.NOT_CONVERGED: "No way from the home pose leads here on which the legs stay closed and keep their assembly "
+    "mode, of those that were tried; yet nothing shows that there is none. The pose may lie behind a singularity or in "
+    "another assembly mode: move it nearer to the home pose, or write the machine down at a home pose nearer to it.",
 }

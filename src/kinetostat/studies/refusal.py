@@ -4,9 +4,9 @@ import math
 from collections.abc import Sequence
 
 from kinetostat.kinematics.closing import why_out_of_reach
-from kinetostat.kinematics.closure import nearest_pose
 from kinetostat.kinematics.limits import why_beyond
 from kinetostat.kinematics.mobility import Kind, Mobility, mobility
+from kinetostat.kinematics.nearest import nearest_pose
 from kinetostat.kinematics.singularity import describe, why_singular
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response

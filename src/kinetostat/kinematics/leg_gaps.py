@@ -1,0 +1,323 @@
+"""How far legs are from where a pose puts the platform, for many legs at many poses at once, with rates of the joints.
+
+Legs of one build, such as copies of one leg, are placed by one evaluation of the formulas of a leg. What is done with
+the gaps is elsewhere (`following`, `closure`).
+
+Source: theory (19)-(21); placements are in the base frame.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.algebra.scalar import Scalar, is_zero
+from kinetostat.algebra.vector import Displacement, Vector
+from kinetostat.kinematics.closing import ANGLES, POINT, Array, leg_end, placement_of, rotation_between, stacked
+from kinetostat.machine.column import column, plain
+from kinetostat.machine.leg import Joint
+from kinetostat.machine.machine import Chains, Step
+from kinetostat.tolerances import LEAST_NORM_DAMPING, PARALLEL_AXES, UNDETERMINED
+
+Numbers = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+Coordinates = dict[str, Scalar]
+"""Of the platform: x, y, z (m) and roll, pitch, yaw (rad), one entry per problem; a float where it is the same."""
+
+
+@dataclass(frozen=True)
+class Build:
+    """Legs with the same sorts of joints in a row.
+
+    Attributes:
+        elements: what moves in them, at the home pose; scalars are floats, or arrays [poses or 1 x legs].
+        slides: which of their coordinates are lengths [elements].
+        places: of their coordinates among those of the machine [legs x elements].
+    """
+
+    elements: tuple[Any, ...]
+    slides: Mask
+    places: Numbers
+
+    def steps(self, poses: Numbers, legs: Numbers) -> tuple[Step, ...]:
+        """The elements of some legs at some poses, as one leg over columns.
+
+        Args:
+            poses, legs: numbers of pose and leg [n].
+        """
+
+        def chosen(scalar: Scalar) -> Scalar:
+            return scalar if isinstance(scalar, float) else column(scalar[poses if len(scalar) > 1 else 0, legs])
+
+        return tuple(Step(_merged([element], lambda scalars: chosen(scalars[0])), True) for element in self.elements)
+
+
+def builds_of(chains: Chains) -> list[Build]:
+    """Sort the legs of a machine by their build."""
+    alike: dict[object, list[tuple[list[Any], Numbers]]] = {}
+    first = 0
+    for steps in chains.legs:
+        elements = [getattr(step.element, "joint", step.element) for step in steps if step.moves]
+        sorts = tuple((type(e), e.mover.point is None, is_zero(e.mover.pitch)) for e in elements)
+        alike.setdefault(sorts, []).append((elements, np.arange(first, first + len(elements))))
+        first += len(elements)
+    builds = []
+    for sorts, legs in alike.items():
+        elements = [_merged(each, _row) for each in zip(*(elements for elements, _ in legs), strict=True)]
+        slides = np.array([slide for _, slide, _ in sorts], dtype=bool)  # type: ignore[attr-defined]
+        builds.append(Build(tuple(elements), slides, np.stack([places for _, places in legs])))
+    return builds
+
+
+def _merged(elements: Sequence[Any], merge: Callable[[Sequence[Scalar]], Scalar]) -> Any:
+    """An element whose scalars are made of those of several."""
+    changes: dict[str, Any] = {}
+    for name in (field.name for field in fields(elements[0])):
+        values = [getattr(element, name) for element in elements]
+        if isinstance(values[0], Vector):
+            changes[name] = Vector(*map(merge, zip(*(value.components() for value in values), strict=True)))
+        elif not isinstance(values[0], str | None):
+            changes[name] = merge(values)
+    return replace(elements[0], **changes)
+
+
+def _row(scalars: Sequence[Scalar]) -> Scalar:
+    """A float where all legs have it; else an array [poses or 1 x legs]."""
+    first = scalars[0]
+    if all(isinstance(scalar, int | float) and scalar == first for scalar in scalars):
+        return float(first)
+    rows = [np.atleast_1d(np.asarray(plain(scalar), dtype=float)) for scalar in scalars]
+    return np.stack(np.broadcast_arrays(*rows), axis=1)
+
+
+@dataclass(frozen=True)
+class Part:
+    """Legs of one build in each of some problems.
+
+    Attributes:
+        build: theirs.
+        legs: their numbers in the build [problems x legs].
+        columns: of their coordinates among the unknowns of a problem [legs x joints].
+    """
+
+    build: Build
+    legs: Numbers
+    columns: Numbers
+
+
+@dataclass(frozen=True)
+class Problems:
+    """Equations to be solved, all of one form: at a pose, one leg alone, or all legs and the coordinates not given.
+
+    The unknowns are joint coordinates, rad or in units of the machine's length, and after them changes of the
+    coordinates not given, from the home pose, in the same units.
+
+    Attributes:
+        chains: the machine.
+        poses: number of the pose of each problem [problems].
+        parts: the legs of a problem.
+        free: names of the pose's coordinates that are not given.
+    """
+
+    chains: Chains
+    poses: Numbers
+    parts: tuple[Part, ...]
+    free: tuple[str, ...]
+
+    @property
+    def size(self) -> int:
+        """How many unknowns each problem has."""
+        return sum(part.columns.size for part in self.parts) + len(self.free)
+
+    @property
+    def lengths(self) -> Array:
+        """The machine's length in each problem, m [problems]."""
+        length = np.atleast_1d(np.asarray(plain(self.chains.length), dtype=float))
+        return length[self.poses] if len(length) > 1 else np.broadcast_to(length, (len(self.poses),))
+
+    def at_home(self) -> Coordinates:
+        """Coordinates of the platform at the home pose."""
+        point = {name: _at(getattr(self.chains.home.translation, name), self.poses) for name in POINT}
+        return point | dict.fromkeys(ANGLES, 0.0)
+
+    def take(self, chosen: Numbers) -> "Problems":
+        """Some of them, by number."""
+        parts = tuple(replace(part, legs=part.legs[chosen]) for part in self.parts)
+        return replace(self, poses=self.poses[chosen], parts=parts)
+
+    def gaps(self, unknowns: Array, goal: Coordinates) -> tuple[Array, Array]:
+        """Return what is left from the legs' ends to the goal, and how the unknowns reduce it.
+
+        Args:
+            unknowns: [problems x unknowns].
+            goal: coordinates of the platform; those not given are those of the home pose.
+
+        Returns:
+            Six numbers for each leg, a rotation vector and a displacement in units of the length
+            [problems x rows], and their rates [problems x rows x unknowns].
+        """
+        lengths, first = self.lengths, self.size - len(self.free)
+        for k, name in enumerate(self.free, first):
+            goal = goal | {name: goal[name] + unknowns[:, k] * (1.0 if name in ANGLES else lengths)}
+        left, rates = [], []
+        for part in self.parts:
+            legs = part.legs.shape[1]
+            ends, twists = self._ends(part, unknowns, lengths)
+            wanted = placement_of({name: column(_repeated(value, legs)) for name, value in goal.items()})
+            each = 1.0 / np.repeat(lengths, legs)
+            turned = rotation_between(ends.rotation, wanted.rotation).components()
+            apart = [plain(c) * each for c in (wanted.translation - ends.translation).components()]
+            left.append(stacked([*turned, *apart], len(each)).reshape(len(lengths), 6 * legs))
+            rates.append(self._spread(part, twists, wanted, len(lengths)))
+        return np.hstack(left), rates[0] if len(rates) == 1 else np.concatenate(rates, axis=1)
+
+    def _ends(self, part: Part, unknowns: Array, lengths: Array) -> tuple[Displacement, Array]:
+        """Where legs take the platform, and its twist per unit of each of their coordinates [legs x 6 x joints]."""
+        count = part.legs.shape[1]
+        coordinates = unknowns[:, part.columns].reshape(-1, part.columns.shape[1])
+        each = np.repeat(lengths, count)
+        poses = np.repeat(self.poses, count)
+        home = self.chains.home.translation.components()
+        start = Displacement(self.chains.home.rotation, Vector(*(column(_at(c, poses)) for c in home)))
+        slides = part.build.slides
+        amounts = [column(q * each if slide else q) for q, slide in zip(coordinates.T.copy(), slides, strict=True)]
+        end = leg_end(part.build.steps(poses, part.legs.ravel()), start, iter(amounts))
+        twists = np.empty((len(each), 6, len(slides)))
+        for k, (mover, slide) in enumerate(zip(end.movers, slides, strict=True)):
+            turning = mover.twist(end.platform.translation).components()
+            for row, scalar in enumerate(turning):
+                scale = (each if slide else 1.0) * (1.0 if row < 3 else 1.0 / each)
+                twists[:, row, k] = plain(scalar) * scale
+        return end.platform, twists
+
+    def _spread(self, part: Part, twists: Array, wanted: Displacement, count: int) -> Array:
+        """The rates of some legs' gaps by all unknowns."""
+        if not self.free and part.columns.shape[0] == 1 and len(self.parts) == 1:
+            return twists
+        legs = len(part.columns)
+        rates = np.zeros((count, 6 * legs, self.size))
+        blocks = twists.reshape(count, legs, 6, part.columns.shape[1])
+        for k, places in enumerate(part.columns):
+            rates[:, 6 * k : 6 * k + 6, places] = blocks[:, k]
+        for k, name in enumerate(self.free, self.size - len(self.free)):
+            rates[:, :, k] = -stacked(_rates_of(name, wanted), count * legs).reshape(count, 6 * legs)
+        return rates
+
+
+def _at(scalar: Scalar, poses: Numbers) -> Scalar:
+    values = plain(scalar)
+    return values[poses] if np.size(values) > 1 else float(np.ravel(values)[0])
+
+
+def _repeated(values: Scalar, times: int) -> Scalar:
+    return values if isinstance(values, float) or times == 1 else np.repeat(values, times)
+
+
+def _rates_of(name: str, placement: Displacement) -> tuple[Scalar, ...]:
+    """The twist of the platform per unit of one coordinate of its pose, translations in units of the length."""
+    if name in POINT:
+        return (0.0, 0.0, 0.0, *(float(name == other) for other in POINT))
+    turn = placement.rotation
+    if name == "roll":
+        return (*turn.x.components(), 0.0, 0.0, 0.0)
+    if name == "yaw":
+        return (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    yaw = np.arctan2(np.asarray(turn.x.y), np.asarray(turn.x.x))
+    return (-np.sin(yaw), np.cos(yaw), 0.0, 0.0, 0.0, 0.0)
+
+
+def problems_of(chains: Chains, count: int, free: Sequence[str]) -> list[Problems]:
+    """State the equations of a machine at some poses: leg by leg where the pose is complete, else all legs together.
+
+    Args:
+        chains: the machine.
+        count: number of poses.
+        free: coordinates that the pose does not give, and that can change.
+    """
+    builds = builds_of(chains)
+    if free:
+        parts, first = [], 0
+        for build in builds:
+            columns = np.arange(first, first + build.places.size).reshape(build.places.shape)
+            parts.append(Part(build, np.broadcast_to(np.arange(len(columns)), (count, len(columns))), columns))
+            first += columns.size
+        return [Problems(chains, np.arange(count), tuple(parts), tuple(free))]
+    problems = []
+    for build in builds:
+        legs = len(build.places)
+        numbers = np.tile(np.arange(legs), count)[:, None]
+        alone = Part(build, numbers, np.arange(build.places.shape[1])[None])
+        problems.append(Problems(chains, np.repeat(np.arange(count), legs), (alone,), ()))
+    return problems
+
+
+def free_coordinates(chains: Chains) -> tuple[str, ...]:
+    """Coordinates that the pose does not give, without those out of the plane of a machine that only moves in one."""
+    staying = ("z", "roll", "pitch") if stays_in_plane(chains) else ()
+    return tuple(name for name in (*POINT, *ANGLES) if name not in chains.pose and name not in staying)
+
+
+def stays_in_plane(chains: Chains) -> bool:
+    """Tell whether no joint moves anything out of the x-y plane."""
+    return all(_in_plane(step.element.mover) for steps in chains.legs for step in steps if step.moves)
+
+
+def _in_plane(mover: Joint) -> bool:
+    along = np.max(np.abs(np.asarray(plain(mover.axis.z), dtype=float)))
+    across = max(np.max(np.abs(np.asarray(plain(c), dtype=float))) for c in (mover.axis.x, mover.axis.y))
+    return bool(is_zero(mover.pitch) and (along if mover.point is None else across) <= PARALLEL_AXES)
+
+
+def goal_of(problems: Problems, goal: Array) -> Coordinates:
+    """Coordinates of the platform in each problem; those not given are those of the home pose.
+
+    Args:
+        problems: at some poses.
+        goal: coordinates of the poses, in the order of the chains' pose [poses x given], rad or m.
+    """
+    return problems.at_home() | {name: goal[problems.poses, i] for i, name in enumerate(problems.chains.pose)}
+
+
+def undetermined(problems: Problems, unknowns: Array, goal: Coordinates) -> Mask:
+    """Tell in which solved problems the platform can move without opening a leg or changing a given coordinate.
+
+    The damped inverse of what determines it is then as large as the damping is small.
+
+    Args:
+        problems: that have been solved.
+        unknowns: their solutions [problems x unknowns].
+        goal: coordinates of the platform in each of them.
+    """
+    rates = problems.gaps(unknowns, goal)[1]
+    square = np.swapaxes(rates, 1, 2) @ rates
+    damping = LEAST_NORM_DAMPING * np.trace(square, axis1=1, axis2=2)
+    moving = np.eye(problems.size)[:, problems.size - len(problems.free) :]
+    freedom = np.linalg.solve(damped(square), np.broadcast_to(moving, (len(rates), *moving.shape)))
+    return np.asarray((freedom * moving).sum(axis=(1, 2)) * damping > UNDETERMINED)
+
+
+def least_norm(rates: Array, left: Array) -> Array:
+    """Least-squares solutions of rates x = left, all but least in norm, problem by problem; NaN where not finite.
+
+    Args:
+        rates: [problems x rows x unknowns].
+        left: [problems x rows].
+    """
+    sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(left).all(axis=1)
+    if not sound.all():
+        steps = np.full((len(rates), rates.shape[2]), np.nan)
+        if sound.any():
+            steps[sound] = least_norm(rates[sound], left[sound])
+        return steps
+    across = np.swapaxes(rates, 1, 2)
+    if rates.shape[2] >= rates.shape[1]:
+        return np.asarray((across @ np.linalg.solve(damped(rates @ across), left[:, :, None]))[:, :, 0])
+    return np.asarray(np.linalg.solve(damped(across @ rates), across @ left[:, :, None])[:, :, 0])
+
+
+def damped(square: Array) -> Array:
+    """Make squares of rates [n x n, each] regular by a trace of damping that only directions without effect feel."""
+    trace = np.trace(square, axis1=1, axis2=2)[:, None, None]
+    return np.asarray(square + LEAST_NORM_DAMPING * (trace + 1e-300) * np.eye(square.shape[1]))
