@@ -49,6 +49,8 @@ SAME_CENTRE = 1e-9
 LEAST_NORM_DAMPING = 1e-15
 """Damping as a share of the trace of the squared rates: far below what a regular direction weighs, enough for a joint
 coordinate that moves nothing."""
+NO_ANGLE_RATES = 1e-9
+"""Relative singular value below which roll and yaw have no separate rates (at pitch = +-90 deg)."""
 ROUNDED_ORIENTATION = 1e-3
 """How far a quaternion or a rotation matrix may be from exact: what numbers rounded to three digits differ by."""
 UNDETERMINED = 1e-4
