@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, cos, sin, smaller, sqrt
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector, rotation_x, rotation_y, rotation_z
+from kinetostat.machine.column import column
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.machine import Chains, Closure, Configuration, Step
 from kinetostat.machine.written.family import place
@@ -170,8 +171,67 @@ def squared_distance(start: Displacement, end: Displacement, length: Scalar) -> 
     return square
 
 
+@dataclass(frozen=True)
+class Gaps:
+    """How far legs are from the first one, in rad and in units of the machine's length [n x rows].
+
+    Attributes:
+        closure: the gaps between the legs.
+        closure_rates: reduction of the gaps per unit of each joint coordinate, slides in units of the machine's length
+            [n x rows x coordinates].
+        platform_rates: twist of the platform by the first leg per unit of each joint coordinate, in the same units
+            [n x 6 x coordinates].
+    """
+
+    closure: Array
+    closure_rates: Array
+    platform_rates: Array
+
+
+def gaps_at(chains: Chains, coordinates: Array) -> Gaps:
+    """Evaluate the gaps between the legs and their rates, from the joints' screws, wherever the platform may be.
+
+    Args:
+        chains: the legs at the home pose.
+        coordinates: joint coordinates [n x coordinates], rad or m.
+    """
+    count = len(coordinates)
+    length = np.broadcast_to(np.asarray(chains.length, dtype=float), (count,))
+    ends = leg_ends(chains, [column(c) for c in coordinates.T])
+    scale = np.stack([np.ones(count)] * 3 + [1.0 / length] * 3, axis=1)[:, :, None] * units_of(chains, length)[:, None]
+    twists = [block * scale for block in _platform_twists(ends, count)]
+    closure = stacked(_between_legs(ends, length), count) / length[:, None]
+    closure_rates = [np.zeros((count, 0, chains.size)), *(block - twists[0] for block in twists[1:])]
+    return Gaps(closure, np.concatenate(closure_rates, axis=1), twists[0])
+
+
+def units_of(chains: Chains, length: Array) -> Array:
+    """Return the unit of each joint coordinate [n x coordinates]: 1 rad, or for a slide the machine's length, m."""
+    slides = np.array([step.element.mover.point is None for steps in chains.legs for step in steps if step.moves])
+    return np.where(slides, length[:, None], 1.0)
+
+
+def _platform_twists(ends: Sequence[LegEnd], count: int) -> list[Array]:
+    """Return for each leg the platform's twist per unit of every joint coordinate [n x 6 x all]; 0 for other legs."""
+    blocks, first = [], 0
+    size = sum(len(end.movers) for end in ends)
+    for end in ends:
+        block = np.zeros((count, 6, size))
+        for k, mover in enumerate(end.movers, first):
+            block[:, :, k] = stacked(mover.twist(end.platform.translation).components(), count)
+        first += len(end.movers)
+        blocks.append(block)
+    return blocks
+
+
 def stacked(scalars: Sequence[Scalar], count: int) -> Array:
     """Stack scalars as columns [n x scalars]."""
     if not scalars:
         return np.zeros((count, 0))
     return np.stack([np.broadcast_to(np.asarray(s, dtype=float), (count,)) for s in scalars], axis=1)
+
+
+def pose_of(end: Displacement) -> dict[str, Array]:
+    """Pose coordinates of a placement: P (m) and the angles of Q = Rz(yaw) Ry(pitch) Rx(roll) (rad), arrays [n]."""
+    angles = {name: np.arctan2(sine, cosine) for name, (cosine, sine) in _sides(end.rotation).items()}
+    return {name: np.asarray(getattr(end.translation, name)) for name in POINT} | angles

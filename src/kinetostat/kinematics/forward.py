@@ -178,7 +178,7 @@ class LegByLeg:
 
     def left(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
         """See `System`; the rates [n x gaps x unknowns] are the twists of the passive joints."""
-        gaps = gaps_at(self.chains, self._whole(unknowns, goal), np.zeros((len(unknowns), len(self.chains.pose))))
+        gaps = gaps_at(self.chains, self._whole(unknowns, goal))
         return gaps.closure, gaps.closure_rates[:, :, self.free]
 
     def placements(self, unknowns: Array, goal: Array) -> list[Displacement]:
@@ -207,7 +207,7 @@ class LegByLeg:
 
     def drift(self) -> Array:
         """See `System` [6 x unknowns]."""
-        gaps = gaps_at(self.chains, self.joints[None], np.zeros((1, len(self.chains.pose))))
+        gaps = gaps_at(self.chains, self.joints[None])
         return np.asarray(gaps.platform_rates[0][:, self.free])
 
 
