@@ -1,4 +1,4 @@
-"""Attack kinetostat: `python tests/attack --files 100000 --lines 10000 --kills 20`.
+"""Attack kinetostat: `python tests/attack --files 100000 --lines 10000 --kills 20 --tabs 50`.
 
 Every case has a number, drawn from the seed; `--case KIND:NUMBER` repeats one alone. Findings are printed with their
 cases, one of each sort; the exit code is 1 where there is any.
@@ -23,6 +23,7 @@ from hostile import file
 from judging import FILES, judged, line_case
 from kills import COMMANDS, kill_and_resume, undisturbed
 from lines import command_line
+from tabs import tabs
 
 MEMORY = 3 << 30
 """Address space of a process, bytes: a case that wants more is a finding, not the end of the computer."""
@@ -83,6 +84,8 @@ def main() -> int:
     parser.add_argument("--files", type=int, default=1000)
     parser.add_argument("--lines", type=int, default=100)
     parser.add_argument("--kills", type=int, default=0, help="how often each long command is killed")
+    parser.add_argument("--tabs", type=int, default=0, help="so many tabs of a studio, beside one that is hostile")
+    parser.add_argument("--seconds", type=float, default=180.0, help="how long the tabs move the machine")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--case", metavar="KIND:NUMBER", help="show one case and its end")
@@ -101,12 +104,13 @@ def main() -> int:
                 sorts[f"{kind}: {last}"] += 1
                 if sorts[f"{kind}: {last}"] == 1:
                     print(f"--case {kind}:{number} --seed {options.seed}\n{finding}\n", flush=True)
-    for finding in kills(options.kills, options.seed):
+    crowded = tabs(options.tabs, options.seconds) if options.tabs else ()
+    for finding in (*kills(options.kills, options.seed), *crowded):
         print(finding + "\n", flush=True)
         sorts[finding] += 1
     total = sum(sorts.values())
     cases = f"{options.files} files, {options.lines} command lines, {options.kills} kills of each long command"
-    print(f"{cases}: {total} findings of {len(sorts)} sorts")
+    print(f"{cases}, {options.tabs} tabs: {total} findings of {len(sorts)} sorts")
     return 1 if total else 0
 
 

@@ -2,12 +2,14 @@
 
 import asyncio
 import sys
+from types import SimpleNamespace
 
 import pytest
+from nicegui.client import ClientConnectionTimeout
 
 from kinetostat.machine.loading import bundled
 from kinetostat.spec.errors import InputError
-from kinetostat.studio import uploads
+from kinetostat.studio import serving, uploads
 from kinetostat.studio.turns import Turns
 
 
@@ -29,7 +31,7 @@ def test_a_refusal_is_that_of_the_reader(kind, data, words):
 
 HOG = """
 import sys
-from kinetostat.studio import uploads
+from kinetostat.studio import serving, uploads
 from kinetostat.studio.turns import Turns
 uploads._limit()
 taken = []
@@ -94,3 +96,22 @@ def test_turns_go_in_order_and_a_tab_may_ask_again_after_its_turn():
 
     asyncio.run(twice())
     assert done == list("abcabc")
+
+
+def test_a_page_that_opens_no_socket_is_forgotten_without_an_error(monkeypatch):
+    """A page that a program loads is built for nobody: it waits for its socket, and then leaves nothing behind."""
+
+    class Loaded:
+        id, is_deleted = "loaded", False
+
+        async def connected(self, **_):
+            raise ClientConnectionTimeout(self)
+
+        def delete(self):
+            self.is_deleted = True
+
+    page = Loaded()
+    fake = SimpleNamespace(add_css=lambda _: None, context=SimpleNamespace(client=page))
+    monkeypatch.setattr(serving, "ui", fake)
+    asyncio.run(serving.show(None, "", None))
+    assert page.is_deleted

@@ -8,7 +8,7 @@ from starlette.responses import PlainTextResponse
 
 pytest.importorskip("nicegui", reason="the extra kinetostat[studio] is not installed")
 
-from kinetostat.studio.admission import CREDIT, PACE, SHARE, OwnOrigin, Pace, Paced, timed
+from kinetostat.studio.admission import CREDIT, PACE, SENDING, SHARE, OwnOrigin, Pace, Paced, timed
 
 HOST = "127.0.0.1:8000"
 
@@ -104,3 +104,26 @@ def test_the_time_of_a_message_counts_for_its_own_connection(monkeypatch):
     socket(Paced(slow), b"", [{"type": "websocket.receive"}])
     assert waits[0] == 0.0
     assert waits[1] == pytest.approx((10.0 - CREDIT) / SHARE, rel=0.01)
+
+
+def test_a_tab_that_sends_many_files_waits_and_others_do_not(monkeypatch):
+    waits, pause = {}, asyncio.sleep
+    app = Paced(PlainTextResponse("sent"))
+
+    async def noting(seconds):
+        waits.setdefault(sender, []).append(seconds)
+        await pause(0)
+
+    monkeypatch.setattr("kinetostat.studio.admission.asyncio.sleep", noting)
+
+    async def send_files():
+        nonlocal sender
+        transport = httpx.ASGITransport(app)
+        async with httpx.AsyncClient(transport=transport, base_url=f"http://{HOST}") as client:
+            for sender in ("hostile",) * 40 + ("other",):
+                await client.post(f"/_nicegui/client/{sender}/upload/7", content=b"x")
+
+    sender = ""
+    asyncio.run(send_files())
+    assert waits["hostile"][0] == waits["other"][0] == 0.0
+    assert waits["hostile"][-1] == pytest.approx((40 * SENDING - CREDIT) / SHARE, rel=0.1)

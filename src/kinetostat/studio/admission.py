@@ -5,6 +5,7 @@ It knows requests and sockets only; what is on the page is the business of `page
 """
 
 import asyncio
+import re
 import time
 from collections.abc import Callable
 from typing import Any
@@ -32,6 +33,12 @@ PACE = "kinetostat pace"
 """Key of a connection's `Pace` in its scope."""
 MESSAGE = 0.002
 """Seconds that a message of a tab counts at least."""
+SENDING = 0.2
+"""Seconds that a file sent by a tab counts."""
+MOST_TABS = 1000
+"""Tabs of which it is remembered how much they have sent."""
+TAB = re.compile(r"/_nicegui/client/([^/]+)/")
+"""The address to which a tab sends files."""
 SHARE = 0.5
 """Share of the server's time that the messages of one tab may take in the long run."""
 CREDIT = 2.0
@@ -138,17 +145,23 @@ class Pace:
 
 
 class Paced:
-    """Middleware that reads the messages of a tab more slowly where they have taken too much of the server's time.
+    """Middleware that reads the messages and files of a tab more slowly where they take too much of the server's time.
 
     What is not read waits in the tab's own connection, so that only this tab becomes slow.
     """
 
     def __init__(self, served: ASGIApp) -> None:
         self._served = served
+        self._sending: dict[str, Pace] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a connection on; its messages come as fast as its `Pace` allows."""
         if scope["type"] != "websocket":
+            sender = TAB.match(scope.get("path", "")) if scope.get("method") == "POST" else None
+            if sender is not None:
+                pace = self._pace_of(sender[1])
+                pace.add(SENDING)
+                await asyncio.sleep(pace.wait)
             await self._served(scope, receive, send)
             return
         pace = scope[PACE] = Pace()
@@ -159,6 +172,13 @@ class Paced:
             return await receive()
 
         await self._served(scope, paced, send)
+
+    def _pace_of(self, tab: str) -> Pace:
+        """Return the pace at which a tab sends files; those that sent nothing for the longest time are forgotten."""
+        pace = self._sending[tab] = self._sending.pop(tab, None) or Pace()
+        if len(self._sending) > MOST_TABS:
+            del self._sending[next(iter(self._sending))]
+        return pace
 
 
 def timed(handler: Callable[[str, Any], None], scope_of: Callable[[str], Scope]) -> Callable[[str, Any], None]:

@@ -68,7 +68,7 @@ def serve(machine: Machine, name: str, host: str, port: int, browser: bool, stat
     core.sio.eio.transports = app.config.socket_io_js_transports = ["websocket"]
     ui.run(
         host=host, port=port, title="kinetostat studio", favicon=MARK, show=browser, reload=False, tailwind=False,
-        show_welcome_message=False, reconnect_timeout=30.0, message_history_length=200,
+        show_welcome_message=False, reconnect_timeout=60.0, message_history_length=200,
         ws_max_size=LARGEST_BODY,
     )  # fmt: skip
 
