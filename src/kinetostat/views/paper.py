@@ -73,7 +73,9 @@ def write_all(
 
 def figures(reproduction: Reproduction) -> dict[str, Figure]:
     """The figures by file name."""
-    section = reproduction.maps.rename({"geometry.passive_leg_offset": "pose.y"})
+    # The paper calls this offset of the passive leg y, the coordinate of its figure.
+    section = reproduction.maps.rename({"geometry_passive_leg_offset": "y"})
+    section = section.assign_coords(y=section["y"].assign_attrs(field="pose.y"))
     return {
         "machine": three_views(reproduction.machine, MACHINE),
         "figure-4": curves(reproduction.curves, GROUPS["stiffness"], FIGURE_4),
