@@ -1,0 +1,99 @@
+"""Reach of machines that are closed by iteration: that of their closed form, wherever the home pose lies."""
+
+import numpy as np
+import pytest
+
+from kinetostat.exchange.leg_by_leg import document_of
+from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinematics.nearest import nearest_pose
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.loading import build
+from kinetostat.machine.parameters import with_values
+from kinetostat.spec import document
+from machines import load_without_limits
+
+CRANKS = """
+schema = 1
+name = "cranks"
+family = "hexapod-rus"
+[geometry]
+base_radius = "300 mm"
+base_angles = ["-12 deg", "12 deg", "108 deg", "132 deg", "228 deg", "252 deg"]
+platform_radius = "120 mm"
+platform_angles = ["-45 deg", "45 deg", "75 deg", "165 deg", "195 deg", "-75 deg"]
+platform_height = 0
+crank_length = "250 mm"
+rod_length = "350 mm"
+[stiffness]
+actuator = 1e5
+[pose]
+x = 0
+y = 0
+z = 0.45
+roll = 0
+pitch = 0
+yaw = 0
+"""
+REACHED = (Status.OK, Status.SINGULAR, Status.JOINT_LIMIT)
+
+
+def cranks(z=0.45):
+    """The family, and itself leg by leg with its home pose at a height, m."""
+    family = with_values(build(document.parse(CRANKS, "cranks"), "cranks"), {"pose.z": z})
+    return family, build(document_of(family), "cranks")
+
+
+def poses(count, far, turned, seed=4):
+    """Random coordinates: a point within a box and small angles."""
+    rng = np.random.default_rng(seed)
+    point = {f"pose.{name}": rng.uniform(-far, far, count) for name in "xyz"}
+    return point | {f"pose.{name}": rng.uniform(-turned, turned, count) for name in ("roll", "pitch", "yaw")}
+
+
+def reached(machine, columns):
+    with np.errstate(all="ignore"):
+        return np.isin(np.asarray(respond(with_values(machine, columns)).status), REACHED)
+
+
+@pytest.mark.parametrize("z", [0.25, 0.37, 0.5])
+def test_a_pose_is_reached_where_its_closed_form_reaches_it(z):
+    family, legs = cranks(z)
+    columns = poses(300, 0.5, 0.4)
+    status = np.asarray(solve_joints(with_values(legs, columns)).status)
+    inside = reached(family, columns)
+    assert 30 < inside.sum() < 270
+    assert (status[inside] == Status.OK).all()
+    assert (status[~inside] == Status.OUT_OF_REACH).all(), "which is shown, not supposed"
+
+
+@pytest.mark.parametrize("name", ["hexapod-hardware", "tripteron"])
+def test_a_pose_has_the_same_answer_alone_and_in_a_batch(name):
+    machine = load_without_limits(name)
+    columns = {path: values[:6] for path, values in poses(6, 0.35, 0.9).items()}
+    columns["pose.z"] = columns["pose.z"] + 0.3
+    if name == "tripteron":
+        machine = load_without_limits(name, ["pose.roll=0"])  # more than it can choose, so that it is iterated
+        columns = {f"pose.{c}": columns[f"pose.{c}"] + 0.5 for c in "xyz"} | {"pose.roll": np.arange(6) % 2 * 0.01}
+    together = solve_joints(with_values(machine, columns))
+    for i in range(6):
+        alone = solve_joints(with_values(machine, {path: float(values[i]) for path, values in columns.items()}))
+        assert alone.status == together.status[i]
+        if alone.status == Status.OK:
+            assert list(alone.coordinates) == pytest.approx([q[i] for q in together.coordinates], abs=1e-12)
+
+
+def test_a_way_round_that_is_longer_than_half_a_turn_is_not_taken():
+    here, there = (load_without_limits("hexapod-hardware", [f'pose.roll="{roll} deg"']) for roll in (-5, 355))
+    assert solve_joints(here).coordinates == pytest.approx(solve_joints(there).coordinates, abs=1e-9)
+
+
+def test_the_nearest_pose_is_on_the_border_and_no_sampled_one_is_nearer():
+    machine = load_without_limits("tripteron", ['pose.x="3 m"'])
+    near = nearest_pose(machine)
+    apart = np.linalg.norm([near["x"] - 3.0, near["y"] - 0.5, near["z"] - 0.5])
+    rng = np.random.default_rng(1)
+    columns = {f"pose.{name}": rng.uniform(-0.6, 1.9, 1000) for name in "xyz"}
+    inside = np.asarray(solve_joints(with_values(machine, columns)).status) == Status.OK
+    distances = np.hypot(np.hypot(columns["pose.x"] - 3.0, columns["pose.y"] - 0.5), columns["pose.z"] - 0.5)
+    assert apart < distances[inside].min() + 1e-3
