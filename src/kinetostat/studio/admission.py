@@ -175,7 +175,8 @@ class Paced:
 
     def _pace_of(self, tab: str) -> Pace:
         """Return the pace at which a tab sends files; those that sent nothing for the longest time are forgotten."""
-        pace = self._sending[tab] = self._sending.pop(tab, None) or Pace()
+        pace = self._sending.pop(tab) if tab in self._sending else Pace()
+        self._sending[tab] = pace
         if len(self._sending) > MOST_TABS:
             del self._sending[next(iter(self._sending))]
         return pace
