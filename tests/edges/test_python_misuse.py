@@ -160,7 +160,7 @@ MISUSES = [
     ("problem", lambda: optimize("zhang-gosselin-2002")),
     ("problem", lambda: optimize(H)),
     ("folder", lambda: optimize(problem(), 3)),
-    ("a file is there", lambda: optimize(problem(), "f.csv")),
+    ("in the place of a folder", lambda: optimize(problem(), "f.csv")),
     ("resume", lambda: optimize(problem(), resume=True)),
     ("stop", lambda: optimize(problem(), stop=True)),
     ("watch", lambda: optimize(problem(), watch="yes")),
