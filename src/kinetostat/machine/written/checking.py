@@ -55,8 +55,9 @@ def _check_axes(data: Any, where: str) -> None:
     for name, axis in axes.items():
         if math.hypot(*axis) < LEAST_AXIS:
             raise InputError(f"{where}: {name} has no length; give a direction, e.g. {name} = [0, 0, 1].")
-    if len(axes) == 2:
-        first, second = (np.array(axis) / math.hypot(*axis) for axis in axes.values())
+    if {"first_axis", "second_axis"} <= axes.keys():
+        pair = axes["first_axis"], axes["second_axis"]
+        first, second = (np.array(axis) / math.hypot(*axis) for axis in pair)
         if np.linalg.norm(np.cross(first, second)) < PARALLEL:
             raise InputError(f"{where}: first_axis and second_axis are parallel; turn one of them.")
     if hasattr(data, "far") and math.dist(data.point, data.far) < LEAST_AXIS:

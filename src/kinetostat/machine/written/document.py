@@ -13,7 +13,7 @@ from kinetostat.machine.cross_section import MATERIALS, SHAPES
 from kinetostat.machine.series import is_series, parts
 from kinetostat.machine.written.copies import KEYS, copied, copies_in
 from kinetostat.machine.written.directions import directed
-from kinetostat.machine.written.joints import JOINT_TYPES, ONE_FREEDOM, SEAT, needs_axis
+from kinetostat.machine.written.joints import JOINT_TYPES, ONE_FREEDOM, SEAT, needs_axis, stiffness_kind
 from kinetostat.machine.written.plan import (
     BASE,
     LINK_MODELS,
@@ -207,22 +207,37 @@ def _joint(name: str, part: dict[str, Any], where: str) -> JointPlan:
     if not isinstance(joins, list) or len(joins) != 2 or not all(isinstance(body, str) and body for body in joins):
         raise InputError(f'{where}: joins is {shorten(joins)}; give the two bodies it joins, e.g. ["base", "arm"].')
     actuated = part.pop("actuated", False)
-    if not isinstance(actuated, bool):
-        raise InputError(f"{where}: actuated is {shorten(actuated)}; it must be true or false.")
-    sprung = "stiffness" in part
-    if (actuated or sprung) and kind not in ONE_FREEDOM:
+    motor, sprung = _motor(kind, actuated, where), "stiffness" in part
+    if (actuated or sprung) and kind not in ONE_FREEDOM and not motor:
         raise InputError(
             f"{where} is {kind}; only {', '.join(ONE_FREEDOM)} joints may be actuated or have a stiffness."
+            + _which(kind, " One of its freedoms may be actuated: write actuated = ")
         )
     if actuated and not sprung:
-        example = "20 N/um" if JOINT_TYPES[kind].stiffness == "linear stiffness" else "1e5 N*m/rad"
+        example = "20 N/um" if stiffness_kind(kind, motor) == "linear stiffness" else "1e5 N*m/rad"
         raise InputError(
             f'{where} is actuated but has no stiffness; add stiffness = "{example}", or "rigid" if its servo is ideal.'
         )
     series = tuple(part["stiffness"]) if isinstance(part.get("stiffness"), dict) else ()
     compliance = _matrix(part.pop("compliance", []), where)
     seat = _seat(kind, part, bool(compliance), where)
-    return JointPlan(name, kind, (joins[0], joins[1]), actuated, sprung, compliance, series, seat)
+    return JointPlan(name, kind, (joins[0], joins[1]), bool(actuated), sprung, compliance, series, seat, motor)
+
+
+def _motor(kind: str, actuated: object, where: str) -> str:
+    """The freedom of a joint with several that is actuated; empty if it has one freedom or is passive."""
+    if isinstance(actuated, bool):
+        return ""
+    if isinstance(actuated, str) and actuated in JOINT_TYPES[kind].motors:
+        return actuated
+    which = _which(kind, "write ") or f"a {kind} joint is actuated as a whole or not: write true or false."
+    raise InputError(f"{where}: actuated is {shorten(actuated)}; {which}")
+
+
+def _which(kind: str, before: str) -> str:
+    """The freedoms of a joint that may be actuated, as they are written; empty if there are none."""
+    names = [f'"{name}"' for name in JOINT_TYPES[kind].motors]
+    return f"{before}{' or '.join(names)}." if names else ""
 
 
 def _seat(kind: str, part: dict[str, Any], has_matrix: bool, where: str) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from typing import Any
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.cross_section import linear_density_of, rigidity_of
-from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Turn
+from kinetostat.machine.leg import Element, Leg, PartName, Spring, Turn
 from kinetostat.machine.link import Beam, any_up, lumped_springs, matrix_springs, seat_springs
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
 from kinetostat.machine.series import springs_in_a_row
@@ -104,18 +104,22 @@ def _seat(leg: LegPlan, joint: JointPlan, data: Any) -> Sequence[Spring]:
 def _moving(leg: LegPlan, joint: JointPlan, data: Any, tables: Mapping[str, Any]) -> list[Step]:
     """The movable elements of a joint, in order; of springs in a row the first one moves."""
     title = PartName(leg.name, joint.name)
-    elements = JOINT_TYPES[joint.kind].elements(title, data)
+    kind = JOINT_TYPES[joint.kind]
+    motor = kind.motors.get(joint.motor)
+    elements = list(((motor and motor.elements) or kind.elements)(title, data))
+    steps = [Step(element, True) for element in elements]
     if not joint.sprung:
-        return [Step(element, True) for element in elements]
-    (freedom,) = (element for element in elements if isinstance(element, Joint))
+        return steps
+    place = motor.place if motor else 0
+    freedom = elements[place]
     name = f"{title} actuator" if joint.actuated else f"{title} hinge"
     stiffness = 0.0 if joint.series else data.stiffness
     spring = Spring(name, freedom, stiffness, title, joint.actuated, not joint.actuated)
     if not joint.series:
-        return [Step(spring, True)]
+        return [*steps[:place], Step(spring, True), *steps[place + 1 :]]
     row = tables[f"{leg.table(joint.name)}.stiffness"]
     row = springs_in_a_row(spring, [(key, getattr(row, key)) for key in joint.series], joint.name)
-    return [Step(part, i == 0) for i, part in enumerate(row)]
+    return [*steps[:place], *(Step(part, i == 0) for i, part in enumerate(row)), *steps[place + 1 :]]
 
 
 def _link_elements(

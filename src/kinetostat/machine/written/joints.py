@@ -5,7 +5,7 @@ are joined to legs is `family`'s business. Points and axes are in the base frame
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, reciprocal
@@ -21,6 +21,23 @@ POINT = Field(Quantity("length", "a point of the joint, base frame, at the home 
 
 
 @dataclass(frozen=True)
+class Motor:
+    """A freedom of a joint that may have an actuator, while the joint's others stay passive.
+
+    Attributes:
+        place: of its element among those of the joint.
+        stiffness: kind of quantity of its stiffness.
+        elements: of the joint with this actuator, where they differ from those without it.
+        fields: that it needs besides those of the joint.
+    """
+
+    place: int
+    stiffness: str
+    elements: Callable[[str, Any], Sequence[Element]] | None = None
+    fields: Mapping[str, Field] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class JointType:
     """A type of joint.
 
@@ -30,6 +47,7 @@ class JointType:
         elements: from the name of a joint and its numbers to what the chain of a leg has for it, base to platform.
         stiffness: kind of quantity of its stiffness, for a type of one freedom, which may have an actuator or a spring
             of its own; None for all others.
+        motors: of a type of several freedoms, those that may have an actuator each, by what `actuated` says.
         seat: directions in which its bearings may have a stiffness: those of `SEAT` in which it does not move.
         seat_travels: whether its bearings go with the body that it moves, as those of a carriage do; those of other
             joints stay on the base side.
@@ -44,6 +62,7 @@ class JointType:
     in_plane: str = ""
     seat: tuple[str, ...] = ()
     seat_travels: bool = False
+    motors: Mapping[str, Motor] = field(default_factory=dict)
 
 
 SEAT = {
@@ -96,6 +115,23 @@ def _spherical(name: str, data: Any) -> Sequence[Element]:
     return revolutes(Vector(*data.point), AXES, name)
 
 
+def _driven_spherical(name: str, data: Any) -> Sequence[Element]:
+    """A spherical joint with a motor: which axes the other freedoms turn about matters, so that the file says it."""
+    return revolutes(Vector(*data.point), (unit(data.first_axis), unit(data.second_axis), _normal(data)), name)
+
+
+def _normal(data: Any) -> Vector:
+    """The unit normal of both axes of a joint."""
+    normal = unit(data.first_axis).cross(unit(data.second_axis))
+    return normal * reciprocal(normal.norm())
+
+
+def _planar(name: str, data: Any) -> Sequence[Element]:
+    point = Vector(*data.point)
+    slides = [Joint(unit(axis), None, name, carriage=point) for axis in (data.first_axis, data.second_axis)]
+    return *slides, Joint(_normal(data), point, name)
+
+
 def _helical(name: str, data: Any) -> Sequence[Element]:
     return (Joint(unit(data.axis), Vector(*data.point), name, data.pitch),)
 
@@ -133,14 +169,35 @@ JOINT_TYPES = {
         _cylindrical,
         seat=("radial", "tilt"),
         seat_travels=True,
+        motors={"rotation": Motor(0, "torsional stiffness"), "translation": Motor(1, "linear stiffness")},
     ),
     "universal": JointType(
         "turns about `first_axis`, then about `second_axis`, both through `point` (Hooke joint)",
         {"point": POINT, "first_axis": AXIS, "second_axis": AXIS},
         _universal,
         seat=("radial", "axial", "torsion"),
+        motors={"first_axis": Motor(0, "torsional stiffness"), "second_axis": Motor(1, "torsional stiffness")},
     ),
-    "spherical": JointType("turns about `point`", {"point": POINT}, _spherical, seat=("radial", "axial")),
+    "spherical": JointType(
+        "turns about `point`",
+        {"point": POINT},
+        _spherical,
+        seat=("radial", "axial"),
+        motors={
+            name: Motor(i, "torsional stiffness", _driven_spherical, {"first_axis": AXIS, "second_axis": AXIS})
+            for i, name in enumerate(("first_axis", "second_axis", "normal"))
+        },
+    ),
+    "planar": JointType(
+        "slides along `first_axis`, then along `second_axis`, and turns about their normal through `point`",
+        {"point": POINT, "first_axis": AXIS, "second_axis": AXIS},
+        _planar,
+        motors={
+            "first_axis": Motor(0, "linear stiffness"),
+            "second_axis": Motor(1, "linear stiffness"),
+            "rotation": Motor(2, "torsional stiffness"),
+        },
+    ),
     "helical": JointType(
         "turns about `axis` through `point` and advances by `pitch` per radian",
         {"point": POINT, "axis": AXIS, "pitch": Field(Quantity("length", "advance per radian"))},
@@ -171,6 +228,16 @@ JOINT_TYPES = {
     ),
 }
 """Types of joints by the name that machine files give them."""
+
+MOTORS = tuple(dict.fromkeys(name for kind in JOINT_TYPES.values() for name in kind.motors))
+"""What `actuated` may say of joints with several freedoms."""
+
+
+def stiffness_kind(kind: str, motor: str) -> str:
+    """Kind of quantity of the stiffness of a joint's actuator or hinge; `motor` says which freedom it is on, if any."""
+    row = JOINT_TYPES[kind]
+    return row.motors[motor].stiffness if motor else row.stiffness or "torsional stiffness"
+
 
 ONE_FREEDOM = tuple(name for name, kind in JOINT_TYPES.items() if kind.stiffness)
 """Types that may have an actuator or a spring of their own."""

@@ -43,6 +43,7 @@ class JointPlan:
         sprung: whether it has a stiffness, as an actuator or a flexure hinge.
         series: keys of the parts that this stiffness is made of, in a row; empty if it is one number.
         seat: directions in which its bearings have a stiffness: some of `joints.SEAT`.
+        motor: the freedom that is actuated, of a joint with several: a key of its type's `motors`; empty otherwise.
         compliance: of its own, rows rx ry rz x y z at its point, base axes at the home pose, SI; empty if it is stiff.
     """
 
@@ -54,6 +55,7 @@ class JointPlan:
     compliance: Matrix
     series: tuple[str, ...] = ()
     seat: tuple[str, ...] = ()
+    motor: str = ""
 
 
 @dataclass(frozen=True)
@@ -165,7 +167,7 @@ def literals(plan: Plan) -> dict[str, dict[str, object]]:
 def _joint_literals(joint: JointPlan) -> dict[str, object]:
     written: dict[str, object] = {"type": joint.kind, "joins": list(joint.joins)}
     if joint.actuated:
-        written["actuated"] = True
+        written["actuated"] = joint.motor or True
     if joint.compliance:
         written["compliance"] = [list(row) for row in joint.compliance]
     return written

@@ -5,7 +5,7 @@ from typing import Any
 from kinetostat.machine.cross_section import MATERIALS, SHAPE_KINDS, SHAPES
 from kinetostat.machine.orientation import orientation_schema
 from kinetostat.machine.series import label
-from kinetostat.machine.written.joints import AXIS, JOINT_TYPES, SEAT, needs_axis
+from kinetostat.machine.written.joints import AXIS, JOINT_TYPES, MOTORS, SEAT, needs_axis, stiffness_kind
 from kinetostat.machine.written.plan import LINK_MODELS, NAME, SPATIAL_POSE, SUMMARY, JointPlan, Plan
 from kinetostat.spec.fields import Field, Quantity, made_table
 from kinetostat.spec.validation import DISPLAY_SCHEMA
@@ -31,18 +31,20 @@ def tables_of(plan: Plan) -> dict[str, type]:
 
 def _joint_fields(joint: JointPlan) -> dict[str, Field]:
     fields = dict(JOINT_TYPES[joint.kind].fields)
+    if joint.motor:
+        fields |= JOINT_TYPES[joint.kind].motors[joint.motor].fields
     if joint.seat:
         fields |= {"axis": AXIS} if needs_axis(joint.kind) else {}
         fields |= {f"stiffness_{way}": SEAT[way] for way in joint.seat}
     if joint.sprung and not joint.series:
-        kind = JOINT_TYPES[joint.kind].stiffness or "torsional stiffness"
+        kind = stiffness_kind(joint.kind, joint.motor)
         what = "its actuator, held by its servo" if joint.actuated else "the joint's own, as of a flexure hinge"
         fields["stiffness"] = Field(Quantity(kind, what))
     return fields
 
 
 def _series_fields(joint: JointPlan) -> dict[str, Field]:
-    kind = JOINT_TYPES[joint.kind].stiffness or "torsional stiffness"
+    kind = stiffness_kind(joint.kind, joint.motor)
     return {key: Field(Quantity(kind, f"{label(key)}, in a row with the others")) for key in joint.series}
 
 
@@ -107,7 +109,7 @@ def _leg() -> dict[str, Any]:
         "name": {"type": "string"},
         "type": {"enum": list(JOINT_TYPES), "description": about},
         "joins": {**BODIES, "description": "bodies on the base side and on the platform side"},
-        "actuated": {"type": "boolean"},
+        "actuated": {"enum": [True, False, *MOTORS], "description": "of a joint with several freedoms: which one"},
         "stiffness": {
             "type": ["number", "string", "array", "object"],
             "description": 'of its actuator or flexure; "rigid" is exact; parts in a row: ["screw 200 N/um", ...]',
