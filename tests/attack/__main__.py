@@ -23,7 +23,6 @@ from hostile import file
 from judging import FILES, judged, line_case
 from kills import COMMANDS, kill_and_resume, undisturbed
 from lines import command_line
-from tabs import tabs
 
 MEMORY = 3 << 30
 """Address space of a process, bytes: a case that wants more is a finding, not the end of the computer."""
@@ -71,6 +70,13 @@ def kills(count: int, seed: int) -> Iterator[str]:
                     yield finding
 
 
+def crowd(count: int, seconds: float) -> Iterator[str]:
+    """Findings of many tabs; what the studio needs is imported only here."""
+    from tabs import tabs
+
+    return tabs(count, seconds)
+
+
 def show(kind: str, number: int, seed: int) -> None:
     """Print a case and how it ends."""
     rng = Random(f"{seed} {kind} {number}")
@@ -104,7 +110,7 @@ def main() -> int:
                 sorts[f"{kind}: {last}"] += 1
                 if sorts[f"{kind}: {last}"] == 1:
                     print(f"--case {kind}:{number} --seed {options.seed}\n{finding}\n", flush=True)
-    crowded = tabs(options.tabs, options.seconds) if options.tabs else ()
+    crowded = crowd(options.tabs, options.seconds) if options.tabs else iter(())
     for finding in (*kills(options.kills, options.seed), *crowded):
         print(finding + "\n", flush=True)
         sorts[finding] += 1
