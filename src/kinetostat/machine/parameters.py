@@ -167,8 +167,9 @@ def with_values(machine: AnyMachine, changes: Mapping[str, Any]) -> AnyMachine:
     return replace(new_machine, tables=tables)
 
 
-Given = float | str | Iterable[float | str]
-"""A value as people give it: SI, or text with a unit; of a field with several entries, one for all or one for each."""
+Given = float | str | Iterable[float | str] | Iterable[Iterable[float]] | Mapping[str, float | str]
+"""A value as people give it: SI, or text with a unit; of a field with several entries, one for all or one for each; a
+matrix or a table for an orientation (`machine.orientation`)."""
 
 
 def read_numbers(family: HasFields, given: Mapping[str, Given]) -> dict[str, float]:
