@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from pint import Quantity, UnitRegistry
+    from pint import UnitRegistry
+    from pint.facets.plain import PlainQuantity
 
 
 @dataclass(frozen=True)
@@ -250,7 +251,7 @@ def _registry() -> "UnitRegistry[float]":
     return pint.UnitRegistry(str(UNITS))
 
 
-def _in_root_units(unit: str) -> "Quantity[float] | None":
+def _in_root_units(unit: str) -> "PlainQuantity[float] | None":
     """Return one `unit` in pint's root units; None if there is no such unit."""
     from pint import PintError
 

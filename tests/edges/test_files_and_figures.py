@@ -11,7 +11,6 @@ from matplotlib.text import Text
 from kinetostat.cli import main
 from kinetostat.machine.loading import as_toml, build, load
 from kinetostat.spec.document import parse
-from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.grid.grid import evaluate_grid, failures
 from kinetostat.studies.grid.quantities import resolve_quantities
@@ -22,6 +21,7 @@ from kinetostat.views.drawing import three_views
 from kinetostat.views.figures import contour_maps, curves
 from kinetostat.views.influence_figures import guideline_figures, sensitivity_figure
 from kinetostat.views.levels import levels_of
+from refusals import refused
 
 MACHINE = "zhang-gosselin-4dof"
 
@@ -205,7 +205,7 @@ def test_a_dataset_file_is_replaced_whole(tmp_path, section):
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").touch()
-    with pytest.raises(InputError, match="cannot be written"):
+    with refused("cannot be written"):
         write_text(tmp_path / "file" / "result.txt", "text")
 
 

@@ -15,11 +15,11 @@ from kinetostat.commands.common import BAD_INPUT, DONE, STOPPED
 from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
 from kinetostat.machine.loading import load
-from kinetostat.spec.errors import InputError
 from kinetostat.studies import result_file
 from kinetostat.studies.grid import grid, stored_grid
 from kinetostat.studies.grid.grid import grid_question
 from kinetostat.studies.grid.stored_grid import answer_into
+from refusals import refused
 
 MACHINE = "zhang-gosselin-4dof"
 RANGES = ["x=-40 cm:40 cm:50", "z=40 cm:140 cm:50", "theta5=-70 deg:-50 deg:50"]
@@ -214,7 +214,7 @@ def test_a_small_grid_does_not_take_the_place_of_a_large_one(undisturbed, monkey
 
 def test_a_large_grid_does_not_take_the_place_of_a_small_one(question, tmp_path):
     (tmp_path / "map.nc").write_text("precious")
-    with pytest.raises(InputError, match=r"map\.nc\" exists already"):
+    with refused(r"map\.nc\" exists already"):
         answer_into(question, tmp_path, "map")
     assert (tmp_path / "map.nc").read_text() == "precious"
 
@@ -233,7 +233,7 @@ def test_two_processes_do_not_share_a_folder_and_a_dead_one_leaves_no_lock(quest
     command = [sys.executable, "-c", HOLDING, str(tmp_path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
         assert other.stdout.readline() == "held\n"
-        with pytest.raises(InputError, match="another kinetostat is at work"):
+        with refused("another kinetostat is at work"):
             answer_into(question, tmp_path, "map")
         other.kill()
     answer_into(question, tmp_path, "map")
@@ -256,14 +256,14 @@ def test_nothing_to_resume_is_said(tmp_path, monkeypatch, capsys):
 def test_a_folder_that_lost_a_file_is_refused(lost, message, question, undisturbed, tmp_path):
     folder = shutil.copytree(undisturbed, tmp_path / "study")
     (folder / lost).unlink()
-    with pytest.raises(InputError, match=message):
+    with refused(message):
         answer_into(question, folder, "map")
 
 
 def test_a_study_that_cannot_be_read_is_refused(question, undisturbed, tmp_path):
     folder = shutil.copytree(undisturbed, tmp_path / "study")
     (folder / "study.json").write_text("{")
-    with pytest.raises(InputError, match=r"study\.json\" cannot be read"):
+    with refused(r"study\.json\" cannot be read"):
         answer_into(question, folder, "map")
 
 
@@ -272,7 +272,7 @@ Usage = namedtuple("Usage", "total used free")
 
 def test_a_full_disk_is_seen_before_anything_is_made(question, tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "disk_usage", lambda _place: Usage(10**12, 10**12, 10**6))
-    with pytest.raises(InputError, match=r"room for 0\.0 GB, but 125,000 points of 2 quantities"):
+    with refused(r"room for 0\.0 GB, but 125,000 points of 2 quantities"):
         answer_into(question, tmp_path / "a" / "b", "map")
     assert not (tmp_path / "a").exists()
 
@@ -286,7 +286,7 @@ def test_a_disk_that_fills_up_is_said_and_nothing_is_lost(question, undisturbed,
         settle(stream)
 
     monkeypatch.setattr(result_file, "settle", failing)
-    with pytest.raises(InputError, match=r"the disk is full; .*; what was written"):
+    with refused(r"the disk is full; .*; what was written"):
         answer_into(question, tmp_path, "map")
     monkeypatch.setattr(result_file, "settle", settle)
     assert history(tmp_path) == [0]
@@ -296,7 +296,7 @@ def test_a_disk_that_fills_up_is_said_and_nothing_is_lost(question, undisturbed,
 
 def test_the_size_of_a_grid_is_bounded(question, tmp_path, monkeypatch):
     monkeypatch.setattr(stored_grid, "MOST_NUMBERS", 249_999)
-    with pytest.raises(InputError, match="250,000 numbers; at most 249,999"):
+    with refused("250,000 numbers; at most 249,999"):
         answer_into(question, tmp_path, "map")
 
 

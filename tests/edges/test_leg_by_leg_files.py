@@ -8,8 +8,8 @@ import pytest
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import build, bundled, load, machine_schema, template
 from kinetostat.spec import document
-from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
+from refusals import refused
 
 GOOD = bundled()["tripteron"].partition("[limits]")[0]
 
@@ -90,8 +90,8 @@ MISTAKES = {
 }
 
 
-def refused(text, settings=()):
-    with pytest.raises(InputError) as caught:
+def refusal(text, settings=()):
+    with refused() as caught:
         build(document.parse(text, "mine.toml"), "mine.toml", settings)
     return str(caught.value)
 
@@ -99,7 +99,7 @@ def refused(text, settings=()):
 @pytest.mark.parametrize(("old", "new", "words"), MISTAKES.values(), ids=MISTAKES)
 def test_a_mistake_is_refused_with_leg_and_joint(old, new, words):
     assert old in GOOD
-    message = refused(GOOD.replace(old, new, 1))
+    message = refusal(GOOD.replace(old, new, 1))
     assert message.startswith('"mine.toml": ')
     for word in words:
         assert word in message
@@ -115,7 +115,7 @@ def test_a_mistake_is_refused_with_leg_and_joint(old, new, words):
     ],
 )
 def test_a_mistaken_override_is_refused(setting, words):
-    message = refused(GOOD, [setting])
+    message = refusal(GOOD, [setting])
     for word in words:
         assert word in message
 

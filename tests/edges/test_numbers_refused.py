@@ -4,9 +4,10 @@ import math
 
 import pytest
 
-from kinetostat import InputError, analyze, build, bundled, changed, evaluate_grid, load, load_problem
+from kinetostat import analyze, build, bundled, changed, evaluate_grid, load, load_problem
 from kinetostat.cli import main
 from kinetostat.spec.document import parse
+from refusals import refused
 
 BAD = {"nan": math.nan, "-inf": -math.inf, "1e-300": 1e-300}
 STUDY = "zhang-gosselin-2002"
@@ -40,7 +41,7 @@ def from_study(number):
 @pytest.mark.parametrize("number", BAD)
 @pytest.mark.parametrize("enter", [from_file, from_tables, from_setting, from_python, from_range, from_study])
 def test_no_entrance_takes_what_is_no_number(enter, number):
-    with pytest.raises(InputError) as refusal:
+    with refused() as refusal:
         enter(number)
     assert number.lower() in str(refusal.value).lower()
 
@@ -48,7 +49,7 @@ def test_no_entrance_takes_what_is_no_number(enter, number):
 @pytest.mark.parametrize("path", ["pose.z", "load.force.0", "tool.offset.0", "geometry.base_radius"])
 @pytest.mark.parametrize("number", [math.nan, math.inf, True, None, 1j, "1e400 m"])
 def test_a_length_or_a_force_is_finite(path, number):
-    with pytest.raises(InputError, match=rf"^{path.removeprefix('pose.')} is "):
+    with refused(rf"^{path.removeprefix('pose.')} is "):
         changed(load("delta"), {path: number})
 
 
@@ -62,11 +63,9 @@ def test_infinity_in_python_is_rigid_and_no_limit(path):
 
 def test_stiffnesses_too_far_apart_to_be_told_from_rigid_are_refused():
     settings = ["stiffness.actuator=1e-9", "stiffness.bar_axial=1e20"]
-    with pytest.raises(
-        InputError, match=r"stiffness\.actuator.* 1e-09 .* stiffness\.bar_axial 1e\+20 .*factor of 1e\+22"
-    ):
+    with refused(r"stiffness\.actuator.* 1e-09 .* stiffness\.bar_axial 1e\+20 .*factor of 1e\+22"):
         load("delta", settings)
-    with pytest.raises(InputError, match=r"factor of 1e\+22"):
+    with refused(r"factor of 1e\+22"):
         changed(load("delta", settings[:1]), {"stiffness.bar_axial": 1e20})
     softest = analyze(load("delta", ["stiffness.actuator=1e-9", "stiffness.bar_axial=1e12"]))
     assert softest.stiffness is not None
@@ -78,7 +77,7 @@ def test_stiffnesses_too_far_apart_to_be_told_from_rigid_are_refused():
     "direction", [(math.inf, 0, 1), (math.nan, 0, 1), (1, 2), "123", None, (1e200, 0, 0), 3, (0, 0, 0)]
 )
 def test_a_direction_is_three_finite_numbers(direction):
-    with pytest.raises(InputError, match="The direction"):
+    with refused("The direction"):
         analyze(load("delta")).along(direction)
 
 

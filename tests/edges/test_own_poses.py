@@ -10,9 +10,10 @@ import pandas as pd
 import pytest
 import xarray as xr
 
-from kinetostat import InputError, Status, analyze, changed, evaluate, load
+from kinetostat import Status, analyze, changed, evaluate, load
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
+from refusals import refused
 
 HEXAPOD = load("hexapod", ["limits.longest_leg=30 cm"])
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -102,14 +103,14 @@ def test_a_pose_without_a_result_has_a_status():
     ],
 )
 def test_a_mistake_in_poses_is_one_sentence(poses, message):
-    with pytest.raises(InputError, match=message):
+    with refused(message):
         evaluate(HEXAPOD, poses)
 
 
 def test_a_name_is_neither_a_machine_nor_a_quantity():
-    with pytest.raises(InputError, match='machine is "hexapod"'):
+    with refused('machine is "hexapod"'):
         evaluate("hexapod", {"x": 0})
-    with pytest.raises(InputError, match='"stiffnes_z" is not a quantity'):
+    with refused('"stiffnes_z" is not a quantity'):
         evaluate(HEXAPOD, {"x": 0}, "stiffnes_z")
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinetostat import InputError, analyze, build, bundled, evaluate, load_problem, requirements
+from kinetostat import analyze, build, bundled, evaluate, load_problem, requirements
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
 from kinetostat.machine.loading import as_toml
@@ -15,6 +15,7 @@ from kinetostat.spec.document import parse
 from kinetostat.spec.study import read_study
 from kinetostat.spec.study_text import study_toml
 from kinetostat.studies.bundled import bundled_studies
+from refusals import refused
 
 BOX = '["x=-2 cm:2 cm:5", "z=12 cm:16 cm:5"]'
 TABLE = f"""
@@ -102,10 +103,10 @@ def test_commands_say_it_and_end_with_1(tmp_path, capsys):
     ],
 )
 def test_a_mistake_names_the_requirement(table, message):
-    with pytest.raises(InputError, match=message):
+    with refused(message):
         requirements(build(f"{bundled()['hexapod']}[requirements]\n{table}"))
 
 
 def test_a_name_has_no_requirements():
-    with pytest.raises(InputError, match='machine is "hexapod"'):
+    with refused('machine is "hexapod"'):
         requirements("hexapod")

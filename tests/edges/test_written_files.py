@@ -13,8 +13,8 @@ from kinetostat.commands.common import BAD_INPUT, DONE
 from kinetostat.commands.report import WITHOUT
 from kinetostat.exchange.formats import KNOWN, export
 from kinetostat.machine.loading import load
-from kinetostat.spec.errors import InputError
 from kinetostat.studies.storage import PREFIX, scratch, write_text
+from refusals import refused
 from studies import SMALL
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no limits, links and devices of this kind")
@@ -40,7 +40,7 @@ def tree(folder):
 
 @pytest.mark.parametrize("suffix", [form.suffix for form in KNOWN if form.name != "step"])
 def test_an_export_to_a_full_disk_is_one_sentence_and_leaves_nothing(suffix, tmp_path):
-    with files_of_at_most(500), pytest.raises(InputError, match="cannot be written: it would exceed"):
+    with files_of_at_most(500), refused("cannot be written: it would exceed"):
         export(load(MACHINE), tmp_path / "new" / f"file{suffix}")
     assert tree(tmp_path) == []
 
@@ -144,7 +144,7 @@ def test_a_link_stays_and_its_file_is_replaced(there, tmp_path):
 
 def test_two_files_that_belong_together_are_both_written_or_none(tmp_path):
     (tmp_path / "machine.yaml").mkdir()
-    with pytest.raises(InputError, match=r"machine\.yaml\" is a folder"):
+    with refused(r"machine\.yaml\" is a folder"):
         export(load(MACHINE), tmp_path / "machine.urdf")
     assert tree(tmp_path) == ["machine.yaml"]
 

@@ -10,8 +10,8 @@ from scipy.io import loadmat
 
 from kinetostat.exchange.formats import KNOWN, choose
 from kinetostat.machine.loading import as_toml, load
-from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
+from refusals import refused
 
 WITH_TOOL = ('tool.offset=["10 mm", "0 mm", "-80 mm"]',)
 
@@ -114,9 +114,9 @@ def test_a_format_is_found_by_name_and_by_suffix(one, tmp_path):
 
 
 def test_an_unknown_format_is_refused(tmp_path):
-    with pytest.raises(InputError, match='"mjfc"; did you mean "mjcf"'):
+    with refused('"mjfc"; did you mean "mjcf"'):
         choose("mjfc", None)
-    with pytest.raises(InputError, match=r"one of these suffixes: mjcf \(\.xml\)"):
+    with refused(r"one of these suffixes: mjcf \(\.xml\)"):
         choose(None, tmp_path / "machine.sldprt")
 
 

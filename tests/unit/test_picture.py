@@ -9,7 +9,6 @@ from PIL import Image
 
 from kinetostat.algebra.vector import Displacement, Vector, rotation_x
 from kinetostat.machine.loading import load
-from kinetostat.spec.errors import InputError
 from kinetostat.views.picture import machine_picture, picture
 from kinetostat.views.rendering.camera import VIEWS, camera_on
 from kinetostat.views.rendering.light import light_on
@@ -18,6 +17,7 @@ from kinetostat.views.scene import shapes
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.mesh import mesh_of
 from kinetostat.views.scene.solids import Label, Scene, Solid
+from refusals import refused
 
 SIZE = (120, 90)
 
@@ -186,7 +186,7 @@ def test_the_ground_is_darker_in_the_shadow():
     ],
 )
 def test_what_cannot_be_had_is_said(arguments, problem):
-    with pytest.raises(InputError, match=problem):
+    with refused(problem):
         machine_picture(load("planar-3rpr"), **{"size": SIZE, **arguments})
 
 
@@ -195,10 +195,10 @@ def test_signs_alone_are_drawn_without_shadow_and_nothing_is_refused():
     assert share_of(pixels(picture(scene(arrow), SIZE)), "passive") > 0.005
     sign = Solid("frame O/x", shapes.arrow(0.5, 0.02), "x axis", layer="frames")
     assert share_of(pixels(picture(scene(sign), SIZE, hidden=())), "passive") > 0.005
-    with pytest.raises(InputError, match="nothing to draw"):
+    with refused("nothing to draw"):
         picture(scene(sign), SIZE)
 
 
 def test_a_pose_out_of_reach_cannot_be_drawn():
-    with pytest.raises(InputError, match="cannot be drawn at this pose"):
+    with refused("cannot be drawn at this pose"):
         scene_of(load("delta", ["pose.z=-30 m"]))

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinetostat.spec.errors import InputError
 from kinetostat.spec.text_bounds import DEEPEST, check_bounds
+from refusals import refused
 
 PIECES = ['"', '"""', "'", "'''", "\\", "#", "\n", ".", "=", ",", "[", "]", "{", "}", "a", " ", '"b"', "1.5", "x = "]
 
@@ -51,5 +51,5 @@ def test_an_open_text_is_scanned_once(text):
     "text", ['a = """x"""' + ".a" * 9, "a = [" * 10 + "{" * 10, "a . " * 9 + "a = 1", '"x".' * 9 + "a = 1"]
 )
 def test_depth_is_counted(text):
-    with pytest.raises(InputError, match="nested too deeply"):
+    with refused("nested too deeply"):
         check_bounds(text, "x")

@@ -101,10 +101,10 @@ BAD = [
 
 @pytest.mark.parametrize(("written", "kind", "words"), BAD)
 def test_bad_quantities_say_what_is_allowed(written, kind, words):
-    with pytest.raises(UnitError) as refused:
+    with pytest.raises(UnitError) as caught:
         parse(written, kind)
-    assert words in str(refused.value)
-    assert FIX[kind] in str(refused.value)
+    assert words in str(caught.value)
+    assert FIX[kind] in str(caught.value)
 
 
 ATTACKS = [

@@ -56,7 +56,7 @@ class Build:
 
 def builds_of(chains: Chains) -> list[Build]:
     """Sort the legs of a machine by their build."""
-    alike: dict[object, list[tuple[list[Any], Numbers]]] = {}
+    alike: dict[tuple[tuple[type, bool, bool], ...], list[tuple[list[Any], Numbers]]] = {}
     first = 0
     for steps in chains.legs:
         elements = [getattr(step.element, "joint", step.element) for step in steps if step.moves]
@@ -66,7 +66,7 @@ def builds_of(chains: Chains) -> list[Build]:
     builds = []
     for sorts, legs in alike.items():
         elements = [_merged(each, _row) for each in zip(*(elements for elements, _ in legs), strict=True)]
-        slides = np.array([slide for _, slide, _ in sorts], dtype=bool)  # type: ignore[attr-defined]
+        slides = np.array([slide for _, slide, _ in sorts], dtype=bool)
         builds.append(Build(tuple(elements), slides, np.stack([places for _, places in legs])))
     return builds
 

@@ -5,12 +5,12 @@ Which coordinates close the chains at a pose is found in `kinematics.closure`. P
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, cast
 
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.cross_section import linear_density_of, rigidity_of
-from kinetostat.machine.leg import Element, Leg, PartName, Spring, Turn
+from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Turn
 from kinetostat.machine.link import Beam, any_up, lumped_springs, matrix_springs, seat_springs
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
 from kinetostat.machine.series import springs_in_a_row
@@ -111,7 +111,7 @@ def _moving(leg: LegPlan, joint: JointPlan, data: Any, tables: Mapping[str, Any]
     if not joint.sprung:
         return steps
     place = motor.place if motor else 0
-    freedom = elements[place]
+    freedom = cast(Joint, elements[place])  # only a joint can be sprung: a parallelogram has no motor
     name = f"{title} actuator" if joint.actuated else f"{title} hinge"
     stiffness = 0.0 if joint.series else data.stiffness
     spring = Spring(name, freedom, stiffness, title, joint.actuated, not joint.actuated)
