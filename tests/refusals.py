@@ -9,11 +9,11 @@ from kinetostat.spec.errors import InputError
 
 
 @contextmanager
-def refused(pattern: str = "") -> Iterator[pytest.ExceptionInfo[InputError]]:
+def refused(pattern: str | None = None) -> Iterator[pytest.ExceptionInfo[InputError]]:
     """Expect that something is refused.
 
     Args:
-        pattern: of the message, as `pytest.raises` takes it.
+        pattern: of the message, as `pytest.raises` takes it; none if the test looks at the message itself.
     """
     with pytest.raises(InputError, match=pattern) as caught:
         yield caught

@@ -11,6 +11,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec import document
+from kinetostat.studies.workspace.workspace import workspace
 from machines import load_without_limits
 
 CRANKS = """
@@ -97,3 +98,21 @@ def test_the_nearest_pose_is_on_the_border_and_no_sampled_one_is_nearer():
     inside = np.asarray(solve_joints(with_values(machine, columns)).status) == Status.OK
     distances = np.hypot(np.hypot(columns["pose.x"] - 3.0, columns["pose.y"] - 0.5), columns["pose.z"] - 0.5)
     assert apart < distances[inside].min() + 1e-3
+
+
+@pytest.mark.parametrize("ball", [False, True], ids=["universal", "ball"])
+def test_a_workspace_is_that_of_the_closed_form_node_by_node(ball):
+    """Rods between two ball joints may spin; which axes stand for a ball joint is nothing that divides a workspace."""
+    lengths = {"base_radius": 0.3, "platform_radius": 0.12, "crank_length": 0.25, "rod_length": 0.35}
+    family = load_without_limits("hexapod-rus", [f"geometry.{name}={length}" for name, length in lengths.items()])
+    family = with_values(family, {"pose.z": 0.49})
+    tables = document_of(family)
+    for joint in (joint for leg in tables["legs"] for joint in leg["joints"] if ball and joint["type"] == "universal"):
+        joint["type"] = "spherical"
+        for axis in ("axis", "first_axis", "second_axis"):
+            joint.pop(axis, None)
+    box = ["x=-25 cm:25 cm:7", "y=-25 cm:25 cm:7", "z=5 cm:60 cm:9"]
+    ours, theirs = workspace(build(tables, "legs"), box), workspace(family, box)
+    assert ours.nodes == theirs.nodes
+    assert (ours.dataset["verdict"].values == theirs.dataset["verdict"].values).all()
+    assert min(ours.nodes[word] for word in ("inside", "beyond a singularity")) > 10

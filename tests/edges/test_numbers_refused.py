@@ -49,7 +49,7 @@ def test_no_entrance_takes_what_is_no_number(enter, number):
 @pytest.mark.parametrize("path", ["pose.z", "load.force.0", "tool.offset.0", "geometry.base_radius"])
 @pytest.mark.parametrize("number", [math.nan, math.inf, True, None, 1j, "1e400 m"])
 def test_a_length_or_a_force_is_finite(path, number):
-    with refused(rf"^{path.removeprefix('pose.')} is "):
+    with refused(rf"^(values\['{path}'\]|{path.removeprefix('pose.')}) is "):
         changed(load("delta"), {path: number})
 
 
@@ -77,7 +77,7 @@ def test_stiffnesses_too_far_apart_to_be_told_from_rigid_are_refused():
     "direction", [(math.inf, 0, 1), (math.nan, 0, 1), (1, 2), "123", None, (1e200, 0, 0), 3, (0, 0, 0)]
 )
 def test_a_direction_is_three_finite_numbers(direction):
-    with refused("The direction"):
+    with refused(r"^(The )?direction"):
         analyze(load("delta")).along(direction)
 
 

@@ -100,7 +100,7 @@ MISUSES = [
     (r"values\['x'\]", lambda: changed(H, {"x": b"1"})),
     (r"values\['x'\]", lambda: changed(H, {"x": 1j})),
     (r"values\['base_angles'\]", lambda: changed(H, {"base_angles": {1, 2, 3, 4, 5, 6}})),
-    (r"values\['base_angles'\]\[0\]", lambda: changed(H, {"base_angles": np.zeros((6, 1))})),
+    (r"geometry\.base_angles\.0", lambda: changed(H, {"base_angles": np.zeros((6, 1))})),
     ("x", lambda: changed(H, x=1)),
     ("values", lambda: H.with_values("x=1")),
     ("x", lambda: H.with_values(x=Odd())),

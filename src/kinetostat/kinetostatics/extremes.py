@@ -7,18 +7,22 @@ Source: theory section 10; the aspect is theory (30).
 
 import math
 from collections.abc import Sequence
+from itertools import groupby
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller, sqrt, total, where
 from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.solve import handedness
 from kinetostat.algebra.symmetric import SIZE, Symmetric6, greatest_eigenvalue
+from kinetostat.algebra.vector import Vector
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
 from kinetostat.kinetostatics.response import Response, actuator_loads
-from kinetostat.machine.leg import comparable
+from kinetostat.machine.leg import Leg, comparable
 from kinetostat.machine.rods import rods
 from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE
 
 ROTATIONS, TRANSLATIONS = range(3), range(3, 6)
+SPACE = 3
+"""Axes about which a ball joint turns."""
 
 
 def components(response: Response) -> tuple[int, ...]:
@@ -141,5 +145,35 @@ def aspect(response: Response) -> Scalar:
     for leg, screws in zip(response.configuration.legs, response.legs, strict=True):
         if not leg.lines:
             needed = [twist for i, twist in enumerate(screws.passive) if i not in leg.idle]
-            sign = sign * handedness([comparable(twist, shrink) for twist in needed])
+            sign = sign * handedness([comparable(twist, shrink) for twist in needed]) * _ball_signs(leg)
     return sign
+
+
+def _ball_signs(leg: Leg) -> Scalar:
+    """Return the sign by which the axes of a leg's ball joints enter the sign of its passive screws.
+
+    A ball joint is three revolutes through one point, and which three has no effect on what it lets move. Their axes
+    turn with the joint and may become dependent; there the sign of their screws jumps although the leg passes nothing
+    singular. At the other end of a strut with a ball joint are two axes: a universal joint, or a ball joint without the
+    idle spin. They may flip, with the strut where it was; so the strut itself stands for the third axis.
+    """
+    sign: Scalar = 1.0
+    joints = _through_one_point(leg)
+    for i, (centre, axes) in enumerate(joints):
+        beside = [*joints[max(i - 1, 0) : i], *joints[i + 1 : i + 2]]
+        strut = next((centre - other for other, others in beside if len(others) == SPACE), None)
+        three = [*axes, strut] if len(axes) == SPACE - 1 and strut is not None else axes
+        if len(three) == SPACE:
+            sign = where(three[0].cross(three[1]).dot(three[2]) < 0.0, -sign, sign)
+    return sign
+
+
+def _through_one_point(leg: Leg) -> list[tuple[Vector, list[Vector]]]:
+    """Return centre and axes of each joint of a leg, base to platform; a joint has one name. Idle axes are left out."""
+    numbered = groupby(enumerate(leg.passive), key=lambda pair: pair[1].name)
+    rows = [list(row) for _, row in numbered]
+    return [
+        (row[0][1].point, [joint.axis for place, joint in row if place not in leg.idle])
+        for row in rows
+        if all(joint.point is not None for _, joint in row)
+    ]
