@@ -77,7 +77,7 @@ def test_step_says_which_library_of_the_system_it_lacks(tmp_path, monkeypatch, c
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
-        ([MACHINE], BAD_INPUT, "give --to"),
+        ([MACHINE], BAD_INPUT, "name it with --to"),
         ([MACHINE, "--to", "iges"], BAD_INPUT, "choose from mjcf, urdf"),
         ([MACHINE, "-o", "a.docx"], BAD_INPUT, "one of these suffixes"),
         (["nope", "--to", "csv"], BAD_INPUT, "neither a file nor a bundled machine"),

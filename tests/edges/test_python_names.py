@@ -242,7 +242,7 @@ def test_a_machine_is_exported_as_by_the_command(tmp_path, monkeypatch):
     assert main(["export", "tripteron", "--to", "ansys", "-o", "theirs.mac"]) == DONE
     assert (tmp_path / "ours.mac").read_bytes() == (tmp_path / "theirs.mac").read_bytes()
     assert export(machine, tmp_path / "table.txt", "csv")[0].read_text().startswith("quantity")
-    with refused("give --to"):
+    with refused("name it with --to"):
         export(machine, tmp_path / "table.txt")
     with refused("would have to span"):
         export(changed(load("delta"), {"pose.z": "-30 m"}), tmp_path / "far.csv")

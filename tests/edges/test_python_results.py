@@ -72,8 +72,8 @@ def test_other_numbers_are_given_by_any_name_one_by_one_or_as_arrays():
     [
         ({"geometry.base_angles": [1, 2]}, r"geometry\.base_angles is \[1, 2\]; give 6 values"),
         ({"x": [1, 2]}, r"x is \[1, 2\]; give one value"),
-        ({"x": None}, r"x is None: it must be a length"),
-        ({"x": True}, r"x is True: it must be a length"),
+        ({"x": None}, r"values\['x'\] is None"),
+        ({"x": True}, r"values\['x'\] is True"),
         ({"x": float("nan")}, r"x is nan: it is not a finite number"),
         ({"geometry.base_angles": ["1 mm"] * 6}, r'geometry\.base_angles\.0 is "1 mm": "mm" is not a unit of angle'),
         ({"base_angles": 1}, r"geometry\.base_angles holds 6 numbers; name one of them"),
