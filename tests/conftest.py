@@ -20,7 +20,9 @@ MARKERS = {
     "engines": ("test_validation", "test_mujoco"),
     "attack": ("test_attack",),
     "packaging": ("test_packaging",),
-    "step": ("test_step_file", "test_step_outlines", "test_step_solids"),
+    "numbers": ("test_derivatives", "test_scalars", "test_engine", "test_limited_poses"),
+    "reports": ("test_report",),
+    "step": ("test_glb", "test_step_file", "test_step_outlines", "test_step_solids"),
 }
 """Files of tests that plain `pytest` leaves out, because they take long; CI runs them with `-m slow`. A single test of
 another file that takes long carries one of these markers itself."""
