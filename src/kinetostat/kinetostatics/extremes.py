@@ -170,10 +170,10 @@ def _ball_signs(leg: Leg) -> Scalar:
 
 def _through_one_point(leg: Leg) -> list[tuple[Vector, list[Vector]]]:
     """Return centre and axes of each joint of a leg, base to platform; a joint has one name. Idle axes are left out."""
-    numbered = groupby(enumerate(leg.passive), key=lambda pair: pair[1].name)
-    rows = [list(row) for _, row in numbered]
-    return [
-        (row[0][1].point, [joint.axis for place, joint in row if place not in leg.idle])
-        for row in rows
-        if all(joint.point is not None for _, joint in row)
-    ]
+    centred = []
+    for _, row in groupby(enumerate(leg.passive), key=lambda pair: pair[1].name):
+        numbered = list(row)
+        centre = numbered[0][1].point
+        if centre is not None and all(joint.point is not None for _, joint in numbered):
+            centred.append((centre, [joint.axis for place, joint in numbered if place not in leg.idle]))
+    return centred
