@@ -109,7 +109,7 @@ def test_a_planar_machine_moves_in_its_plane_only():
     end = {"name": "end", "type": "fixed", "joins": ["crank", "platform"], "point": [0.5, 0, 0]}
     beam = {"links": {"crank": {"model": "beam", "section": "bar"}}}
     bar = {"bar": {"shape": "round", "diameter": "20 mm", "material": "steel"}}
-    found = analyze(arm([motor, end], {"x": 0.5}, leg=beam, sections=bar, space="planar"))
+    found = analyze(arm([motor, end], {"y": 0.0}, leg=beam, sections=bar, space="planar"))
     loaded = Loaded(found)
     compare(found, loaded)
     model = loaded.model

@@ -251,7 +251,7 @@ def test_nothing_to_resume_is_said(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     ("lost", "message"),
-    [("map.nc", "was removed from its study"), ("study.json", "is there already")],
+    [("map.nc", "was removed from its study"), ("study.json", "exists already")],
 )
 def test_a_folder_that_lost_a_file_is_refused(lost, message, question, undisturbed, tmp_path):
     folder = shutil.copytree(undisturbed, tmp_path / "study")
@@ -263,7 +263,7 @@ def test_a_folder_that_lost_a_file_is_refused(lost, message, question, undisturb
 def test_a_study_that_cannot_be_read_is_refused(question, undisturbed, tmp_path):
     folder = shutil.copytree(undisturbed, tmp_path / "study")
     (folder / "study.json").write_text("{")
-    with refused(r"study\.json\" cannot be read"):
+    with refused(r"study\.json. is damaged and cannot be read"):
         answer_into(question, folder, "map")
 
 
@@ -312,8 +312,8 @@ def test_a_large_map_of_two_dimensions_is_drawn_thinned(tmp_path, capsys):
     assert "thinned" in (tmp_path / "map.svg").read_text("utf-8")
     with xr.open_dataset(tmp_path / "map.nc") as whole:
         shown = result_file.thinned(tmp_path / "map.nc")
-        assert dict(shown.sizes) == {"pose.x": 300, "pose.z": 3}
-        xr.testing.assert_identical(shown, whole.isel({"pose.x": slice(None, None, 3)}).load())
+        assert dict(shown.sizes) == {"x": 300, "z": 3}
+        xr.testing.assert_identical(shown, whole.isel({"x": slice(None, None, 3)}).load())
 
 
 def test_six_dimensions_are_answered_and_seven_refused(capsys):
