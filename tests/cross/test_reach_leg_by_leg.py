@@ -100,12 +100,11 @@ def test_the_nearest_pose_is_on_the_border_and_no_sampled_one_is_nearer():
     assert apart < distances[inside].min() + 1e-3
 
 
+@pytest.mark.parametrize("z", [0.37, 0.49])
 @pytest.mark.parametrize("ball", [False, True], ids=["universal", "ball"])
-def test_a_workspace_is_that_of_the_closed_form_node_by_node(ball):
+def test_a_workspace_is_that_of_the_closed_form_node_by_node(ball, z):
     """Rods between two ball joints may spin; which axes stand for a ball joint is nothing that divides a workspace."""
-    lengths = {"base_radius": 0.3, "platform_radius": 0.12, "crank_length": 0.25, "rod_length": 0.35}
-    family = load_without_limits("hexapod-rus", [f"geometry.{name}={length}" for name, length in lengths.items()])
-    family = with_values(family, {"pose.z": 0.49})
+    family, _ = cranks(z)
     tables = document_of(family)
     for joint in (joint for leg in tables["legs"] for joint in leg["joints"] if ball and joint["type"] == "universal"):
         joint["type"] = "spherical"

@@ -159,7 +159,7 @@ def test_a_missing_engine_says_how_to_install_it(monkeypatch):
     monkeypatch.setattr(comparison, "find_spec", lambda _: None)
     assert engines() == {}
     for asked in (None, "pynite"):
-        with refused(r"Install it with .*exudyn"):
+        with refused(r"Install it with `.*(exudyn|PyNite|validate).*`"):
             validate(load("hexapod"), asked)
 
 

@@ -167,7 +167,7 @@ def test_our_units_are_what_pint_knows_under_these_names():
 
 @pytest.mark.parametrize(("si", "unit", "value"), [(si, *row) for si, rows in USUAL.items() for row in rows.items()])
 def test_usual_units_are_those_of_pint_to_the_last_bit(si, unit, value):
-    registry = pint.UnitRegistry(str(UNITS))
-    one, whole = (registry.Quantity(1.0, text).to_root_units() for text in (unit, si))
+    known = pint.UnitRegistry(str(UNITS))
+    one, whole = (known.Quantity(1.0, text).to_root_units() for text in (unit, si))
     assert one.units == whole.units
     assert one.magnitude / whole.magnitude == value

@@ -33,6 +33,8 @@ MOST_ITERATIONS = 60
 """Of Newton's method at the goal, where each halves the gap at worst."""
 MOST_DESCENTS = 60
 """Steps towards the least gap, where no way leads to the goal."""
+ASIDE = 1e-2
+"""Displacement of the unknowns from which these steps start, rad or in units of the machine's length."""
 
 
 def follow(problems: Problems, goal: Coordinates) -> tuple[Array, Numbers]:
@@ -151,7 +153,8 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
     Returns:
         The unknowns there, and whether that is shown to be a least gap which is not zero.
     """
-    best, shown = unknowns.copy(), np.zeros(len(unknowns), dtype=bool)
+    # The slope also vanishes where the gap is greatest, as at the end of a crank's stroke: the descent starts beside it.
+    best, shown = unknowns + ASIDE * np.cos(np.arange(problems.size)), np.zeros(len(unknowns), dtype=bool)
     damping, items = np.full(len(unknowns), 1e-2), np.arange(len(unknowns))
     left, rates = problems.gaps(best, goal)
     for _ in range(MOST_DESCENTS):

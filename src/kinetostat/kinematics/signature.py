@@ -6,14 +6,16 @@ mode. Nothing is solved here.
 Source: theory section 6.
 """
 
-from itertools import pairwise
-
 import numpy as np
 
 from kinetostat.kinematics.closing import Array
 from kinetostat.kinematics.leg_gaps import Coordinates, Mask, Problems, stays_in_plane
 from kinetostat.kinematics.ways import rows_of
-from kinetostat.tolerances import DEPENDENT, SAME_CENTRE
+from kinetostat.machine.leg import rows_about_one_point
+from kinetostat.tolerances import DEPENDENT
+
+AXES = 3
+"""Of a ball joint."""
 
 
 def same_mode(problems: Problems, unknowns: Array, goal: Coordinates) -> Mask:
@@ -47,16 +49,15 @@ def signs(problems: Problems, unknowns: Array, goal: Coordinates) -> Array:
         return np.zeros(len(rates))
     result = np.linalg.det(rates[:, rows])
     result = np.where(np.abs(result) > DEPENDENT, result, 0.0)
-    for first in _balls(problems):
-        result = result * np.linalg.det(rates[:, :3, first : first + 3])
+    for ball in _balls(problems):
+        result = result * np.linalg.det(rates[:, :3, ball])
     return np.asarray(np.sign(result))
 
 
-def _balls(problems: Problems) -> list[int]:
-    """Where three revolutes in a row have one centre at the home pose: the number of the first of them."""
+def _balls(problems: Problems) -> list[list[int]]:
+    """The numbers of three coordinates each that are the revolutes of a ball joint."""
     (part,) = problems.parts
     first = np.zeros(1, dtype=int)
     joints = [step.element.mover for step in part.build.steps(first, first)]
-    points = [None if joint.point is None else rows_of(joint.point, 1) for joint in joints]
-    near = [a is not None and b is not None and bool(np.linalg.norm(a - b) <= SAME_CENTRE) for a, b in pairwise(points)]
-    return [k for k, both in enumerate(pairwise(near)) if all(both)]
+    centres = [None if joint.point is None else rows_of(joint.point, 1)[0] for joint in joints]
+    return [list(row) for row in rows_about_one_point(centres) if len(row) == AXES]

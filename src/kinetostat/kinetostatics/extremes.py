@@ -7,13 +7,11 @@ Source: theory section 10; the aspect is theory (30).
 
 import math
 from collections.abc import Sequence
-from itertools import groupby
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller, sqrt, total, where
 from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.solve import handedness
 from kinetostat.algebra.symmetric import SIZE, Symmetric6, greatest_eigenvalue
-from kinetostat.algebra.vector import Vector
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
 from kinetostat.kinetostatics.response import Response, actuator_loads
 from kinetostat.machine.leg import Leg, comparable
@@ -158,22 +156,13 @@ def _ball_signs(leg: Leg) -> Scalar:
     idle spin. They may flip, with the strut where it was; so the strut itself stands for the third axis.
     """
     sign: Scalar = 1.0
-    joints = _through_one_point(leg)
-    for i, (centre, axes) in enumerate(joints):
+    joints = [[leg.passive[i] for i in row if i not in leg.idle] for row in leg.centred]
+    for i, joint in enumerate(joints):
         beside = [*joints[max(i - 1, 0) : i], *joints[i + 1 : i + 2]]
-        strut = next((centre - other for other, others in beside if len(others) == SPACE), None)
-        three = [*axes, strut] if len(axes) == SPACE - 1 and strut is not None else axes
-        if len(three) == SPACE:
-            sign = where(three[0].cross(three[1]).dot(three[2]) < 0.0, -sign, sign)
+        ball = next((other for other in beside if len(other) == SPACE), None)
+        axes = [revolute.axis for revolute in joint]
+        if len(axes) == SPACE - 1 and ball is not None:
+            axes.append(joint[0].point - ball[0].point)
+        if len(axes) == SPACE:
+            sign = where(axes[0].cross(axes[1]).dot(axes[2]) < 0.0, -sign, sign)
     return sign
-
-
-def _through_one_point(leg: Leg) -> list[tuple[Vector, list[Vector]]]:
-    """Return centre and axes of each joint of a leg, base to platform; a joint has one name. Idle axes are left out."""
-    centred = []
-    for _, row in groupby(enumerate(leg.passive), key=lambda pair: pair[1].name):
-        numbered = list(row)
-        centre = numbered[0][1].point
-        if centre is not None and all(joint.point is not None for _, joint in numbered):
-            centred.append((centre, [joint.axis for place, joint in numbered if place not in leg.idle]))
-    return centred

@@ -6,6 +6,7 @@ business (`catalogue`), what the screws do to the platform is that of `kinetosta
 Source: theory (1) and (2), eqs. 1-4. In the base frame.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -14,6 +15,7 @@ from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin, whe
 from kinetostat.algebra.screw import Twist, Wrench, force_along, pure_moment, rotation_about, translation_along
 from kinetostat.algebra.solve import complement
 from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector, rotation_along
+from kinetostat.tolerances import SAME_CENTRE
 
 UNSEEN = 1e-12
 """Share of the sizes of a wrench and a twist below which the work of one on the other is the rounding of zero."""
@@ -236,6 +238,22 @@ class LegScrews:
     singularity_margin: Scalar
 
 
+def rows_about_one_point(centres: Sequence[Sequence[float] | None]) -> tuple[tuple[int, ...], ...]:
+    """Return the numbers of joints in a row that turn about one point, two or more: universal and ball joints.
+
+    Args:
+        centres: of the joints of a leg in order, m; None for what does not turn about a point.
+    """
+    rows: list[list[int]] = []
+    before: Sequence[float] | None = None
+    for number, centre in enumerate(centres):
+        if centre is None or before is None or math.dist(before, centre) > SAME_CENTRE:
+            rows.append([])
+        rows[-1].append(number)
+        before = centre
+    return tuple(tuple(row) for row in rows if len(row) > 1)
+
+
 @dataclass(frozen=True)
 class Leg:
     """A serial chain from base to platform.
@@ -246,6 +264,8 @@ class Leg:
         lines: where it is known in closed form that the leg carries forces along these lines and nothing else.
         idle: which of its passive freedoms, counted from the base, depend on the others: the spin of a strut between
             two spherical joints, for instance. Irrelevant where `lines` are given.
+        centred: passive freedoms in a row that turn about one point, counted likewise: universal and ball joints, however
+            they are written. Only machines written leg by leg state them.
         number: of the actuated legs of a family, from 1, in the order of its fields; None for a leg that is not one of
             them, and in machines written leg by leg.
         short: what a drawing writes beside it; its name if empty.
@@ -255,6 +275,7 @@ class Leg:
     chain: tuple[Element, ...]
     lines: tuple[Line, ...] = ()
     idle: tuple[int, ...] = ()
+    centred: tuple[tuple[int, ...], ...] = ()
     number: int | None = None
     short: str = ""
 

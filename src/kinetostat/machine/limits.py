@@ -1,4 +1,4 @@
-"""The limits that a machine file may set in [limits]: one row each, with what it is compared with and how it is told.
+"""The limits that a machine file may set in [limits]: one row each, with what it is compared with and its wording.
 
 A row knows the parts of a machine, not how they are solved for: `kinematics.limits` places them and compares.
 

@@ -15,6 +15,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = MappingProxyType(
         "quantity": {"regularity": "singularity_margin", "side": "aspect"},
         "JSON key": {
             "order": "components",
+            "ridges_told": "ridges_text",
             "regularity": "singularity_margin",
             "side": "aspect",
         },

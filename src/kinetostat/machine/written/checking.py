@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.vector import Vector
-from kinetostat.machine.leg import Joint
+from kinetostat.machine.leg import Joint, rows_about_one_point
 from kinetostat.machine.machine import Plane
 from kinetostat.machine.written.closed_form import closed_form
 from kinetostat.machine.written.family import chains, place
@@ -92,7 +93,7 @@ def _check_link(
 
 
 def completed(plan: Plan, tables: Mapping[str, Any]) -> Plan:
-    """The plan with what its numbers tell of each leg: a closed form if there is one, and its idle freedoms.
+    """The plan with what its numbers tell of each leg: its closed form, idle freedoms, and joints about one point.
 
     Freedoms are idle that depend on others by form: as the file writes them, up to round-off. Near such a form a leg is
     nearly locked, and its margin falls to zero with the angle that is left. The home pose may be special, so that
@@ -106,8 +107,15 @@ def completed(plan: Plan, tables: Mapping[str, Any]) -> Plan:
         placed, _ = place(steps, remaining)
         freedoms = [joint for element in placed for joint in element.freedoms]
         idle = _dependent(freedoms, plan.planar, home.home.translation, float(home.length))
-        legs.append(replace(leg, idle=idle, inverse=closed_form(leg.name, steps)))
+        centred = rows_about_one_point([_centre(joint) for joint in freedoms])
+        legs.append(replace(leg, idle=idle, centred=centred, inverse=closed_form(leg.name, steps)))
     return replace(plan, legs=tuple(legs))
+
+
+def _centre(joint: Joint) -> tuple[float, ...] | None:
+    """Return the point about which a joint with numbers turns, m; None of a slide or a screw."""
+    turns = joint.point is not None and is_zero(joint.pitch)
+    return tuple(map(float, joint.point.components())) if turns else None
 
 
 def _dependent(freedoms: Sequence[Joint], planar: bool, reference: Vector, length: float) -> tuple[int, ...]:

@@ -50,7 +50,8 @@ def configure(plan: Plan, joints: Sequence[Scalar | Turn], **tables: Any) -> Con
     home = chains(plan, **tables)
     remaining = iter(joints)
     placed = [place(steps, remaining) for steps in home.legs]
-    legs = tuple(Leg(leg.name, tuple(chain), (), leg.idle) for leg, (chain, _) in zip(plan.legs, placed, strict=True))
+    ends = zip(plan.legs, placed, strict=True)
+    legs = tuple(Leg(leg.name, tuple(chain), (), leg.idle, leg.centred) for leg, (chain, _) in ends)
     return Configuration(placed[0][1] @ home.home, legs, (), home.length, Plane() if plan.planar else None)
 
 

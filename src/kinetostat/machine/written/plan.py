@@ -99,7 +99,7 @@ class LegPlan(Immutable):
     Attributes:
         name: unique within the machine.
         joints, links: of it.
-        idle: see `leg.Leg`.
+        idle, centred: see `leg.Leg`.
         inverse: closed form of its joint coordinates, if it has one.
         written: name of the leg of the file that it is a copy of; empty if it is not a copy.
         copies: what the file says about that leg's copies.
@@ -110,6 +110,7 @@ class LegPlan(Immutable):
     joints: tuple[JointPlan, ...]
     links: Mapping[str, LinkPlan]
     idle: tuple[int, ...] = ()
+    centred: tuple[tuple[int, ...], ...] = ()
     inverse: Inverse | None = None
     written: str = ""
     copies: Copies | None = None

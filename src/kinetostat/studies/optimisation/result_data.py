@@ -71,7 +71,7 @@ def as_json(result: Result) -> dict[str, Any]:
                 {"variables": list(r.names), "from": list(r.start), "to": list(r.end), "relative_change": r.change}
                 for r in result.ridges
             ],
-            "ridges_told": ridge_sentences(result.ridges, problem) or [result.no_ridges],
+            "ridges_text": ridge_sentences(result.ridges, problem) or [result.no_ridges],
             "robustness": _scatter(result.robustness) if result.robustness else None,
             "convergence": {
                 key: [step.get(key) for step in result.log.steps] for key in ("designs", "feasible", "best", "mean")

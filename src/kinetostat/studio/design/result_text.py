@@ -105,7 +105,7 @@ def _remarks(result: dict[str, Any]) -> list[str]:
             name = each["name"].removeprefix("compliance_")
             gain = f"{each['gain']:.2g}"
             remarks.append(f"In the direction {name}, the best design keeps only {gain} of the initial stiffness.")
-    return remarks + (result["ridges_told"] if result["front"] is None else [])
+    return remarks + (result["ridges_text"] if result["front"] is None else [])
 
 
 def _exact(value: float | None, unit: str = "", digits: int = EXACT) -> str:
