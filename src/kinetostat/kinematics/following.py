@@ -153,7 +153,7 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
     Returns:
         The unknowns there, and whether that is shown to be a least gap which is not zero.
     """
-    # The slope also vanishes where the gap is greatest, as at the end of a crank's stroke: the descent starts beside it.
+    # The slope vanishes where the gap is greatest too, as at the end of a crank's stroke: the descent starts beside.
     best, shown = unknowns + ASIDE * np.cos(np.arange(problems.size)), np.zeros(len(unknowns), dtype=bool)
     damping, items = np.full(len(unknowns), 1e-2), np.arange(len(unknowns))
     left, rates = problems.gaps(best, goal)

@@ -264,8 +264,8 @@ class Leg:
         lines: where it is known in closed form that the leg carries forces along these lines and nothing else.
         idle: which of its passive freedoms, counted from the base, depend on the others: the spin of a strut between
             two spherical joints, for instance. Irrelevant where `lines` are given.
-        centred: passive freedoms in a row that turn about one point, counted likewise: universal and ball joints, however
-            they are written. Only machines written leg by leg state them.
+        centred: passive freedoms in a row that turn about one point, counted likewise: universal and ball joints,
+            however they are written. Only machines written leg by leg state them.
         number: of the actuated legs of a family, from 1, in the order of its fields; None for a leg that is not one of
             them, and in machines written leg by leg.
         short: what a drawing writes beside it; its name if empty.
