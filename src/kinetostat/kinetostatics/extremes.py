@@ -156,13 +156,12 @@ def _ball_signs(leg: Leg) -> Scalar:
     idle spin. They may flip, with the strut where it was; so the strut itself stands for the third axis.
     """
     sign: Scalar = 1.0
-    joints = [[leg.passive[i] for i in row if i not in leg.idle] for row in leg.centred]
+    rows = ([leg.passive[i] for i in row if i not in leg.idle] for row in leg.centred)
+    joints = [row for row in rows if row]
     for i, joint in enumerate(joints):
-        beside = [*joints[max(i - 1, 0) : i], *joints[i + 1 : i + 2]]
-        ball = next((other for other in beside if len(other) == SPACE), None)
-        axes = [revolute.axis for revolute in joint]
-        if len(axes) == SPACE - 1 and ball is not None:
-            axes.append(joint[0].point - ball[0].point)
+        balls = [other for other in (*joints[max(i - 1, 0) : i], *joints[i + 1 : i + 2]) if len(other) == SPACE]
+        strut = [here - there for ball in balls[:1] for here in joint[0].path for there in ball[0].path]
+        axes = [*(revolute.axis for revolute in joint), *strut][:SPACE]
         if len(axes) == SPACE:
             sign = where(axes[0].cross(axes[1]).dot(axes[2]) < 0.0, -sign, sign)
     return sign

@@ -114,8 +114,9 @@ def completed(plan: Plan, tables: Mapping[str, Any]) -> Plan:
 
 def _centre(joint: Joint) -> tuple[float, ...] | None:
     """Return the point about which a joint with numbers turns, m; None of a slide or a screw."""
-    turns = joint.point is not None and is_zero(joint.pitch)
-    return tuple(map(float, joint.point.components())) if turns else None
+    if joint.point is None or not is_zero(joint.pitch):
+        return None
+    return tuple(map(float, joint.point.components()))
 
 
 def _dependent(freedoms: Sequence[Joint], planar: bool, reference: Vector, length: float) -> tuple[int, ...]:
