@@ -42,6 +42,8 @@ are lost there."""
 NEAREST_SETTLED = 1e-7
 """Slope of the squared distance from a pose, as a share of the distance, at which the nearest pose is reached: it is
 written in five digits."""
+NEAREST_GAIN = 1e-10
+"""Share of the distance by which a step must come nearer to be worth another: the place then changes by its root."""
 SURELY_APART = 1e-9
 """Share of the machine's length by which a leg must miss its platform, so that this shows it to be out of reach."""
 SAME_CENTRE = 1e-9

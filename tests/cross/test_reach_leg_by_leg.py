@@ -5,6 +5,7 @@ import pytest
 
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinematics.leg_gaps import Problems
 from kinetostat.kinematics.nearest import nearest_pose
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
@@ -98,6 +99,15 @@ def test_the_nearest_pose_is_on_the_border_and_no_sampled_one_is_nearer():
     inside = np.asarray(solve_joints(with_values(machine, columns)).status) == Status.OK
     distances = np.hypot(np.hypot(columns["pose.x"] - 3.0, columns["pose.y"] - 0.5), columns["pose.z"] - 0.5)
     assert apart < distances[inside].min() + 1e-3
+
+
+def test_the_nearest_pose_takes_few_evaluations_of_the_legs(monkeypatch):
+    """Each takes some 2 ms: a message is to be there in 0.3 s."""
+    calls, gaps = [], Problems.gaps
+    monkeypatch.setattr(Problems, "gaps", lambda *arguments: calls.append(1) or gaps(*arguments))
+    for far in ({"pose.x": 3.0}, {"pose.x": 3.0, "pose.y": -2.0}):
+        nearest_pose(with_values(load_without_limits("tripteron"), far))
+    assert len(calls) < 130
 
 
 @pytest.mark.parametrize("z", [0.37, 0.49])

@@ -18,7 +18,7 @@ from kinetostat.tolerances import CLOSED, LEAST_GAP_SETTLED, NEWTON_SETTLED
 
 MOST_TRIALS = 80
 """Steps that are tried on one way, accepted or not."""
-SHORTEST = 1e-3
+SHORTEST = 1e-4
 """Share of the way below which a step is too short to go on: the way is blocked."""
 FURTHEST = 1.5
 """Change of an unknown in one step, rad or in units of the machine's length, up to which it is tried."""
@@ -51,14 +51,17 @@ def follow(problems: Problems, goal: Coordinates) -> tuple[Array, Numbers]:
     count = len(problems.poses)
     unknowns, status = np.zeros((count, problems.size)), np.full(count, int(Status.NOT_CONVERGED))
     left = np.arange(count)
-    for number, way in enumerate(ways(problems)):
+    for number, (way, differs) in enumerate(ways(problems, goal)):
         if not left.size:
             return unknowns, status
-        part, there = problems.take(left), some(goal, left)
+        tried = left[differs[left]]
+        if not tried.size:
+            continue
+        part, there = problems.take(tried), some(goal, tried)
         reached, solved = _by_way(part, way(part, there), there)
-        taken = solved if number else np.ones(len(left), dtype=bool)  # where the straight way ends serves if all fail
-        unknowns[left[taken]], status[left[solved]] = reached[taken], int(Status.OK)
-        left = left[~solved]
+        taken = solved if number else np.ones(len(tried), dtype=bool)  # where the straight way ends serves if all fail
+        unknowns[tried[taken]], status[tried[solved]] = reached[taken], int(Status.OK)
+        left = left[status[left] != Status.OK]
     part, there = problems.take(left), some(goal, left)
     unknowns[left], shown = _least_gap(part, unknowns[left], there)
     status[left[shown]] = int(Status.OUT_OF_REACH)

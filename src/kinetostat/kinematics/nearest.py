@@ -10,10 +10,14 @@ import numpy as np
 from kinetostat.kinematics.closing import ANGLES, POINT, Array
 from kinetostat.kinematics.leg_gaps import Numbers, Problems, free_coordinates, least_norm, problems_of
 from kinetostat.machine.machine import Machine
-from kinetostat.tolerances import CLOSED, DEPENDENT, NEAREST_SETTLED, NO_COORDINATE
+from kinetostat.tolerances import CLOSED, DEPENDENT, NEAREST_GAIN, NEAREST_SETTLED, NO_COORDINATE
 
-MOST_STEPS, MOST_TRIALS, MOST_CORRECTIONS = 30, 12, 8
-"""Towards the nearest pose; dampings of a step; and of Newton's method, which closes the legs again after it."""
+MOST_STEPS, MOST_CORRECTIONS = 30, 8
+"""Towards the nearest pose; and of Newton's method, which closes the legs again after each of them."""
+DAMPINGS = 5.0 ** np.arange(-3, 6)
+"""Dampings of a step that are tried in one batch, in units of the one that led nearest in the step before."""
+CONTRACTION = 0.25
+"""Share of a gap that a correction may leave; a step from which it leaves more was too long."""
 
 
 def nearest_pose(machine: Machine) -> dict[str, float]:
@@ -54,44 +58,64 @@ class _Search:
     goal: Array
 
     def nearest(self) -> Array:
-        """Go on from the home pose until no way that the legs allow leads nearer."""
-        best, damping = np.zeros(self.problems.size), 1e-3
+        """Go on from the home pose until no way that the legs allow leads nearer by more than the figures show."""
+        best, last, damping = np.zeros(self.problems.size), np.zeros(self.problems.size), 1e-3
+        rates = self.problems.gaps(best[None], self.home)[1][0]
         for _ in range(MOST_STEPS):
-            left = self.goal - best[self.rows]
-            ways = self._ways(best)
-            slope = ways[self.rows].T @ left
-            if np.linalg.norm(slope) <= NEAREST_SETTLED * np.linalg.norm(left):
+            left, ways = self.goal - best[self.rows], _ways(rates)
+            far, slope = np.linalg.norm(left), ways[self.rows].T @ left
+            if np.linalg.norm(slope) <= NEAREST_SETTLED * far:
                 break
-            nearer, damping = self._nearer(best, ways, damping)
-            gain = np.linalg.norm(nearer - best)
-            best = nearer
-            if gain <= NEAREST_SETTLED:
+            tried = damping * DAMPINGS
+            steps = self._steps(ways, slope, tried)
+            # Along a curved border of the reach each step is a constant share of the one before: go on along that, too.
+            ends, rates_there = self._closed(best + np.concatenate([steps, steps + ways @ (ways.T @ last)]))
+            apart = np.linalg.norm(self.goal - ends[:, self.rows], axis=1)
+            least = int(np.argmin(np.where(np.isfinite(apart), apart, np.inf)))
+            gain = far - apart[least]
+            if not gain > 0.0:
+                damping = tried[-1]
+                continue
+            last, best, rates, damping = ends[least] - best, ends[least], rates_there[least], tried[least % len(tried)]
+            if gain <= NEAREST_GAIN * far:
                 break
         return best
 
-    def _ways(self, unknowns: Array) -> Array:
-        """Directions in which the legs stay closed, to first order [unknowns x directions]."""
-        rates = self.problems.gaps(unknowns[None], self.home)[1][0]
-        _, sizes, directions = np.linalg.svd(rates)
-        rank = int((sizes > DEPENDENT * sizes.max(initial=0.0)).sum())
-        return np.asarray(directions[rank:].T)
+    def _steps(self, ways: Array, slope: Array, dampings: Array) -> Array:
+        """Steps of Levenberg's and Marquardt's method along the ways that the legs allow [dampings x unknowns]."""
+        slopes = ways[self.rows]
+        squares = slopes.T @ slopes + dampings[:, None, None] * np.eye(len(slope))
+        amounts = np.linalg.solve(squares, np.broadcast_to(slope[:, None], (len(dampings), len(slope), 1)))
+        return np.asarray(amounts[:, :, 0] @ ways.T)
 
-    def _nearer(self, unknowns: Array, ways: Array, damping: float) -> tuple[Array, float]:
-        """Take the longest step that leads nearer to the goal; return its end and the damping for the next one."""
-        left, slopes = self.goal - unknowns[self.rows], ways[self.rows]
-        for _ in range(MOST_TRIALS):
-            square = slopes.T @ slopes + damping * np.eye(slopes.shape[1])
-            there = self._closed(unknowns + ways @ np.linalg.solve(square, slopes.T @ left))
-            if np.linalg.norm(self.goal - there[self.rows]) < np.linalg.norm(left):
-                return there, 0.2 * damping
-            damping *= 5.0
-        return unknowns, damping
+    def _closed(self, unknowns: Array) -> tuple[Array, Array]:
+        """Close the legs again, wherever that takes the platform.
 
-    def _closed(self, unknowns: Array) -> Array:
-        """Close the legs again, wherever that takes the platform; NaN where they do not close."""
+        Args:
+            unknowns: near closed legs [n x unknowns].
+
+        Returns:
+            Unknowns that close them, NaN where that fails, and the rates of the gaps there.
+        """
+        problems = self.problems.take(np.zeros(len(unknowns), dtype=int))
+        last, active = np.full(len(unknowns), np.inf), np.ones(len(unknowns), dtype=bool)
         for _ in range(MOST_CORRECTIONS):
-            left, rates = self.problems.gaps(unknowns[None], self.home)
-            if np.max(np.abs(left)) <= CLOSED:
-                return unknowns
-            unknowns = unknowns + least_norm(rates, left)[0]
-        return np.full_like(unknowns, np.nan)
+            left, rates = problems.gaps(unknowns, self.home)
+            gap = np.max(np.abs(left), axis=1)
+            active = (gap > CLOSED) & (gap < CONTRACTION * last)
+            if not active.any():
+                break
+            unknowns = unknowns + np.where(active[:, None], least_norm(rates, left), 0.0)
+            last = gap
+        return np.where((gap <= CLOSED)[:, None], unknowns, np.nan), rates
+
+
+def _ways(rates: Array) -> Array:
+    """Directions in which the legs stay closed, to first order [unknowns x directions].
+
+    Args:
+        rates: of the gaps [rows x unknowns].
+    """
+    _, sizes, directions = np.linalg.svd(rates)
+    rank = int((sizes > DEPENDENT * sizes.max(initial=0.0)).sum())
+    return np.asarray(directions[rank:].T)

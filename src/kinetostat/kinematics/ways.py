@@ -7,14 +7,16 @@ Source: theory section 6.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import reduce
+from typing import Any
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.closing import ANGLES, POINT, Array, placement_of
-from kinetostat.kinematics.leg_gaps import Coordinates, Numbers, Problems
+from kinetostat.kinematics.leg_gaps import Coordinates, Mask, Numbers, Problems
 from kinetostat.machine.column import column, plain
 from kinetostat.machine.leg import Joint
 
@@ -27,15 +29,26 @@ def some(coordinates: Coordinates, chosen: Numbers) -> Coordinates:
     return {name: value if isinstance(value, float) else value[chosen] for name, value in coordinates.items()}
 
 
-def ways(problems: Problems) -> Iterator[Callable[[Problems, Coordinates], Way]]:
-    """Name the ways in the order in which they are tried, each a function of problems and their goals."""
-    yield straight
+def ways(problems: Problems, goal: Coordinates) -> Iterator[tuple[Callable[[Problems, Coordinates], Way], Mask]]:
+    """Name the ways in the order in which they are tried, each a function of problems and their goals.
+
+    With each comes in which of the problems it differs from the straight one: angles first or last where both angles
+    and the point change, angles as they are given where one exceeds half a turn.
+    """
+    everywhere = np.ones(len(problems.poses), dtype=bool)
+    yield straight, everywhere
     if not problems.free:
-        yield around_the_base
-        yield about_the_first_axis
-    yield turning_last
-    yield turning_first
-    yield the_long_way_round
+        yield around_the_base, everywhere
+        yield about_the_first_axis, everywhere
+    start = _start(problems, goal)
+    moves, turns = (_any(goal[name] != start[name] for name in names) & everywhere for names in (POINT, ANGLES))
+    yield turning_last, moves & turns
+    yield turning_first, moves & turns
+    yield the_long_way_round, _any(np.abs(goal[name]) > math.pi for name in ANGLES) & everywhere
+
+
+def _any(conditions: Iterable[Any]) -> Mask:
+    return np.asarray(reduce(np.logical_or, conditions))
 
 
 def _start(problems: Problems, goal: Coordinates) -> Coordinates:
