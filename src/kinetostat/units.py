@@ -233,6 +233,8 @@ def _finite(number: float, wanted: Kind) -> float:
 
 
 def _allowed(wanted: Kind) -> str:
+    if not wanted.unit:
+        return f"a number without a unit, e.g. {wanted.example}"
     rigid = f', or "{RIGID}"' if wanted.stiff else ""
     article = "an" if wanted.name[0] in "aeiou" else "a"
     bare = f"a bare number in {wanted.bare or wanted.unit}"

@@ -100,6 +100,45 @@ def test_poses_of_evaluate_may_be_quaternions_and_matrices():
     assert by_tilt.C.values[1] == pytest.approx(np.array(analyze(machine.with_values(pitch="2 deg")).compliance))
 
 
+def test_columns_of_a_table_hold_the_parts_of_a_form(tmp_path):
+    machine = load_without_limits("hexapod")
+    turns = [Rotation.from_rotvec([0.02 * i, -0.01 * i, 0.03]) for i in range(4)]
+    rows = {
+        "quaternion": [("w", "x", "y", "z"), [forms(turn)["quaternion"] for turn in turns]],
+        "rotation": [[f"{r}.{c}" for r in "123" for c in "123"], [turn.as_matrix().ravel() for turn in turns]],
+    }
+    file = tmp_path / "turns.csv"
+    for form, (parts, numbers) in rows.items():
+        lines = [", ".join(f"{form}.{part}" for part in parts), *(", ".join(map(repr, map(float, n))) for n in numbers)]
+        file.write_text("\n".join(lines))
+        read = evaluate(machine, file)
+        for name, angle in zip(ANGLES, np.array([turn.as_euler("xyz") for turn in turns]).T, strict=True):
+            assert read[name].values == pytest.approx(angle, abs=1e-12)
+    file.write_text("tilt.azimuth [deg]; tilt_angle\n90; 2 deg\n0; 0,01")
+    read = evaluate(machine, str(file))
+    assert read["roll"].values == pytest.approx([-math.radians(2), 0.0], abs=1e-15)
+    assert read["pitch"].values == pytest.approx([0.0, 0.01], abs=1e-15)
+
+
+COLUMNS_REFUSED = {
+    "no quaternion.z; give a column for each of quaternion.w": {
+        "quaternion.w": 1,
+        "quaternion.x": 0,
+        "quaternion.y": 0,
+    },
+    r"poses\['quaternion.x'\]\[0\] is \"a\": it must be a number": {"quaternion.w": 1, "quaternion.x": "a"},
+    "quaternion.w is given by two columns": {"quaternion.w": 1, "pose.quaternion.w": 1},
+    "tilt and roll both say": {"tilt.azimuth": 0, "tilt.angle": 0, "roll": 0},
+    r"several lengths \(1, 2, 3\)": {"tilt": {"azimuth": 0, "angle": [0, 0], "torsion": [0, 0, 0]}},
+}
+
+
+@pytest.mark.parametrize("reason", COLUMNS_REFUSED)
+def test_columns_that_are_no_orientation_are_refused(reason):
+    with refused(reason):
+        evaluate(load_without_limits("hexapod"), COLUMNS_REFUSED[reason])
+
+
 REFUSED = {
     "length 1.41421": {"quaternion": [1, 0, 0, 1]},
     "mirror image": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]},

@@ -29,13 +29,48 @@ FORMS = {
     '"10 deg", torsion = "0 deg" }',
 }
 """Ways to write an orientation beside roll, pitch and yaw, by the name that files have for them."""
+PARTS = {
+    "quaternion": ("w", "x", "y", "z"),
+    "rotation": tuple(f"{row}.{column}" for row in (1, 2, 3) for column in (1, 2, 3)),
+    "tilt": TILT,
+}
+"""The numbers of each form in order, by the names that they have as columns of a table: "quaternion.w"."""
 ANGLE = Quantity("angle", "an angle of an orientation")
+PURE = Quantity("direction", "a number of an orientation")
 
 
 def form_of(name: str) -> str:
     """Return the form that a path leads to or into, "pose.tilt.angle" or "quaternion"; empty if it leads to none."""
     head = _bare(name).partition(".")[0]
     return head if head in FORMS else ""
+
+
+def part_of(name: object) -> tuple[str, str]:
+    """Return form and part that a column of a table stands for, ("tilt", "angle"); two empty texts if it is neither."""
+    form, _, part = _bare(str(name)).replace("_", ".").partition(".")
+    return (form, part) if part in PARTS.get(form, ()) else ("", "")
+
+
+def from_parts(form: str, parts: Mapping[str, Array]) -> Any:
+    """Put the columns of a table together: orientations as `angles_of` takes them.
+
+    Args:
+        form: a key of `PARTS`.
+        parts: values of each of its parts [n], or one value for all.
+
+    Raises:
+        InputError: a part has no column (only the torsion of a tilt may be left out), or they differ in length.
+    """
+    missing = [part for part in PARTS[form] if part not in parts and part != "torsion"]
+    if missing:
+        raise InputError(
+            f"the poses have a column {form}.{next(iter(parts))}, but no {form}.{missing[0]}; give a column for each of "
+            f"{', '.join(f'{form}.{part}' for part in PARTS[form])}."
+        )
+    if form == "tilt":
+        return parts
+    columns = np.stack(_together([parts[part] for part in PARTS[form]], form), axis=1)
+    return columns.reshape(-1, 3, 3) if form == "rotation" else columns
 
 
 def angles_of(form: str, value: object, where: str) -> dict[str, Array]:
@@ -106,8 +141,19 @@ def _of_tilts(value: object, where: str) -> Array:
     if not isinstance(value, Mapping) or not {"azimuth", "angle"} <= value.keys() <= set(TILT):
         raise InputError(f"{where} is {shorten(value)}; give {FORMS['tilt']} (torsion may be left out: 0).")
     given = {"torsion": 0.0, **value}
-    azimuth, angle, torsion = np.broadcast_arrays(*(_angle_values(given[name], f"{where}.{name}") for name in TILT))
+    azimuth, angle, torsion = _together([_angle_values(given[name], f"{where}.{name}") for name in TILT], where)
     return _about_z(azimuth) @ _about_y(angle) @ _about_z(torsion - azimuth)
+
+
+def _together(arrays: Sequence[Array], where: str) -> Sequence[Array]:
+    """Arrays of one length from arrays [n] and [1]."""
+    try:
+        return np.broadcast_arrays(*arrays)
+    except ValueError:
+        lengths = ", ".join(str(len(array)) for array in arrays)
+        raise InputError(
+            f"{where} has parts of several lengths ({lengths}); give each one value for each pose."
+        ) from None
 
 
 def _angle_values(value: Any, where: str) -> Array:

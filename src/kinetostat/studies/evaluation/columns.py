@@ -8,9 +8,10 @@ import numpy as np
 
 from kinetostat.engine.points import Array
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.orientation import ANGLE, ANGLES, PURE, angles_of, from_parts, numbers_for, part_of
 from kinetostat.machine.parameters import Parameter, find
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.spec.fields import Quantity
+from kinetostat.spec.fields import Quantity, quantities
 from kinetostat.units import UnitError, parse
 
 MOST_POSES = 5_000_000
@@ -69,7 +70,8 @@ def read_columns(
 
     Args:
         machine: whose fields they are.
-        columns: all of one length, or of length one.
+        columns: all of one length, or of length one. Orientations may be columns of a quaternion, a rotation matrix or
+            a tilt, as `quaternion.w`; they become roll, pitch and yaw.
         where: says in messages where a value stands.
         labels: further columns of the poses.
 
@@ -79,6 +81,7 @@ def read_columns(
     """
     if not columns:
         raise InputError("poses has no columns; name the field that each column holds, e.g. x.")
+    columns = _with_angles(machine, columns, where)
     fields = [_field(machine, column.name) for column in columns]
     given = [leaf for field in fields for leaf in field.leaves]
     for leaf in given:
@@ -98,6 +101,25 @@ def read_columns(
             f"there are {count:,} poses, and at most {MOST_POSES:,} are evaluated at once; evaluate them in parts."
         )
     return PoseColumns(tuple(fields), tuple(np.broadcast_to(array, count) for array in values), labels or {})
+
+
+def _with_angles(machine: Machine, columns: Sequence[Column], where: Where) -> Sequence[Column]:
+    """Return the columns with roll, pitch and yaw in the place of those of a quaternion, a matrix or a tilt."""
+    parts: dict[str, dict[str, Array]] = {}
+    others = []
+    for column in columns:
+        form, part = part_of(column.name)
+        if not form:
+            others.append(column)
+            continue
+        if part in parts.setdefault(form, {}):
+            raise InputError(f"{form}.{part} is given by two columns of the poses; remove one of them.")
+        parts[form][part] = _values(column, ANGLE if form == "tilt" else PURE, where)
+    if not parts:
+        return columns
+    given = {column.name: column for column in others} | {form: from_parts(form, parts[form]) for form in parts}
+    named = numbers_for(quantities(machine.family.tables["pose"]), given, angles_of)
+    return [*others, *(Column(name, named[name]) for name in ANGLES)]
 
 
 def _field(machine: Machine, name: object) -> Parameter:
