@@ -16,7 +16,7 @@ from pydantic import TypeAdapter
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.machine import pickling as _pickling  # noqa: F401  # machines that are loaded can be pickled
-from kinetostat.machine.catalogue import families, register_installed
+from kinetostat.machine.catalogue import families, family_named
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.limits import Parts, check_limits
 from kinetostat.machine.machine import Family, Machine, Written
@@ -115,7 +115,7 @@ def _whole_path(document: Document, name: str) -> str:
         return f"{POSE}{name}"
     if kind == NAME:
         return f"{POSE}{name}" if name in (*SPATIAL_POSE, *PLANAR_POSE) else name
-    family = families().get(kind) if isinstance(kind, str) else None
+    family = family_named(kind) if isinstance(kind, str) else None
     if family is None or head in {*KEYS, *document, *(table.partition(".")[0] for table in family.every_table)}:
         return name
     try:
@@ -204,12 +204,10 @@ def _counts(family: Family) -> dict[str, int]:
 
 
 def _family(name: object, origin: str) -> Family:
-    if isinstance(name, str) and name not in families():
-        register_installed()
-    known_families = families()
-    if isinstance(name, str) and name in known_families:
-        return known_families[name]
-    known = [*known_families, NAME]
+    family = family_named(name) if isinstance(name, str) else None
+    if family is not None:
+        return family
+    known = [*families(), NAME]
     if name is None:
         raise InputError(f'"{origin}": family is missing; add family = "..." with one of: {", ".join(known)}.')
     near = difflib.get_close_matches(str(name), known, 1)

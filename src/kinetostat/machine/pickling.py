@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any
 
-from kinetostat.machine.catalogue import families, register_installed
+from kinetostat.machine.catalogue import family_named
 from kinetostat.machine.machine import Family, Machine
 from kinetostat.spec.errors import InputError
 
@@ -27,7 +27,7 @@ def _machine(content: Mapping[str, Any]) -> Machine:
 def _of_family(family: Family) -> tuple[Any, ...]:
     if family.recipe is not None:
         return _made, family.recipe
-    if families().get(family.name) is not family:
+    if family_named(family.name) is not family:
         raise InputError(f'family "{family.name}" cannot be pickled before it is registered; call register(family).')
     return _named, (family.name,)
 
@@ -39,11 +39,10 @@ def _made(recipe: Callable[..., Family], given: tuple[Any, ...]) -> Family:
 
 def _named(name: str) -> Family:
     """Return the family of a name."""
-    if name not in families():
-        register_installed()
-    if name not in families():
+    family = family_named(name)
+    if family is None:
         raise InputError(f'family "{name}" is not known in this program; register it before its machines are read.')
-    return families()[name]
+    return family
 
 
 copyreg.pickle(Machine, _of_machine)

@@ -19,7 +19,7 @@ MOST_LISTED = 10_000
 class Requirement(BaseModel):
     """What must hold, and where: at the pose of the file unless `over` or `poses` is given."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     demand: Annotated[list[str], BeforeValidator(lambda given: [given] if isinstance(given, str) else given)] = Field(
         description='conditions that must all hold, e.g. "free_stiffness_z > 50 N/um"', min_length=1, max_length=50
@@ -39,7 +39,7 @@ Requirements: TypeAlias = dict[
     Annotated[str, Field(min_length=1, max_length=80)], Annotated[Requirement, BeforeValidator(_whole)]
 ]
 """Requirements by the names that people give them."""
-_READER: TypeAdapter[Requirements] = TypeAdapter(Requirements)
+_READER: TypeAdapter[Requirements] = TypeAdapter(Requirements, config=ConfigDict(defer_build=True))
 HOW = (
     'write NAME = "free_stiffness_z > 50 N/um", or NAME = { demand = "...", over = ["x=-2 cm:2 cm:11"] } for a box, or '
     'NAME = { demand = "...", poses = [{ x = "1 cm" }, { x = "2 cm" }] } for a list of poses'

@@ -29,7 +29,7 @@ OVER = "worst, mean or percentile P"
 class Table(BaseModel):
     """A table of a study file: refuses keys that it does not have."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False, defer_build=True)
 
 
 class VariableTable(Table):

@@ -4,7 +4,7 @@ import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -14,7 +14,6 @@ from kinetostat.machine.loading import kinds_of_machine
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import doubts, parameters, values
 from kinetostat.spec.fields import Quantity
-from kinetostat.spec.study import StudyFile
 from kinetostat.units import KINDS
 from kinetostat.views.fitted_table import FittedTable
 
@@ -38,7 +37,7 @@ def print_machines(console: Console, bundled: Sequence[Machine], names: Sequence
     console.print(table)
 
 
-def print_studies(console: Console, studies: Mapping[str, StudyFile]) -> None:
+def print_studies(console: Console, studies: Mapping[str, "StudyFile"]) -> None:
     """The bundled studies by name."""
     table = text_table("Bundled studies (kinetostat optimize STUDY)", "name", "study", "machine")
     for name, study in studies.items():

@@ -21,10 +21,32 @@ def families() -> dict[str, Family]:
     return dict(sorted({**_of_this_package(), **_REGISTERED}.items()))
 
 
-@cache
+def family_named(name: str) -> Family | None:
+    """Return the family of a name, or None if there is none; of this package, only its own module is imported.
+
+    A module's name begins the names of its families. If no module's does, all are looked through, and then those that
+    installed packages register.
+    """
+    for module in sorted(_modules(), key=lambda module: not name.startswith(module.replace("_", "-"))):
+        if name in _families_in(module):
+            return _families_in(module)[name]
+    if name not in _REGISTERED:
+        register_installed()
+    return _REGISTERED.get(name)
+
+
 def _of_this_package() -> dict[str, Family]:
-    modules = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
-    return {value.name: value for module in modules for value in vars(module).values() if isinstance(value, Family)}
+    return {name: family for module in _modules() for name, family in _families_in(module).items()}
+
+
+def _modules() -> list[str]:
+    return [module.name for module in pkgutil.iter_modules(__path__)]
+
+
+@cache
+def _families_in(module: str) -> dict[str, Family]:
+    content = vars(importlib.import_module(f"{__name__}.{module}")).values()
+    return {value.name: value for value in content if isinstance(value, Family)}
 
 
 @checked
