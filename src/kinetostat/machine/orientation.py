@@ -64,8 +64,8 @@ def from_parts(form: str, parts: Mapping[str, Array]) -> Any:
     missing = [part for part in PARTS[form] if part not in parts and part != "torsion"]
     if missing:
         raise InputError(
-            f"the poses have a column {form}.{next(iter(parts))}, but no {form}.{missing[0]}; give a column for each of "
-            f"{', '.join(f'{form}.{part}' for part in PARTS[form])}."
+            f"the poses have a column {form}.{next(iter(parts))}, but no {form}.{missing[0]}; give a column for each "
+            f"of {', '.join(f'{form}.{part}' for part in PARTS[form])}."
         )
     if form == "tilt":
         return parts

@@ -17,6 +17,9 @@ from kinetostat.spec.fields import Quantity
 from kinetostat.units import KINDS
 from kinetostat.views.fitted_table import FittedTable
 
+if TYPE_CHECKING:
+    from kinetostat.spec.study import StudyFile
+
 DIGITS_OF_INPUT = 10
 """Digits of what people have written themselves."""
 PIPED = 100

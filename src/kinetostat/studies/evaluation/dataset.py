@@ -17,8 +17,8 @@ from kinetostat.studies.grid.grid import ABOUT_STATUS, about
 from kinetostat.studies.setting import frame_of, pose_of
 from kinetostat.units import KINDS
 
-# With its first dataset, xarray imports other array libraries that it finds (pint 0.2 s, dask 0.5 s). This belongs to the
-# import of this module: then the first answer takes as long as the others.
+# With its first dataset, xarray imports the other array libraries that it finds (pint 0.2 s, dask 0.5 s). This belongs
+# to the import of this module: then the first answer takes as long as the others.
 xr.Dataset(coords={"pose": [0]})
 
 
