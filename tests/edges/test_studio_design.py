@@ -106,7 +106,7 @@ def test_a_front_of_three_objectives_is_seen_along_any_of_them(tmp_path):
         await until(page, "done")
         shown = page.shown("FrontView", "show")
         assert (shown["axes"], shown["coloured"]) == ([0, 1], 2)
-        assert shown["labels"] == ["compliance_sum (SI)", "compliance_z (m/N)", "stiffness_x (N/m)"]
+        assert shown["labels"] == ["compliance sum (SI)", "compliance z (m/N)", "stiffness x (N/m)"]
         assert all(len(point) == 3 for point in [*shown["points"], shown["initial"]])
         await page.choose("front-across", 2)
         await page.choose("front-colour", -1)

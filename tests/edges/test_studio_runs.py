@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -15,8 +16,10 @@ from kinetostat.machine.saving import as_file
 from kinetostat.studies.study_folder import HISTORY, QUESTION, study_folder
 from kinetostat.studio.controls import controls
 from kinetostat.studio.design.draft import Draft, bundled_draft, sent_draft, usual_bounds
-from kinetostat.studio.design.progress import Follower, failure
-from kinetostat.studio.design.runs import MOST_RUNNING, UNREADABLE, Runs, Stage
+from kinetostat.studio.design.progress import Follower, Progress, failure
+from kinetostat.studio.design.result_text import result_text
+from kinetostat.studio.design.run_panel import convergence
+from kinetostat.studio.design.runs import MOST_RUNNING, UNREADABLE, Run, Runs, Stage
 from kinetostat.studio.design.state_folder import Favourites
 from refusals import refused
 from studies import PAPER, SMALL, problem, written
@@ -53,6 +56,30 @@ def kept(finished, tmp_path):
     there = Runs(tmp_path)
     yield there, there.of(1)
     there.close()
+
+
+def test_plots_and_tables_of_a_search_have_the_units_of_the_machine(tmp_path):
+    text = (
+        SMALL.replace(MACHINE, "hexapod").replace("sum", "z")
+        + '[[constraints]]\nquantity = "compliance_x"\nat_most = 1e-6\n'
+    )
+    study = written(text)
+    run = Run(1, tmp_path, "small", Stage.DONE)
+    progress = Progress(run, study, 2, 2, 16, [None, 2e-8], [3e-8, 2.5e-8], [[2e-8]])
+    curve = convergence(progress)
+    assert curve["label"]["y"] == "compliance z (µm/N)"
+    assert curve["lines"][0]["values"] == [None, pytest.approx(0.02)]
+    assert "0.02 µm/N" in result_text(progress)
+    worth = {"objectives": {"compliance_z": 2e-8}, "constraints": {"compliance_x <= 1e-06 m/N": 5e-7}}
+    result = {
+        "status": "ok", "message": "", "objective": 2e-8, "variables": {}, "at_bounds": {}, "sensitivity": {},
+        "directions": [], "poses": {"count": 1}, "robustness": None, "front": None, "ridges_text": [],
+        "initial": worth, **worth,
+    }  # fmt: skip
+    shown = result_text(replace(progress, result=result))
+    assert "compliance z (µm/N)" in shown
+    assert "compliance x &lt;= 1 µm/N" in shown
+    assert "0.5 µm/N" in shown
 
 
 def followed(runs, number):

@@ -38,7 +38,7 @@ def aims(problem: Problem) -> list[str]:
         f"Objective: {term.goal} {spoken(term.term.label)}{_unit(term.term.unit, problem.machine.display)}"
         for term in problem.objectives
     ]
-    return objectives + [f"Constraint: {spoken(term.label)}" for term in problem.constraints]
+    return objectives + [f"Constraint: {bound.shown(problem.machine.display)}" for bound in problem.constraints]
 
 
 def bounds_table(problem: Problem) -> Table:
@@ -107,7 +107,7 @@ def worth_table(result: Result) -> Table:
         before, after = result.initial.constraints[0, k], result.outcome.constraints[0, k]
         unit = constraint.term.unit
         cells = (display.number(value, unit) for value in (before, after))
-        table.add_row(constraint.label, *cells, "", "" if unit == "1" else display.scale(unit).unit)
+        table.add_row(constraint.shown(display), *cells, "", "" if unit == "1" else display.scale(unit).unit)
     return table
 
 

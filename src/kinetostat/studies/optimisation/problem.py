@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from kinetostat.display import Display
+from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.spec import document as documents
@@ -60,9 +62,17 @@ class Constraint:
 
     @property
     def label(self) -> str:
-        """As people read it."""
+        """As files have it, SI."""
         unit = "" if self.term.unit == "1" else f" {self.term.unit}"
-        return f"{self.term.label} {'<=' if self.sign > 0 else '>='} {self.bound:.6g}{unit}"
+        return f"{self.term.label} {self._relation} {self.bound:.6g}{unit}"
+
+    def shown(self, display: Display) -> str:
+        """As people read it."""
+        return f"{spoken(self.term.label)} {self._relation} {display.show(self.bound, self.term.unit)}"
+
+    @property
+    def _relation(self) -> str:
+        return "<=" if self.sign > 0 else ">="
 
     @property
     def scale(self) -> float:

@@ -3,18 +3,18 @@
 A design is named by its place in the front, sorted by the first objective; clicks on plot and table pass it on.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
+from kinetostat.display import Scale
 from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.studio.design.progress import Progress
 from kinetostat.studio.elements import DesignTable, FrontView, choice
 
 NONE = -1
 """The choice of no objective for the colour."""
-DIGITS = 5
 NO_FRONT = "A study with two to four objectives ends in a Pareto front; its designs will be listed here."
 AXES = {"across": "horizontal axis", "up": "vertical axis", "colour": "colour"}
 
@@ -79,15 +79,16 @@ class FrontPanel:
         if progress is None:
             return
         initial = progress.result and list(progress.result["initial"]["objectives"].values())
+        scales = [progress.scale(objective) for objective in progress.problem.objectives]
         self.view.run_method(
             "show",
             {
-                "points": progress.objectives,
+                "points": [_in_units(point, scales) for point in progress.objectives],
                 "axes": [self.across.value, self.up.value],
                 "coloured": None if self.coloured.value == NONE else self.coloured.value,
-                "labels": [axis_label(aim.term.label, aim.term.unit) for aim in progress.problem.objectives],
+                "labels": [progress.label(objective) for objective in progress.problem.objectives],
                 "knee": progress.knee,
-                "initial": initial if initial and None not in initial else None,
+                "initial": _in_units(initial, scales) if initial and None not in initial else None,
                 "chosen": self._chosen,
             },
         )
@@ -96,21 +97,19 @@ class FrontPanel:
         self._pick(int(event.args))
 
 
-def axis_label(label: str, unit: str) -> str:
-    """Return the label of an axis, with its unit if it has one."""
-    return label if unit == "1" else f"{label} ({unit})"
+def _in_units(values: Sequence[float], scales: Sequence[Scale]) -> list[float]:
+    return [value * scale.factor for value, scale in zip(values, scales, strict=True)]
 
 
 def _table(progress: Progress) -> tuple[list[str], list[list[float]], list[list[str]]]:
     """Return names of columns, numbers to sort by, and texts: the objectives first, then the variables."""
-    space = progress.problem.space
-    goals = [f"{aim.goal} {axis_label(spoken(aim.term.label), aim.term.unit)}" for aim in progress.problem.objectives]
+    space, display, aims = progress.problem.space, progress.problem.machine.display, progress.problem.objectives
     designs = [] if progress.genes is None else space.values(progress.genes).tolist()
     values, texts = [], []
     for objectives, design in zip(progress.objectives, designs, strict=True):
         values.append([*objectives, *design])
-        pairs = zip(space.searched, design, strict=True)
-        sizes = [v.shown(size, progress.problem.machine.display) for v, size in pairs]
-        texts.append([*(f"{value:.{DIGITS}g}" for value in objectives), *sizes])
+        goals = [display.number(value, aim.term.unit) for value, aim in zip(objectives, aims, strict=True)]
+        sizes = [v.shown(size, display) for v, size in zip(space.searched, design, strict=True)]
+        texts.append([*goals, *sizes])
     names = [spoken(variable.name.removeprefix("geometry.")) for variable in space.searched]
-    return [*goals, *names], values, texts
+    return [*(f"{aim.goal} {progress.label(aim)}" for aim in aims), *names], values, texts

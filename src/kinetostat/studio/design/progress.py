@@ -8,19 +8,24 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from kinetostat.display import Scale, number, with_unit
 from kinetostat.engine.points import Array
+from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.optimisation.log import best_feasible, front_of, knee_of
-from kinetostat.studies.optimisation.problem import Problem
+from kinetostat.studies.optimisation.problem import Objective, Problem
 from kinetostat.studies.optimisation.result import designed
 from kinetostat.studies.optimisation.search import kept_log, stored_problem
 from kinetostat.studies.study_folder import Record, noted
 from kinetostat.studio.design.runs import FAILURE, RESULT, Run, Stage
 
+EXACT = 9
+"""Digits with which objectives are shown: the last ones still change while a search converges."""
+
 
 @dataclass(frozen=True)
 class Progress:
-    """The state of a search.
+    """The state of a search; numbers are SI.
 
     Attributes:
         run: the search as it is listed now.
@@ -47,6 +52,19 @@ class Progress:
     genes: Array | None = None
     knee: int = 0
     result: dict[str, Any] | None = None
+
+    def scale(self, objective: Objective) -> Scale:
+        """The unit in which the values of an objective are shown."""
+        return self.problem.machine.display.scale(objective.term.unit)
+
+    def label(self, objective: Objective) -> str:
+        """The label of an objective with the unit in which its values are shown."""
+        return self.scale(objective).label(spoken(objective.term.label))
+
+    def exact(self, objective: Objective, value: float) -> str:
+        """The value of an objective with all its digits and its unit; a sum of several kinds has none."""
+        scale = self.scale(objective)
+        return with_unit(number(value * scale.factor, digits=EXACT), scale.unit.replace("SI", "1"))
 
     def design(self, place: int) -> Machine:
         """The design at a place of the front as a machine; with one objective, place 0 is the best design."""

@@ -3,20 +3,18 @@
 The numbers are those of `optimize --json`; here they are only rounded and arranged.
 """
 
-import math
 from typing import Any
 
-from kinetostat.display import DASH
+from kinetostat.display import DASH, Scale, number
+from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studio.design.progress import Progress
-from kinetostat.studio.wording import engineering, gains, heading, paragraph, table
+from kinetostat.studio.design.progress import EXACT, Progress
+from kinetostat.studio.wording import gains, heading, paragraph, table
 
 SACRIFICED = 0.01
 """A remark says so if a direction keeps less than this share of its initial stiffness."""
 NEGLIGIBLE = 1e-4
 """A sensitivity below this, in percent per percent, is shown as 0."""
-EXACT = 9
-"""Digits with which objectives are shown."""
 
 
 def result_text(progress: Progress) -> str:
@@ -27,8 +25,8 @@ def result_text(progress: Progress) -> str:
     if result["status"] != "ok":
         return paragraph(str(result["message"]), "lead")
     several = result["objective"] is None
-    parts = [paragraph(str(result["message"]), "note"), _objectives(result, "knee" if several else "best")]
-    parts += [_design(progress.problem, result), _directions(result), _robustness(result)]
+    parts = [paragraph(str(result["message"]), "note"), _objectives(progress, result, "knee" if several else "best")]
+    parts += [_design(progress.problem, result), _directions(result), _robustness(progress, result)]
     return "".join(parts + [paragraph(line) for line in _remarks(result)])
 
 
@@ -38,23 +36,25 @@ def _so_far(progress: Progress) -> str:
     if len(progress.problem.objectives) > 1:
         count = len(progress.objectives)
         return paragraph(f"The Pareto front has {count} designs so far. Click one in the plot to load it.")
-    aim = progress.problem.objectives[0]
-    rows = [[f"{aim.goal} {aim.term.label}", _exact(progress.objectives[0][0], aim.term.unit)]]
+    aim, display = progress.problem.objectives[0], progress.problem.machine.display
+    rows = [[f"{aim.goal} {spoken(aim.term.label)}", progress.exact(aim, progress.objectives[0][0])]]
     if progress.genes is not None:
         space = progress.problem.space
         pairs = zip(space.searched, space.values(progress.genes[0]), strict=True)
-        rows += [[variable.name, variable.shown(value, progress.problem.machine.display)] for variable, value in pairs]
+        rows += [[variable.name, variable.shown(value, display)] for variable, value in pairs]
     return heading("Best so far") + table("Best so far", ["", "best"], rows)
 
 
-def _objectives(result: dict[str, Any], best: str) -> str:
-    rows = []
-    for label, after in result["objectives"].items():
-        before = result["initial"]["objectives"][label]
-        rows.append([label, _exact(before), _exact(after), _ratio(before, after)])
-    for label, after in result["constraints"].items():
-        rows.append([label, _exact(result["initial"]["constraints"][label]), _exact(after), ""])
-    title = "Objectives and constraints" if result["constraints"] else "Objectives" if len(rows) > 1 else "Objective"
+def _objectives(progress: Progress, result: dict[str, Any], best: str) -> str:
+    problem, rows = progress.problem, []
+    for aim in problem.objectives:
+        before, after = (given["objectives"][aim.term.label] for given in (result["initial"], result))
+        rows.append([progress.label(aim), *_exact(progress.scale(aim), before, after), _ratio(before, after)])
+    for bound in problem.constraints:
+        values = (given["constraints"][bound.label] for given in (result["initial"], result))
+        texts = (problem.machine.display.show(value, bound.term.unit) for value in values)
+        rows.append([bound.shown(problem.machine.display), *texts, ""])
+    title = "Objectives and constraints" if problem.constraints else "Objectives" if len(rows) > 1 else "Objective"
     return heading(title) + table(title, ["", "initial", best, "ratio"], rows)
 
 
@@ -85,14 +85,14 @@ def _directions(result: dict[str, Any]) -> str:
     return heading(title) + gains("stiffness gain", [row for row in rows if row[1] is not None])
 
 
-def _robustness(result: dict[str, Any]) -> str:
+def _robustness(progress: Progress, result: dict[str, Any]) -> str:
     scatter = result["robustness"]
     if scatter is None:
         return ""
-    keys = ("nominal", "mean", "percentile_95", "worst")
-    rows = [
-        [label, *(_exact(spread[key], digits=6) for key in keys)] for label, spread in scatter["objectives"].items()
-    ]
+    keys, rows = ("nominal", "mean", "percentile_95", "worst"), []
+    for aim in progress.problem.objectives:
+        spread = scatter["objectives"][aim.term.label]
+        rows.append([progress.label(aim), *_exact(progress.scale(aim), *(spread[key] for key in keys))])
     title = f"With tolerances: {scatter['machines']:,} machines"
     return heading(title) + table(title, ["", "nominal", "mean", "reached by 95 %", "worst"], rows)
 
@@ -108,10 +108,8 @@ def _remarks(result: dict[str, Any]) -> list[str]:
     return remarks + (result["ridges_text"] if result["front"] is None else [])
 
 
-def _exact(value: float | None, unit: str = "", digits: int = EXACT) -> str:
-    if value is None or not math.isfinite(value):
-        return engineering(value)
-    return f"{value:.{digits}g} {unit if unit not in ('1', 'SI') else ''}".strip()
+def _exact(scale: Scale, *values: float | None) -> list[str]:
+    return [number(value and value * scale.factor, digits=EXACT) for value in values]
 
 
 def _ratio(before: float | None, after: float | None) -> str:

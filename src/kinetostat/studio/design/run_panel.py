@@ -10,7 +10,7 @@ from nicegui import ui
 
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studio.design.front_panel import FrontPanel, axis_label
+from kinetostat.studio.design.front_panel import FrontPanel
 from kinetostat.studio.design.progress import Follower, Progress, failure
 from kinetostat.studio.design.result_text import result_text
 from kinetostat.studio.design.runs import UNREADABLE, Run, Runs, Stage
@@ -157,11 +157,10 @@ class RunPanel:
         self.front.reveal(several)
 
     def _draw(self, progress: Progress) -> None:
-        first, *others = progress.problem.objectives
-        if others:
+        if len(progress.problem.objectives) > 1:
             self.front.show(progress, self._place)
         elif progress.steps > 1:
-            self.curve.run_method("show", _curve(progress, axis_label(first.term.label, first.term.unit)))
+            self.curve.run_method("show", convergence(progress))
 
     def _chosen(self) -> None:
         self._place = None
@@ -200,11 +199,18 @@ class RunPanel:
         self.refresh()
 
 
-def _curve(progress: Progress, label: str) -> dict[str, object]:
+def convergence(progress: Progress) -> dict[str, object]:
+    """Return the only objective over the steps, best and mean, as `CurveView` draws it: in the units of the machine."""
+    objective = progress.problem.objectives[0]
+    factor = progress.scale(objective).factor
+    lines = {"best": progress.best, "mean": progress.mean}
     return {
         "x": list(range(1, progress.steps + 1)),
-        "lines": [{"name": "best", "values": progress.best}, {"name": "mean", "values": progress.mean}],
-        "label": {"x": "step", "y": label},
+        "lines": [
+            {"name": name, "values": [None if value is None else value * factor for value in values]}
+            for name, values in lines.items()
+        ],
+        "label": {"x": "step", "y": progress.label(objective)},
         "unit": "",
         "here": None,
         "log": False,
@@ -216,4 +222,4 @@ def _line(progress: Progress) -> str:
     total = f" of {progress.total}" if progress.total else ""
     line = f"{progress.run.stage}: {progress.steps}{total} steps, {progress.designs:,} designs"
     best = progress.best[-1] if progress.best else None
-    return line if best is None else f"{line}, best {best:.9g}"
+    return line if best is None else f"{line}, best {progress.exact(progress.problem.objectives[0], best)}"
