@@ -192,6 +192,8 @@ JOINT_TYPES = {
         "slides along `first_axis`, then along `second_axis`, and turns about their normal through `point`",
         {"point": POINT, "first_axis": AXIS, "second_axis": AXIS},
         _planar,
+        seat=("axial", "tilt"),
+        seat_travels=True,
         motors={
             "first_axis": Motor(0, "linear stiffness"),
             "second_axis": Motor(1, "linear stiffness"),
