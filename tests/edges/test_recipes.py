@@ -20,7 +20,14 @@ import pytest
 from pages import ROOT, Block, blocks, commands, missing
 
 PAGE = ROOT / "docs" / "extending.md"
-TITLES = ("Add a machine family", "Add a joint type", "Add hardware", "Add a limit", "Add an index", "Add an export format")
+TITLES = (
+    "Add a machine family",
+    "Add a joint type",
+    "Add hardware",
+    "Add a limit",
+    "Add an index",
+    "Add an export format",
+)
 
 
 def recipe(title: str) -> list[Block]:
