@@ -69,6 +69,17 @@ def test_a_pose_is_reached_where_its_closed_form_reaches_it(z):
     assert (status[~inside] == Status.OUT_OF_REACH).all(), "which is shown, not supposed"
 
 
+def test_poses_beyond_flat_parallelograms_are_shown_to_be_out_of_reach():
+    """The least gap lies where the bars are flat; the angles of the platform are dependent."""
+    family = load_without_limits("orthoglide")
+    columns = {path: values for path, values in poses(30, 0.35, 0.0).items() if path[-1] in "xyz"}
+    inside = reached(family, columns)
+    status = np.asarray(solve_joints(with_values(build(document_of(family), "orthoglide"), columns)).status)
+    assert 5 < inside.sum() < 25
+    assert (np.isin(status, REACHED) == inside).all()
+    assert (status[~inside] == Status.OUT_OF_REACH).mean() > 0.9
+
+
 @pytest.mark.parametrize("name", ["hexapod-hardware", "tripteron"])
 def test_a_pose_has_the_same_answer_alone_and_in_a_batch(name):
     machine = load_without_limits(name)

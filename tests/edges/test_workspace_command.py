@@ -1,6 +1,7 @@
 """`kinetostat workspace` as people type it: what it prints and writes, and what it refuses."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ import xarray as xr
 
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
+from kinetostat.engine.batch import evaluate
+from kinetostat.kinematics.status import Status
 
 PLANE = ["workspace", "planar-3rpr", "--over", "x=-30 cm:30 cm:13", "--over", "y=-30 cm:30 cm:11"]
 SPACE = ["workspace", "hexapod", "--over", "x=-8 cm:8 cm:9", "--over", "y=-8 cm:8 cm:7", "--over", "z=6 cm:25 cm:8"]
@@ -110,3 +113,22 @@ def test_mistakes_are_refused_with_the_way_out(arguments, words, capsys):
     text = capsys.readouterr().err
     for word in words:
         assert word in text
+
+
+def test_points_that_do_not_converge_count_in_the_error_and_the_assembly_mode_is_named(monkeypatch, capsys):
+    def without_answer(*arguments):
+        result = evaluate(*arguments)
+        status = result.status.copy()
+        status[[0, 1, 6]] = Status.NOT_CONVERGED  # two points of the first cell, one of the fourth
+        return replace(result, status=status)
+
+    question = ["workspace", "tripteron", "--over", "x=20 cm:80 cm:4", "--over", "y=20 cm:80 cm:4"]
+    assert main([*question, "--json"]) == DONE
+    assert json.loads(capsys.readouterr().out)["volume"]["unknown"] == 0.0
+    monkeypatch.setattr("kinetostat.studies.workspace.workspace.evaluate", without_answer)
+    assert main(question) == DONE
+    text = " ".join(capsys.readouterr().out.split())
+    assert "larger by up to 0.08 m²: in 2 of the cells a point did not converge" in text
+    assert "keeps to the assembly mode of its home pose" in text
+    assert main(PLANE) == DONE
+    assert "assembly mode" not in capsys.readouterr().out, "a family states its mode by its formulas"

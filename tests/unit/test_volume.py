@@ -49,9 +49,10 @@ class TestCells:
 def ball(dims, count, seed):
     where = cells(*[count] * dims, seed=seed)
     inside = (points(where) ** 2).sum(axis=0) <= 0.81
-    return estimate_volume(inside, [2.0] * dims, ["m"] * dims)
+    return estimate_volume(inside, np.zeros_like(inside), [2.0] * dims, ["m"] * dims)
 
 
+ALL, NONE = np.ones(8, dtype=bool), np.zeros(8, dtype=bool)
 TRUE = {2: math.pi * 0.9**2, 3: 4 / 3 * math.pi * 0.9**3, 4: math.pi**2 / 2 * 0.9**4}
 
 
@@ -73,15 +74,18 @@ class TestVolume:
         assert fine.standard_error / coarse.standard_error == pytest.approx(expected, rel=0.25)
 
     def test_units_are_those_of_the_axes(self):
-        inside = np.ones(8, dtype=bool)
-        assert estimate_volume(inside, [1, 2], ["m", "m"]).unit == "m²"
-        assert estimate_volume(inside, [1, 2, 3], ["m", "rad", "m"]).unit == "m²·rad"
-        assert estimate_volume(inside, [1, 2, 3], ["rad"] * 3).unit == "rad³"
+        for units, unit in ((["m", "m"], "m²"), (["m", "rad", "m"], "m²·rad"), (["rad"] * 3, "rad³")):
+            assert estimate_volume(ALL, NONE, [1] * len(units), units).unit == unit
 
     def test_all_or_nothing_has_no_error(self):
-        full = estimate_volume(np.ones(8, dtype=bool), [2.0, 3.0], ["m", "m"])
-        assert (full.value, full.standard_error, full.share) == (6.0, 0.0, 1.0)
-        assert estimate_volume(np.zeros(8, dtype=bool), [2.0, 3.0], ["m", "m"]).value == 0.0
+        full = estimate_volume(ALL, NONE, [2.0, 3.0], ["m", "m"])
+        assert (full.value, full.standard_error, full.unknown, full.share) == (6.0, 0.0, 0.0, 1.0)
+        assert estimate_volume(NONE, NONE, [2.0, 3.0], ["m", "m"]).value == 0.0
+
+    def test_a_cell_with_an_unknown_point_counts_whole_and_once(self):
+        unknown = np.array([1, 1, 0, 1, 0, 0, 0, 0], dtype=bool)
+        volume = estimate_volume(NONE, unknown, [2.0, 3.0], ["m", "m"])
+        assert (volume.value, volume.unknown_cells, volume.unknown) == (0.0, 2, 3.0)
 
 
 class TestConnected:

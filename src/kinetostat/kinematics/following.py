@@ -13,7 +13,7 @@ from kinetostat.kinematics.closing import Array
 from kinetostat.kinematics.leg_gaps import Coordinates, Mask, Numbers, Problems, least_norm
 from kinetostat.kinematics.signature import same_mode
 from kinetostat.kinematics.status import Status
-from kinetostat.kinematics.ways import Way, some, ways
+from kinetostat.kinematics.ways import Plan, Way, some, ways
 from kinetostat.tolerances import CLOSED, LEAST_GAP_SETTLED, NEWTON_SETTLED
 
 MOST_TRIALS = 80
@@ -22,6 +22,8 @@ SHORTEST = 1e-4
 """Share of the way below which a step is too short to go on: the way is blocked."""
 FURTHEST = 1.5
 """Change of an unknown in one step, rad or in units of the machine's length, up to which it is tried."""
+CAREFUL = 0.1
+"""The same where a way has led to another assembly mode."""
 NEARBY = 0.1
 """Error of the tangent, in the same units, up to which a step is accepted: less than branches usually lie apart."""
 CONTRACTION = 0.55
@@ -33,6 +35,10 @@ MOST_ITERATIONS = 60
 """Of Newton's method at the goal, where each halves the gap at worst."""
 MOST_DESCENTS = 60
 """Steps towards the least gap, where no way leads to the goal."""
+STIFFENING = 1e-2
+"""Added to the curvature at first, for unknowns that change nothing there."""
+DESCENT = 0.3
+"""Change of an unknown in such a step, in the same units, so that it stays in the valley where it starts."""
 ASIDE = 1e-2
 """Displacement of the unknowns from which these steps start, rad or in units of the machine's length."""
 
@@ -51,14 +57,14 @@ def follow(problems: Problems, goal: Coordinates) -> tuple[Array, Numbers]:
     count = len(problems.poses)
     unknowns, status = np.zeros((count, problems.size)), np.full(count, int(Status.NOT_CONVERGED))
     left = np.arange(count)
-    for number, (way, differs) in enumerate(ways(problems, goal)):
+    for number, (plan, differs) in enumerate(ways(problems, goal)):
         if not left.size:
             return unknowns, status
         tried = left[differs[left]]
         if not tried.size:
             continue
         part, there = problems.take(tried), some(goal, tried)
-        reached, solved = _by_way(part, way(part, there), there)
+        reached, solved = _by_way(part, plan, there)
         taken = solved if number else np.ones(len(tried), dtype=bool)  # where the straight way ends serves if all fail
         unknowns[tried[taken]], status[tried[solved]] = reached[taken], int(Status.OK)
         left = left[status[left] != Status.OK]
@@ -68,20 +74,34 @@ def follow(problems: Problems, goal: Coordinates) -> tuple[Array, Numbers]:
     return unknowns, status
 
 
-def _by_way(problems: Problems, way: Way, goal: Coordinates) -> tuple[Array, Mask]:
-    """Follow solutions along a way; return where that ends, and whether it ends at the goal in the same mode."""
-    unknowns, arrived = _along(problems, way)
-    solved = np.zeros(len(unknowns), dtype=bool)
+def _by_way(problems: Problems, plan: Plan, goal: Coordinates) -> tuple[Array, Mask]:
+    """Follow solutions along a way; return where that ends, and whether it ends at the goal in the same mode.
+
+    Where it ends there in another mode, a step was so long that it crossed to that, and shorter ones are taken.
+    """
+    unknowns, solved, crossed = _strides(problems, plan(problems, goal), goal, FURTHEST)
+    again = np.flatnonzero(crossed)
+    if again.size:
+        part, there = problems.take(again), some(goal, again)
+        unknowns[again], solved[again], _ = _strides(part, plan(part, there), there, CAREFUL)
+    return unknowns, solved
+
+
+def _strides(problems: Problems, way: Way, goal: Coordinates, furthest: float) -> tuple[Array, Mask, Mask]:
+    """Follow solutions along a way; return where that ends, whether at the goal, and whether there in another mode."""
+    unknowns, arrived = _along(problems, way, furthest)
+    solved, crossed = np.zeros((2, len(unknowns)), dtype=bool)
     here = np.flatnonzero(arrived)
     if here.size:
         part, there = problems.take(here), some(goal, here)
         settled, gap = _settled(part, unknowns[here], there)
         unknowns[here] = settled
-        solved[here] = (gap <= CLOSED) & same_mode(part, settled, there)
-    return unknowns, solved
+        same = same_mode(part, settled, there)
+        solved[here], crossed[here] = (gap <= CLOSED) & same, (gap <= CLOSED) & ~same
+    return unknowns, solved, crossed
 
 
-def _along(problems: Problems, way: Way) -> tuple[Array, Mask]:
+def _along(problems: Problems, way: Way, furthest: float) -> tuple[Array, Mask]:
     """Go along a way as far as it is open: with how far one comes at the goal, or short of it."""
     count = len(problems.poses)
     unknowns, done, stride = np.zeros((count, problems.size)), np.zeros(count), np.ones(count)
@@ -94,13 +114,13 @@ def _along(problems: Problems, way: Way) -> tuple[Array, Mask]:
         shares = np.ones(count)
         shares[items] = next_share
         part, target = problems.take(items), some(way(shares), items)
-        moved, error, accepted = _step(part, unknowns[items], target)
+        moved, error, accepted = _step(part, unknowns[items], target, furthest)
         unknowns[items[accepted]], done[items[accepted]] = moved[accepted], next_share[accepted]
         stride[items] *= np.where(accepted, np.clip(0.9 * error, 0.5, 4.0), np.clip(0.7 * error, 0.1, 0.5))
     return unknowns, done == 1.0
 
 
-def _step(problems: Problems, unknowns: Array, target: Coordinates) -> tuple[Array, Array, Mask]:
+def _step(problems: Problems, unknowns: Array, target: Coordinates, furthest: float) -> tuple[Array, Array, Mask]:
     """Step to a target: along the tangent, and once more by Newton's method.
 
     Returns:
@@ -109,7 +129,7 @@ def _step(problems: Problems, unknowns: Array, target: Coordinates) -> tuple[Arr
     left, rates = problems.gaps(unknowns, target)
     tangent = least_norm(rates, left)
     first = _size(tangent)
-    moved, longer = unknowns.copy(), FURTHEST / np.maximum(first, 1e-30)
+    moved, longer = unknowns.copy(), furthest / np.maximum(first, 1e-30)
     accepted = longer >= 1.0
     tried = np.flatnonzero(accepted)
     if tried.size:
@@ -151,28 +171,53 @@ def _settled(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[Ar
 
 
 def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[Array, Mask]:
-    """Make the gaps as small as they become near some unknowns, by Levenberg's and Marquardt's method.
+    """Bring the legs' ends as near to the goal as they come from some unknowns, by a quasi-Newton method (BFGS).
+
+    It begins with the curvature of Gauss and Newton, which would do if the distance came to zero.
 
     Returns:
-        The unknowns there, and whether that is shown to be a least gap which is not zero.
+        The unknowns there, and whether that is shown to be a least distance which is not zero.
     """
     # The slope vanishes where the gap is greatest too, as at the end of a crank's stroke: the descent starts beside.
     best, shown = unknowns + ASIDE * np.cos(np.arange(problems.size)), np.zeros(len(unknowns), dtype=bool)
-    damping, items = np.full(len(unknowns), 1e-2), np.arange(len(unknowns))
-    left, rates = problems.gaps(best, goal)
+    items, share = np.arange(len(unknowns)), np.ones(len(unknowns))
+    left, rates, distance = problems.measured(best, goal)
+    slope = np.einsum("nrc,nr->nc", rates, left)
+    inverse = np.linalg.inv(np.einsum("nrc,nrd->ncd", rates, rates) + STIFFENING * np.eye(problems.size))
     for _ in range(MOST_DESCENTS):
-        slope = np.einsum("nrc,nr->nc", rates, left)
-        gap = np.linalg.norm(left, axis=1)
-        still = np.linalg.norm(slope, axis=1) <= LEAST_GAP_SETTLED * gap
-        shown[items[still & (gap > CLOSED)]] = True
-        go = ~still & (gap > CLOSED) & np.isfinite(gap)
-        items, left, rates, slope, gap = items[go], left[go], rates[go], slope[go], gap[go]
+        still = np.linalg.norm(slope, axis=1) <= LEAST_GAP_SETTLED * np.sqrt(distance)
+        apart = (distance > CLOSED * CLOSED) & np.isfinite(distance)
+        shown[items[still & apart]] = True
+        go = ~still & apart
+        items, share, slope, distance, inverse = items[go], share[go], slope[go], distance[go], inverse[go]
         if not items.size:
             break
-        square = np.einsum("nrc,nrd->ncd", rates, rates) + damping[items][:, None, None] * np.eye(problems.size)
-        moved = best[items] + np.linalg.solve(square, slope[:, :, None])[:, :, 0]
-        left_there, rates_there = problems.take(items).gaps(moved, some(goal, items))
-        better = np.linalg.norm(left_there, axis=1) < gap
-        best[items[better]], left[better], rates[better] = moved[better], left_there[better], rates_there[better]
-        damping[items] *= np.where(better, 0.2, 5.0)
+        step = np.einsum("ncd,nd->nc", inverse, slope)
+        step *= (share * np.minimum(1.0, DESCENT / np.maximum(_size(step), 1e-30)))[:, None]
+        moved = best[items] + step
+        left, rates, distance_there = problems.take(items).measured(moved, some(goal, items))
+        slope_there = np.einsum("nrc,nr->nc", rates, left)
+        better = distance_there < distance
+        inverse[better] = _curved(inverse[better], step[better], slope[better] - slope_there[better])
+        best[items[better]], slope[better], distance[better] = (
+            moved[better],
+            slope_there[better],
+            distance_there[better],
+        )
+        share = np.where(better, 1.0, 0.25 * share)
     return best, shown
+
+
+def _curved(inverse: Array, step: Array, change: Array) -> Array:
+    """Correct inverse curvatures so that steps have the changes of slope that were met (BFGS).
+
+    Args:
+        inverse: [n x unknowns x unknowns].
+        step: [n x unknowns].
+        change: how much less steep it is at the end of the step [n x unknowns].
+    """
+    work = np.einsum("nc,nc->n", step, change)
+    sound = work > 1e-12 * np.linalg.norm(step, axis=1) * np.linalg.norm(change, axis=1)
+    weight = np.where(sound, 1.0 / np.where(sound, work, 1.0), 0.0)[:, None, None]
+    across = np.eye(step.shape[1]) - weight * step[:, :, None] * change[:, None, :]
+    return np.asarray(across @ inverse @ np.swapaxes(across, 1, 2) + weight * step[:, :, None] * step[:, None, :])

@@ -15,7 +15,16 @@ import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import Displacement, Vector
-from kinetostat.kinematics.closing import ANGLES, POINT, Array, leg_end, placement_of, rotation_between, stacked
+from kinetostat.kinematics.closing import (
+    ANGLES,
+    POINT,
+    Array,
+    leg_end,
+    placement_of,
+    rotation_between,
+    squared_distance,
+    stacked,
+)
 from kinetostat.machine.column import column, plain
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.machine import Chains, Step
@@ -158,10 +167,22 @@ class Problems:
             Six numbers for each leg, a rotation vector and a displacement in units of the length
             [problems x rows], and their rates [problems x rows x unknowns].
         """
+        return self.measured(unknowns, goal)[:2]
+
+    def measured(self, unknowns: Array, goal: Coordinates) -> tuple[Array, Array, Array]:
+        """Return the gaps and their rates, and the squared distance of all ends from the goal [problems].
+
+        The gap of a rotation is the sine of its angle a, which vanishes at half a turn as well. The distance has
+        2 (1 - cos a) in the place of its square: this vanishes at 0 only, and the slope of half the distance is exactly
+        the gaps times their rates, however large they are.
+
+        Args:
+            unknowns, goal: as for `gaps`.
+        """
         lengths, first = self.lengths, self.size - len(self.free)
         for k, name in enumerate(self.free, first):
             goal = goal | {name: goal[name] + unknowns[:, k] * (1.0 if name in ANGLES else lengths)}
-        left, rates = [], []
+        left, rates, distance = [], [], np.zeros(len(unknowns))
         for part in self.parts:
             legs = part.legs.shape[1]
             ends, twists = self._ends(part, unknowns, lengths)
@@ -171,7 +192,9 @@ class Problems:
             apart = [plain(c) * each for c in (wanted.translation - ends.translation).components()]
             left.append(stacked([*turned, *apart], len(each)).reshape(len(lengths), 6 * legs))
             rates.append(self._spread(part, twists, wanted, len(lengths)))
-        return np.hstack(left), rates[0] if len(rates) == 1 else np.concatenate(rates, axis=1)
+            apart = plain(squared_distance(ends, wanted, column(np.repeat(lengths, legs))))
+            distance = distance + np.asarray(apart).reshape(-1, legs).sum(axis=1)
+        return np.hstack(left), rates[0] if len(rates) == 1 else np.concatenate(rates, axis=1), distance
 
     def _ends(self, part: Part, unknowns: Array, lengths: Array) -> tuple[Displacement, Array]:
         """Where legs take the platform, and its twist per unit of each of their coordinates [legs x 6 x joints]."""

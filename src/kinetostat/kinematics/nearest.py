@@ -14,7 +14,7 @@ from kinetostat.tolerances import CLOSED, DEPENDENT, NEAREST_GAIN, NEAREST_SETTL
 
 MOST_STEPS, MOST_CORRECTIONS = 30, 8
 """Towards the nearest pose; and of Newton's method, which closes the legs again after each of them."""
-DAMPINGS = 5.0 ** np.arange(-3, 6)
+DAMPINGS: Array = 5.0 ** np.arange(-3.0, 6.0)
 """Dampings of a step that are tried in one batch, in units of the one that led nearest in the step before."""
 CONTRACTION = 0.25
 """Share of a gap that a correction may leave; a step from which it leaves more was too long."""
@@ -74,9 +74,10 @@ class _Search:
             least = int(np.argmin(np.where(np.isfinite(apart), apart, np.inf)))
             gain = far - apart[least]
             if not gain > 0.0:
-                damping = tried[-1]
+                damping = float(tried[-1])
                 continue
-            last, best, rates, damping = ends[least] - best, ends[least], rates_there[least], tried[least % len(tried)]
+            last, best, rates = ends[least] - best, ends[least], rates_there[least]
+            damping = float(tried[least % len(tried)])
             if gain <= NEAREST_GAIN * far:
                 break
         return best

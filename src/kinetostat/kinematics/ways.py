@@ -22,6 +22,8 @@ from kinetostat.machine.leg import Joint
 
 Way = Callable[[Array], Coordinates]
 """From the share of the way that is done in each problem [problems] to coordinates of the platform there."""
+Plan = Callable[[Problems, Coordinates], Way]
+"""From problems and their goals to a way."""
 
 
 def some(coordinates: Coordinates, chosen: Numbers) -> Coordinates:
@@ -29,8 +31,8 @@ def some(coordinates: Coordinates, chosen: Numbers) -> Coordinates:
     return {name: value if isinstance(value, float) else value[chosen] for name, value in coordinates.items()}
 
 
-def ways(problems: Problems, goal: Coordinates) -> Iterator[tuple[Callable[[Problems, Coordinates], Way], Mask]]:
-    """Name the ways in the order in which they are tried, each a function of problems and their goals.
+def ways(problems: Problems, goal: Coordinates) -> Iterator[tuple[Plan, Mask]]:
+    """Name the ways in the order in which they are tried, each a plan.
 
     With each comes in which of the problems it differs from the straight one: angles first or last where both angles
     and the point change, angles as they are given where one exceeds half a turn.

@@ -177,6 +177,8 @@ class Parallelogram:
         side: unit vector along the short sides.
         width: of the short sides, m.
         bar: axial stiffness of each bar, N/m.
+        kept: unit normal of its plane once it has moved. If it were computed from the sides, its sign and the direction
+            of the motion would change where the bars pass the short sides.
     """
 
     name: str
@@ -185,6 +187,7 @@ class Parallelogram:
     side: Vector
     width: Scalar
     bar: Scalar = RIGID
+    kept: Vector | None = None
 
     @property
     def along(self) -> Vector:
@@ -195,6 +198,8 @@ class Parallelogram:
     @property
     def normal(self) -> Vector:
         """Unit normal of its plane."""
+        if self.kept is not None:
+            return self.kept
         across = self.side.cross(self.along)
         return across * reciprocal(across.norm())
 
@@ -229,15 +234,18 @@ class Parallelogram:
 
     def displaced(self, motion: Displacement) -> "Parallelogram":
         """The parallelogram after a rigid displacement of the whole machine."""
-        ends = motion.apply(self.near), motion.apply(self.far)
-        return Parallelogram(self.name, *ends, motion.rotation.apply(self.side), self.width, self.bar)
+        turn = motion.rotation.apply
+        kept = None if self.kept is None else turn(self.kept)
+        near, far = motion.apply(self.near), motion.apply(self.far)
+        return replace(self, near=near, far=far, side=turn(self.side), kept=kept)
 
     def moved(self, amount: Scalar) -> tuple["Parallelogram", Displacement]:
         """The parallelogram once its far side has run by `amount` (m of arc), and how that displaces what follows."""
         angle = amount * reciprocal((self.far - self.near).norm())
-        turn = rotation_along(self.normal, cos(angle), sin(angle))
+        normal = self.normal
+        turn = rotation_along(normal, cos(angle), sin(angle))
         far = self.near + turn.apply(self.far - self.near)
-        return replace(self, far=far), Displacement(IDENTITY, far - self.far)
+        return replace(self, far=far, kept=normal), Displacement(IDENTITY, far - self.far)
 
 
 def seat_springs(name: str, axis: Vector, point: Vector, stiffness: Mapping[str, Scalar]) -> tuple[Spring, ...]:

@@ -127,6 +127,13 @@ def _summary(workspace: Workspace) -> Iterator[str]:
         f"({100.0 * volume.share:.4g} % of the box; two random points in each of {volume.cells:,} cells, ± two "
         "standard errors)."
     )
+    if volume.unknown_cells:
+        yield (
+            f"It may be larger by up to {volume.unknown:.2g} {volume.unit}: in {volume.unknown_cells:,} of the cells a "
+            "point did not converge. Whether it can be reached is not known; it counts as outside."
+        )
+    if "assembly_mode" in workspace.dataset.attrs:
+        yield "The machine keeps to the assembly mode of its home pose, the one in which its legs are written down."
     if not workspace.limits:
         yield unlimited(Limits())
     if not workspace.exists:

@@ -24,6 +24,8 @@ class Volume:
         box: volume of all cells together.
         cells: number of cells.
         divided: number of cells in which one point is inside and the other outside.
+        unknown_cells: number of cells with a point of which nobody knows whether it is inside; such a point counts as
+            outside.
     """
 
     value: float
@@ -32,16 +34,23 @@ class Volume:
     box: float
     cells: int
     divided: int
+    unknown_cells: int
+
+    @property
+    def unknown(self) -> float:
+        """By how much the region may be larger: the volume of the unknown cells, in the same unit."""
+        return self.box * self.unknown_cells / self.cells
 
     @property
     def share(self) -> float:
         return self.value / self.box
 
 
+Points = npt.NDArray[np.bool_]
 METHOD = "stratified sampling, two random points in each cell of the grid; error from their differences"
 
 
-def estimate_volume(inside: npt.NDArray[np.bool_], sizes: Sequence[float], units: Sequence[str]) -> Volume:
+def estimate_volume(inside: Points, unknown: Points, sizes: Sequence[float], units: Sequence[str]) -> Volume:
     """Estimate the volume of a region from two independent, uniform random points in each cell of a grid.
 
     The mean over both points is unbiased for any region. Cells are independent, and the variance of the mean of two
@@ -51,6 +60,7 @@ def estimate_volume(inside: npt.NDArray[np.bool_], sizes: Sequence[float], units
 
     Args:
         inside: whether each point lies in the region; the two points of a cell follow one another [2 x cells].
+        unknown: whether nobody knows that; such points are not inside [2 x cells].
         sizes: size of the box along each axis, SI.
         units: units of the axes.
 
@@ -61,7 +71,8 @@ def estimate_volume(inside: npt.NDArray[np.bool_], sizes: Sequence[float], units
     cell = box / len(pairs)
     divided = int((pairs[:, 0] != pairs[:, 1]).sum())
     value, error = cell * float(inside.sum()) / PER_CELL, 0.5 * cell * sqrt(divided)
-    return Volume(value, error, unit_product(units), box, len(pairs), divided)
+    unknown_cells = int(unknown.reshape(-1, PER_CELL).any(axis=1).sum())
+    return Volume(value, error, unit_product(units), box, len(pairs), divided, unknown_cells)
 
 
 def unit_product(units: Sequence[str]) -> str:

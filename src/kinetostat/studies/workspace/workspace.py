@@ -14,6 +14,7 @@ from scipy import ndimage
 
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import Cells
+from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.arguments import checked
@@ -31,6 +32,8 @@ SOFTEST = "least_translational_stiffness"
 """Quantity by which a workspace is coloured where no condition names another."""
 BORDER = "border_"
 BORDER_MEANING = "share of the step to the next node at which the verdict changes, along"
+HOME_MODE = "that of the home pose"
+"""The assembly mode in which machines written leg by leg are evaluated; families state theirs by their formulas."""
 MOST_DEMANDS = 200_000
 """Inside nodes at which lengths, angles and loads are computed; of more nodes, evenly chosen ones."""
 
@@ -161,7 +164,8 @@ def _volume(judge: Judge, question: GridQuestion, seed: int, progress: Progress)
     evaluation = evaluate(judge.machine, Cells(axes, seed), judge.quantities, progress)
     sizes = [float(axis.values[-1] - axis.values[0]) for axis in axes]
     units = [str(question.labels[dim].attrs["units"]) for dim in question.dims]
-    return estimate_volume(judge.inside(evaluation.status, evaluation.values), sizes, units)
+    unknown = np.asarray(evaluation.status == Status.NOT_CONVERGED)
+    return estimate_volume(judge.inside(evaluation.status, evaluation.values), unknown, sizes, units)
 
 
 def _nearest(question: GridQuestion) -> list[int]:
@@ -213,14 +217,20 @@ def _labelled(
         "flag_values": [0, 1],
         "flag_meanings": "no yes",
     }
-    figures = {"volume": volume.value, "volume_standard_error": volume.standard_error, "volume_units": volume.unit}
+    figures = {
+        "volume": volume.value,
+        "volume_standard_error": volume.standard_error,
+        "volume_unknown": volume.unknown,
+        "volume_units": volume.unit,
+    }
     wanted = nodes.drop_vars("aspect").assign(
         verdict=(dims, verdict, about), connected=(dims, connected.astype(np.int8), about_connected)
     )
     for dim, edge in zip(dims, edges, strict=False):
         wanted[f"{BORDER}{dim}"] = (dims, edge, {"long_name": f"{BORDER_MEANING} {dim}", "units": "1"})
     pose = {path: float(value) for path, value in values(judge.machine).items() if path.startswith("pose.")}
-    return wanted.assign_attrs({**figures, "volume_method": METHOD, **pose})
+    mode = {} if judge.machine.family.chains is None else {"assembly_mode": HOME_MODE}
+    return wanted.assign_attrs({**figures, "volume_method": METHOD, **mode, **pose})
 
 
 def as_json(workspace: Workspace) -> dict[str, Any]:
@@ -243,11 +253,13 @@ def as_json(workspace: Workspace) -> dict[str, Any]:
             "volume": {
                 "value": volume.value,
                 "standard_error": volume.standard_error,
+                "unknown": volume.unknown,
                 "units": volume.unit,
                 "share_of_box": volume.share,
                 "cells": volume.cells,
                 "method": METHOD,
             },
+            "assembly_mode": dataset.attrs.get("assembly_mode"),
             "limits": list(workspace.limits),
             "nodes": workspace.nodes,
             "connected": workspace.connected,
