@@ -49,15 +49,14 @@ def pages() -> None:
 
 
 def page() -> None:
-    """The top of a page, where the machine is."""
+    """The summary on a page, with the machine."""
     with TemporaryDirectory() as folder, browser() as new_tab:
         file = Path(folder) / "report.html"
         main(["report", "zhang-gosselin-4dof", "-o", str(file)])
         tab = new_tab(width=1000, height=1150).tab
         tab.goto(file.as_uri())
         tab.wait_for_function("document.querySelector('.machine-view')?.dataset.rest === 'fine'")
-        tab.locator("#s2").scroll_into_view_if_needed()
-        tab.evaluate("document.querySelector('#s1 table').scrollIntoView()")
+        tab.evaluate("document.querySelector('#s1').scrollIntoView()")
         tab.wait_for_timeout(1500)
         keep(Image.open(BytesIO(tab.screenshot())), "report-page")
 

@@ -20,6 +20,10 @@ WIDTHS = (80, 100, 120)
 QUICK = ("tripteron", "planar-3rpr")
 """A machine with long names of fields, and one with three components."""
 LOAD = 'load.force=["10 N", "0 N", "-50 N"]'
+DEMANDS = {
+    "stiff along x at the pose": "free_stiffness_x > 12.3456 N/um",
+    "margin": "singularity_margin > 0.123456",
+}
 STUDY = [
     "zhang-gosselin-2002",
     *("--set=optimizer.population=8", "--set=optimizer.generations=3", "--set=optimizer.method=genetic"),
@@ -95,8 +99,11 @@ def pose_ranges(name, count=3):
     return found
 
 
-def commands_of(name):
+def commands_of(name, folder):
     across, up = pose_ranges(name)
+    poses = folder / "poses.csv"
+    field, _, ends = across.partition("=")
+    poses.write_text("\n".join([field, *ends.split(":")[:2]]))
     yield "check", name
     yield "analyze", name, "--full", "--set", LOAD, "--along", "1,1,0"
     yield "analyze", name, "--units", "si"
@@ -106,19 +113,22 @@ def commands_of(name):
     yield "map", name, "--over", across, "--over", up
     yield "guidelines", name, "--full"
     yield "workspace", name, "--over", across, "--over", up
+    yield "analyze", name, *(f"--set=requirements.{key}={demand}" for key, demand in DEMANDS.items())
+    yield "forward", name, "--starts", "5"
+    yield "path", name, str(poses), "--quantity", "stiffness", "--quantity", "singularity_margin"
     yield "compare", name, f"{name}:{across.split('=')[0]}={across.split('=')[1].split(':')[0]}"
 
 
 @pytest.mark.parametrize("name", QUICK)
-def test_every_digit_is_printed_for_some_machines(name, monkeypatch):
-    for arguments in commands_of(name):
+def test_every_digit_is_printed_for_some_machines(name, monkeypatch, tmp_path):
+    for arguments in commands_of(name, tmp_path):
         check(printed(monkeypatch, *arguments))
 
 
 @pytest.mark.documents
 @pytest.mark.parametrize("name", bundled())
-def test_every_digit_is_printed_for_all_machines(name, monkeypatch):
-    for arguments in commands_of(name):
+def test_every_digit_is_printed_for_all_machines(name, monkeypatch, tmp_path):
+    for arguments in commands_of(name, tmp_path):
         check(printed(monkeypatch, *arguments))
 
 
@@ -155,7 +165,7 @@ def test_names_to_type_are_whole_in_the_list(monkeypatch):
 
 HELP = [(), *((name,) for name in ("new", "schema", "check", "analyze", "sweep", "map", "workspace", "sensitivity"))]
 HELP += [(name,) for name in ("guidelines", "compare", "validate", "optimize", "pareto", "report", "export")]
-HELP += [("reproduce",), ("studio",), ("doctor",)]
+HELP += [("reproduce",), ("studio",), ("doctor",), ("path",), ("forward",), ("list",)]
 
 
 @pytest.mark.parametrize("command", HELP, ids=lambda command: " ".join(command) or "kinetostat")

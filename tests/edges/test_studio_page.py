@@ -227,7 +227,7 @@ def test_a_click_goes_to_the_worst_pose_of_a_requirement():
     async def steps(page):
         await page.upload("mine.toml", (bundled()["hexapod"] + demand).encode())
         await page.front("Requirements")
-        assert page.one("requirements-headline").text == "1 of 1 requirements is not met."
+        assert page.one("requirements-headline").text == "The requirement is not met."
         await page.send("worst-stiff", "click")
         assert "120" in str(page.one("control pose.z")._props)
 

@@ -13,8 +13,10 @@ from kinetostat.studies.requirements import Verdict
 def headline(verdicts: Sequence[Verdict]) -> str:
     """Say how many requirements are met."""
     failed = sum(not verdict.met for verdict in verdicts)
+    if len(verdicts) == 1:
+        return f"The requirement is {'not ' if failed else ''}met."
     if not failed:
-        return "All requirements are met." if len(verdicts) > 1 else "The requirement is met."
+        return "All requirements are met."
     return f"{failed} of {len(verdicts)} requirements {'is' if failed == 1 else 'are'} not met."
 
 
