@@ -17,6 +17,8 @@ _HOMES = {
     "changed": "kinetostat.machine.changing",
     "analyze": "kinetostat.studies.analysis",
     "forward": "kinetostat.studies.assembly",
+    "under_load": "kinetostat.studies.under_load",
+    "command": "kinetostat.studies.command",
     "evaluate": "kinetostat.studies.evaluation.dataset",
     "evaluate_grid": "kinetostat.studies.grid.grid",
     "workspace": "kinetostat.studies.workspace.workspace",
@@ -52,10 +54,10 @@ _SHOWN = {
 """Classes that notebooks show as HTML, with their modules: IPython gets names only, so that nothing is imported."""
 
 __all__ = [
-    "InputError", "Machine", "Status", "analyze", "build", "bundled", "changed", "compare", "evaluate", "evaluate_grid",
-    "export", "forward", "guidelines", "load", "load_problem", "machine_picture", "optimize", "plot", "register",
-    "report", "reproduce",
-    "requirements", "save", "sensitivity", "validate", "workspace",
+    "InputError", "Machine", "Status", "analyze", "build", "bundled", "changed", "command", "compare",
+    "evaluate", "evaluate_grid", "export", "forward", "guidelines", "load", "load_problem", "machine_picture",
+    "optimize", "plot", "register", "report", "reproduce", "requirements", "save", "sensitivity",
+    "under_load", "validate", "workspace",
 ]  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from kinetostat.machine.machine import Machine as Machine
 from kinetostat.spec.errors import InputError as InputError
 from kinetostat.studies.analysis import analyze as analyze
 from kinetostat.studies.assembly import forward as forward
+from kinetostat.studies.command import command as command
 from kinetostat.studies.comparison.designs import compare as compare
 from kinetostat.studies.evaluation.dataset import evaluate as evaluate
 from kinetostat.studies.grid.grid import evaluate_grid as evaluate_grid
@@ -22,6 +23,7 @@ from kinetostat.studies.optimisation.search import optimize as optimize
 from kinetostat.studies.paper.reproduction import reproduce as reproduce
 from kinetostat.studies.requirements import requirements as requirements
 from kinetostat.studies.sensitivity import sensitivity as sensitivity
+from kinetostat.studies.under_load import under_load as under_load
 from kinetostat.studies.workspace.workspace import workspace as workspace
 from kinetostat.validation.comparison import validate as validate
 from kinetostat.views.answers import plot as plot

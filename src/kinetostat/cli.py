@@ -33,6 +33,7 @@ from kinetostat.commands.doctor import add_doctor_command
 from kinetostat.commands.forward import add_forward_command
 from kinetostat.commands.grid import add_grid_commands
 from kinetostat.commands.influence import add_influence_commands
+from kinetostat.commands.loaded import add_command_command, analyze_loaded
 from kinetostat.commands.optimize import add_optimize_commands
 from kinetostat.commands.path import add_path_command
 from kinetostat.commands.report import add_report_commands
@@ -191,8 +192,13 @@ def _parser() -> Parser:
         help="also give the stiffness along (force) and about (moment) this direction; repeatable",
     )  # fmt: skip
     analyze.add_argument("--full", action="store_true", help="also show eigenscrews and every single spring")
+    analyze.add_argument(
+        "--loaded", action="store_true",
+        help="at rest under gravity, preload and [load], with exact geometry: displacement, springs, tangent stiffness",
+    )  # fmt: skip
     takes_json(analyze)
     add_forward_command(commands)
+    add_command_command(commands)
     add_path_command(commands)
     add_grid_commands(commands)
     add_influence_commands(commands)
@@ -312,6 +318,8 @@ def _analyze(options: argparse.Namespace) -> int:
     from kinetostat.views.analysis_tables import print_analysis
 
     machine = load_machine(options)
+    if options.loaded:
+        return analyze_loaded(options, machine)
     verdicts = _verdicts(machine)
     analysis = analyze(machine, options.axes)
     answered = analysis.status is Status.OK

@@ -75,6 +75,18 @@ PARALLEL_AXES = 1e-12
 NO_LINK = 1e-9
 """Length of a link, m, below which it has no direction."""
 
+# Equilibrium under load
+
+AT_REST = 1e-10
+"""Motion in one of Newton's steps, rad or in units of the machine's length, below which steps converge quadratically or
+are round-off: the next one is the square of it."""
+
+UNRESISTED = 1e-12
+"""Share of the largest singular value or stiffness below which a motion meets no condition, or no spring."""
+
+COMMANDED = 1e-14
+"""Change of an actuator, rad or in units of the machine's length, below which a correction is round-off."""
+
 # Engine: derivatives
 
 SAME_DERIVATIVE = 1e-6

@@ -63,6 +63,7 @@ KINDS = {
         Kind("density", "kg/m**3", "7850 kg/m**3"),
         Kind("linear density", "kg/m", "3.5 kg/m"),
         Kind("mass", "kg", "12 kg"),
+        Kind("acceleration", "m/s**2", "9.81 m/s**2"),
         Kind("direction", "", "1.0"),
     )
 }
@@ -87,6 +88,7 @@ USUAL = {
     "kg/m**3": {"kg/m**3": 1.0},
     "kg/m": {"kg/m": 1.0, "g/m": 1e-3},
     "kg": {"kg": 1.0, "g": 1e-3},
+    "m/s**2": {"m/s**2": 1.0},
 }
 """SI values of the units that most files use, by SI unit. They are pint's to the last bit, which a test compares; pint
 itself takes longer to import than a thousand poses take to compute, and is only asked about all other units."""

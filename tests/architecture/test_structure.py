@@ -16,6 +16,7 @@ LAYERS = [
     "machine",
     "kinematics",
     "kinetostatics",
+    "equilibrium",
     "engine",
     "studies",
     "validation",

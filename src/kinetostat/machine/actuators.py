@@ -6,7 +6,7 @@ Nothing is solved here. Points and axes are in the base frame.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from kinetostat.machine.machine import Chains, Configuration
 from kinetostat.machine.rods import rods
 from kinetostat.tolerances import NO_LINK, PARALLEL_AXES
 
+AHEAD = 1e-4
+"""Motion of an actuator, m or rad, that shows its sense."""
 LENGTH, POSITION = "length of the leg", "position along its axis from the base origin"
 ELEVATION, BEARING = "angle of the crank above the x-y plane", "angle of the crank from x"
 TRAVEL, TURNED = "travel from the home pose", "turn from the home pose"
@@ -75,6 +77,24 @@ def actuators_of(configuration: Configuration) -> list[Actuator]:
                 meaning, coordinate = _crank_angle(spring.joint, leg, place, end)
             result.append(Actuator(name_of(spring), leg.name, meaning, coordinate, slides))
     return result
+
+
+def senses_of(configuration: Configuration) -> list[float]:
+    """Tell for each of `actuators_of` whether its coordinate grows (1) or falls (-1) as its joint moves forward."""
+    senses: list[float] = []
+    for number, leg in enumerate(configuration.legs):
+        for place, spring in enumerate(leg.chain):
+            if not (isinstance(spring, Spring) and spring.actuated):
+                continue
+            ahead, motion = spring.moved(AHEAD)
+            behind = [element.displaced(motion) for element in leg.chain[place + 1 :]]
+            moved = replace(leg, chain=(*leg.chain[:place], ahead, *behind))
+            legs = (*configuration.legs[:number], moved, *configuration.legs[number + 1 :])
+            there = replace(configuration, platform=motion @ configuration.platform, legs=legs)
+            pairs = zip(actuators_of(configuration), actuators_of(there), strict=True)
+            changes = [float(b.coordinate) - float(a.coordinate) for a, b in pairs]
+            senses.append(float(np.sign(changes[len(senses)])))
+    return senses
 
 
 def name_of(spring: Spring) -> str:

@@ -44,8 +44,8 @@ class CrankLinks:
 
 
 CRANK_LINKS = (
-    LinkKind("cranks", ("crank_bending",), in_each_leg("crank", "crank_length")),
-    LinkKind("rods", ("leg_axial",), in_each_leg("rod", "rod_length")),
+    LinkKind("cranks", ("crank_bending",), in_each_leg("crank", "crank_length", 0)),
+    LinkKind("rods", ("leg_axial",), in_each_leg("rod", "rod_length", 1)),
 )
 """The links of R-U-S legs, whose rods have the rigidity `leg_axial`."""
 

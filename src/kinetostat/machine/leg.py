@@ -44,6 +44,10 @@ class PartName(str):
         return self.leg, self.kind
 
 
+Station = tuple[int, Vector]
+"""A point of a leg, base frame, m, and how many elements of its chain, from the base, carry it."""
+
+
 @dataclass(frozen=True)
 class Turn:
     """An angle by its cosine and sine: what closed forms find, and all that placing a revolute needs."""
@@ -133,6 +137,8 @@ class Spring:
         part: the joint or link that it stands for, together with others of the same part; its own name if empty.
         actuated: whether it is an actuator.
         hinge: whether it is a flexure hinge: a joint that resists, where others are free.
+        preload: what it carries where it is not deformed, N or N·m, positive where it pulls its ends together.
+        acts: "pulls" or "pushes" if it carries loads of one sign only, as a cable does; otherwise empty.
     """
 
     name: str
@@ -141,6 +147,8 @@ class Spring:
     part: str = ""
     actuated: bool = False
     hinge: bool = False
+    preload: Scalar = 0.0
+    acts: str = ""
 
     @property
     def of(self) -> str:
@@ -302,8 +310,13 @@ class Leg:
     @property
     def path(self) -> tuple[Vector, ...]:
         """Its joint centres and link ends from base to platform, base frame, m: what a drawing connects."""
-        points = [point for element in self.chain for point in element.path]
-        return tuple(p for i, p in enumerate(points) if i == 0 or p != points[i - 1])
+        return tuple(point for _, point in self.stations)
+
+    @property
+    def stations(self) -> tuple[Station, ...]:
+        """The points of its path, and how many elements of the chain carry each."""
+        every = [(i + k, p) for i, element in enumerate(self.chain) for k, p in enumerate(element.path)]
+        return tuple(each for n, each in enumerate(every) if n == 0 or each[1] != every[n - 1][1])
 
     def displaced(self, motion: Displacement) -> "Leg":
         """The leg after a rigid displacement of the whole machine."""

@@ -1,4 +1,4 @@
-"""Links of a family that have a mass: what people call them, where their cross-section may stand, how long they are.
+"""Links of a family that have a mass: what people call them, where their cross-section may stand, where they are.
 
 What they weigh together is `mass`' business; links of machines written leg by leg are in their files.
 
@@ -10,13 +10,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero
-from kinetostat.algebra.vector import Vector
-from kinetostat.machine.leg import Leg
+from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.machine.leg import Leg, Station
 from kinetostat.spec.fields import Field, Quantity, made_table
 
-Lengths = Callable[[Sequence[Leg], Vector, Any], list[tuple[str, str, Scalar]]]
-"""From the legs at a pose, P (base frame, m) and the table `geometry` to each link: its leg, or nothing if it
-belongs to none, its name and its length (m)."""
+Placed = tuple[str, str, Scalar, tuple[Station, ...]]
+"""A link: its leg, or nothing if it belongs to none, its name, its length (m), and both ends of its axis."""
+Lengths = Callable[[Sequence[Leg], Vector, Any], list[Placed]]
+"""From the legs at a pose, P (base frame, m) and the table `geometry` to each link."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class LinkKind:
     Attributes:
         name: their field in the table [linear_density].
         rigidities: fields of [stiffness] in which their cross-section may be written.
-        lengths: of each of them.
+        lengths: of each of them, and where it is.
         count: how many entries those fields have; None where one is for all links.
     """
 
@@ -46,35 +47,57 @@ def density_table(kinds: Sequence[LinkKind]) -> type:
     return made_table("LinearDensity", fields)
 
 
-def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[tuple[str, str, Scalar]]:
+def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[Placed]:
     """Legs from the first to the last of their passive joints, as long as the pose makes them."""
-    ends = [(leg.name, leg.passive[0].point, leg.passive[-1].point) for leg in actuated_legs(legs)]
-    return [(name, name, (end - start).norm()) for name, start, end in ends if start is not None and end is not None]
+    ends = [(leg, leg.passive[0].point, leg.passive[-1].point) for leg in actuated_legs(legs)]
+    return [
+        (leg.name, leg.name, (end - start).norm(), (leg.stations[0], leg.stations[-1]))
+        for leg, start, end in ends
+        if start is not None and end is not None
+    ]
 
 
-def in_each_leg(what: str, field: str, bars: int = 1) -> Lengths:
-    """Links of the actuated legs, all as long as a field of [geometry] says; in pairs where `bars` is 2."""
+def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:
+    """Links of the actuated legs, all as long as a field of [geometry] says; in pairs where `bars` is 2.
 
-    def lengths(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[tuple[str, str, Scalar]]:
+    Args:
+        what: they are called.
+        field: with their length.
+        segment: which piece of the leg's path from the base they are, counted from 0.
+        bars: side by side.
+    """
+
+    def lengths(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[Placed]:
         names = [what] if bars == 1 else [f"{what} {i}" for i in range(1, bars + 1)]
         length = getattr(geometry, field)
-        return [(leg.name, f"{leg.name} {name}", length) for leg in actuated_legs(legs) for name in names]
+        return [
+            (leg.name, f"{leg.name} {name}", length, leg.stations[segment : segment + 2])
+            for leg in actuated_legs(legs)
+            for name in names
+        ]
 
     return lengths
 
 
 def listed(what: str, field: str) -> Lengths:
-    """Links whose lengths are the entries of a field of [geometry]."""
+    """Links whose lengths are the entries of a field of [geometry]: the path of the leg that has no actuator."""
 
-    def lengths(_legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[tuple[str, str, Scalar]]:
-        return [("", f"{what} {i}", length) for i, length in enumerate(getattr(geometry, field), 1)]
+    def lengths(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[Placed]:
+        path = next((leg.stations for leg in legs if leg.number is None), ())
+        sizes = enumerate(getattr(geometry, field))
+        return [("", f"{what} {i + 1}", length, path[i : i + 2]) for i, length in sizes]
 
     return lengths
 
 
 def from_origin(what: str) -> Lengths:
     """One link from the origin of the base frame to P."""
-    return lambda _legs, tip, _geometry: [(what, what, tip.norm())]
+
+    def lengths(legs: Sequence[Leg], tip: Vector, _geometry: Any) -> list[Placed]:
+        elements = next((len(leg.chain) for leg in legs if leg.name == what), 0)
+        return [(what, what, tip.norm(), ((0, ZERO), (elements, tip)))]
+
+    return lengths
 
 
 def actuated_legs(legs: Sequence[Leg]) -> list[Leg]:

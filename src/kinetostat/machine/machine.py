@@ -14,7 +14,7 @@ from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import COMPONENTS, Wrench
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.display import ENGINEERING, Display, read_display
-from kinetostat.machine.leg import Joint, Leg, Spring, Turn
+from kinetostat.machine.leg import Joint, Leg, Spring, Station, Turn
 from kinetostat.machine.limits import Limits
 from kinetostat.machine.links import LinkKind, density_table
 from kinetostat.machine.orientation import numbers_for, single_angles
@@ -107,12 +107,15 @@ class Member:
         name: unique within the machine.
         length: from joint to joint, m.
         linear_density: kg/m; 0 where nothing says it.
+        ends: both ends of its axis at the pose: how many elements of the leg's chain carry it, and where it is, base
+            frame, m.
     """
 
     leg: str
     name: str
     length: Scalar
     linear_density: Scalar
+    ends: tuple[Station, ...] = ()
 
 
 @table
@@ -129,11 +132,20 @@ class Tool:
         ),
     ] = (0.0, 0.0, 0.0)
     mass: Annotated[float, Quantity("mass", "of the platform and the tool together; 0: not counted")] = 0.0
+    centre_of_mass: Annotated[
+        tuple[float, float, float],
+        Quantity("length", "centre of that mass from P in platform axes: x, y, z", count=3, apart=True),
+    ] = (0.0, 0.0, 0.0)
+    payload: Annotated[float, Quantity("mass", "mass of what the tool carries; 0: nothing")] = 0.0
+    payload_centre: Annotated[
+        tuple[float, float, float],
+        Quantity("length", "centre of the payload from the tool point T in platform axes", count=3, apart=True),
+    ] = (0.0, 0.0, 0.0)
 
 
 @table
 class Load:
-    """Table [load], in any machine file: a wrench on the platform at the tool point, base axes."""
+    """Table [load], in any machine file: a wrench on the platform at the tool point, and gravity; base axes."""
 
     moment: Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3, apart=True)] = (
         0.0,
@@ -145,6 +157,10 @@ class Load:
         0.0,
         0.0,
     )
+    gravity: Annotated[
+        tuple[float, float, float],
+        Quantity("acceleration", "along x, y, z: pulls at all masses of a loaded machine", count=3, apart=True),
+    ] = (0.0, 0.0, 0.0)
 
 
 COMMON = {"tool": Tool, "load": Load, "limits": Limits}

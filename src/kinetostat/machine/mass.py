@@ -3,9 +3,11 @@
 A mass is a plain sum, over any scalar: how it is distributed, and what it does to dynamics, is not asked here.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, is_zero, total
+from kinetostat.machine.leg import Turn
 from kinetostat.machine.machine import Configuration, Machine, Member
 
 PLATFORM = "platform and tool"
@@ -45,6 +47,22 @@ def moving_mass(machine: Machine, configuration: Configuration) -> Scalar:
     return total([mass.mass for mass in moving_masses(machine, configuration) if mass.mass is not None])
 
 
+def located_members(
+    machine: Machine, configuration: Configuration, joints: Sequence[Scalar | Turn] | None
+) -> list[Member]:
+    """The links of which a mass is known, with both ends of each at the pose.
+
+    Args:
+        machine, configuration: see `moving_masses`.
+        joints: coordinates at the pose, of a machine written leg by leg.
+    """
+    if machine.family.members is None:
+        links = _members(machine, configuration)
+    else:
+        links = machine.family.members(joints=joints, **machine.family_tables)
+    return [link for link in links if not is_zero(link.linear_density) and len(link.ends) == 2]
+
+
 def _weighed(link: Member) -> Scalar | None:
     return None if is_zero(link.linear_density) else link.linear_density * link.length
 
@@ -57,6 +75,6 @@ def _members(machine: Machine, configuration: Configuration) -> list[Member]:
     for kind in family.links:
         density = getattr(machine.tables["linear_density"], kind.name)
         placed = configuration.legs, configuration.platform.translation, machine.tables["geometry"]
-        for i, (leg, name, length) in enumerate(kind.lengths(*placed)):
-            members.append(Member(leg, name, length, density if kind.count is None else density[i]))
+        for i, (leg, name, length, ends) in enumerate(kind.lengths(*placed)):
+            members.append(Member(leg, name, length, density if kind.count is None else density[i], ends))
     return members

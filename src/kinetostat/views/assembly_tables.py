@@ -24,7 +24,7 @@ def print_forward(console: Console, answer: Forward) -> None:
         heads = [display.scale(unit).label(name) for name, unit in units.items()]
         table = numeric_table("Assembly modes", "mode", [*heads, "status", "residual"])
         for i, pose in enumerate(answer.poses, 1):
-            values = [_number(pose.pose[name], unit, display) for name, unit in units.items()]
+            values = [precise(pose.pose[name], unit, display) for name, unit in units.items()]
             mark = f"{i} (present)" if pose.present else f"{i}{'' if pose.by_pose else ' *'}"
             table.add_row(mark, *values, pose.status.word.replace("_", " "), f"{pose.residual:.0e}")
         console.print(table)
@@ -38,11 +38,12 @@ def actuator_coordinates(actuators: Sequence[Actuator], display: Display) -> Tab
     """Tabulate where actuators stand."""
     table = numeric_table("Actuators", "actuator", ["coordinate", "counts"])
     for actuator in actuators:
-        value = _number(float(actuator.coordinate), actuator.unit, display)
+        value = precise(float(actuator.coordinate), actuator.unit, display)
         table.add_row(actuator.name, f"{value} {display.scale(actuator.unit).unit}", actuator.meaning)
     return table
 
 
-def _number(value: float, unit: str, display: Display) -> str:
+def precise(value: float, unit: str, display: Display) -> str:
+    """Return a coordinate in the unit that people read, in as many digits as a machine's controller takes."""
     scale = display.scale(unit)
     return f"{round(value * scale.factor, 9) + 0.0:.{DIGITS}g}"

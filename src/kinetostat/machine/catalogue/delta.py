@@ -83,7 +83,7 @@ FAMILY = Family(
     tables={"geometry": Geometry, "stiffness": Stiffness, "pose": Translations},
     configure=configure,
     links=(
-        LinkKind("arms", ("arm_bending", "arm_torsion"), in_each_leg("arm", "arm_length")),
-        LinkKind("bars", ("bar_axial",), in_each_leg("bar", "bar_length", bars=2)),
+        LinkKind("arms", ("arm_bending", "arm_torsion"), in_each_leg("arm", "arm_length", 0)),
+        LinkKind("bars", ("bar_axial",), in_each_leg("bar", "bar_length", 1, bars=2)),
     ),
 )

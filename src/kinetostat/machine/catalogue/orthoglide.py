@@ -89,7 +89,7 @@ FAMILY = Family(
     tables={"geometry": Geometry, "stiffness": Stiffness, "pose": Translations},
     configure=configure,
     links=(
-        LinkKind("feet", ("foot_bending", "foot_torsion"), in_each_leg("foot", "foot_length")),
-        LinkKind("bars", ("bar_axial",), in_each_leg("bar", "bar_length", bars=2)),
+        LinkKind("feet", ("foot_bending", "foot_torsion"), in_each_leg("foot", "foot_length", 0)),
+        LinkKind("bars", ("bar_axial",), in_each_leg("bar", "bar_length", 1, bars=2)),
     ),
 )

@@ -77,8 +77,8 @@ FAMILY = Family(
     tables={"geometry": Geometry, "stiffness": Stiffness, "pose": Pose},
     configure=configure,
     links=(
-        LinkKind("proximal_links", ("proximal_bending",), in_each_leg("proximal link", "proximal_link")),
-        LinkKind("distal_links", ("distal_axial",), in_each_leg("distal link", "distal_link")),
+        LinkKind("proximal_links", ("proximal_bending",), in_each_leg("proximal link", "proximal_link", 0)),
+        LinkKind("distal_links", ("distal_axial",), in_each_leg("distal link", "distal_link", 1)),
     ),
     planar=True,
 )

@@ -16,7 +16,9 @@ from kinetostat.machine.written.directions import directed
 from kinetostat.machine.written.joints import JOINT_TYPES, ONE_FREEDOM, SEAT, needs_axis, stiffness_kind
 from kinetostat.machine.written.plan import (
     BASE,
+    CABLE,
     LINK_MODELS,
+    ONE_SIDED,
     PLANAR_POSE,
     PLATFORM,
     SPATIAL_POSE,
@@ -32,6 +34,9 @@ from kinetostat.spec.fields import LARGEST_OTHER, SOFTEST
 
 MOST_LEGS, MOST_JOINTS = 24, 24
 """Legs of a machine and joints of a leg: more is a mistake, and the equations would take minutes."""
+
+CABLE_KEYS = ("from", "to", "stiffness", "preload")
+"""What is written about a cable: its ends, base frame at the home pose, and its winch; the preload may be left out."""
 
 SYMMETRIC = 1e-9
 """Relative difference up to which a compliance matrix counts as symmetric and as free of negative eigenvalues."""
@@ -49,9 +54,33 @@ def by_name(document: Document, origin: str) -> Document:
         result["legs"] = legs = _named(legs, f'"{origin}"', "leg")
     named = _checked_legs(legs, origin)
     for name, leg in named.items():
+        if "type" in leg:
+            named[name] = leg = _cable(leg, f'"{origin}": leg "{name}"', result.get("space") == "planar")
         if "joints" in leg:
             named[name] = _merged(leg, f'"{origin}": leg "{name}"')
     return with_parts(result, origin)
+
+
+def _cable(leg: dict[str, Any], where: str, planar: bool) -> dict[str, Any]:
+    """The joints of a leg that is written as a cable: two ends, and between them an actuator that only pulls."""
+    choice(leg.get("type"), (CABLE,), f"{where}: type")
+    for key in leg.keys() - {"type", *CABLE_KEYS, *KEYS, "name"}:
+        raise InputError(f"{where}: {key} is not known; a cable has {', '.join(CABLE_KEYS)}, and may have copies.")
+    missing = [key for key in CABLE_KEYS[:3] if key not in leg]
+    if missing:
+        raise InputError(f'{where} is a cable without {" and ".join(missing)}; write e.g. from = [0, 0, "2 m"].')
+    rest = {key: value for key, value in leg.items() if key not in ("type", *CABLE_KEYS)}
+    pulled = {key: leg[key] for key in CABLE_KEYS[2:] if key in leg}
+    ends = [{"type": "revolute", "axis": [0, 0, 1]}] * 2
+    if not planar:
+        ends = [{"type": "universal", "axis": "eye"}, {"type": "spherical"}]
+    winch = {"type": "prismatic", "axis": "eye", "actuated": True, "acts": ONE_SIDED[0]}
+    joints = {
+        "anchor": {**ends[0], "joins": [BASE, "cable"], "point": leg["from"]},
+        "winch": {**winch, "joins": ["cable", "end"], "point": leg["from"], **pulled},
+        "eye": {**ends[1], "joins": ["end", PLATFORM], "point": leg["to"]},
+    }
+    return {**rest, "joints": joints}
 
 
 def _checked_legs(legs: object, origin: str) -> dict[str, Document]:
@@ -221,7 +250,19 @@ def _joint(name: str, part: dict[str, Any], where: str) -> JointPlan:
     series = tuple(part["stiffness"]) if isinstance(part.get("stiffness"), dict) else ()
     compliance = _matrix(part.pop("compliance", []), where)
     seat = _seat(kind, part, bool(compliance), where)
-    return JointPlan(name, kind, (joins[0], joins[1]), bool(actuated), sprung, compliance, series, seat, motor)
+    acts, preloaded = _acts(part, sprung, where), "preload" in part
+    ends = joins[0], joins[1]
+    return JointPlan(name, kind, ends, bool(actuated), sprung, compliance, series, seat, motor, preloaded, acts)
+
+
+def _acts(part: dict[str, Any], sprung: bool, where: str) -> str:
+    """The sign of the loads that a joint's spring carries, if it carries only one: "pulls" or "pushes"."""
+    for key in ("acts", "preload"):
+        if key in part and not sprung:
+            raise InputError(
+                f"{where}: {key} is for an actuator or a spring; give the joint a stiffness, or omit {key}."
+            )
+    return choice(part.pop("acts"), ONE_SIDED, f"{where}: acts") if "acts" in part else ""
 
 
 def _motor(kind: str, actuated: object, where: str) -> str:

@@ -4,13 +4,14 @@ Which coordinates close the chains at a pose is found in `kinematics.closure`. P
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any, cast
 
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.cross_section import linear_density_of, rigidity_of
-from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Turn
+from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Station, Turn
 from kinetostat.machine.link import Beam, any_up, lumped_springs, matrix_springs, seat_springs
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
 from kinetostat.machine.series import springs_in_a_row
@@ -78,17 +79,23 @@ def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[
 
 def chain_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[Step]:
     """The elements of a leg at the home pose, from base to platform."""
+    return [step for moving, link in _parts_at_home(plan, leg, tables) for step in (*moving, *link)]
+
+
+def _parts_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[tuple[list[Step], list[Step]]]:
+    """The elements of each joint of a leg, and those of the link behind it."""
     data = [joint_numbers(leg, joint, tables) for joint in leg.joints]
-    steps: list[Step] = []
+    parts: list[tuple[list[Step], list[Step]]] = []
     for i, joint in enumerate(leg.joints):
         seat = [Step(spring, False) for spring in _seat(leg, joint, data[i])]
         moving = _moving(leg, joint, data[i], tables)
-        steps += [*moving, *seat] if JOINT_TYPES[joint.kind].seat_travels else [*seat, *moving]
-        link = leg.links.get(joint.joins[1])
+        steps = [*moving, *seat] if JOINT_TYPES[joint.kind].seat_travels else [*seat, *moving]
+        link, flexible = leg.links.get(joint.joins[1]), []
         if link is not None:
             ends = Vector(*data[i].point), Vector(*data[i + 1].point)
-            steps += [Step(element, False) for element in _link_elements(leg, link, ends, plan, tables)]
-    return steps
+            flexible = [Step(element, False) for element in _link_elements(leg, link, ends, plan, tables)]
+        parts.append((steps, flexible))
+    return parts
 
 
 def _seat(leg: LegPlan, joint: JointPlan, data: Any) -> Sequence[Spring]:
@@ -116,6 +123,7 @@ def _moving(leg: LegPlan, joint: JointPlan, data: Any, tables: Mapping[str, Any]
     name = f"{title} actuator" if joint.actuated else f"{title} hinge"
     stiffness = 0.0 if joint.series else data.stiffness
     spring = Spring(name, freedom, stiffness, title, joint.actuated, not joint.actuated)
+    spring = replace(spring, preload=data.preload if joint.preloaded else 0.0, acts=joint.acts)
     if not joint.series:
         return [*steps[:place], Step(spring, True), *steps[place + 1 :]]
     row = tables[f"{leg.table(joint.name)}.stiffness"]
@@ -140,20 +148,42 @@ def _link_elements(
     return (Beam(title, *ends, up, rigidity),)
 
 
-def members(plan: Plan, **tables: Any) -> list[Member]:
-    """The links between two joints that can move: those after the first joint of their leg that is not fixed."""
-    links = []
+def members(plan: Plan, joints: Sequence[Scalar | Turn] | None = None, **tables: Any) -> list[Member]:
+    """The links between two joints that can move: those after the first joint of their leg that is not fixed.
+
+    Args:
+        plan: of the machine.
+        joints: coordinates at the pose, which place the ends of the links; without them no ends are given.
+        tables: of the machine, by keyword.
+    """
+    links, left = [], None if joints is None else iter(joints)
     for leg in plan.legs:
         points = [Vector(*joint_numbers(leg, joint, tables).point) for joint in leg.joints]
+        placed = [()] * len(points) if left is None else _link_ends(plan, leg, tables, points, left)
         moves = False
-        for joint, start, end in zip(leg.joints, points, points[1:], strict=False):
+        for joint, start, end, ends in zip(leg.joints, points, points[1:], placed, strict=False):
             moves = moves or joint.kind != "fixed"
             if moves:
                 section = leg.links[joint.joins[1]].cross_section if joint.joins[1] in leg.links else ""
                 data = tables[f"sections.{section}"] if section else None
                 density = linear_density_of(plan.shapes[section], data) if section else 0.0
-                links.append(Member(leg.name, f"{leg.name} {joint.joins[1]}", (end - start).norm(), density))
+                name = f"{leg.name} {joint.joins[1]}"
+                links.append(Member(leg.name, name, (end - start).norm(), density, ends))
     return links
+
+
+def _link_ends(
+    plan: Plan, leg: LegPlan, tables: Mapping[str, Any], points: Sequence[Vector], joints: Iterator[Scalar | Turn]
+) -> list[tuple[Station, ...]]:
+    """Where both ends of each link of a leg are, from its joints' points at the home pose and their coordinates."""
+    motion, carried = Displacement(IDENTITY, ZERO), 0
+    ends: list[tuple[Station, ...]] = []
+    following = [*points[1:], points[-1]]
+    for (moving, flexible), start, end in zip(_parts_at_home(plan, leg, tables), points, following, strict=True):
+        motion = place([replace(s, element=s.element.displaced(motion)) for s in moving], joints)[1] @ motion
+        carried += len(moving) + len(flexible)
+        ends.append(((carried - len(flexible), motion.apply(start)), (carried, motion.apply(end))))
+    return ends
 
 
 def _length(plan: Plan, tables: Mapping[str, Any]) -> Scalar:

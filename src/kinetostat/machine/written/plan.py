@@ -24,6 +24,11 @@ LINK_MODELS = {
 }
 """How a link may deflect."""
 
+CABLE = "cable"
+"""What the `type` of a leg may say."""
+ONE_SIDED = ("pulls", "pushes")
+"""What `acts` may say: a cable pulls its ends together, a prop pushes them apart; neither does the other."""
+
 SPATIAL_POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 PLANAR_POSE = ("x", "y", "yaw")
 """Coordinates of the platform: P in the base frame, and Q = Rz(yaw) Ry(pitch) Rx(roll) against the home pose."""
@@ -44,6 +49,8 @@ class JointPlan:
         series: keys of the parts that this stiffness is made of, in a row; empty if it is one number.
         seat: directions in which its bearings have a stiffness: some of `joints.SEAT`.
         motor: the freedom that is actuated, of a joint with several: a key of its type's `motors`; empty otherwise.
+        preloaded: whether the file gives a preload of its spring.
+        acts: "pulls" or "pushes" if its spring carries loads of one sign only; empty otherwise.
         compliance: of its own, rows rx ry rz x y z at its point, base axes at the home pose, SI; empty if it is stiff.
     """
 
@@ -56,6 +63,8 @@ class JointPlan:
     series: tuple[str, ...] = ()
     seat: tuple[str, ...] = ()
     motor: str = ""
+    preloaded: bool = False
+    acts: str = ""
 
 
 @dataclass(frozen=True)
@@ -169,6 +178,8 @@ def _joint_literals(joint: JointPlan) -> dict[str, object]:
     written: dict[str, object] = {"type": joint.kind, "joins": list(joint.joins)}
     if joint.actuated:
         written["actuated"] = joint.motor or True
+    if joint.acts:
+        written["acts"] = joint.acts
     if joint.compliance:
         written["compliance"] = [list(row) for row in joint.compliance]
     return written

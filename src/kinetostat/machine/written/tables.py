@@ -6,7 +6,7 @@ from kinetostat.machine.cross_section import MATERIALS, SHAPE_KINDS, SHAPES
 from kinetostat.machine.orientation import orientation_schema
 from kinetostat.machine.series import label
 from kinetostat.machine.written.joints import AXIS, JOINT_TYPES, MOTORS, SEAT, needs_axis, stiffness_kind
-from kinetostat.machine.written.plan import LINK_MODELS, NAME, SPATIAL_POSE, SUMMARY, JointPlan, Plan
+from kinetostat.machine.written.plan import CABLE, LINK_MODELS, NAME, ONE_SIDED, SPATIAL_POSE, SUMMARY, JointPlan, Plan
 from kinetostat.spec.fields import Field, Quantity, made_table
 from kinetostat.spec.validation import DISPLAY_SCHEMA
 from kinetostat.units import KINDS
@@ -40,6 +40,9 @@ def _joint_fields(joint: JointPlan) -> dict[str, Field]:
         kind = stiffness_kind(joint.kind, joint.motor)
         what = "its actuator, held by its servo" if joint.actuated else "the joint's own, as of a flexure hinge"
         fields["stiffness"] = Field(Quantity(kind, what))
+    if joint.preloaded:
+        kind = "force" if stiffness_kind(joint.kind, joint.motor) == "linear stiffness" else "moment"
+        fields["preload"] = Field(Quantity(kind, "what it carries undeformed, positive if it pulls its ends together"))
     return fields
 
 
@@ -116,6 +119,8 @@ def _leg() -> dict[str, Any]:
         },
         **{f"stiffness_{way}": {**QUANTITY, "description": field.quantity.meaning} for way, field in SEAT.items()},
         "compliance": COMPLIANCE,
+        "preload": {**QUANTITY, "description": "load of its spring where that is not deformed; a cable's pretension"},
+        "acts": {"enum": list(ONE_SIDED), "description": "of a spring that carries loads of one sign only"},
     }
     models = "; ".join(f"{model}: {meaning}" for model, meaning in LINK_MODELS.items())
     link = {
@@ -131,7 +136,17 @@ def _leg() -> dict[str, Any]:
         "angles": {"type": "array", "items": QUANTITY, "description": "of the copies; left out: equal steps"},
         "mirrored": {"type": "boolean", "description": "every other copy is a mirror image in the x-z plane"},
     }
-    return _table({"name": {"type": "string"}, **copies, "joints": joints, "links": links}, ["name", "joints"])
+    chain = _table({"name": {"type": "string"}, **copies, "joints": joints, "links": links}, ["name", "joints"])
+    end = {"type": "array", "items": QUANTITY, "minItems": 3, "maxItems": 3}
+    cable = {
+        "type": {"const": CABLE, "description": "an actuator that only pulls, between two points"},
+        "from": {**end, "description": "its end at the base, base frame at the home pose"},
+        "to": {**end, "description": "its end at the platform, base frame at the home pose"},
+        "stiffness": joint["stiffness"],
+        "preload": joint["preload"],
+    }
+    rope = _table({"name": {"type": "string"}, **copies, **cable}, ["name", "type", "from", "to", "stiffness"])
+    return {"anyOf": [chain, rope]}
 
 
 def _field(field: Field) -> dict[str, Any]:

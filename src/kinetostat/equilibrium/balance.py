@@ -1,0 +1,248 @@
+"""The equations of equilibrium of a mechanism and their rates: where everything is, what it carries, the rest.
+
+A state is at rest where one potential is stationary: energy of the springs, weight, and the potential of the load,
+under the condition that all legs end at the platform. The multipliers of these conditions are the wrenches that the
+platform exerts on the legs. Nothing is solved here.
+
+Source: theory (35)-(38). Units, axes and origin are those of `mechanism`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.equilibrium.mechanism import Chain, Mechanism
+from kinetostat.equilibrium.motion import Array, Motions, brackets, exponential, logarithm, skew_of, still
+
+
+@dataclass(frozen=True)
+class State:
+    """Where a mechanism is, and what its legs carry, at n poses.
+
+    Attributes:
+        platform: displacement of the platform from the free state.
+        coordinates: of each leg [n x coordinates].
+        wrenches: that the platform exerts on each leg, at the origin [n x 6].
+        amounts: by which the actuators are driven from the free state [n x actuators].
+    """
+
+    platform: Motions
+    coordinates: tuple[Array, ...]
+    wrenches: tuple[Array, ...]
+    amounts: Array
+
+    def taken(self, rows: npt.NDArray[np.int64]) -> "State":
+        """The state at some of the poses [rows]."""
+        return State(
+            Motions(self.platform.rotation[rows], self.platform.translation[rows]),
+            tuple(values[rows] for values in self.coordinates),
+            tuple(values[rows] for values in self.wrenches),
+            self.amounts[rows],
+        )
+
+
+def free_state(mechanism: Mechanism) -> State:
+    """The state without loads: nothing has moved."""
+    count = len(mechanism.length)
+    return State(
+        still(count),
+        tuple(np.zeros((count, leg.size)) for leg in mechanism.legs),
+        tuple(np.zeros((count, 6)) for _ in mechanism.legs),
+        np.zeros((count, len(mechanism.actuators))),
+    )
+
+
+@dataclass(frozen=True)
+class LegTerms:
+    """What a leg adds to the equations, at n poses.
+
+    Attributes:
+        end: displacement of its end.
+        rates: twist of its end per unit of each coordinate [n x 6 x coordinates].
+        driven: the same per unit of each actuator [n x 6 x actuators].
+        loads: in its springs [n x coordinates], 0 of a passive coordinate.
+        carrying: stiffness of each spring that carries, 0 of those that are slack [n x coordinates].
+        left: what is left of the equilibrium of its coordinates [n x coordinates].
+        geometric: change of `left` by the coordinates through weight and wrenches alone [n x c x c].
+        by_actuators: change of `left` by the actuators [n x coordinates x actuators].
+    """
+
+    end: Motions
+    rates: Array
+    driven: Array
+    loads: Array
+    carrying: Array
+    left: Array
+    geometric: Array
+    by_actuators: Array
+
+
+def leg_terms(leg: Chain, coordinates: Array, wrench: Array, amounts: Array, gravity: Array) -> LegTerms:
+    """Evaluate a leg.
+
+    Args:
+        leg: the leg.
+        coordinates: of it [n x coordinates].
+        wrench: that the platform exerts on it, at the origin [n x 6].
+        amounts: of all actuators of the machine [n x actuators].
+        gravity: [n x 3].
+    """
+    count = len(coordinates)
+    placed, columns = [still(count)], []
+    for number, (by, driven) in enumerate(zip(leg.coordinate, leg.actuator, strict=True)):
+        twist = leg.twists[:, number]
+        amount = amounts[:, driven] if by < 0 else coordinates[:, by]
+        columns.append(placed[-1].twist(twist))
+        placed.append(placed[-1] @ exponential(twist * amount[:, None]))
+    screws = np.stack(columns, axis=1) if columns else np.zeros((count, 0, 6))
+    weight, change = _weight(leg, placed, screws, gravity)
+    # A screw changes with the motions before it, so that the work of the wrench on it does.
+    changing = np.einsum("nc,njkc->nkj", wrench, brackets(screws))
+    change = change - np.tril(changing, -1)
+    own = leg.follows(leg.coordinate, leg.size)
+    drives = leg.follows(leg.actuator, amounts.shape[1])
+    loads = leg.stiffness * coordinates + leg.preload
+    carries = leg.sign * loads >= 0.0
+    loads = np.where(carries, loads, 0.0)
+    work = np.einsum("nfc,nc->nf", screws, wrench)
+    return LegTerms(
+        placed[-1],
+        np.einsum("nfc,fk->nck", screws, own),
+        np.einsum("nfc,fk->nck", screws, drives),
+        loads,
+        np.where(carries, leg.stiffness, 0.0),
+        loads + (weight - work) @ own,
+        np.einsum("fk,nfg,gl->nkl", own, change, own),
+        np.einsum("fk,nfg,gl->nkl", own, change, drives),
+    )
+
+
+def _weight(leg: Chain, placed: list[Motions], screws: Array, gravity: Array) -> tuple[Array, Array]:
+    """Gradient of the potential of a leg's weight by its motions [n x motions], and the gradient's rates."""
+    count, motions = screws.shape[:2]
+    gradient, rates = np.zeros((count, motions)), np.zeros((count, motions, motions))
+    for i, carried in enumerate(leg.masses.carried):
+        force = gravity * leg.masses.mass[:, i, None]
+        at = placed[carried].point(leg.masses.point[:, i])
+        moving = np.cross(screws[:, :carried, :3], at[:, None]) + screws[:, :carried, 3:]
+        gradient[:, :carried] -= np.einsum("nc,nfc->nf", force, moving)
+        # Of two motions, the one nearer to the base turns the path on which the other one moves the mass.
+        turned = np.cross(screws[:, :carried, None, :3], moving[:, None])
+        both = np.triu(np.einsum("nc,njkc->njk", force, turned))
+        rates[:, :carried, :carried] -= both + np.swapaxes(np.triu(both, 1), 1, 2)
+    return gradient, rates
+
+
+def platform_load(mechanism: Mechanism, platform: Motions) -> tuple[Array, Array]:
+    """The load on the platform at the origin [n x 6], and its change by a twist of the platform [n x 6 x 6].
+
+    Forces keep their direction and go with their points; the moment keeps its axis.
+    """
+    count = len(mechanism.length)
+    points = [np.zeros((count, 3)), *np.swapaxes(mechanism.platform.point, 0, 1)]
+    weights = mechanism.platform.mass.T[:, :, None] * mechanism.gravity[None]
+    forces = [mechanism.wrench[:, 3:], *weights]
+    wrench = np.concatenate([mechanism.wrench[:, :3], np.zeros((count, 3))], axis=1)
+    change = np.zeros((count, 6, 6))
+    for point, force in zip(points, forces, strict=True):
+        at = platform.point(point)
+        wrench = wrench + np.concatenate([np.cross(at, force), force], axis=1)
+        change[:, :3, :3] += skew_of(force) @ skew_of(at)
+        change[:, :3, 3:] -= skew_of(force)
+    return wrench, change
+
+
+@dataclass(frozen=True)
+class Balance:
+    """The equations at a state; unknown are the twist of the platform, and of each leg its coordinates and wrench.
+
+    Attributes:
+        state: where everything is.
+        legs: what each adds.
+        left: what is left of the equations [n x unknowns].
+        load: on the platform at the origin [n x 6].
+        load_change: of it by a twist of the platform [n x 6 x 6].
+    """
+
+    mechanism: Mechanism
+    state: State
+    legs: tuple[LegTerms, ...]
+    left: Array
+    load: Array
+    load_change: Array
+
+    @property
+    def starts(self) -> list[int]:
+        """Where the unknowns of each leg begin, and where the last ones end."""
+        ways = self.mechanism.ways.shape[1]
+        starts = [ways]
+        for leg in self.mechanism.legs:
+            starts.append(starts[-1] + leg.size + ways)
+        return starts
+
+    def rates(self, loaded: bool = True) -> Array:
+        """Rates of the equations by the unknowns [n x unknowns x unknowns].
+
+        Args:
+            loaded: with what loads and wrenches do by turning; without it, springs alone resist.
+        """
+        ways, starts = self.mechanism.ways, self.starts
+        size = ways.shape[1]
+        result = np.zeros((len(self.left), starts[-1], starts[-1]))
+        if loaded:
+            result[:, :size, :size] = -ways.T @ self.load_change @ ways
+        for leg, terms, start in zip(self.mechanism.legs, self.legs, starts, strict=False):
+            own, wrench = slice(start, start + leg.size), slice(start + leg.size, start + leg.size + size)
+            inner = terms.carrying[:, :, None] * np.eye(leg.size) + leg.idle @ np.swapaxes(leg.idle, 1, 2)
+            across = ways.T @ terms.rates
+            result[:, own, own] = inner + terms.geometric if loaded else inner
+            result[:, own, wrench] = -np.swapaxes(across, 1, 2)
+            result[:, wrench, own] = across
+            result[:, wrench, :size] = -np.eye(size)
+            result[:, :size, wrench] = np.eye(size)
+        return result
+
+    def by_actuators(self) -> Array:
+        """Rates of the equations by the amounts of the actuators [n x unknowns x actuators]."""
+        ways, starts = self.mechanism.ways, self.starts
+        result = np.zeros((len(self.left), starts[-1], self.state.amounts.shape[1]))
+        for leg, terms, start in zip(self.mechanism.legs, self.legs, starts, strict=False):
+            own, wrench = slice(start, start + leg.size), slice(start + leg.size, start + leg.size + ways.shape[1])
+            result[:, own] = terms.by_actuators
+            result[:, wrench] = ways.T @ terms.driven
+        return result
+
+    def moved(self, step: Array) -> State:
+        """The state after a step of the unknowns [n x unknowns]."""
+        ways, size = self.mechanism.ways, self.mechanism.ways.shape[1]
+        coordinates, wrenches = [], []
+        for k, (leg, start) in enumerate(zip(self.mechanism.legs, self.starts, strict=False)):
+            coordinates.append(self.state.coordinates[k] + step[:, start : start + leg.size])
+            wrenches.append(self.state.wrenches[k] + step[:, start + leg.size : start + leg.size + size] @ ways.T)
+        platform = exponential(step[:, :size] @ ways.T) @ self.state.platform
+        return State(platform, tuple(coordinates), tuple(wrenches), self.state.amounts)
+
+    def motion_of(self, step: Array) -> Array:
+        """The largest motion in a step of the unknowns, rad and units of the length [n]."""
+        moving = np.concatenate(
+            [step[:, : self.mechanism.ways.shape[1]]]
+            + [step[:, s : s + leg.size] for leg, s in zip(self.mechanism.legs, self.starts, strict=False)],
+            axis=1,
+        )
+        return np.asarray(np.abs(moving).max(axis=1, initial=0.0))
+
+
+def balance(mechanism: Mechanism, state: State) -> Balance:
+    """Evaluate the equations of equilibrium at a state."""
+    ways = mechanism.ways
+    load, change = platform_load(mechanism, state.platform)
+    terms, carried, left = [], np.zeros_like(load), []
+    for leg, coordinates, wrench in zip(mechanism.legs, state.coordinates, state.wrenches, strict=True):
+        own = leg_terms(leg, coordinates, wrench, state.amounts, mechanism.gravity)
+        terms.append(own)
+        carried = carried + wrench
+        left += [own.left, -logarithm(state.platform @ own.end.inverse()) @ ways]
+    return Balance(
+        mechanism, state, tuple(terms), np.concatenate([(carried - load) @ ways, *left], axis=1), load, change
+    )

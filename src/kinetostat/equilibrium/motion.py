@@ -1,0 +1,119 @@
+"""Finite displacements of many bodies at once: exponentials of screws, their inverse, and how screws change with them.
+
+Arrays of NumPy, rotation first, all screws at the origin and in base axes; leading axes are poses. The single pose over
+scalars is in `algebra`.
+
+Source: R. M. Murray, Z. Li and S. S. Sastry, A Mathematical Introduction to Robotic Manipulation (1994), section 2.3
+and appendix A; theory section 12.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+SMALL_ANGLE = 0.05
+"""Angle, rad, below which quotients like (t - sin t) / t^3 are taken from their series: the fourth term is 1e-16."""
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Rigid displacements of n bodies.
+
+    Attributes:
+        rotation: [n x 3 x 3].
+        translation: m [n x 3].
+    """
+
+    rotation: Array
+    translation: Array
+
+    def __matmul__(self, other: "Motions") -> "Motions":
+        """First `other`, then this one."""
+        return Motions(self.rotation @ other.rotation, self.point(other.translation))
+
+    def point(self, points: Array) -> Array:
+        """Where points [n x 3] go."""
+        return np.asarray(np.einsum("nij,nj->ni", self.rotation, points) + self.translation)
+
+    def twist(self, twists: Array) -> Array:
+        """Where screws fixed in the bodies [n x 6] go (the adjoint map)."""
+        turning = np.einsum("nij,nj->ni", self.rotation, twists[:, :3])
+        moving = np.einsum("nij,nj->ni", self.rotation, twists[:, 3:])
+        return np.concatenate([turning, moving + np.cross(self.translation, turning)], axis=1)
+
+    def inverse(self) -> "Motions":
+        """The displacements that undo these."""
+        back = np.swapaxes(self.rotation, 1, 2)
+        return Motions(back, -np.einsum("nij,nj->ni", back, self.translation))
+
+
+def still(count: int) -> Motions:
+    """No displacement, of n bodies."""
+    return Motions(np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3)))
+
+
+def exponential(twists: Array) -> Motions:
+    """The displacement by a screw motion for one unit of time [n x 6]."""
+    turning, moving = twists[:, :3], twists[:, 3:]
+    angle = np.linalg.norm(turning, axis=1)
+    first, second, third = _quotients(angle)
+    skew = skew_of(turning)
+    squared = skew @ skew
+    rotation = np.eye(3) + first[:, None, None] * skew + second[:, None, None] * squared
+    along = np.eye(3) + second[:, None, None] * skew + third[:, None, None] * squared
+    return Motions(rotation, np.einsum("nij,nj->ni", along, moving))
+
+
+def logarithm(motions: Motions) -> Array:
+    """The screw [n x 6] whose exponential a displacement is, for rotations below half a turn."""
+    rotation = motions.rotation
+    sines = 0.5 * np.stack(
+        [
+            rotation[:, 2, 1] - rotation[:, 1, 2],
+            rotation[:, 0, 2] - rotation[:, 2, 0],
+            rotation[:, 1, 0] - rotation[:, 0, 1],
+        ],
+        axis=1,
+    )
+    angle = np.arctan2(np.linalg.norm(sines, axis=1), 0.5 * (np.trace(rotation, axis1=1, axis2=2) - 1.0))
+    first, second, _ = _quotients(angle)
+    turning = sines / first[:, None]
+    skew = skew_of(turning)
+    # 1/t^2 - (1 + cos t)/(2 t sin t) = (1 - first / (2 second)) / t^2, which is 1/12 for no angle at all.
+    small = angle < SMALL_ANGLE
+    square = np.where(small, 1.0, angle * angle)
+    series = 1.0 / 12.0 + angle**2 / 720.0 + angle**4 / 30240.0 + angle**6 / 1209600.0
+    rest = np.where(small, series, (1.0 - 0.5 * first / second) / square)
+    back = np.eye(3) - 0.5 * skew + rest[:, None, None] * (skew @ skew)
+    return np.concatenate([turning, np.einsum("nij,nj->ni", back, motions.translation)], axis=1)
+
+
+def _quotients(angle: Array) -> tuple[Array, Array, Array]:
+    """sin t / t, (1 - cos t) / t^2 and (t - sin t) / t^3 [n]."""
+    small, square = angle < SMALL_ANGLE, angle * angle
+    safe = np.where(small, 1.0, angle)
+    first = np.where(small, 1.0 - square / 6.0 + square**2 / 120.0 - square**3 / 5040.0, np.sin(safe) / safe)
+    half = np.where(small, 1.0 - square / 24.0 + square**2 / 1920.0, np.sin(0.5 * safe) / (0.5 * safe))
+    third = np.where(
+        small, 1.0 / 6.0 - square / 120.0 + square**2 / 5040.0 - square**3 / 362880.0, (safe - np.sin(safe)) / safe**3
+    )
+    return first, 0.5 * half * half, third
+
+
+def skew_of(vectors: Array) -> Array:
+    """The matrices [n x 3 x 3] that multiply by vectors [n x 3]: skew_of(a) b = a x b."""
+    result = np.zeros((len(vectors), 3, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        result[:, k, j], result[:, j, k] = vectors[:, i], -vectors[:, i]
+    return result
+
+
+def brackets(twists: Array) -> Array:
+    """The change [n x m x m x 6] of each screw [n x m x 6], second index, by a unit motion along each, first index."""
+    first, second = twists[:, :, None], twists[:, None, :]
+    turning = np.cross(first[..., :3], second[..., :3])
+    moving = np.cross(first[..., :3], second[..., 3:]) + np.cross(first[..., 3:], second[..., :3])
+    return np.concatenate([turning, moving], axis=-1)

@@ -1,0 +1,126 @@
+"""Solve for the state in which a mechanism is at rest: Newton's method, in steps of the load where it needs them.
+
+Source: theory section 12. Units, axes and origin are those of `mechanism`.
+"""
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.equilibrium.balance import Balance, State, balance, free_state
+from kinetostat.equilibrium.mechanism import Mechanism
+from kinetostat.equilibrium.motion import Array, Motions
+from kinetostat.tolerances import AT_REST
+
+Rows = npt.NDArray[np.int64]
+
+MOST_ITERATIONS = 40
+"""Of Newton's method for one step of the load."""
+LONGEST_STEP = 0.2
+"""Motion in one iteration, rad or in units of the machine's length: beyond it, the linear equations mean little."""
+LOAD_STEPS = (1, 8, 64)
+"""In how many steps the load is applied: in one, and in more where that does not converge."""
+
+
+class Rest(IntEnum):
+    """Whether a machine comes to rest under its loads."""
+
+    OK = 0
+    NO_REST = 1
+    UNSTABLE = 2
+
+    @property
+    def word(self) -> str:
+        """In a word, as JSON and tables have it."""
+        return self.name.lower().replace("_", " ")
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Equilibria at n poses.
+
+    Attributes:
+        balance: the equations at the states that were reached.
+        settled: where these are at rest [n].
+    """
+
+    balance: Balance
+    settled: npt.NDArray[np.bool_]
+
+
+def at_rest(mechanism: Mechanism, start: State | None = None) -> Solution:
+    """Find the states of rest under the full load.
+
+    Args:
+        mechanism: with its load.
+        start: a state nearby; the free state if None.
+    """
+    state = start or free_state(mechanism)
+    reached = _newton(mechanism, state)
+    for steps in LOAD_STEPS[1:]:
+        rows = np.flatnonzero(~reached.settled)
+        if not len(rows):
+            break
+        part, state_of_part = mechanism.taken(rows), free_state(mechanism.taken(rows))
+        state_of_part = replace(state_of_part, amounts=state.amounts[rows])
+        for number in range(1, steps + 1):
+            solution = _newton(_with_share(part, number / steps), state_of_part)
+            state_of_part = solution.balance.state
+        reached = _put(mechanism, reached, rows, solution)
+    return reached
+
+
+def _with_share(mechanism: Mechanism, share: float) -> Mechanism:
+    legs = tuple(replace(leg, preload=leg.preload * share) for leg in mechanism.legs)
+    return replace(mechanism, legs=legs, wrench=mechanism.wrench * share, gravity=mechanism.gravity * share)
+
+
+def _put(mechanism: Mechanism, reached: Solution, rows: Rows, part: Solution) -> Solution:
+    """The solution with some of its poses replaced."""
+    whole, new = reached.balance.state, part.balance.state
+
+    def put(old: Any, values: Any) -> Any:
+        result = old.copy()
+        result[rows] = values
+        return result
+
+    state = State(
+        Motions(
+            put(np.array(whole.platform.rotation), new.platform.rotation),
+            put(whole.platform.translation, new.platform.translation),
+        ),
+        tuple(map(put, whole.coordinates, new.coordinates)),
+        tuple(map(put, whole.wrenches, new.wrenches)),
+        whole.amounts,
+    )
+    return Solution(balance(mechanism, state), put(reached.settled, part.settled))
+
+
+def _newton(mechanism: Mechanism, state: State) -> Solution:
+    equations = balance(mechanism, state)
+    settled = np.zeros(len(mechanism.length), dtype=bool)
+    last = np.full(len(mechanism.length), np.inf)
+    for _ in range(MOST_ITERATIONS):
+        step = solve(equations.rates(), -equations.left)
+        motion = equations.motion_of(step)
+        # Steps that no longer shrink are round-off, once they are as small as that.
+        settled = (motion < AT_REST) & ((motion == 0.0) | (motion > 0.1 * last) | (motion < 1e-3 * AT_REST)) | settled
+        step = step * np.minimum(1.0, LONGEST_STEP / np.maximum(motion, 1e-300))[:, None]
+        step = np.where(np.isfinite(step) & ~settled[:, None], step, 0.0)
+        if settled.all():
+            break
+        equations, last = balance(mechanism, equations.moved(step)), motion
+    return Solution(equations, settled)
+
+
+def solve(rates: Array, right: Array) -> Array:
+    """Solve linear equations [n x m x m] for right sides [n x m] or [n x m x k], singular ones by least norm."""
+    columns = right if right.ndim == rates.ndim else right[..., None]
+    try:
+        result = np.linalg.solve(rates, columns)
+    except np.linalg.LinAlgError:
+        result = np.stack([np.linalg.lstsq(a, b, rcond=None)[0] for a, b in zip(rates, columns, strict=True)])
+    return np.asarray(result if right.ndim == rates.ndim else result[..., 0])

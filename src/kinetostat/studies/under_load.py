@@ -1,0 +1,268 @@
+"""A machine at rest under its loads: where its tool comes to, what every leg carries, how stiff and how stable it is.
+
+The equations are in `equilibrium`; the command is `analyze --loaded`.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kinetostat.algebra.screw import Twist
+from kinetostat.algebra.vector import Vector
+from kinetostat.equilibrium.balance import Balance, LegTerms, balance, free_state
+from kinetostat.equilibrium.mechanism import Chain, Mechanism, mechanism_of
+from kinetostat.equilibrium.motion import Array, Motions, logarithm
+from kinetostat.equilibrium.solving import Rest, at_rest, solve
+from kinetostat.equilibrium.tangent import Stability, compliance, stability
+from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.singularity import describe
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.plain_data import as_answer
+from kinetostat.studies.refusal import why_not
+from kinetostat.studies.rounding import clean_matrix, clean_screw
+from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
+
+
+@dataclass(frozen=True)
+class SpringState:
+    """A spring at rest under load.
+
+    Attributes:
+        name, leg: of it.
+        turning: whether it is a rotation: N·m and rad, otherwise N and m.
+        load: that it carries, positive where it pulls its ends together.
+        deformation: from the free state.
+        slack: whether it could carry loads of the other sign only, and carries nothing.
+    """
+
+    name: str
+    leg: str
+    turning: bool
+    load: float
+    deformation: float
+    slack: bool
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedState(Immutable):
+    """A machine at rest under gravity, its preload and its table [load]; base axes, at the loaded tool point, SI.
+
+    Attributes:
+        machine: at the pose that it has without loads.
+        rest: whether it comes to rest.
+        message: what is special about it, or why there is no state of rest.
+        components: names of rows and columns: rx ry rz x y z, or rz x y.
+        displacement: rotation vector (rad) and displacement of the tool point (m), from the unloaded pose.
+        linear: the same to first order, C w with all weights; None where C is not finite.
+        springs: all that deform.
+        slack_legs: names of the legs in which a spring is slack.
+        elastic, tangent: stiffness of the springs alone where they are now, and that which further loads meet: with
+            what the loads do by turning; None where it is not finite.
+        compliance: inverse of the tangent stiffness.
+        factor: by which the loads may grow in proportion until the machine is unstable; infinite if no growth does it,
+            None where springs alone hold nothing.
+        mode: twist of the platform when it becomes unstable, largest component 1, rad and machine lengths.
+        mode_legs: the legs that move most then.
+        residual: what is left of the equations, as a share of the loads.
+    """
+
+    machine: Machine
+    rest: Rest
+    message: str
+    components: tuple[str, ...]
+    displacement: tuple[float, ...] = ()
+    linear: tuple[float, ...] | None = None
+    springs: tuple[SpringState, ...] = ()
+    slack_legs: tuple[str, ...] = ()
+    elastic: list[list[float]] | None = None
+    tangent: list[list[float]] | None = None
+    compliance: list[list[float]] | None = None
+    factor: float | None = None
+    mode: tuple[float, ...] = ()
+    mode_legs: tuple[str, ...] = ()
+    residual: float = 0.0
+
+    def __repr__(self) -> str:
+        return f"<{self.machine.name!r} under load: {self.rest.word}>"
+
+
+@checked
+def under_load(machine: Machine) -> LoadedState:
+    """Find the state in which a machine is at rest under its loads, with exact geometry.
+
+    The free state is the machine at its pose with relaxed springs. Loads are the wrench of [load], the weight of all
+    masses that are known under `load.gravity`, and preloads. A spring that only pulls or only pushes carries nothing
+    where it would have to do the other.
+
+    Args:
+        machine: with its pose and loads.
+
+    Raises:
+        InputError: there is gravity, but nothing says a mass.
+    """
+    joints = solve_joints(machine) if machine.family.chains else None
+    response = respond(machine, joints)
+    names = machine.family.component_names
+    if int(response.status) in (Status.OUT_OF_REACH, Status.NOT_CONVERGED):
+        return LoadedState(machine, Rest.NO_REST, why_not(machine, response, []), names)
+    mechanism = weighed(machine, response, joints)
+    solution = at_rest(mechanism)
+    if not solution.settled[0]:
+        return LoadedState(machine, Rest.NO_REST, _without_rest(machine), names)
+    return _state(machine, response, solution.balance)
+
+
+def weighed(machine: Machine, response: Response, joints: Joints | None, count: int = 1) -> Mechanism:
+    """The mechanism of a machine with loads, see `mechanism_of`.
+
+    Raises:
+        InputError: there is gravity, but nothing says a mass.
+    """
+    mechanism = mechanism_of(machine, response, joints, count)
+    if np.any(mechanism.gravity) and not mechanism.weighs:
+        raise InputError(
+            f"{machine.name}: load.gravity pulls at masses, but none is known; give the platform's as [tool] mass, or "
+            "links a cross-section with a density."
+        )
+    return mechanism
+
+
+def _state(machine: Machine, response: Response, equations: Balance) -> LoadedState:
+    mechanism, parts = equations.mechanism, list(machine.family.components)
+    platform = equations.state.platform
+    turned = logarithm(Motions(platform.rotation, np.zeros_like(platform.translation)))[0, :3]
+    moved = np.concatenate([turned, platform.translation[0]])
+    units = mechanism.twist_units[0]
+    soft, springs_alone = (
+        (compliance(equations, loaded)[0] * np.outer(units, units) / mechanism.length[0] / mechanism.force[0])[
+            np.ix_(parts, parts)
+        ]
+        for loaded in (True, False)
+    )
+    judged = stability(equations)
+    states = [
+        state
+        for leg, terms, q in zip(mechanism.legs, equations.legs, equations.state.coordinates, strict=True)
+        for state in _springs(mechanism, leg, terms, q)
+    ]
+    slack = tuple(dict.fromkeys(state.leg for state in states if state.slack))
+    moving = [leg.name for leg, size in zip(mechanism.legs, judged.legs, strict=True) if size > 0.5 * max(judged.legs)]
+    return LoadedState(
+        machine,
+        Rest.OK if judged.stable else Rest.UNSTABLE,
+        " ".join([_message(judged, slack), *_passed_limit(machine, response)]),
+        machine.family.component_names,
+        _in_si(mechanism, moved, parts),
+        _linear(response, mechanism, parts),
+        tuple(states),
+        slack,
+        _inverse(springs_alone),
+        _inverse(soft),
+        clean_matrix(soft.tolist()),
+        None if math.isnan(judged.factor) else judged.factor,
+        tuple(judged.mode[parts].tolist()),
+        tuple(moving) if math.isfinite(judged.factor) else (),
+        float(np.abs(equations.left).max() / max(np.abs(equations.load).max(), 1e-300)),
+    )
+
+
+def _springs(mechanism: Mechanism, leg: Chain, terms: LegTerms, coordinates: Array) -> list[SpringState]:
+    length, force = float(mechanism.length[0]), float(mechanism.force[0])
+    states = []
+    for i, spring in enumerate(leg.springs):
+        if spring is None:
+            continue
+        turning = spring.joint.point is not None
+        load = float(terms.loads[0, i]) * force * (length if turning else 1.0)
+        amount = float(coordinates[0, i]) * (1.0 if turning else length)
+        slack = bool(leg.sign[i]) and terms.carrying[0, i] == 0.0
+        states.append(SpringState(spring.name, leg.name, turning, load, amount, slack))
+    return states
+
+
+def _linear(response: Response, mechanism: Mechanism, parts: list[int]) -> tuple[float, ...] | None:
+    """The displacement to first order: one step of Newton's method from the free state."""
+    rows = np.array(response.compliance.rows(), dtype=float)
+    if int(response.status) not in (Status.OK, Status.JOINT_LIMIT) or not np.isfinite(rows).all():
+        return None
+    start = balance(mechanism, free_state(mechanism))
+    step = solve(start.rates(loaded=False), -start.left)[0]
+    size = mechanism.ways.shape[1]
+    return _in_si(mechanism, mechanism.ways @ step[:size], parts)
+
+
+def _in_si(mechanism: Mechanism, twist: Array, parts: list[int]) -> tuple[float, ...]:
+    """Components of a displacement in rad and m, round-off cut off."""
+    cleaned = clean_screw(Twist(Vector(*twist[:3].tolist()), Vector(*twist[3:].tolist())), 1.0).components()
+    return tuple(float(cleaned[i] * mechanism.twist_units[0, i]) for i in parts)
+
+
+def _inverse(matrix: Array) -> list[list[float]] | None:
+    """The stiffness of a compliance, or None where a direction is rigid."""
+    sizes = np.sqrt(np.abs(np.diag(matrix)))
+    if not (sizes > 0.0).all():
+        return None
+    scaled = matrix / np.outer(sizes, sizes)
+    if np.linalg.cond(scaled) > 1.0 / ROUND_OFF_OF_ENTRY:
+        return None
+    return clean_matrix((np.linalg.inv(scaled) / np.outer(sizes, sizes)).tolist())
+
+
+def _message(judged: Stability, slack: tuple[str, ...]) -> str:
+    sentences = []
+    if not judged.stable:
+        sentences.append(
+            "The machine is not stable under this load: the least disturbance moves it away. Reduce the load, or "
+            f"stiffen what moves: {_mode(judged)}."
+        )
+    if slack:
+        sentences.append(f"Slack, so that they carry nothing: {', '.join(slack)}.")
+    return " ".join(sentences) or "At rest and stable."
+
+
+def _passed_limit(machine: Machine, response: Response) -> list[str]:
+    """The sentence about a limit that the machine passes without its weights, if it does."""
+    return [why_not(machine, response, [])] if int(response.status) == Status.JOINT_LIMIT else []
+
+
+def _mode(judged: Stability) -> str:
+    return describe([float(c) for c in judged.mode], ("rad", "machine lengths")) or "legs alone"
+
+
+def _without_rest(machine: Machine) -> str:
+    return (
+        f"{machine.name} comes to no rest under this load, even if it grows in 64 steps: either the load passes a "
+        "limit of stability, or what carries it goes slack. Reduce the load, or preload what only pulls."
+    )
+
+
+def as_json(state: LoadedState) -> dict[str, Any]:
+    """Return the state as plain data, SI."""
+    machine = state.machine
+    return as_answer(
+        {
+            "name": machine.name,
+            "family": machine.family.name,
+            "rest": state.rest.word,
+            "message": state.message,
+            "components": state.components,
+            "displacement": state.displacement,
+            "linear": state.linear,
+            "springs": state.springs,
+            "slack_legs": state.slack_legs,
+            "elastic_stiffness": state.elastic,
+            "tangent_stiffness": state.tangent,
+            "compliance": state.compliance,
+            "load_factor": state.factor,
+            "mode": state.mode,
+            "mode_legs": state.mode_legs,
+            "residual": state.residual,
+        }
+    )

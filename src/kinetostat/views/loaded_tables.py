@@ -1,0 +1,84 @@
+"""A machine under load as tables on a terminal: the answer first, then springs and stiffness. Nothing is computed."""
+
+import math
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from kinetostat.display import DASH, Display, number
+from kinetostat.studies.command import Command
+from kinetostat.studies.setting import pose_of
+from kinetostat.studies.under_load import LoadedState
+from kinetostat.views.analysis_tables import matrix_table
+from kinetostat.views.assembly_tables import precise
+from kinetostat.views.tables import numeric_table, print_doubts
+
+
+def print_loaded(console: Console, state: LoadedState) -> None:
+    """Print the state of rest under load: what is the case, displacement, springs, and stiffness."""
+    machine, display = state.machine, state.machine.display
+    console.print(Text.assemble((machine.name, "bold"), f"  under load: {state.rest.word}"))
+    answer = Table.grid(padding=(0, 2, 0, 0))
+    answer.add_row(Text("Pose", "bold"), f"{pose_of(machine)}. {state.message}")
+    if state.displacement:
+        answer.add_row(Text("Stability", "bold"), _stability(state))
+    console.print(answer)
+    print_doubts(console, machine)
+    if not state.displacement:
+        return
+    console.print(_displacements(state, display))
+    console.print(_springs(state, display))
+    about = f"Components {' '.join(state.components)} at the loaded {machine.reference}, base axes."
+    console.print(about, style="dim", highlight=False)
+    for title, kind, rows in (
+        ("Tangent stiffness", "stiffness", state.tangent),
+        ("Elastic part of it", "stiffness", state.elastic),
+        ("Compliance to further loads", "compliance", state.compliance),
+    ):
+        if rows is not None:
+            console.print(matrix_table(title, kind, state.components, rows, display))
+
+
+def _stability(state: LoadedState) -> str:
+    if state.factor is None:
+        return "The springs alone hold nothing here: weight and tension do."
+    if math.isinf(state.factor):
+        return "No growth of this load makes the machine unstable."
+    return f"The load may grow to {number(state.factor)} times its size until the machine becomes unstable."
+
+
+def _displacements(state: LoadedState, display: Display) -> Table:
+    """How far the load moves the tool, and what linear equations say."""
+    units = ["rad" if name.startswith("r") else "m" for name in state.components]
+    scales = dict.fromkeys(display.deflection(unit).unit for unit in units)
+    table = numeric_table(f"Displacement of the tool point ({', '.join(scales)})", "", state.components)
+    for what, values in (("under load", state.displacement), ("to first order", state.linear)):
+        if values is not None:
+            shown = (display.show_deflection(v, unit).split()[0] for v, unit in zip(values, units, strict=True))
+            table.add_row(what, *shown)
+    return table
+
+
+def _springs(state: LoadedState, display: Display) -> Table:
+    table = numeric_table("Springs", "spring", ["load", "deformation", "state"])
+    for spring in state.springs:
+        load = display.show(spring.load, "N·m" if spring.turning else "N")
+        amount = display.show_deflection(spring.deformation, "rad" if spring.turning else "m")
+        table.add_row(spring.name, load, amount, "slack" if spring.slack else "carries")
+    return table
+
+
+def print_command(console: Console, answer: Command) -> None:
+    """Print where the actuators must stand, a row for each pose, and what that leaves."""
+    display = answer.machine.display
+    console.print(answer.message, highlight=False)
+    scales = [display.scale(unit) for unit in answer.units]
+    heads = [scale.label(name) for name, scale in zip(answer.actuators, scales, strict=True)]
+    table = numeric_table("Commands: where each actuator must stand", "pose", [*heads, "error before", "error left"])
+    for i, row in enumerate(answer.coordinates):
+        known = bool(answer.settled[i])
+        cells = [precise(float(v), unit, display) if known else DASH for v, unit in zip(row, answer.units, strict=True)]
+        errors = [display.show_deflection(float(e[i]), "m") if known else DASH for e in (answer.before, answer.left)]
+        table.add_row(str(i + 1), *cells, *errors)
+    console.print(table)
