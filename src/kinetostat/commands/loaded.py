@@ -12,7 +12,11 @@ if TYPE_CHECKING:
 
 
 def analyze_loaded(options: argparse.Namespace, machine: "Machine") -> int:
-    """Answer `analyze --loaded`; return the exit code."""
+    """Answer `analyze --loaded` and return the exit code.
+
+    Raises:
+        InputError: options that only the unloaded machine has.
+    """
     from kinetostat.spec.errors import InputError
     from kinetostat.studies.under_load import as_json, under_load
     from kinetostat.views.loaded_tables import print_loaded

@@ -100,7 +100,7 @@ def leg_terms(leg: Chain, coordinates: Array, wrench: Array, amounts: Array, gra
     # A screw changes with the motions before it, so that the work of the wrench on it does.
     changing = np.einsum("nc,njkc->nkj", wrench, brackets(screws))
     change = change - np.tril(changing, -1)
-    own = leg.follows(leg.coordinate, leg.size)
+    follows = leg.follows(leg.coordinate, leg.size)
     drives = leg.follows(leg.actuator, amounts.shape[1])
     loads = leg.stiffness * coordinates + leg.preload
     carries = leg.sign * loads >= 0.0
@@ -108,13 +108,13 @@ def leg_terms(leg: Chain, coordinates: Array, wrench: Array, amounts: Array, gra
     work = np.einsum("nfc,nc->nf", screws, wrench)
     return LegTerms(
         placed[-1],
-        np.einsum("nfc,fk->nck", screws, own),
+        np.einsum("nfc,fk->nck", screws, follows),
         np.einsum("nfc,fk->nck", screws, drives),
         loads,
         np.where(carries, leg.stiffness, 0.0),
-        loads + (weight - work) @ own,
-        np.einsum("fk,nfg,gl->nkl", own, change, own),
-        np.einsum("fk,nfg,gl->nkl", own, change, drives),
+        loads + (weight - work) @ follows,
+        np.einsum("fk,nfg,gl->nkl", follows, change, follows),
+        np.einsum("fk,nfg,gl->nkl", follows, change, drives),
     )
 
 
@@ -193,12 +193,12 @@ class Balance:
         if loaded:
             result[:, :size, :size] = -ways.T @ self.load_change @ ways
         for leg, terms, start in zip(self.mechanism.legs, self.legs, starts, strict=False):
-            own, wrench = slice(start, start + leg.size), slice(start + leg.size, start + leg.size + size)
+            moving, wrench = slice(start, start + leg.size), slice(start + leg.size, start + leg.size + size)
             inner = terms.carrying[:, :, None] * np.eye(leg.size) + leg.idle @ np.swapaxes(leg.idle, 1, 2)
             across = ways.T @ terms.rates
-            result[:, own, own] = inner + terms.geometric if loaded else inner
-            result[:, own, wrench] = -np.swapaxes(across, 1, 2)
-            result[:, wrench, own] = across
+            result[:, moving, moving] = inner + terms.geometric if loaded else inner
+            result[:, moving, wrench] = -np.swapaxes(across, 1, 2)
+            result[:, wrench, moving] = across
             result[:, wrench, :size] = -np.eye(size)
             result[:, :size, wrench] = np.eye(size)
         return result
@@ -208,8 +208,8 @@ class Balance:
         ways, starts = self.mechanism.ways, self.starts
         result = np.zeros((len(self.left), starts[-1], self.state.amounts.shape[1]))
         for leg, terms, start in zip(self.mechanism.legs, self.legs, starts, strict=False):
-            own, wrench = slice(start, start + leg.size), slice(start + leg.size, start + leg.size + ways.shape[1])
-            result[:, own] = terms.by_actuators
+            moving, wrench = slice(start, start + leg.size), slice(start + leg.size, start + leg.size + ways.shape[1])
+            result[:, moving] = terms.by_actuators
             result[:, wrench] = ways.T @ terms.driven
         return result
 
@@ -239,10 +239,9 @@ def balance(mechanism: Mechanism, state: State) -> Balance:
     load, change = platform_load(mechanism, state.platform)
     terms, carried, left = [], np.zeros_like(load), []
     for leg, coordinates, wrench in zip(mechanism.legs, state.coordinates, state.wrenches, strict=True):
-        own = leg_terms(leg, coordinates, wrench, state.amounts, mechanism.gravity)
-        terms.append(own)
+        terms.append(leg_terms(leg, coordinates, wrench, state.amounts, mechanism.gravity))
         carried = carried + wrench
-        left += [own.left, -logarithm(state.platform @ own.end.inverse()) @ ways]
+        left += [terms[-1].left, -logarithm(state.platform @ terms[-1].end.inverse()) @ ways]
     return Balance(
         mechanism, state, tuple(terms), np.concatenate([(carried - load) @ ways, *left], axis=1), load, change
     )

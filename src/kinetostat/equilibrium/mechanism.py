@@ -131,11 +131,6 @@ class Mechanism:
         )
 
     @property
-    def wrench_units(self) -> Array:
-        """Units of the components of wrenches, N·m and N [n x 6]."""
-        return _wrench_units(self.length, self.force)
-
-    @property
     def twist_units(self) -> Array:
         """Units of the components of twists, rad and m [n x 6]."""
         return np.concatenate([np.ones((len(self.length), 3)), np.repeat(self.length[:, None], 3, axis=1)], axis=1)
@@ -173,7 +168,7 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
     for leg in configuration.legs:
         here = [m for m in members if m.leg == leg.name or (not m.leg and leg.number is None)]
         # The potential of a straight uniform link is that of half its mass at either end.
-        halves = [(carried, p, 0.5 * m.length * m.linear_density) for m in here for carried, p in m.ends]
+        halves = [(carried, p, 0.5 * m.length * m.linear_density) for m in here if m.ends for carried, p in m.ends()]
         legs.append(_chain(leg, units, preloads, actuators, halves))
     platform = configuration.platform
     tool = machine.tables["tool"]
@@ -181,9 +176,8 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
         platform.apply(Vector(*tool.centre_of_mass)),
         response.reference + platform.rotation.apply(Vector(*tool.payload_centre)),
     ]
-    own = [
-        (0, point, mass) for point, mass in zip(centres, (tool.mass, tool.payload), strict=True) if not is_zero(mass)
-    ]
+    pairs = zip(centres, (tool.mass, tool.payload), strict=True)
+    weights = [(0, point, mass) for point, mass in pairs if not is_zero(mass)]
     load = machine.tables["load"]
     wrench = stacked([*load.moment, *load.force], count) / _wrench_units(length, force)
     ways = np.eye(6)
@@ -195,13 +189,13 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
         tuple(legs),
         tuple(spring.joint.name or spring.of for spring in actuators),
         tuple(spring.joint.point is None for spring in actuators),
-        units.masses(own),
+        units.masses(weights),
         wrench,
         stacked(load.gravity, count),
         ways,
         length,
         force,
-        bool(own) or any(leg.masses.carried for leg in legs),
+        bool(weights) or any(leg.masses.carried for leg in legs),
     )
 
 

@@ -106,8 +106,10 @@ def _newton(mechanism: Mechanism, state: State) -> Solution:
     for _ in range(MOST_ITERATIONS):
         step = solve(equations.rates(), -equations.left)
         motion = equations.motion_of(step)
-        # Steps that no longer shrink are round-off, once they are as small as that.
-        settled = (motion < AT_REST) & ((motion == 0.0) | (motion > 0.1 * last) | (motion < 1e-3 * AT_REST)) | settled
+        # Steps that no longer shrink are round-off, once they are as small as that. The first one may only find what
+        # the legs carry and move nothing.
+        shrinking = (motion < 0.1 * last) & (motion > 1e-3 * AT_REST)
+        settled = (motion < AT_REST) & ~shrinking & np.isfinite(last) | settled
         step = step * np.minimum(1.0, LONGEST_STEP / np.maximum(motion, 1e-300))[:, None]
         step = np.where(np.isfinite(step) & ~settled[:, None], step, 0.0)
         if settled.all():

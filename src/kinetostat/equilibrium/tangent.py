@@ -20,22 +20,38 @@ from kinetostat.equilibrium.solving import solve
 from kinetostat.tolerances import UNRESISTED
 
 
-def compliance(equations: Balance, loaded: bool = True) -> Array:
-    """The twist of the platform per unit of a further wrench, at the loaded tool point [n x 6 x 6].
-
-    Args:
-        equations: at a state of rest.
-        loaded: with the geometric part; without it, the compliance of the springs at this place.
-    """
+def compliance(equations: Balance) -> Array:
+    """The twist of the platform per unit of a further wrench, at the loaded tool point [n x 6 x 6]."""
     ways = equations.mechanism.ways
     size = ways.shape[1]
     right = np.zeros((len(equations.left), equations.left.shape[1], size))
     right[:, :size] = np.eye(size)
-    moved = ways @ solve(equations.rates(loaded), right)[:, :size] @ ways.T
+    moved = ways @ solve(equations.rates(), right)[:, :size] @ ways.T
     shift = np.broadcast_to(np.eye(6), moved.shape).copy()
     shift[:, 3:, :3] = -skew_of(equations.state.platform.translation)
     moved = shift @ moved @ np.swapaxes(shift, 1, 2)
     return np.asarray(0.5 * (moved + np.swapaxes(moved, 1, 2)))
+
+
+def elastic_stiffness(equations: Balance) -> Array:
+    """The stiffness of the springs where they are, leg by leg, at the loaded tool point [n x 6 x 6].
+
+    Infinite or undefined where a leg has rigid parts only: entries are then not finite.
+    """
+    ways = equations.mechanism.ways
+    size = ways.shape[1]
+    total = np.zeros((len(equations.left), size, size))
+    rates = equations.rates(loaded=False)
+    for leg, start in zip(equations.mechanism.legs, equations.starts, strict=False):
+        block = rates[:, start : start + leg.size + size, start : start + leg.size + size]
+        right = np.zeros((len(block), leg.size + size, size))
+        right[:, leg.size :] = np.eye(size)
+        sound = np.linalg.cond(block) < 1.0 / UNRESISTED
+        total += np.where(sound[:, None, None], solve(block, right)[:, leg.size :], np.nan)
+    back = np.broadcast_to(np.eye(6), (len(total), 6, 6)).copy()
+    back[:, 3:, :3] = skew_of(equations.state.platform.translation)
+    whole = np.swapaxes(back, 1, 2) @ ways @ total @ ways.T @ back
+    return np.asarray(0.5 * (whole + np.swapaxes(whole, 1, 2)))
 
 
 @dataclass(frozen=True)
@@ -65,10 +81,10 @@ def stability(equations: Balance, pose: int = 0) -> Stability:
     conditions = np.zeros((size * len(sizes), starts[-1]))
     geometric[:size, :size] = -ways.T @ equations.load_change[pose] @ ways
     for k, (leg, terms) in enumerate(zip(mechanism.legs, equations.legs, strict=True)):
-        own, rows = slice(starts[k], starts[k + 1]), slice(size * k, size * (k + 1))
-        elastic[own, own] = np.diag(terms.carrying[pose]) + leg.idle[pose] @ leg.idle[pose].T
-        geometric[own, own] = terms.geometric[pose]
-        conditions[rows, own] = ways.T @ terms.rates[pose]
+        moving, rows = slice(starts[k], starts[k + 1]), slice(size * k, size * (k + 1))
+        elastic[moving, moving] = np.diag(terms.carrying[pose]) + leg.idle[pose] @ leg.idle[pose].T
+        geometric[moving, moving] = terms.geometric[pose]
+        conditions[rows, moving] = ways.T @ terms.rates[pose]
         conditions[rows, :size] = -np.eye(size)
     _, values, rows_of_all = np.linalg.svd(conditions)
     rank = int((values > UNRESISTED * values[0]).sum()) if len(values) else 0

@@ -47,13 +47,16 @@ def independent(screws: Sequence[Screw], translational_scale: float, tolerance: 
     return int((values > tolerance * max(values, default=0.0)).sum())
 
 
-def free_twist(legs: Sequence[LegScrews], length: float) -> list[float]:
+def free_twist(legs: Sequence[LegScrews], length: float, guide: Sequence[Wrench] = ()) -> list[float]:
     """Return the twist that the wrenches of all legs resist least; at a singularity they leave it free.
+
+    Args:
+        legs, length, guide: see `conditioning`.
 
     Returns:
         [omega; v] at P in base axes, with a rotation of 1 rad, or of 1 m if it is a pure translation.
     """
-    wrenches = [wrench for leg in legs for wrench in leg.wrenches]
+    wrenches = [*(wrench for leg in legs for wrench in leg.wrenches), *guide]
     left, _, _ = np.linalg.svd(columns(wrenches, 1.0 / length, 1.0))
     angular, linear = left[:3, -1] / length, left[3:, -1]
     turning = np.linalg.norm(angular) * length > PURE_TRANSLATION
@@ -61,7 +64,9 @@ def free_twist(legs: Sequence[LegScrews], length: float) -> list[float]:
     return [float(c / size) for c in (*angular, *linear)]
 
 
-def why_singular(names: Sequence[str], legs: Sequence[LegScrews], length: float, tolerance: float) -> str:
+def why_singular(
+    names: Sequence[str], legs: Sequence[LegScrews], length: float, tolerance: float, guide: Sequence[Wrench] = ()
+) -> str:
     """Name the causes of a singularity, a sentence each.
 
     Args:
@@ -69,6 +74,7 @@ def why_singular(names: Sequence[str], legs: Sequence[LegScrews], length: float,
         legs: screws of the legs at P, base axes.
         length: characteristic length, m.
         tolerance: a leg counts as locked if its singularity margin is at most this.
+        guide: wrenches of a planar machine against the twists that do not exist in the plane.
     """
     locked = [name for name, leg in zip(names, legs, strict=True) if not leg.singularity_margin > tolerance]
     if locked:
@@ -76,7 +82,7 @@ def why_singular(names: Sequence[str], legs: Sequence[LegScrews], length: float,
             f"The passive joints of the {' and the '.join(locked)} lock up here (links stretched, folded or aligned), "
             "so that the leg loses a freedom; move the pose away from this limit."
         )
-    motion = describe(free_twist(legs, length), ("rad", "m"))
+    motion = describe(free_twist(legs, length, guide), ("rad", "m"))
     return f"With all actuators locked the platform can still move by the twist {motion}; change the pose or joints."
 
 

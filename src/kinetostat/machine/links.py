@@ -14,8 +14,9 @@ from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.machine.leg import Leg, Station
 from kinetostat.spec.fields import Field, Quantity, made_table
 
-Placed = tuple[str, str, Scalar, tuple[Station, ...]]
-"""A link: its leg, or nothing if it belongs to none, its name, its length (m), and both ends of its axis."""
+Ends = Callable[[], tuple[Station, ...]]
+Placed = tuple[str, str, Scalar, Ends]
+"""A link: its leg, or nothing if it belongs to none, its name, its length (m), and what gives both ends of its axis."""
 Lengths = Callable[[Sequence[Leg], Vector, Any], list[Placed]]
 """From the legs at a pose, P (base frame, m) and the table `geometry` to each link."""
 
@@ -51,7 +52,7 @@ def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[Pla
     """Legs from the first to the last of their passive joints, as long as the pose makes them."""
     ends = [(leg, leg.passive[0].point, leg.passive[-1].point) for leg in actuated_legs(legs)]
     return [
-        (leg.name, leg.name, (end - start).norm(), (leg.stations[0], leg.stations[-1]))
+        (leg.name, leg.name, (end - start).norm(), lambda leg=leg: (leg.stations[0], leg.stations[-1]))
         for leg, start, end in ends
         if start is not None and end is not None
     ]
@@ -71,7 +72,7 @@ def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:
         names = [what] if bars == 1 else [f"{what} {i}" for i in range(1, bars + 1)]
         length = getattr(geometry, field)
         return [
-            (leg.name, f"{leg.name} {name}", length, leg.stations[segment : segment + 2])
+            (leg.name, f"{leg.name} {name}", length, lambda leg=leg: leg.stations[segment : segment + 2])
             for leg in actuated_legs(legs)
             for name in names
         ]
@@ -83,9 +84,9 @@ def listed(what: str, field: str) -> Lengths:
     """Links whose lengths are the entries of a field of [geometry]: the path of the leg that has no actuator."""
 
     def lengths(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[Placed]:
-        path = next((leg.stations for leg in legs if leg.number is None), ())
+        passive = next(leg for leg in legs if leg.number is None)
         sizes = enumerate(getattr(geometry, field))
-        return [("", f"{what} {i + 1}", length, path[i : i + 2]) for i, length in sizes]
+        return [("", f"{what} {i + 1}", length, lambda i=i: passive.stations[i : i + 2]) for i, length in sizes]
 
     return lengths
 
@@ -95,7 +96,7 @@ def from_origin(what: str) -> Lengths:
 
     def lengths(legs: Sequence[Leg], tip: Vector, _geometry: Any) -> list[Placed]:
         elements = next((len(leg.chain) for leg in legs if leg.name == what), 0)
-        return [(what, what, tip.norm(), ((0, ZERO), (elements, tip)))]
+        return [(what, what, tip.norm(), lambda: ((0, ZERO), (elements, tip)))]
 
     return lengths
 

@@ -107,15 +107,14 @@ class Member:
         name: unique within the machine.
         length: from joint to joint, m.
         linear_density: kg/m; 0 where nothing says it.
-        ends: both ends of its axis at the pose: how many elements of the leg's chain carry it, and where it is, base
-            frame, m.
+        ends: gives both ends of its axis at the pose; None where they are not known.
     """
 
     leg: str
     name: str
     length: Scalar
     linear_density: Scalar
-    ends: tuple[Station, ...] = ()
+    ends: Callable[[], tuple[Station, ...]] | None = None
 
 
 @table

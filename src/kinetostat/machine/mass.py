@@ -60,7 +60,7 @@ def located_members(
         links = _members(machine, configuration)
     else:
         links = machine.family.members(joints=joints, **machine.family_tables)
-    return [link for link in links if not is_zero(link.linear_density) and len(link.ends) == 2]
+    return [link for link in links if link.ends is not None and not is_zero(link.linear_density)]
 
 
 def _weighed(link: Member) -> Scalar | None:

@@ -39,7 +39,7 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
     if motion and not nearby and _locked_joints(configuration) < motion.full_cycle:
         return _lacks_actuators(configuration, motion)
     names = [leg.name for leg in configuration.legs]
-    reason = why_singular(names, response.legs, configuration.length, SINGULAR)
+    reason = why_singular(names, response.legs, configuration.length, SINGULAR, response.guide)
     kind = f" ({motion.kind})" if motion and motion.kind is not Kind.REGULAR else ""
     return f"The pose is singular{kind}. {reason}"
 

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from kinetostat.algebra.screw import Twist
+from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.balance import Balance, LegTerms, balance, free_state
 from kinetostat.equilibrium.mechanism import Chain, Mechanism, mechanism_of
 from kinetostat.equilibrium.motion import Array, Motions, logarithm
 from kinetostat.equilibrium.solving import Rest, at_rest, solve
-from kinetostat.equilibrium.tangent import Stability, compliance, stability
+from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, stability
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.singularity import describe
 from kinetostat.kinematics.status import Status
@@ -68,7 +69,7 @@ class LoadedState(Immutable):
         compliance: inverse of the tangent stiffness.
         factor: by which the loads may grow in proportion until the machine is unstable; infinite if no growth does it,
             None where springs alone hold nothing.
-        mode: twist of the platform when it becomes unstable, largest component 1, rad and machine lengths.
+        mode: small motion of the tool point when it becomes unstable, of any size, rad and m.
         mode_legs: the legs that move most then.
         residual: what is left of the equations, as a share of the loads.
     """
@@ -140,12 +141,9 @@ def _state(machine: Machine, response: Response, equations: Balance) -> LoadedSt
     turned = logarithm(Motions(platform.rotation, np.zeros_like(platform.translation)))[0, :3]
     moved = np.concatenate([turned, platform.translation[0]])
     units = mechanism.twist_units[0]
-    soft, springs_alone = (
-        (compliance(equations, loaded)[0] * np.outer(units, units) / mechanism.length[0] / mechanism.force[0])[
-            np.ix_(parts, parts)
-        ]
-        for loaded in (True, False)
-    )
+    size = np.outer(units, units) / (mechanism.length[0] * mechanism.force[0])
+    soft = (compliance(equations)[0] * size)[np.ix_(parts, parts)]
+    springs_alone = (elastic_stiffness(equations)[0] / size)[np.ix_(parts, parts)]
     judged = stability(equations)
     states = [
         state
@@ -157,17 +155,17 @@ def _state(machine: Machine, response: Response, equations: Balance) -> LoadedSt
     return LoadedState(
         machine,
         Rest.OK if judged.stable else Rest.UNSTABLE,
-        " ".join([_message(judged, slack), *_passed_limit(machine, response)]),
+        " ".join([_message(judged, slack, judged.mode * units), *_passed_limit(machine, response)]),
         machine.family.component_names,
         _in_si(mechanism, moved, parts),
         _linear(response, mechanism, parts),
         tuple(states),
         slack,
-        _inverse(springs_alone),
-        _inverse(soft),
+        _cleaned(springs_alone),
+        _cleaned(_inverse(soft)),
         clean_matrix(soft.tolist()),
         None if math.isnan(judged.factor) else judged.factor,
-        tuple(judged.mode[parts].tolist()),
+        tuple((judged.mode * units)[parts].tolist()),
         tuple(moving) if math.isfinite(judged.factor) else (),
         float(np.abs(equations.left).max() / max(np.abs(equations.load).max(), 1e-300)),
     )
@@ -204,23 +202,32 @@ def _in_si(mechanism: Mechanism, twist: Array, parts: list[int]) -> tuple[float,
     return tuple(float(cleaned[i] * mechanism.twist_units[0, i]) for i in parts)
 
 
-def _inverse(matrix: Array) -> list[list[float]] | None:
-    """The stiffness of a compliance, or None where a direction is rigid."""
+def _inverse(matrix: Array) -> Array:
+    """The stiffness of a compliance; infinite where a direction is rigid."""
     sizes = np.sqrt(np.abs(np.diag(matrix)))
     if not (sizes > 0.0).all():
-        return None
-    scaled = matrix / np.outer(sizes, sizes)
-    if np.linalg.cond(scaled) > 1.0 / ROUND_OFF_OF_ENTRY:
-        return None
-    return clean_matrix((np.linalg.inv(scaled) / np.outer(sizes, sizes)).tolist())
+        return np.full(matrix.shape, np.inf)
+    return np.asarray(np.linalg.inv(matrix / np.outer(sizes, sizes)) / np.outer(sizes, sizes))
 
 
-def _message(judged: Stability, slack: tuple[str, ...]) -> str:
+def _cleaned(stiffness: Array) -> list[list[float]] | None:
+    """A stiffness without round-off; None where an entry is not finite.
+
+    Where springs hold nothing in a direction, its entries are round-off beside those of the others of their kind.
+    """
+    if not np.isfinite(stiffness).all():
+        return None
+    turning = np.arange(len(stiffness)) < (SIZE // 2 if len(stiffness) == SIZE else 1)
+    largest = np.sqrt([np.abs(np.diag(stiffness))[turning == kind].max() for kind in turning])
+    return clean_matrix(np.where(np.abs(stiffness) < ROUND_OFF_OF_ENTRY * np.outer(largest, largest), 0.0, stiffness).tolist())
+
+
+def _message(judged: Stability, slack: tuple[str, ...], mode: Array) -> str:
     sentences = []
     if not judged.stable:
         sentences.append(
             "The machine is not stable under this load: the least disturbance moves it away. Reduce the load, or "
-            f"stiffen what moves: {_mode(judged)}."
+            f"stiffen what moves: {describe(mode.tolist(), ('rad', 'm')) or 'its legs'}."
         )
     if slack:
         sentences.append(f"Slack, so that they carry nothing: {', '.join(slack)}.")
@@ -230,10 +237,6 @@ def _message(judged: Stability, slack: tuple[str, ...]) -> str:
 def _passed_limit(machine: Machine, response: Response) -> list[str]:
     """The sentence about a limit that the machine passes without its weights, if it does."""
     return [why_not(machine, response, [])] if int(response.status) == Status.JOINT_LIMIT else []
-
-
-def _mode(judged: Stability) -> str:
-    return describe([float(c) for c in judged.mode], ("rad", "machine lengths")) or "legs alone"
 
 
 def _without_rest(machine: Machine) -> str:

@@ -3,7 +3,7 @@
 Which coordinates close the chains at a pose is found in `kinematics.closure`. Points and axes are in the base frame.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any, cast
@@ -159,7 +159,7 @@ def members(plan: Plan, joints: Sequence[Scalar | Turn] | None = None, **tables:
     links, left = [], None if joints is None else iter(joints)
     for leg in plan.legs:
         points = [Vector(*joint_numbers(leg, joint, tables).point) for joint in leg.joints]
-        placed = [()] * len(points) if left is None else _link_ends(plan, leg, tables, points, left)
+        placed = [None] * len(points) if left is None else _link_ends(plan, leg, tables, points, left)
         moves = False
         for joint, start, end, ends in zip(leg.joints, points, points[1:], placed, strict=False):
             moves = moves or joint.kind != "fixed"
@@ -174,15 +174,16 @@ def members(plan: Plan, joints: Sequence[Scalar | Turn] | None = None, **tables:
 
 def _link_ends(
     plan: Plan, leg: LegPlan, tables: Mapping[str, Any], points: Sequence[Vector], joints: Iterator[Scalar | Turn]
-) -> list[tuple[Station, ...]]:
+) -> list[Callable[[], tuple[Station, ...]]]:
     """Where both ends of each link of a leg are, from its joints' points at the home pose and their coordinates."""
     motion, carried = Displacement(IDENTITY, ZERO), 0
-    ends: list[tuple[Station, ...]] = []
+    ends: list[Callable[[], tuple[Station, ...]]] = []
     following = [*points[1:], points[-1]]
     for (moving, flexible), start, end in zip(_parts_at_home(plan, leg, tables), points, following, strict=True):
         motion = place([replace(s, element=s.element.displaced(motion)) for s in moving], joints)[1] @ motion
         carried += len(moving) + len(flexible)
-        ends.append(((carried - len(flexible), motion.apply(start)), (carried, motion.apply(end))))
+        stations = (carried - len(flexible), motion.apply(start)), (carried, motion.apply(end))
+        ends.append(lambda stations=stations: stations)
     return ends
 
 
