@@ -7,6 +7,7 @@ Points are in the base frame.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero
@@ -52,10 +53,15 @@ def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[Pla
     """Legs from the first to the last of their passive joints, as long as the pose makes them."""
     ends = [(leg, leg.passive[0].point, leg.passive[-1].point) for leg in actuated_legs(legs)]
     return [
-        (leg.name, leg.name, (end - start).norm(), lambda leg=leg: (leg.stations[0], leg.stations[-1]))
+        (leg.name, leg.name, (end - start).norm(), partial(_stations, leg))
         for leg, start, end in ends
         if start is not None and end is not None
     ]
+
+
+def _stations(leg: Leg, segment: int | None = None) -> tuple[Station, ...]:
+    """Both ends of a piece of a leg's path, or of the whole path."""
+    return (leg.stations[0], leg.stations[-1]) if segment is None else leg.stations[segment : segment + 2]
 
 
 def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:
@@ -72,7 +78,7 @@ def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:
         names = [what] if bars == 1 else [f"{what} {i}" for i in range(1, bars + 1)]
         length = getattr(geometry, field)
         return [
-            (leg.name, f"{leg.name} {name}", length, lambda leg=leg: leg.stations[segment : segment + 2])
+            (leg.name, f"{leg.name} {name}", length, partial(_stations, leg, segment))
             for leg in actuated_legs(legs)
             for name in names
         ]
@@ -86,7 +92,7 @@ def listed(what: str, field: str) -> Lengths:
     def lengths(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[Placed]:
         passive = next(leg for leg in legs if leg.number is None)
         sizes = enumerate(getattr(geometry, field))
-        return [("", f"{what} {i + 1}", length, lambda i=i: passive.stations[i : i + 2]) for i, length in sizes]
+        return [("", f"{what} {i + 1}", length, partial(_stations, passive, i)) for i, length in sizes]
 
     return lengths
 

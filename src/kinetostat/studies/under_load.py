@@ -219,7 +219,8 @@ def _cleaned(stiffness: Array) -> list[list[float]] | None:
         return None
     turning = np.arange(len(stiffness)) < (SIZE // 2 if len(stiffness) == SIZE else 1)
     largest = np.sqrt([np.abs(np.diag(stiffness))[turning == kind].max() for kind in turning])
-    return clean_matrix(np.where(np.abs(stiffness) < ROUND_OFF_OF_ENTRY * np.outer(largest, largest), 0.0, stiffness).tolist())
+    negligible = np.abs(stiffness) < ROUND_OFF_OF_ENTRY * np.outer(largest, largest)
+    return clean_matrix(np.where(negligible, 0.0, stiffness).tolist())
 
 
 def _message(judged: Stability, slack: tuple[str, ...], mode: Array) -> str:

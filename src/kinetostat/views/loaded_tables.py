@@ -69,10 +69,23 @@ def _springs(state: LoadedState, display: Display) -> Table:
     return table
 
 
+def _single_command(answer: Command, display: Display) -> Table:
+    """A row for each actuator, for one pose."""
+    table = numeric_table("Where each actuator must stand", "actuator", ["commanded", "without loads", "difference"])
+    rows = zip(answer.actuators, answer.units, answer.coordinates[0], answer.unloaded[0], strict=True)
+    for name, unit, commanded, unloaded in rows:
+        shown = (f"{precise(float(v), unit, display)} {display.scale(unit).unit}" for v in (commanded, unloaded))
+        table.add_row(name, *shown, display.show_deflection(float(commanded - unloaded), unit))
+    return table
+
+
 def print_command(console: Console, answer: Command) -> None:
     """Print where the actuators must stand, a row for each pose, and what that leaves."""
     display = answer.machine.display
     console.print(answer.message, highlight=False)
+    if len(answer.coordinates) == 1:
+        console.print(_single_command(answer, display))
+        return
     scales = [display.scale(unit) for unit in answer.units]
     heads = [scale.label(name) for name, scale in zip(answer.actuators, scales, strict=True)]
     table = numeric_table("Commands: where each actuator must stand", "pose", [*heads, "error before", "error left"])

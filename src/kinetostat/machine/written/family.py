@@ -183,7 +183,7 @@ def _link_ends(
         motion = place([replace(s, element=s.element.displaced(motion)) for s in moving], joints)[1] @ motion
         carried += len(moving) + len(flexible)
         stations = (carried - len(flexible), motion.apply(start)), (carried, motion.apply(end))
-        ends.append(lambda stations=stations: stations)
+        ends.append(partial(tuple[Station, ...], stations))
     return ends
 
 
