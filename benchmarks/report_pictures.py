@@ -23,6 +23,8 @@ sys.path.append(str(ROOT / "tests" / "edges"))
 from browser import browser  # noqa: E402  (of the tests)
 
 IMAGES = ROOT / "docs" / "images"
+SWEEPS = 20
+"""Improvements of the palette: without them, rare colours such as those of marks are lost."""
 PAGES, DOTS, GAP = 3, 72, 12
 """Pages beside each other, dots to an inch, and pixels between."""
 LOAD = 'load.force=["0 N","0 N","-500 N"]'
@@ -31,7 +33,7 @@ LOAD = 'load.force=["0 N","0 N","-500 N"]'
 def keep(image: Image.Image, name: str) -> None:
     """Write a small PNG."""
     path = IMAGES / f"{name}.png"
-    image.convert("RGB").quantize(256).save(path, optimize=True)
+    image.convert("RGB").quantize(256, kmeans=SWEEPS, dither=Image.Dither.NONE).save(path, optimize=True)
     print(f"docs/images/{path.name}  {path.stat().st_size >> 10} KiB")
 
 

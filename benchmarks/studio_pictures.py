@@ -16,6 +16,8 @@ sys.path.append(str(ROOT / "tests" / "edges"))
 from browser import Watched, browser, served  # noqa: E402  (of the tests)
 
 IMAGES = ROOT / "docs" / "images"
+SWEEPS = 20
+"""Improvements of the palette: without them, rare colours such as those of marks are lost."""
 
 
 def still(page: Watched) -> None:
@@ -29,7 +31,8 @@ def keep(page: Watched, name: str, part: str = "") -> None:
     still(page)
     shot = page.tab.locator(part).first.screenshot() if part else page.tab.screenshot()
     IMAGES.mkdir(parents=True, exist_ok=True)
-    Image.open(BytesIO(shot)).convert("RGB").save(IMAGES / f"{name}.png", optimize=True)
+    image = Image.open(BytesIO(shot)).convert("RGB").quantize(256, kmeans=SWEEPS, dither=Image.Dither.NONE)
+    image.save(IMAGES / f"{name}.png", optimize=True)
     print(f"docs/images/{name}.png  {(IMAGES / f'{name}.png').stat().st_size >> 10} KiB")
 
 

@@ -1,4 +1,4 @@
-"""The pictures at the head of README and of the tutorials: the machine that each is about.
+"""The pictures of README and of the tutorials: the machine that each is about, and maps.
 
 Run `python benchmarks/tutorial_pictures.py`; writes docs/images/.
 """
@@ -9,7 +9,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from kinetostat import build, load, load_problem, machine_picture, optimize
+from kinetostat import build, evaluate_grid, load, load_problem, machine_picture, optimize, plot
 from kinetostat.machine.machine import Machine
 
 ROOT = Path(__file__).parent.parent
@@ -17,6 +17,8 @@ sys.path.append(str(ROOT / "tests"))
 from pages import blocks  # noqa: E402  (of the tests)
 
 SIZE = (760, 440)
+SWEEPS = 20
+"""Improvements of the palette: without them, rare colours are lost."""
 HIDDEN = ("frames", "labels", "springs")
 """Layers that these pictures leave out."""
 PAPER = "zhang-gosselin-4dof"
@@ -35,8 +37,21 @@ def keep(name: str, *machines: Machine) -> None:
     for i, machine in enumerate(machines):
         drawn = machine_picture(machine, (width, height), hidden=HIDDEN)
         image.paste(Image.open(BytesIO(drawn)).convert("RGB"), (i * width, 0))
+    write(name, image)
+
+
+def keep_map(name: str, degrees: int, *quantities: str) -> None:
+    """Write a small PNG of maps of the Tricept over both tilts."""
+    grid = evaluate_grid(load("tricept"), [f"theta{i}=-{degrees} deg:{degrees} deg:41" for i in (1, 2)], quantities)
+    drawn = BytesIO()
+    plot(grid).savefig(drawn, dpi=180)
+    write(name, Image.open(drawn).convert("RGB"))
+
+
+def write(name: str, image: Image.Image) -> None:
+    """Write a small PNG into docs/images."""
     path = ROOT / "docs" / "images" / f"{name}.png"
-    image.quantize(128).save(path, optimize=True)
+    image.quantize(256, kmeans=SWEEPS, dither=Image.Dither.NONE).save(path, optimize=True)
     print(f"docs/images/{path.name}  {path.stat().st_size >> 10} KiB")
 
 
@@ -45,4 +60,6 @@ if __name__ == "__main__":
     keep("five-bar", five_bar())
     keep("paper-machine", load(PAPER))
     keep("tricept", load("tricept"))
+    keep_map("tricept-map", 40, "free_stiffness_z", "stiffness_z", "singularity_margin")
+    keep_map("tricept-stiffness", 25, "free_stiffness_z")
     keep("better-design", load(PAPER), optimize(load_problem("zhang-gosselin-2002", ["optimizer.seed=3"])).machine)
