@@ -81,6 +81,9 @@ AT_REST = 1e-10
 """Motion in one of Newton's steps, rad or in units of the machine's length, below which steps converge quadratically or
 are round-off: the next one is the square of it."""
 
+STIFFEST_LEG = 1e9
+"""Stiffness of a leg, in units of the typical one of the machine's springs, beyond which it counts as rigid: the sum of
+all legs keeps seven digits."""
 UNRESISTED = 1e-12
 """Share of the largest singular value or stiffness below which a motion meets no condition, or no spring."""
 

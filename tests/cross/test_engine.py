@@ -29,7 +29,8 @@ from numeric import lost
 Array = npt.NDArray[np.float64]
 Columns = dict[str, Array]
 
-NAMES = tuple(QUANTITIES)
+UNLOADED = [quantity for quantity in QUANTITIES.values() if not quantity.loaded]
+NAMES = tuple(quantity.name for quantity in UNLOADED)
 DIAGONALS = (*GROUPS["compliance"], *GROUPS["stiffness"])
 AGREEMENT = 5e-12
 """Of an entry of K or C against the geometric mean of its two diagonal entries: some hundred roundings, times the
@@ -75,12 +76,12 @@ def by_arrays(machine: Machine, columns: Columns) -> Found:
     with np.errstate(all="ignore"):
         response = respond(with_values(machine, columns))
         status = np.broadcast_to(response.status, count).astype(np.int8)
-        found = [np.broadcast_to(q.value(response), count) for q in QUANTITIES.values()]
+        found = [np.broadcast_to(q.value(response), count) for q in UNLOADED]
     return Found(np.where(status == Status.OK, found, np.nan), status, lost(respond(machine)))
 
 
 def read(response: Response) -> list[float]:
-    return [q.value(response) if response.status == Status.OK else math.nan for q in QUANTITIES.values()]
+    return [q.value(response) if response.status == Status.OK else math.nan for q in UNLOADED]
 
 
 def scales(found: Array) -> Array:

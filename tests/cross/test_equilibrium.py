@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from kinetostat import analyze, build, command, forward, under_load
+from kinetostat import analyze, build, command, evaluate, forward, sensitivity, under_load
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.validation import exudyn_machine
@@ -342,3 +342,27 @@ def test_gravity_without_any_mass_is_refused():
 def test_a_cable_that_is_not_one_is_refused(line, pattern):
     with refused(pattern):
         build(f'{CABLES}\n[[legs]]\nname = "a"\n{line}\n')
+
+
+@pytest.mark.parametrize("name", ["hexapod", "planar-3rrr", "delta", "tripteron"])
+def test_a_table_of_loaded_states_is_each_of_them(name):
+    planar = name.startswith("planar")
+    machine = load_without_limits(name, [f"load.force={[20, 30, 0] if planar else [20, 30, -50]}"])
+    home = machine.tables["pose"].x
+    places = [home - 0.01, home + 0.005, home + 50.0]
+    table = evaluate(machine, {"x": places}, ["displacement", "tangent_stiffness", "slack_springs", "load_factor"])
+    assert table.status.values[:2].tolist() == [0, 0]
+    assert table.status.values[2] != 0
+    for i in range(2):
+        state = under_load(machine.with_values(x=places[i]))
+        size = max(map(abs, state.displacement))
+        for row, part in enumerate(state.components):
+            assert float(table[f"displacement_{part}"][i]) == pytest.approx(state.displacement[row], abs=1e-9 * size)
+            assert float(table[f"tangent_stiffness_{part}"][i]) == pytest.approx(state.tangent[row][row], rel=1e-9)
+        assert float(table["load_factor"][i]) == pytest.approx(state.factor, rel=1e-9)
+    assert np.isnan(table["slack_springs"][2])
+
+
+def test_what_is_about_the_loaded_machine_has_no_derivative():
+    with refused(r'"displacement_z" is about the machine under load.*sweep or a map'):
+        sensitivity(load_without_limits("hexapod"), ["displacement_z"])

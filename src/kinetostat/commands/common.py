@@ -35,7 +35,8 @@ QUANTITIES = (
     "least_translational_stiffness, greatest_translational_stiffness, least_rotational_stiffness, "
     "greatest_rotational_stiffness, frobenius_condition (of K), singularity_margin (0: singular, 1: best), "
     "aspect (1 or -1; the sign changes at singularities), shortest_leg, longest_leg, actuator_force, "
-    "actuator_moment (the greatest under [load]), mass (of all moving parts); repeatable"
+    "actuator_moment (the greatest under [load]), mass (of all moving parts); of the machine at rest under its loads: "
+    "displacement, tangent_stiffness, tangent_free_stiffness, load_factor, slack_springs; repeatable"
 )
 """Help on the quantities of sweeps, maps and sensitivities."""
 MACHINE = "a machine file, or the name of a bundled machine (see `kinetostat list`)"

@@ -181,26 +181,28 @@ class Balance:
             starts.append(starts[-1] + leg.size + ways)
         return starts
 
-    def rates(self, loaded: bool = True) -> Array:
-        """Rates of the equations by the unknowns [n x unknowns x unknowns].
+    def platform_rates(self, loaded: bool = True) -> Array:
+        """Rates of the platform's equations by its twist [n x ways x ways].
 
         Args:
             loaded: with what loads and wrenches do by turning; without it, springs alone resist.
         """
-        ways, starts = self.mechanism.ways, self.starts
-        size = ways.shape[1]
-        result = np.zeros((len(self.left), starts[-1], starts[-1]))
-        if loaded:
-            result[:, :size, :size] = -ways.T @ self.load_change @ ways
-        for leg, terms, start in zip(self.mechanism.legs, self.legs, starts, strict=False):
-            moving, wrench = slice(start, start + leg.size), slice(start + leg.size, start + leg.size + size)
-            inner = terms.carrying[:, :, None] * np.eye(leg.size) + leg.idle @ np.swapaxes(leg.idle, 1, 2)
-            across = ways.T @ terms.rates
-            result[:, moving, moving] = inner + terms.geometric if loaded else inner
-            result[:, moving, wrench] = -np.swapaxes(across, 1, 2)
-            result[:, wrench, moving] = across
-            result[:, wrench, :size] = -np.eye(size)
-            result[:, :size, wrench] = np.eye(size)
+        ways = self.mechanism.ways
+        rates = -ways.T @ self.load_change @ ways
+        return rates if loaded else np.zeros_like(rates)
+
+    def leg_rates(self, number: int, loaded: bool = True) -> Array:
+        """Rates of a leg's equations by its coordinates and its wrench [n x m x m]; `loaded` as for the platform.
+
+        Its wrench enters the platform's equations, and the platform's twist those of its closure, as it is.
+        """
+        leg, terms, ways = self.mechanism.legs[number], self.legs[number], self.mechanism.ways
+        across = ways.T @ terms.rates
+        result = np.zeros((len(across), leg.size + ways.shape[1], leg.size + ways.shape[1]))
+        inner = terms.carrying[:, :, None] * np.eye(leg.size) + leg.idle @ np.swapaxes(leg.idle, 1, 2)
+        result[:, : leg.size, : leg.size] = inner + terms.geometric if loaded else inner
+        result[:, : leg.size, leg.size :] = -np.swapaxes(across, 1, 2)
+        result[:, leg.size :, : leg.size] = across
         return result
 
     def by_actuators(self) -> Array:

@@ -42,7 +42,7 @@ def commanded(mechanism: Mechanism) -> Commanded:
     for _ in range(MOST_CORRECTIONS):
         equations = solution.balance
         off = logarithm(equations.state.platform) @ ways
-        rates = solve(equations.rates(), -equations.by_actuators())[:, : ways.shape[1]]
+        rates = solve(equations, -equations.by_actuators())[:, : ways.shape[1]]
         change = -np.einsum("nac,nc->na", np.linalg.pinv(rates, rcond=UNRESISTED), off)
         change = np.where(solution.settled[:, None], change, 0.0)
         solution = at_rest(mechanism, replace(equations.state, amounts=equations.state.amounts + change))

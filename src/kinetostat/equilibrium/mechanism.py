@@ -182,9 +182,8 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
     wrench = stacked([*load.moment, *load.force], count) / _wrench_units(length, force)
     ways = np.eye(6)
     if configuration.plane is not None:
-        turn, *slides = configuration.plane.freedoms
-        at_tool = [replace(turn, point=origin).twist(origin), *(slide.twist(origin) for slide in slides)]
-        ways = np.array([twist.components() for twist in at_tool], dtype=float).T
+        turn, *slides = (np.array(joint.axis.components(), dtype=float) for joint in configuration.plane.freedoms)
+        ways = np.column_stack([[*turn, 0.0, 0.0, 0.0], *([0.0, 0.0, 0.0, *axis] for axis in slides)])
     return Mechanism(
         tuple(legs),
         tuple(spring.joint.name or spring.of for spring in actuators),

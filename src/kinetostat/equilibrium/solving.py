@@ -5,6 +5,7 @@ Source: theory section 12. Units, axes and origin are those of `mechanism`.
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy.typing as npt
 from kinetostat.equilibrium.balance import Balance, State, balance, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.motion import Array, Motions
-from kinetostat.tolerances import AT_REST
+from kinetostat.tolerances import AT_REST, STIFFEST_LEG
 
 Rows = npt.NDArray[np.int64]
 
@@ -104,7 +105,7 @@ def _newton(mechanism: Mechanism, state: State) -> Solution:
     settled = np.zeros(len(mechanism.length), dtype=bool)
     last = np.full(len(mechanism.length), np.inf)
     for _ in range(MOST_ITERATIONS):
-        step = solve(equations.rates(), -equations.left)
+        step = solve(equations, -equations.left[:, :, None])[:, :, 0]
         motion = equations.motion_of(step)
         # Steps that no longer shrink are round-off, once they are as small as that. The first one may only find what
         # the legs carry and move nothing.
@@ -118,11 +119,51 @@ def _newton(mechanism: Mechanism, state: State) -> Solution:
     return Solution(equations, settled)
 
 
-def solve(rates: Array, right: Array) -> Array:
-    """Solve linear equations [n x m x m] for right sides [n x m] or [n x m x k], singular ones by least norm."""
-    columns = right if right.ndim == rates.ndim else right[..., None]
+def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
+    """Solve the linear equations at a state for right sides [n x unknowns x k].
+
+    Each leg is eliminated by itself, so that it is a stiffness to the platform; a leg with rigid parts only has none,
+    and then all equations are solved together, singular ones by least norm.
+
+    Args:
+        equations: at the state.
+        right: right sides.
+        loaded: with what loads and wrenches do by turning.
+    """
+    size, starts = equations.mechanism.ways.shape[1], equations.starts
+    whole, total = equations.platform_rates(loaded), right[:, :size]
+    parts = []
+    for number, (start, end) in enumerate(pairwise(starts)):
+        pushed = np.zeros((len(right), end - start, size))
+        pushed[:, -size:] = np.eye(size)
+        try:
+            part = np.linalg.solve(
+                equations.leg_rates(number, loaded), np.concatenate([right[:, start:end], pushed], axis=2)
+            )
+        except np.linalg.LinAlgError:
+            return _together(equations, right, loaded)
+        stiffness = part[:, -size:, -size:]
+        if not (np.abs(stiffness) < STIFFEST_LEG).all():
+            return _together(equations, right, loaded)
+        parts.append(part)
+        whole, total = whole + stiffness, total - part[:, -size:, :-size]
+    twist = _solved(whole, total)
+    return np.concatenate([twist, *(part[:, :, :-size] + part[:, :, -size:] @ twist for part in parts)], axis=1)
+
+
+def _together(equations: Balance, right: Array, loaded: bool) -> Array:
+    size, starts = equations.mechanism.ways.shape[1], equations.starts
+    rates = np.zeros((len(right), starts[-1], starts[-1]))
+    rates[:, :size, :size] = equations.platform_rates(loaded)
+    for number, (start, end) in enumerate(pairwise(starts)):
+        rates[:, start:end, start:end] = equations.leg_rates(number, loaded)
+        rates[:, end - size : end, :size] = -np.eye(size)
+        rates[:, :size, end - size : end] = np.eye(size)
+    return _solved(rates, right)
+
+
+def _solved(rates: Array, right: Array) -> Array:
     try:
-        result = np.linalg.solve(rates, columns)
+        return np.asarray(np.linalg.solve(rates, right))
     except np.linalg.LinAlgError:
-        result = np.stack([np.linalg.lstsq(a, b, rcond=None)[0] for a, b in zip(rates, columns, strict=True)])
-    return np.asarray(result if right.ndim == rates.ndim else result[..., 0])
+        return np.stack([np.linalg.lstsq(a, b, rcond=None)[0] for a, b in zip(rates, right, strict=True)])

@@ -26,7 +26,7 @@ def compliance(equations: Balance) -> Array:
     size = ways.shape[1]
     right = np.zeros((len(equations.left), equations.left.shape[1], size))
     right[:, :size] = np.eye(size)
-    moved = ways @ solve(equations.rates(), right)[:, :size] @ ways.T
+    moved = ways @ solve(equations, right)[:, :size] @ ways.T
     shift = np.broadcast_to(np.eye(6), moved.shape).copy()
     shift[:, 3:, :3] = -skew_of(equations.state.platform.translation)
     moved = shift @ moved @ np.swapaxes(shift, 1, 2)
@@ -41,13 +41,10 @@ def elastic_stiffness(equations: Balance) -> Array:
     ways = equations.mechanism.ways
     size = ways.shape[1]
     total = np.zeros((len(equations.left), size, size))
-    rates = equations.rates(loaded=False)
-    for leg, start in zip(equations.mechanism.legs, equations.starts, strict=False):
-        block = rates[:, start : start + leg.size + size, start : start + leg.size + size]
-        right = np.zeros((len(block), leg.size + size, size))
-        right[:, leg.size :] = np.eye(size)
-        sound = np.linalg.cond(block) < 1.0 / UNRESISTED
-        total += np.where(sound[:, None, None], solve(block, right)[:, leg.size :], np.nan)
+    for number, leg in enumerate(equations.mechanism.legs):
+        block = equations.leg_rates(number, loaded=False)
+        sound = np.linalg.cond(block)[:, None, None] < 1.0 / UNRESISTED
+        total += np.where(sound, np.linalg.pinv(block)[:, leg.size :, leg.size :], np.nan)
     back = np.broadcast_to(np.eye(6), (len(total), 6, 6)).copy()
     back[:, 3:, :3] = skew_of(equations.state.platform.translation)
     whole = np.swapaxes(back, 1, 2) @ ways @ total @ ways.T @ back

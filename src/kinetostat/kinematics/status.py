@@ -13,6 +13,7 @@ class Status(IntEnum):
     JOINT_LIMIT = 2
     SINGULAR = 3
     NOT_CONVERGED = 4
+    NO_REST = 5
 
     @classmethod
     def _missing_(cls, value: object) -> "Status":
@@ -21,7 +22,7 @@ class Status(IntEnum):
 
     @property
     def word(self) -> str:
-        """As written in JSON and tables: ok, out_of_reach, joint_limit, singular, not_converged."""
+        """As written in JSON and tables: ok, out_of_reach, joint_limit, singular, not_converged, no_rest."""
         return self.name.lower()
 
     @property
@@ -38,4 +39,5 @@ _SENTENCES = {
     Status.NOT_CONVERGED: "No way from the home pose leads here on which the legs stay closed and keep their assembly "
     "mode, of those that were tried; yet nothing shows that there is none. The pose may lie behind a singularity or in "
     "another assembly mode: move it nearer to the home pose, or write the machine down at a home pose nearer to it.",
+    Status.NO_REST: "The machine comes to no rest under its loads: reduce them, or preload what only pulls.",
 }

@@ -41,6 +41,7 @@ class MapQuantity:
         components: names of those that it is about: the machine must have them.
         better: whether more or less of it is better for a design; None where that depends on the machine.
         needs: what a machine must have for it to mean something; empty if nothing. It is NaN where that is missing.
+        loaded: whether it is about the machine at rest under its loads, which takes an iteration at each pose.
     """
 
     name: str
@@ -50,6 +51,7 @@ class MapQuantity:
     components: tuple[str, ...] = ()
     better: Better = None
     needs: str = ""
+    loaded: bool = False
 
 
 def _compliance(response: Response, i: int, j: int) -> Scalar:
@@ -116,6 +118,42 @@ def _extremes() -> list[MapQuantity]:
     return entries
 
 
+def _under_load(response: Response, what: str, row: int | None = None) -> Scalar:
+    """A number of the loaded state; NaN where it has not been computed."""
+    if response.loaded is None:
+        return float("nan")
+    values = response.loaded[what]
+    return values if row is None else values[:, row]
+
+
+def _tangent_free(response: Response, row: int) -> Scalar:
+    return 1.0 / _under_load(response, "compliance", row)
+
+
+def _of_loaded_state() -> list[MapQuantity]:
+    entries = []
+    for i, name in enumerate(COMPONENTS):
+        shown, unit = rf"\mathrm{{{name}}}", "rad" if i in ROTATIONS else "m"
+        moved = partial(_under_load, what="displacement", row=i)
+        tangent, free = partial(_under_load, what="stiffness", row=i), partial(_tangent_free, row=i)
+        stiff = _stiffness_unit(i, i)
+        entries += [
+            MapQuantity(f"displacement_{name}", unit, rf"$u_{{{shown}}}$", moved, (name,), loaded=True),
+            MapQuantity(
+                f"tangent_stiffness_{name}", stiff, rf"$K_{{t,{shown}}}$", tangent, (name,), "more", loaded=True
+            ),
+            MapQuantity(
+                f"tangent_free_stiffness_{name}", stiff, rf"$1/C_{{t,{shown}}}$", free, (name,), "more", loaded=True
+            ),
+        ]
+    factor, slack = partial(_under_load, what="factor"), partial(_under_load, what="slack")
+    return [
+        *sorted(entries, key=lambda entry: entry.name.rpartition("_")[0]),
+        MapQuantity("load_factor", "1", "load factor", factor, better="more", loaded=True),
+        MapQuantity("slack_springs", "1", "slack springs", slack, better="less", loaded=True),
+    ]
+
+
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
@@ -145,6 +183,7 @@ QUANTITIES = {
             better="less",
             needs=LIMITS["actuator_moment"].needs,
         ),
+        *_of_loaded_state(),
     )
 }
 """Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., singularity_margin, ..."""
@@ -153,8 +192,11 @@ GROUPS = {
     "compliance": tuple(f"compliance_{name}" for name in COMPONENTS),
     "stiffness": tuple(f"stiffness_{name}" for name in COMPONENTS),
     "free_stiffness": tuple(f"free_stiffness_{name}" for name in COMPONENTS),
+    "displacement": tuple(f"displacement_{name}" for name in COMPONENTS),
+    "tangent_stiffness": tuple(f"tangent_stiffness_{name}" for name in COMPONENTS),
+    "tangent_free_stiffness": tuple(f"tangent_free_stiffness_{name}" for name in COMPONENTS),
 }
-"""Names that stand for several quantities: the six diagonal entries of C and of K, and the six 1/C_ii."""
+"""Names that stand for several quantities: diagonals of C and of K, 1/C_ii, and those under load."""
 
 
 def spoken(name: str) -> str:

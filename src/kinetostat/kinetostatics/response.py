@@ -6,7 +6,9 @@ the status is not OK, results are meaningless; the engine and the studies mask t
 Source: theory sections 2 to 9, in their order; loads of actuators, theory (29).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero, smaller, where
 from kinetostat.algebra.screw import Wrench
@@ -44,6 +46,7 @@ class Response:
         checks: the limits of the machine that are set, each with what it is compared with.
         mass: of what moves, as far as it is known, kg.
         joint_status: `Status` code of the joints alone, before the pose is judged.
+        loaded: numbers of the loaded state (`equilibrium.numbers`), where they have been computed.
     """
 
     configuration: Configuration
@@ -59,6 +62,7 @@ class Response:
     checks: tuple[Check, ...] = ()
     mass: Scalar = 0.0
     joint_status: Scalar = int(Status.OK)
+    loaded: Mapping[str, Any] | None = None
     regularity = renamed_property("singularity_margin")
 
 

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from kinetostat.equilibrium.commanding import commanded
 from kinetostat.equilibrium.motion import Array
+from kinetostat.equilibrium.numbers import weighed
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import Status
@@ -26,7 +27,6 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.evaluation.columns import PoseColumns
 from kinetostat.studies.evaluation.given_poses import given_poses
 from kinetostat.studies.plain_data import as_answer
-from kinetostat.studies.under_load import weighed
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 
 

@@ -23,7 +23,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
+from kinetostat.studies.grid.quantities import refuse_absent, refuse_loaded, resolve_quantities
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.tolerances import NO_INFLUENCE, ROUND_OFF_OF_ENTRY, ZERO_LENGTH
 from kinetostat.units import KINDS
@@ -173,6 +173,7 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     names = tuple(resolve_quantities(quantities, machine.family.component_names))
     if not names:
         raise InputError("quantities names none; give at least one quantity or group.")
+    refuse_loaded(names, "sensitivities")
     refuse_absent(machine, names)
     candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(p, names)]
     here = values(machine)

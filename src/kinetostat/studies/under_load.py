@@ -13,17 +13,17 @@ from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.balance import Balance, LegTerms, balance, free_state
-from kinetostat.equilibrium.mechanism import Chain, Mechanism, mechanism_of
+from kinetostat.equilibrium.mechanism import Chain, Mechanism
 from kinetostat.equilibrium.motion import Array, Motions, logarithm
+from kinetostat.equilibrium.numbers import weighed
 from kinetostat.equilibrium.solving import Rest, at_rest, solve
 from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, stability
-from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.singularity import describe
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.refusal import why_not
@@ -120,21 +120,6 @@ def under_load(machine: Machine) -> LoadedState:
     return _state(machine, response, solution.balance)
 
 
-def weighed(machine: Machine, response: Response, joints: Joints | None, count: int = 1) -> Mechanism:
-    """The mechanism of a machine with loads, see `mechanism_of`.
-
-    Raises:
-        InputError: there is gravity, but nothing says a mass.
-    """
-    mechanism = mechanism_of(machine, response, joints, count)
-    if np.any(mechanism.gravity) and not mechanism.weighs:
-        raise InputError(
-            f"{machine.name}: load.gravity pulls at masses, but none is known; give the platform's as [tool] mass, or "
-            "links a cross-section with a density."
-        )
-    return mechanism
-
-
 def _state(machine: Machine, response: Response, equations: Balance) -> LoadedState:
     mechanism, parts = equations.mechanism, list(machine.family.components)
     platform = equations.state.platform
@@ -191,7 +176,7 @@ def _linear(response: Response, mechanism: Mechanism, parts: list[int]) -> tuple
     if int(response.status) not in (Status.OK, Status.JOINT_LIMIT) or not np.isfinite(rows).all():
         return None
     start = balance(mechanism, free_state(mechanism))
-    step = solve(start.rates(loaded=False), -start.left)[0]
+    step = solve(start, -start.left[:, :, None], loaded=False)[0, :, 0]
     size = mechanism.ways.shape[1]
     return _in_si(mechanism, mechanism.ways @ step[:size], parts)
 

@@ -53,6 +53,24 @@ def _exists(name: str, components: Sequence[str]) -> bool:
     return all(part in components for part in QUANTITIES[name].components)
 
 
+def refuse_loaded(names: Sequence[str], what: str) -> None:
+    """Refuse quantities of the machine under load where only unloaded machines are computed.
+
+    Args:
+        names: of quantities.
+        what: is computed, in the plural.
+
+    Raises:
+        InputError: names the first such quantity.
+    """
+    for name in names:
+        if name in QUANTITIES and QUANTITIES[name].loaded:
+            raise InputError(
+                f'"{name}" is about the machine under load, but {what} are those of the unloaded machine; choose '
+                "another quantity, or look at this one in a sweep or a map."
+            )
+
+
 def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Parameter] = ()) -> None:
     """Refuse quantities that have no value for a machine, whatever its pose.
 

@@ -34,6 +34,7 @@ PLAIN = {
     Status.OUT_OF_REACH: "out of reach",
     Status.SINGULAR: "singular",
     Status.NOT_CONVERGED: "not converged",
+    Status.NO_REST: "no rest under load",
 }
 """Verdicts of statuses; for a limit that is passed, the verdict names the limit."""
 LIMIT, FAILS = "limits.", "fails "

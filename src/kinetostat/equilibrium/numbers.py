@@ -1,0 +1,93 @@
+"""Loaded states at many poses: the numbers of `quantities` that are about them. No formula lives here.
+
+Source: theory section 12.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
+from kinetostat.equilibrium.motion import Array, Motions, logarithm
+from kinetostat.equilibrium.solving import at_rest
+from kinetostat.equilibrium.tangent import compliance, stability
+from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import with_values
+from kinetostat.spec.errors import InputError
+
+FREE = (Status.OK, Status.SINGULAR)
+"""Statuses without loads that a loaded machine can have: tension and weight hold where springs do not."""
+
+
+def weighed(machine: Machine, response: Response, joints: Joints | None, count: int = 1) -> Mechanism:
+    """The mechanism of a machine with loads, see `mechanism_of`.
+
+    Raises:
+        InputError: there is gravity, but nothing says a mass.
+    """
+    mechanism = mechanism_of(machine, response, joints, count)
+    if np.any(mechanism.gravity) and not mechanism.weighs:
+        raise InputError(
+            f"{machine.name}: load.gravity pulls at masses, but none is known; give the platform's as [tool] mass, or "
+            "links a cross-section with a density."
+        )
+    return mechanism
+
+
+def loaded_numbers(
+    machine: Machine, columns: Mapping[str, Array], count: int, factors: bool = False
+) -> tuple[dict[str, Array], npt.NDArray[np.int64]]:
+    """Find the loaded states at n poses.
+
+    Args:
+        machine: with its loads; gives all parameters that do not vary.
+        columns: values of those that vary by leaf path, SI [n].
+        count: n.
+        factors: whether load factors are wanted, which take longer.
+
+    Returns:
+        For each name its values [n] or [n x 6], SI, at the loaded tool point in base axes: "displacement" (rotation
+        vector and displacement of the tool), "compliance" (diagonal), "stiffness" (diagonal), "slack" (how many
+        springs), "factor"; NaN where there is no state of rest. And `Status` codes [n].
+
+    Raises:
+        InputError: there is gravity, but nothing says a mass.
+    """
+    result: dict[str, Array] = {
+        **{name: np.full((count, 6), np.nan) for name in ("displacement", "compliance", "stiffness")},
+        **{name: np.full(count, np.nan) for name in ("slack", "factor")},
+    }
+    status = np.broadcast_to(respond(with_values(machine, columns)).status, (count,)).astype(np.int64)
+    rows = np.flatnonzero(np.isin(status, FREE))
+    if not len(rows):
+        return result, status
+    posed = with_values(machine, {path: np.asarray(values)[rows] for path, values in columns.items()})
+    joints = solve_joints(posed) if posed.family.chains else None
+    mechanism = weighed(posed, respond(posed, joints), joints, len(rows))
+    solution = at_rest(mechanism)
+    status[rows] = np.where(solution.settled, Status.OK, Status.NO_REST)
+    rested = rows[solution.settled]
+    equations, units = solution.balance, mechanism.twist_units
+    platform = equations.state.platform
+    turned = logarithm(Motions(platform.rotation, np.zeros_like(platform.translation)))[:, :3]
+    soft = (
+        compliance(equations) * units[:, :, None] * units[:, None] / (mechanism.length * mechanism.force)[:, None, None]
+    )
+    parts = np.array(machine.family.components)
+    there = solution.settled
+    result["displacement"][rested] = (np.concatenate([turned, platform.translation], axis=1) * units)[there]
+    result["compliance"][rested] = np.diagonal(soft, axis1=1, axis2=2)[there]
+    stiffness = np.full((len(rows), 6), np.nan)
+    square = soft[:, parts[:, None], parts]
+    stiffness[:, parts] = np.diagonal(np.linalg.pinv(square), axis1=1, axis2=2)
+    result["stiffness"][rested] = stiffness[there]
+    pairs = zip(mechanism.legs, equations.legs, strict=True)
+    slack = [((leg.sign != 0.0) & (terms.carrying == 0.0)).sum(axis=1) for leg, terms in pairs]
+    result["slack"][rested] = np.sum(slack, axis=0)[there]
+    if factors:
+        result["factor"][rested] = [stability(equations, i).factor for i in np.flatnonzero(there).tolist()]
+    return result, status
