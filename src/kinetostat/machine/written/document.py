@@ -28,6 +28,7 @@ from kinetostat.machine.written.plan import (
     Matrix,
     Plan,
 )
+from kinetostat.machine.written.struts import AXIAL, check_strut
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import LARGEST_OTHER, SOFTEST
@@ -221,8 +222,11 @@ def _leg(name: str, leg: dict[str, Any], where: str, shapes: Mapping[str, str]) 
     if not 1 <= len(joints) <= MOST_JOINTS:
         raise InputError(f"{where} has {len(joints)} joints; it needs 1 to {MOST_JOINTS}, from base to platform.")
     directed(joints, where)
-    plans = tuple(_joint(key, part, f'{where}, joint "{key}"') for key, part in joints.items())
+    plans = tuple(_joint(key, part, f'{where}, joint "{key}"', shapes) for key, part in joints.items())
     _check_chain(plans, where)
+    for place, plan in enumerate(plans):
+        if plan.rod:
+            check_strut(plans, place, f'{where}, joint "{plan.name}"')
     bodies = {plan.joins[1] for plan in plans[:-1]}
     for key in links:
         choice(key, bodies, f"{where}: links name")
@@ -230,7 +234,7 @@ def _leg(name: str, leg: dict[str, Any], where: str, shapes: Mapping[str, str]) 
     return LegPlan(name, plans, flexible)
 
 
-def _joint(name: str, part: dict[str, Any], where: str) -> JointPlan:
+def _joint(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str]) -> JointPlan:
     kind = choice(part.pop("type", None), JOINT_TYPES, f"{where}: type")
     joins = part.pop("joins", None)
     if not isinstance(joins, list) or len(joins) != 2 or not all(isinstance(body, str) and body for body in joins):
@@ -251,8 +255,30 @@ def _joint(name: str, part: dict[str, Any], where: str) -> JointPlan:
     compliance = _matrix(part.pop("compliance", []), where)
     seat = _seat(kind, part, bool(compliance), where)
     acts, preloaded = _acts(part, sprung, where), "preload" in part
-    ends = joins[0], joins[1]
-    return JointPlan(name, kind, ends, bool(actuated), sprung, compliance, series, seat, motor, preloaded, acts)
+    rod, section = _rod(part, shapes, where)
+    return JointPlan(
+        name,
+        kind,
+        (joins[0], joins[1]),
+        bool(actuated),
+        sprung,
+        compliance,
+        series=series,
+        seat=seat,
+        motor=motor,
+        preloaded=preloaded,
+        acts=acts,
+        rod=rod,
+        cross_section=section,
+    )
+
+
+def _rod(part: dict[str, Any], shapes: Mapping[str, str], where: str) -> tuple[bool, str]:
+    """Whether a joint is a strut with a rod, and the name of the rod's cross-section."""
+    rod, section = bool({"section", AXIAL} & part.keys()), part.pop("section", "")
+    if section and AXIAL in part:
+        raise InputError(f"{where}: section and {AXIAL} both say how its rod stretches; leave one out.")
+    return rod, choice(section, shapes, f"{where}: section") if section else ""
 
 
 def _acts(part: dict[str, Any], sprung: bool, where: str) -> str:

@@ -18,6 +18,7 @@ from kinetostat.machine.series import springs_in_a_row
 from kinetostat.machine.written.copies import direction_in, joint_numbers, matrix_in
 from kinetostat.machine.written.joints import JOINT_TYPES, own_axis
 from kinetostat.machine.written.plan import NAME, SUMMARY, JointPlan, LegPlan, LinkPlan, Plan, literals
+from kinetostat.machine.written.struts import rod_of, with_rods
 from kinetostat.machine.written.tables import tables_of
 
 KEPT = 64
@@ -51,8 +52,10 @@ def configure(plan: Plan, joints: Sequence[Scalar | Turn], **tables: Any) -> Con
     home = chains(plan, **tables)
     remaining = iter(joints)
     placed = [place(steps, remaining) for steps in home.legs]
-    ends = zip(plan.legs, placed, strict=True)
-    legs = tuple(Leg(leg.name, tuple(chain), (), leg.idle, leg.centred) for leg, (chain, _) in ends)
+    chains_of = [with_rods(steps, chain) for steps, (chain, _) in zip(home.legs, placed, strict=True)]
+    legs = tuple(
+        Leg(leg.name, chain, (), leg.idle, leg.centred) for leg, chain in zip(plan.legs, chains_of, strict=True)
+    )
     return Configuration(placed[0][1] @ home.home, legs, (), home.length, Plane() if plan.planar else None)
 
 
@@ -88,7 +91,7 @@ def _parts_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[
     parts: list[tuple[list[Step], list[Step]]] = []
     for i, joint in enumerate(leg.joints):
         seat = [Step(spring, False) for spring in _seat(leg, joint, data[i])]
-        moving = _moving(leg, joint, data[i], tables)
+        moving = _moving(leg, joint, data[i], plan, tables)
         steps = [*moving, *seat] if JOINT_TYPES[joint.kind].seat_travels else [*seat, *moving]
         link, flexible = leg.links.get(joint.joins[1]), []
         if link is not None:
@@ -109,8 +112,8 @@ def _seat(leg: LegPlan, joint: JointPlan, data: Any) -> Sequence[Spring]:
     return ()
 
 
-def _moving(leg: LegPlan, joint: JointPlan, data: Any, tables: Mapping[str, Any]) -> list[Step]:
-    """The movable elements of a joint, in order; of springs in a row the first one moves."""
+def _moving(leg: LegPlan, joint: JointPlan, data: Any, plan: Plan, tables: Mapping[str, Any]) -> list[Step]:
+    """The movable elements of a joint, in order; of springs in a row the first one moves, and a rod comes last."""
     title = PartName(leg.name, joint.name)
     kind = JOINT_TYPES[joint.kind]
     motor = kind.motors.get(joint.motor)
@@ -123,12 +126,12 @@ def _moving(leg: LegPlan, joint: JointPlan, data: Any, tables: Mapping[str, Any]
     name = f"{title} actuator" if joint.actuated else f"{title} hinge"
     stiffness = 0.0 if joint.series else data.stiffness
     spring = Spring(name, freedom, stiffness, title, joint.actuated, not joint.actuated)
-    spring = replace(spring, preload=data.preload if joint.preloaded else 0.0, acts=joint.acts)
-    if not joint.series:
-        return [*steps[:place], Step(spring, True), *steps[place + 1 :]]
-    row = tables[f"{leg.table(joint.name)}.stiffness"]
-    row = springs_in_a_row(spring, [(key, getattr(row, key)) for key in joint.series], joint.name)
-    return [*steps[:place], *(Step(part, i == 0) for i, part in enumerate(row)), *steps[place + 1 :]]
+    row = [replace(spring, preload=data.preload if joint.preloaded else 0.0, acts=joint.acts)]
+    if joint.series:
+        parts = tables[f"{leg.table(joint.name)}.stiffness"]
+        row = [*springs_in_a_row(row[0], [(key, getattr(parts, key)) for key in joint.series], joint.name)]
+    rods = [rod_of(leg.name, joint, row[0], data, plan, tables)] if joint.rod else []
+    return [*steps[:place], *(Step(part, i == 0) for i, part in enumerate([*row, *rods])), *steps[place + 1 :]]
 
 
 def _link_elements(
@@ -164,7 +167,7 @@ def members(plan: Plan, joints: Sequence[Scalar | Turn] | None = None, **tables:
         for joint, start, end, ends in zip(leg.joints, points, points[1:], placed, strict=False):
             moves = moves or joint.kind != "fixed"
             if moves:
-                section = leg.links[joint.joins[1]].cross_section if joint.joins[1] in leg.links else ""
+                section = _section(leg, joint.joins[1])
                 data = tables[f"sections.{section}"] if section else None
                 density = linear_density_of(plan.shapes[section], data) if section else 0.0
                 name = f"{leg.name} {joint.joins[1]}"
@@ -185,6 +188,13 @@ def _link_ends(
         stations = (carried - len(flexible), motion.apply(start)), (carried, motion.apply(end))
         ends.append(partial(tuple[Station, ...], stations))
     return ends
+
+
+def _section(leg: LegPlan, body: str) -> str:
+    """Name of the cross-section of a body: its own as a link, or that of a strut which it is a part of; or empty."""
+    struts = [joint.cross_section for joint in leg.joints if body in joint.joins]
+    links = [leg.links[body].cross_section] if body in leg.links else []
+    return next((section for section in (*links, *struts) if section), "")
 
 
 def _length(plan: Plan, tables: Mapping[str, Any]) -> Scalar:

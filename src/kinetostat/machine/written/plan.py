@@ -52,6 +52,8 @@ class JointPlan:
         preloaded: whether the file gives a preload of its spring.
         acts: "pulls" or "pushes" if its spring carries loads of one sign only; empty otherwise.
         compliance: of its own, rows rx ry rz x y z at its point, base axes at the home pose, SI; empty if it is stiff.
+        rod: whether it is a strut whose rod stretches (`struts`).
+        cross_section: name of the rod's cross-section; empty if its axial rigidity is given, or if there is no rod.
     """
 
     name: str
@@ -65,6 +67,8 @@ class JointPlan:
     motor: str = ""
     preloaded: bool = False
     acts: str = ""
+    rod: bool = False
+    cross_section: str = ""
 
 
 @dataclass(frozen=True)
@@ -182,6 +186,8 @@ def _joint_literals(joint: JointPlan) -> dict[str, object]:
         written["acts"] = joint.acts
     if joint.compliance:
         written["compliance"] = [list(row) for row in joint.compliance]
+    if joint.cross_section:
+        written["section"] = joint.cross_section
     return written
 
 

@@ -7,11 +7,15 @@ from kinetostat.machine.orientation import orientation_schema
 from kinetostat.machine.series import label
 from kinetostat.machine.written.joints import AXIS, JOINT_TYPES, MOTORS, SEAT, needs_axis, stiffness_kind
 from kinetostat.machine.written.plan import CABLE, LINK_MODELS, NAME, ONE_SIDED, SPATIAL_POSE, SUMMARY, JointPlan, Plan
+from kinetostat.machine.written.struts import AXIAL
 from kinetostat.spec.fields import Field, Quantity, made_table
 from kinetostat.spec.validation import DISPLAY_SCHEMA
 from kinetostat.units import KINDS
 
 POSE_KINDS = {"x": "length", "y": "length", "z": "length", "roll": "angle", "pitch": "angle", "yaw": "angle"}
+
+
+ROD = Field(Quantity("axial rigidity", "EA of a strut's rod, whose stiffness is EA/L at the pose", positive=True))
 
 
 def tables_of(plan: Plan) -> dict[str, type]:
@@ -43,6 +47,8 @@ def _joint_fields(joint: JointPlan) -> dict[str, Field]:
     if joint.preloaded:
         kind = "force" if stiffness_kind(joint.kind, joint.motor) == "linear stiffness" else "moment"
         fields["preload"] = Field(Quantity(kind, "what it carries undeformed, positive if it pulls its ends together"))
+    if joint.rod and not joint.cross_section:
+        fields[AXIAL] = ROD
     return fields
 
 
@@ -121,6 +127,8 @@ def _leg() -> dict[str, Any]:
         "compliance": COMPLIANCE,
         "preload": {**QUANTITY, "description": "load of its spring where that is not deformed; a cable's pretension"},
         "acts": {"enum": list(ONE_SIDED), "description": "of a spring that carries loads of one sign only"},
+        "section": {"type": "string", "description": "of the rod of a strut: its stiffness is EA/L at the pose"},
+        AXIAL: {**QUANTITY, "description": ROD.quantity.meaning},
     }
     models = "; ".join(f"{model}: {meaning}" for model, meaning in LINK_MODELS.items())
     link = {

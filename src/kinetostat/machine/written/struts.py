@@ -1,0 +1,135 @@
+"""Struts: slides whose rod stretches by EA/L, L being the length that the pose gives it.
+
+A strut is written as an actuated slide with a section or an axial rigidity. Its rod begins at the centre of the joint
+before the slide, or where a slide that comes first is written, and ends at the centre of the joint after it. Points are
+in the base frame.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+from typing import Any
+
+from kinetostat.algebra.scalar import Scalar, reciprocal
+from kinetostat.algebra.vector import Displacement, Vector
+from kinetostat.machine.cross_section import rigidity_of
+from kinetostat.machine.leg import Element, Joint, PartName, Spring
+from kinetostat.machine.machine import Step
+from kinetostat.machine.written.plan import JointPlan, Plan
+from kinetostat.spec.errors import InputError
+
+AXIAL = "axial_rigidity"
+"""The field that gives E A of the rod; `section` names a cross-section instead."""
+UNPOINTED = ("prismatic", "fixed")
+"""Types of joints at whose point no rod ends: it travels, or nothing turns there."""
+
+
+@dataclass(frozen=True)
+class Rod:
+    """The rod of a strut in a chain at the home pose; in a placed chain a spring stands for it.
+
+    Attributes:
+        part: what it is called.
+        actuator: in whose slide it stretches, and whose load it carries.
+        start: where it begins if no joint with a centre comes before it, base frame, m.
+        axial: E A, N.
+    """
+
+    part: PartName
+    actuator: Spring
+    start: Vector
+    axial: Scalar
+
+    @property
+    def freedoms(self) -> tuple[Joint, ...]:
+        """None."""
+        return ()
+
+    @property
+    def springs(self) -> tuple[Spring, ...]:
+        """None, as long as its length is not known."""
+        return ()
+
+    @property
+    def path(self) -> tuple[Vector, ...]:
+        """Nothing that a drawing shows."""
+        return ()
+
+    def displaced(self, motion: Displacement) -> "Rod":
+        """The rod after a rigid displacement of what carries it; what comes first in a leg begins on the base."""
+        return replace(self, actuator=self.actuator.displaced(motion))
+
+    def spring(self, start: Vector, end: Vector) -> Spring:
+        """The rod between two points, base frame, m."""
+        stiffness = self.axial * reciprocal((end - start).norm())
+        return replace(self.actuator, name=self.part, part=self.part, stiffness=stiffness, actuated=False, hinge=False)
+
+
+def rod_of(name: str, slide: JointPlan, actuator: Spring, data: Any, plan: Plan, tables: Mapping[str, Any]) -> Rod:
+    """The rod of a strut.
+
+    Args:
+        name: of the leg.
+        slide: what the file says about the strut.
+        actuator: of it.
+        data: its numbers.
+        plan, tables: of the machine, for the cross-section.
+    """
+    section = slide.cross_section
+    shape, sizes = (plan.shapes[section], tables[f"sections.{section}"]) if section else ("", None)
+    axial = rigidity_of(shape, sizes, False).axial if section else data.axial_rigidity
+    return Rod(PartName(name, f"{slide.name} rod"), actuator, Vector(*data.point), axial)
+
+
+def with_rods(steps: Sequence[Step], placed: Sequence[Element | Rod]) -> tuple[Element, ...]:
+    """A placed chain with springs in the place of its rods.
+
+    Args:
+        steps: of the leg at the home pose.
+        placed: the same elements where they are at a pose, base frame.
+    """
+    centres = [
+        getattr(element, "joint", element).path if step.moves else ()
+        for step, element in zip(steps, placed, strict=True)
+    ]
+    whole: list[Element] = []
+    for i, element in enumerate(placed):
+        if isinstance(element, Rod):
+            start = [element.start, *chain.from_iterable(centres[:i])][-1]
+            whole.append(element.spring(start, next(chain.from_iterable(centres[i:]))))
+        else:
+            whole.append(element)
+    return tuple(whole)
+
+
+def check_strut(joints: Sequence[JointPlan], place: int, where: str) -> None:
+    """Refuse a rod on a joint that is not an actuated slide, and one without joints at which it begins and ends.
+
+    Args:
+        joints: of the leg, in order.
+        place: of the joint with the rod among them.
+        where: names the joint in messages.
+
+    Raises:
+        InputError: says what to write instead.
+    """
+    joint = joints[place]
+    field = "section" if joint.cross_section else AXIAL
+    if joint.kind != "prismatic" or not joint.actuated:
+        what = "not actuated" if joint.kind == "prismatic" else joint.kind
+        raise InputError(
+            f"{where} is {what} and has {field}; only an actuated prismatic joint is a strut whose rod stretches. "
+            f"Leave {field} out, or give the section to a link of the leg."
+        )
+    before, after = ([other.kind for other in row] for row in (joints[:place], joints[place + 1 :]))
+    moving = [kind for kind in before if kind != "fixed"]
+    if moving and all(kind == "prismatic" for kind in moving):
+        raise InputError(
+            f"{where} has {field}, but only slides come before it, so that nothing says where its rod begins; leave "
+            f"{field} out and write the rod's stiffness into stiffness."
+        )
+    if all(kind in UNPOINTED for kind in after):
+        raise InputError(
+            f"{where} has {field}, but no joint that turns comes after it, so that nothing says where its rod ends; "
+            f"leave {field} out and write the rod's stiffness into stiffness."
+        )
