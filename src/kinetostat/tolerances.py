@@ -81,6 +81,10 @@ AT_REST = 1e-10
 """Motion in one of Newton's steps, rad or in units of the machine's length, below which steps converge quadratically or
 are round-off: the next one is the square of it."""
 
+UNMOVED_TOOL = 1e-15
+"""Displacement, rad or in units of the machine's length, below which the tool of a loaded machine has not moved."""
+BALANCED = 1e-9
+"""Share of the load that may be left over where tensions are chosen: least squares keep some twelve digits."""
 STIFFEST_LEG = 1e9
 """Stiffness of a leg, in units of the typical one of the machine's springs, beyond which it counts as rigid: the sum of
 all legs keeps seven digits."""

@@ -277,6 +277,63 @@ def test_cables_go_slack_at_the_load_of_their_derivation(share, slack):
 HINGE = "actuated = true, stiffness = 5e3"
 
 
+@pytest.mark.parametrize(("least", "most"), [(50.0, None), (120.0, 500.0)])
+def test_tensions_are_the_least_within_their_bounds(least, most):
+    """Two cables up and two down under 500 N: each lower one pulls as little as it may, each upper one 250 N more."""
+    bounds = f"min_tension = {least}" + (f"\nmax_tension = {most}" if most else "")
+    state = under_load(cables(HANGING, dict.fromkeys(HANGING, 0.0), f"[load]\nforce = [0, -500, 0]\n{bounds}\n"))
+    loads = [s.load for s in state.springs]
+    assert loads == pytest.approx([least + 250.0, least + 250.0, least, least], rel=1e-9)
+    assert state.displacement == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+
+
+def test_tensions_of_a_spatial_machine_balance_its_weight_and_no_smaller_ones_do():
+    """Eight cables in the corners of a room: balance from points alone, and no feasible direction lowers the norm."""
+    rng = np.random.default_rng(3)
+    corners = np.array([[x, y, z] for x in (-3.0, 3.0) for y in (-2.0, 2.0) for z in (0.0, 4.0)])
+    eyes = np.array([[x, y, z] for x in (-0.2, 0.2) for y in (0.3, -0.3) for z in (2.3, 1.8)])
+    eyes[:, 2] += 0.05 * rng.normal(size=8)
+    legs = "".join(
+        f'[[legs]]\nname = "c{i}"\ntype = "cable"\nfrom = {a}\nto = {b}\nstiffness = 2e5\n'
+        for i, (a, b) in enumerate(zip(corners.tolist(), eyes.tolist(), strict=True))
+    )
+    head = 'schema = 1\nname = "room"\nfamily = "legs"\n[platform]\npoint = [0, 0, 2]\n[pose]\n'
+    pose = "x = 0\ny = 0\nz = 2\nroll = 0\npitch = 0\nyaw = 0\n"
+    load = "[tool]\nmass = 20\ncentre_of_mass = [0.02, 0, 0]\n[load]\ngravity = [0, 0, -9.81]\nmin_tension = 40\n"
+    state = under_load(build(head + pose + load + legs))
+    assert state.rest is Rest.OK
+    tensions = np.array([s.load for s in state.springs])
+    along = (corners - eyes) / np.linalg.norm(corners - eyes, axis=1)[:, None]
+    pulls = np.concatenate([np.cross(eyes - [0.0, 0.0, 2.0], along), along], axis=1).T
+    weight = np.array([0.0, 0.0, -20 * 9.81])
+    assert pulls @ tensions == pytest.approx(-np.concatenate([np.cross([0.02, 0.0, 0.0], weight), weight]), abs=1e-6)
+    assert tensions.min() == pytest.approx(40.0, rel=1e-9)
+    internal = np.linalg.svd(pulls)[2][6:]
+    for direction in rng.normal(size=(200, 2)) @ internal:
+        moved = tensions + 1e-3 * direction
+        if (moved >= 40.0 - 1e-9).all():
+            assert np.linalg.norm(moved) > np.linalg.norm(tensions) - 1e-9
+
+
+@pytest.mark.parametrize(
+    ("bounds", "pattern"),
+    [
+        ("min_tension = 50\nmax_tension = 20", "min_tension is 50 N, more than load.max_tension, 20 N"),
+        ("max_tension = -1", "more than load.max_tension"),
+    ],
+)
+def test_bounds_of_tensions_that_contradict_each_other_are_refused(bounds, pattern):
+    with refused(pattern):
+        under_load(cables(HANGING, dict.fromkeys(HANGING, 0.0), f"[load]\nforce = [0, -5, 0]\n{bounds}\n"))
+
+
+def test_a_load_beyond_all_tensions_is_said_with_its_bounds():
+    bounds = "[load]\nforce = [0, -500, 0]\nmin_tension = 50\nmax_tension = 200\n"
+    state = under_load(cables(HANGING, dict.fromkeys(HANGING, 0.0), bounds))
+    assert state.rest is Rest.NO_REST
+    assert "No tensions of 50 N to 200 N hold this load" in state.message
+
+
 def test_a_planar_machine_that_only_tension_holds_says_how_it_moves_without():
     machine = cables(HANGING, dict.fromkeys(HANGING, 100.0))
     assert "can still move by the twist x" in analyze(machine).message

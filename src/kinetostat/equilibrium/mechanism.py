@@ -161,7 +161,6 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
     typical = _typical(stacked(known, count)) if known else np.ones(count)
     force = typical * length
     units = _Units(origin, length, force, count)
-    preloads = iter(_preloads(machine, configuration.legs))
     members = located_members(machine, configuration, None if joints is None else joints.coordinates)
     actuators: list[Spring] = []
     legs = []
@@ -169,7 +168,7 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
         here = [m for m in members if m.leg == leg.name or (not m.leg and leg.number is None)]
         # The potential of a straight uniform link is that of half its mass at either end.
         halves = [(carried, p, 0.5 * m.length * m.linear_density) for m in here if m.ends for carried, p in m.ends()]
-        legs.append(_chain(leg, units, preloads, actuators, halves))
+        legs.append(_chain(leg, units, actuators, halves))
     platform = configuration.platform
     tool = machine.tables["tool"]
     centres = [
@@ -247,23 +246,9 @@ def _typical(stiffness: Array) -> Array:
     return np.asarray(np.exp(logs / np.maximum(usable.sum(axis=1), 1)))
 
 
-def _preloads(machine: Machine, legs: Sequence[Leg]) -> Iterator[Scalar]:
-    """What each spring carries undeformed, leg by leg: its own preload, and that of the family's actuators."""
-    table = machine.tables.get("preload")
-    given = getattr(table, "actuator", None)
-    for leg in legs:
-        for spring in leg.springs:
-            if spring.actuated and given is not None:
-                number = (leg.number or 1) - 1
-                yield given[number] if isinstance(given, tuple) else given
-            else:
-                yield spring.preload
-
-
 def _chain(
     leg: Leg,
     units: _Units,
-    preloads: Iterator[Scalar],
     actuators: list[Spring],
     weights: Sequence[tuple[int, Vector, Scalar]],
 ) -> Chain:
@@ -291,7 +276,7 @@ def _chain(
         for rows in _passive(element, units):
             free(rows)
         for spring in element.springs:
-            load, row = next(preloads), units.twist(spring.joint)
+            row = units.twist(spring.joint)
             if spring.actuated and not is_zero(spring.stiffness):
                 moves(row, -1, len(actuators))
                 actuators.append(spring)
@@ -301,7 +286,7 @@ def _chain(
                 moves(row, len(springs))
                 springs.append(spring)
                 stiffness.append(units.stiffness(spring))
-                preload.append(units.load(spring, load))
+                preload.append(units.load(spring, spring.preload))
         before.append(len(twists))
     return Chain(
         leg.name,

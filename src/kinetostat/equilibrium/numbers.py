@@ -12,6 +12,8 @@ from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.motion import Array, Motions, logarithm
 from kinetostat.equilibrium.solving import at_rest
 from kinetostat.equilibrium.tangent import compliance, stability
+from kinetostat.equilibrium.tensions import tensioned
+from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
@@ -23,11 +25,16 @@ FREE = (Status.OK, Status.SINGULAR)
 """Statuses without loads that a loaded machine can have: tension and weight hold where springs do not."""
 
 
-def weighed(machine: Machine, response: Response, joints: Joints | None, count: int = 1) -> Mechanism:
-    """The mechanism of a machine with loads, see `mechanism_of`.
+def loaded_mechanism(
+    machine: Machine, response: Response, joints: Joints | None, count: int = 1
+) -> tuple[Mechanism, npt.NDArray[np.bool_]]:
+    """The mechanism of a machine with its loads, see `mechanism_of`, with the tensions that its file leaves open.
+
+    Returns:
+        The mechanism, and where tensions within their bounds hold its loads; everywhere if none are to be chosen [n].
 
     Raises:
-        InputError: there is gravity, but nothing says a mass.
+        InputError: there is gravity but nothing says a mass, or bounds of tensions contradict each other.
     """
     mechanism = mechanism_of(machine, response, joints, count)
     if np.any(mechanism.gravity) and not mechanism.weighs:
@@ -35,7 +42,22 @@ def weighed(machine: Machine, response: Response, joints: Joints | None, count: 
             f"{machine.name}: load.gravity pulls at masses, but none is known; give the platform's as [tool] mass, or "
             "links a cross-section with a density."
         )
-    return mechanism
+    least, most = (stacked([getattr(machine.tables["load"], f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
+    if np.isinf(least).all() and np.isinf(most).all():
+        return mechanism, np.ones(count, dtype=bool)
+    least = np.where(np.isinf(least), 0.0, least)
+    if (least > most).any():
+        show = machine.display.show
+        raise InputError(
+            f"{machine.name}: load.min_tension is {show(float(least.max()), 'N')}, more than load.max_tension, "
+            f"{show(float(most.min()), 'N')}; lower the one or raise the other."
+        )
+    if not any(leg.sign.any() for leg in mechanism.legs):
+        raise InputError(
+            f"{machine.name}: load.min_tension and load.max_tension bound what only pulls or only pushes, which no "
+            'spring does; write acts = "pulls" at an actuator, or a leg of type = "cable".'
+        )
+    return tensioned(mechanism, least / mechanism.force, most / mechanism.force)
 
 
 def loaded_numbers(
@@ -67,10 +89,11 @@ def loaded_numbers(
         return result, status
     posed = with_values(machine, {path: np.asarray(values)[rows] for path, values in columns.items()})
     joints = solve_joints(posed) if posed.family.chains else None
-    mechanism = weighed(posed, respond(posed, joints), joints, len(rows))
+    mechanism, held = loaded_mechanism(posed, respond(posed, joints), joints, len(rows))
     solution = at_rest(mechanism)
-    status[rows] = np.where(solution.settled, Status.OK, Status.NO_REST)
-    rested = rows[solution.settled]
+    there = solution.settled & held
+    status[rows] = np.where(there, Status.OK, Status.NO_REST)
+    rested = rows[there]
     equations, units = solution.balance, mechanism.twist_units
     platform = equations.state.platform
     turned = logarithm(Motions(platform.rotation, np.zeros_like(platform.translation)))[:, :3]
@@ -78,7 +101,6 @@ def loaded_numbers(
         compliance(equations) * units[:, :, None] * units[:, None] / (mechanism.length * mechanism.force)[:, None, None]
     )
     parts = np.array(machine.family.components)
-    there = solution.settled
     result["displacement"][rested] = (np.concatenate([turned, platform.translation], axis=1) * units)[there]
     result["compliance"][rested] = np.diagonal(soft, axis1=1, axis2=2)[there]
     stiffness = np.full((len(rows), 6), np.nan)

@@ -5,6 +5,7 @@ Parameters may be floats or traced scalars; nothing here validates (that is `spe
 Points and axes are in the base frame.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -160,6 +161,10 @@ class Load:
         tuple[float, float, float],
         Quantity("acceleration", "along x, y, z: pulls at all masses of a loaded machine", count=3, apart=True),
     ] = (0.0, 0.0, 0.0)
+    min_tension: Annotated[
+        float, Quantity("force", "least load of what only pulls or pushes; chooses preloads", unset=math.inf)
+    ] = math.inf
+    max_tension: Annotated[float, Quantity("force", "greatest load of them", unset=math.inf)] = math.inf
 
 
 COMMON = {"tool": Tool, "load": Load, "limits": Limits}

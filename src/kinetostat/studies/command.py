@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from kinetostat.equilibrium.commanding import commanded
 from kinetostat.equilibrium.motion import Array
-from kinetostat.equilibrium.numbers import weighed
+from kinetostat.equilibrium.numbers import loaded_mechanism
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import Status
@@ -123,13 +123,13 @@ def _at(machine: Machine) -> tuple[list[Actuator], list[float] | None]:
     else:
         placed = joint_actuators(machine.chains(), leg_names(machine))
         actuators, senses = [each.at(joints.coordinates) for each in placed], [each.sign for each in placed]
-    mechanism = weighed(machine, response, joints)
+    mechanism, held = loaded_mechanism(machine, response, joints)
     by_name = {actuator.name: (actuator, sense) for actuator, sense in zip(actuators, senses, strict=True)}
     driven = [by_name[name] for name in mechanism.actuators]
     if not driven:
         return [], None
     answer = commanded(mechanism)
-    if not answer.solution.settled[0]:
+    if not (answer.solution.settled[0] and held[0]):
         return [actuator for actuator, _ in driven], None
     length, state = float(mechanism.length[0]), answer.solution.balance.state
     amounts = [

@@ -15,7 +15,7 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.balance import Balance, LegTerms, balance, free_state
 from kinetostat.equilibrium.mechanism import Chain, Mechanism
 from kinetostat.equilibrium.motion import Array, Motions, logarithm
-from kinetostat.equilibrium.numbers import weighed
+from kinetostat.equilibrium.numbers import loaded_mechanism
 from kinetostat.equilibrium.solving import Rest, at_rest, solve
 from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, stability
 from kinetostat.kinematics.closure import solve_joints
@@ -28,7 +28,7 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.refusal import why_not
 from kinetostat.studies.rounding import clean_matrix, clean_screw
-from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
+from kinetostat.tolerances import ROUND_OFF_OF_ENTRY, UNMOVED_TOOL
 
 
 @dataclass(frozen=True)
@@ -106,14 +106,16 @@ def under_load(machine: Machine) -> LoadedState:
         machine: with its pose and loads.
 
     Raises:
-        InputError: there is gravity, but nothing says a mass.
+        InputError: there is gravity but nothing says a mass, or bounds of tensions contradict each other.
     """
     joints = solve_joints(machine) if machine.family.chains else None
     response = respond(machine, joints)
     names = machine.family.component_names
     if int(response.status) in (Status.OUT_OF_REACH, Status.NOT_CONVERGED):
         return LoadedState(machine, Rest.NO_REST, why_not(machine, response, []), names)
-    mechanism = weighed(machine, response, joints)
+    mechanism, held = loaded_mechanism(machine, response, joints)
+    if not held[0]:
+        return LoadedState(machine, Rest.NO_REST, _not_held(machine), names)
     solution = at_rest(mechanism)
     if not solution.settled[0]:
         return LoadedState(machine, Rest.NO_REST, _without_rest(machine), names)
@@ -165,6 +167,7 @@ def _springs(mechanism: Mechanism, leg: Chain, terms: LegTerms, coordinates: Arr
         turning = spring.joint.point is not None
         load = float(terms.loads[0, i]) * force * (length if turning else 1.0)
         amount = float(coordinates[0, i]) * (1.0 if turning else length)
+        amount = 0.0 if abs(coordinates[0, i]) < UNMOVED_TOOL else amount
         slack = bool(leg.sign[i]) and terms.carrying[0, i] == 0.0
         states.append(SpringState(spring.name, leg.name, turning, load, amount, slack))
     return states
@@ -183,7 +186,8 @@ def _linear(response: Response, mechanism: Mechanism, parts: list[int]) -> tuple
 
 def _in_si(mechanism: Mechanism, twist: Array, parts: list[int]) -> tuple[float, ...]:
     """Components of a displacement in rad and m, round-off cut off."""
-    cleaned = clean_screw(Twist(Vector(*twist[:3].tolist()), Vector(*twist[3:].tolist())), 1.0).components()
+    seen = np.where(np.abs(twist) < UNMOVED_TOOL, 0.0, twist).tolist()
+    cleaned = clean_screw(Twist(Vector(*seen[:3]), Vector(*seen[3:])), 1.0).components()
     return tuple(float(cleaned[i] * mechanism.twist_units[0, i]) for i in parts)
 
 
@@ -223,6 +227,16 @@ def _message(judged: Stability, slack: tuple[str, ...], mode: Array) -> str:
 def _passed_limit(machine: Machine, response: Response) -> list[str]:
     """The sentence about a limit that the machine passes without its weights, if it does."""
     return [why_not(machine, response, [])] if int(response.status) == Status.JOINT_LIMIT else []
+
+
+def _not_held(machine: Machine) -> str:
+    load, show = machine.tables["load"], machine.display.show
+    least = 0.0 if math.isinf(load.min_tension) else load.min_tension
+    upper = "or more" if math.isinf(load.max_tension) else f"to {show(load.max_tension, 'N')}"
+    return (
+        f"No tensions of {show(least, 'N')} {upper} hold this load at the pose of {machine.name}; change the bounds "
+        "load.min_tension and load.max_tension, the load, or the pose."
+    )
 
 
 def _without_rest(machine: Machine) -> str:

@@ -1,0 +1,101 @@
+"""Preloads that hold a redundant machine at its pose: of all internal loads, the one of least norm within bounds.
+
+A cable machine has more cables than it needs, so that all of them can pull. Which tensions hold its load is a choice;
+here they are as small as their bounds allow. The free lengths of all springs follow: with them, the loaded machine is
+at its pose.
+
+Source: theory (42). Units, axes and origin are those of `mechanism`.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import nnls
+
+from kinetostat.equilibrium.balance import Balance, balance, free_state
+from kinetostat.equilibrium.mechanism import Mechanism
+from kinetostat.equilibrium.motion import Array
+from kinetostat.tolerances import BALANCED, UNRESISTED
+
+
+def tensioned(mechanism: Mechanism, least: Array, most: Array) -> tuple[Mechanism, npt.NDArray[np.bool_]]:
+    """Choose the preloads of all springs so that the machine is at rest at its pose.
+
+    Args:
+        mechanism: with its loads; its own preloads are left out.
+        least, most: bounds of what its one-sided springs pull (or push), in its units of force [n].
+
+    Returns:
+        The mechanism with these preloads, and where there are any within the bounds [n]; elsewhere they are zero.
+    """
+    bare = replace(mechanism, legs=tuple(replace(leg, preload=0.0 * leg.preload) for leg in mechanism.legs))
+    equations = balance(bare, free_state(bare))
+    chosen = [_chosen(equations, i, float(least[i]), float(most[i])) for i in range(len(least))]
+    known = np.array([loads is not None for loads in chosen])
+    size = sum(leg.size for leg in mechanism.legs)
+    table = np.array([np.zeros(size) if loads is None else loads for loads in chosen])
+    ends = np.cumsum([leg.size for leg in mechanism.legs])[:-1]
+    legs = [replace(leg, preload=part) for leg, part in zip(bare.legs, np.split(table, ends, axis=1), strict=True)]
+    return replace(bare, legs=tuple(legs)), known
+
+
+def _chosen(equations: Balance, pose: int, least: float, most: float) -> Array | None:
+    """Loads of all coordinates at one pose, 0 of passive ones; None where none within the bounds balance."""
+    ways, legs = equations.mechanism.ways, equations.mechanism.legs
+    size = ways.shape[1]
+    # Unknown are the wrenches of the legs; passive joints and the platform are in balance.
+    conditions, given = [np.tile(np.eye(size), len(legs))], [ways.T @ equations.load[pose]]
+    felt, weight, signs = [], [], []
+    for number, (leg, terms) in enumerate(zip(legs, equations.legs, strict=True)):
+        rows = np.zeros((leg.size, size * len(legs)))
+        rows[:, size * number : size * (number + 1)] = (ways.T @ terms.rates[pose]).T
+        passive = np.array([spring is None for spring in leg.springs], dtype=bool)
+        conditions.append(rows[passive])
+        given.append(terms.left[pose][passive])
+        felt.append(np.where(passive[:, None], 0.0, rows))
+        weight.append(np.where(passive, 0.0, terms.left[pose]))
+        signs.append(leg.sign)
+    matrix, right = np.concatenate(conditions), np.concatenate(given)
+    start = np.linalg.lstsq(matrix, right, rcond=UNRESISTED)[0]
+    if np.abs(matrix @ start - right).max() > BALANCED * max(np.abs(right).max(), least):
+        return None
+    _, values, rows = np.linalg.svd(matrix)
+    free = rows[int((values > UNRESISTED * values[0]).sum()) :].T
+    every, sign = np.concatenate(felt), np.concatenate(signs)
+    base, turn = every @ start - np.concatenate(weight), every @ free
+    pulls = sign != 0.0
+    inner = _least_norm(sign[pulls] * base[pulls], sign[pulls, None] * turn[pulls], least, most)
+    return None if inner is None else base + turn @ inner
+
+
+def _within(loads: Array, least: float, most: float, slack: float) -> bool:
+    return bool(((loads >= least - slack) & (loads <= most + slack)).all())
+
+
+def _least_norm(base: Array, turn: Array, least: float, most: float) -> Array | None:
+    """The z of least norm of base + turn z within bounds; None where there is none.
+
+    In the coordinates in which the norm is that of a vector, it is the point of a polyhedron that is nearest to the
+    origin, which one problem of least squares with non-negative unknowns gives.
+
+    Source: C. Lawson and R. Hanson, Solving Least Squares Problems (1974), chapter 23, algorithm LDP.
+    """
+    scale = max(np.abs(base).max(initial=0.0), least, UNRESISTED)
+    if not turn.shape[1]:
+        return np.zeros(0) if _within(base, least, most, BALANCED * scale) else None
+    across, sizes, along = np.linalg.svd(turn, full_matrices=False)
+    kept = sizes > UNRESISTED * max(sizes.max(initial=0.0), UNRESISTED)
+    across, back = across[:, kept], along[kept].T / sizes[kept]
+    # base + turn z = fixed + across y with y = across^T (base + turn z), and fixed is at right angles to it.
+    fixed = base - across @ (across.T @ base)
+    sides, ends = across, (least - fixed) / scale
+    if np.isfinite(most):
+        sides, ends = np.concatenate([across, -across]), np.concatenate([ends, (fixed - most) / scale])
+    matrix, wanted = np.vstack([sides.T, ends]), np.append(np.zeros(sides.shape[1]), 1.0)
+    amounts, missed = nnls(matrix, wanted)
+    if missed <= BALANCED:
+        return None
+    left = matrix @ amounts - wanted
+    nearest = -scale * left[:-1] / left[-1]
+    return np.asarray(back @ (nearest - across.T @ base))
