@@ -8,7 +8,6 @@ Names load their modules when first used, so that importing the package costs no
 
 import sys
 from importlib import import_module
-from typing import Any
 
 _HOMES = {
     "load": "kinetostat.machine.loading",
@@ -61,7 +60,7 @@ __all__ = [
 ]  # fmt: skip
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"kinetostat has no {name!r}; it has {', '.join(__all__)}")
@@ -71,7 +70,7 @@ def __dir__() -> list[str]:
     return __all__
 
 
-def load_ipython_extension(shell: Any) -> None:
+def load_ipython_extension(shell: object) -> None:
     """Let IPython show machines, answers and figures as tables and pictures; in a notebook, importing does it."""
     formatters = shell.display_formatter.formatters
     for name, module in _SHOWN.items():
@@ -79,7 +78,7 @@ def load_ipython_extension(shell: Any) -> None:
     formatters["image/png"].for_type_by_name("matplotlib.figure", "Figure", lambda figure: _notebook().png_of(figure))
 
 
-def _notebook() -> Any:
+def _notebook() -> object:
     return import_module("kinetostat.views.notebook")
 
 

@@ -1,7 +1,32 @@
-"""`python -m kinetostat` is the command."""
+"""The command as a process: `kinetostat`, or `python -m kinetostat`. What it does is in `cli`."""
 
+import os
+import signal
 import sys
 
-from kinetostat.cli import main
+CODE = 130
+"""Exit code of a command that Ctrl-C has stopped."""
 
-sys.exit(main())
+
+def main() -> int:
+    """Run the command; Ctrl-C while its program is still being read ends it at once, as nothing has been done yet.
+
+    Returns:
+        The exit code.
+    """
+    obeyed = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # not where a shell has it ignored
+    if obeyed:
+        signal.signal(signal.SIGINT, lambda *_: os._exit(CODE))
+    from kinetostat.cli import main as run
+
+    if obeyed:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    code = run()
+    if code == CODE and hasattr(signal, "pthread_sigmask"):
+        # Where Ctrl-C came in the middle of an `exec`, Python would end itself by the signal, whatever the code.
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

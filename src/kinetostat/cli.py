@@ -38,6 +38,7 @@ from kinetostat.commands.optimize import add_optimize_commands
 from kinetostat.commands.path import add_path_command
 from kinetostat.commands.report import add_report_commands
 from kinetostat.commands.studio import add_studio_command
+from kinetostat.spec.errors import InputError
 from kinetostat.spec.installation import as_typed
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
@@ -72,8 +73,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 done; 1 the question has no answer (infeasible pose, singular, a figure that differs); 2 bad input; 130
         stopped by Ctrl-C.
     """
-    from kinetostat.spec.errors import InputError
-
     _take_surroundings()
     try:
         code = _run(arguments)

@@ -48,6 +48,21 @@ def test_an_override_that_is_no_leg_is_refused(setting, words):
     assert words in str(refusal.value)
 
 
+@pytest.mark.parametrize(
+    "text", ["display.units = '{}'", "requirements.{} = 5", "stiffness.actuator.'{}' = 5"], ids=["unit", "name", "key"]
+)
+def test_a_word_as_long_as_a_file_is_cut_in_a_message(text):
+    with refused() as refusal:
+        build('schema = 1\nname = "m"\nfamily = "hexapod"\n' + text.format("z" * 5000))
+    assert "zzz…" in str(refusal.value)
+    assert len(str(refusal.value)) < 2000
+
+
+def test_a_list_without_entries_among_rigidities_is_refused():
+    with refused(r"stiffness\.passive_links"):
+        load("zhang-gosselin-4dof", ["stiffness.passive_links=[[], 5]"])
+
+
 def test_a_date_is_no_number_of_a_study():
     with refused(r"set\.pose\.z is datetime\.date\(1979, 5, 27\); it must be a number"):
         load_problem("zhang-gosselin-2002", ["set={'pose.z'=1979-05-27}"])

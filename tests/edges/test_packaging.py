@@ -62,7 +62,7 @@ def test_the_wheel_says_what_it_is(wheel):
     assert set(said.get_all("Provides-Extra")) == set(PROJECT["optional-dependencies"])
     assert said["Description-Content-Type"] == "text/markdown"
     assert "MIT License" in of_the_wheel(wheel, "licenses/LICENSE")
-    assert "kinetostat = kinetostat.cli:main" in of_the_wheel(wheel, "entry_points.txt")
+    assert "kinetostat = kinetostat.__main__:main" in of_the_wheel(wheel, "entry_points.txt")
 
 
 def test_the_source_archive_builds_and_tests(archived):

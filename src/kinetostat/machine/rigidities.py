@@ -68,7 +68,7 @@ def _resolved(value: object, which: str, where: str) -> tuple[object, Densities]
     if not isinstance(value, list):
         return _rigidity(value, which, where) if isinstance(value, dict) else (value, 0.0)
     entries = [_resolved(entry, which, f"{where}, entry {i}") for i, entry in enumerate(value)]
-    return [number for number, _ in entries], [float(np.max(density)) for _, density in entries]
+    return [number for number, _ in entries], [float(np.max(density, initial=0.0)) for _, density in entries]
 
 
 def _rigidity(table: Mapping[str, object], which: str, where: str) -> tuple[float, float]:

@@ -1,11 +1,15 @@
 """What can be wrong with what people give us. Each message is one readable paragraph that says how to mend it."""
 
 import difflib
+import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 PRINTABLE = r"^[^\u0000-\u001f\u007f-\u009f\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]*$"
 """Names: no control characters, which would reach terminals, and none that reverse the text after them."""
+LONGEST_WORD = 300
+"""Characters without a space in a message: more than paths usually have."""
+_LONG = re.compile(rf"\S{{{LONGEST_WORD},}}")
 SHOWN, WORDED = 5, 100
 """Mistakes of a file that a message shows, and those that are put into words at all: a hostile file has thousands."""
 
@@ -13,11 +17,13 @@ SHOWN, WORDED = 5, 100
 class InputError(ValueError):
     """Bad input: the message names the field, the value, what is allowed and the fix. Commands exit with 2.
 
-    What people wrote is quoted in messages; characters in it that cannot be printed are shown by their escapes.
+    What people wrote is quoted in messages; characters in it that cannot be printed are shown by their escapes, and a
+    word of hundreds of characters is cut, wherever it comes from: names and keys may be as long as a file.
     """
 
     def __init__(self, message: str) -> None:
-        super().__init__("".join(c if c.isprintable() else ascii(c)[1:-1] for c in message))
+        printable = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in message)
+        super().__init__(_LONG.sub(lambda word: cut(word[0], LONGEST_WORD), printable))
 
 
 def shorten(value: object, longest: int = 60) -> str:
