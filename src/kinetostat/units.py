@@ -215,7 +215,8 @@ def measured(unit: str, known: Collection[str], example: str) -> tuple[str, floa
         target = _in_root_units(si)
         if given is not None and target is not None and given.units == target.units:
             return si, float(given.magnitude / target.magnitude)
-    raise UnitError(f'"{unit}" is not a unit of any result; write for example "{example}"')
+    shown = unit if len(unit) <= _LONGEST else f"{unit[:_LONGEST]}..."
+    raise UnitError(f'"{shown}" is not a unit of any result; write for example "{example}"')
 
 
 def _parse_text(text: str, wanted: Kind) -> float:

@@ -23,6 +23,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.study import read_study
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.optimisation.problem import build_problem
+from kinetostat.studies.under_load import under_load
 
 LONGEST = 5.0
 """Processor time of one case, s."""
@@ -75,6 +76,13 @@ def unclear(message: str) -> str | None:
     return None if message.rstrip()[-1:] in (".", "?", ")", "`") else f"a refusal that does not end: {message!r}"
 
 
+def _judge_loaded(machine: Machine) -> None:
+    """Look for a state of rest that is not one."""
+    state = under_load(machine)
+    if state.displacement and not all(map(math.isfinite, state.displacement)):
+        raise AssertionError(f"at rest at {state.displacement}")
+
+
 def machine_case(text: str) -> str | None:
     """A machine file: read, analysed, written, read again."""
     machine = build(text, "file.toml")
@@ -84,6 +92,8 @@ def machine_case(text: str) -> str | None:
 def wrong_answer(machine: Machine) -> str | None:
     """What is wrong with the analysis of a machine."""
     analysis = analyze(machine)
+    with contextlib.suppress(InputError):  # gravity without a mass, or bounds of tensions without cables
+        _judge_loaded(machine)
     if analysis.status is not Status.OK:
         return None if analysis.message else f"status {analysis.status} without a reason"
     for name in ("stiffness", "compliance", "stiffness_diagonal", "compliance_diagonal"):

@@ -127,6 +127,7 @@ UNITS = {
     "density": (0, 0),  # of what weighs: K and C do not feel it
     "linear density": (0, 0),
     "mass": (0, 0),
+    "acceleration": (1, 0),
     "length": (1, 0),
     "area": (2, 0),
     "second moment of area": (4, 0),

@@ -323,6 +323,7 @@ def _idle(twists: Sequence[Array], coordinate: Sequence[int], springs: Sequence[
         [sum((t for t, c in zip(twists, coordinate, strict=True) if c == i), np.zeros((count, 6))) for i in passive],
         axis=2,
     )
+    columns = np.where(np.isfinite(columns), columns, 0.0)  # where a pose has no place, nothing is idle
     _, sizes, rows = np.linalg.svd(columns, full_matrices=True)
     weights = np.zeros((count, len(passive)))
     weights[:, : sizes.shape[1]] = sizes

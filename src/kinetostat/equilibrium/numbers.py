@@ -11,7 +11,7 @@ import numpy.typing as npt
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.motion import Array, Motions, logarithm
 from kinetostat.equilibrium.solving import at_rest
-from kinetostat.equilibrium.tangent import compliance, stability
+from kinetostat.equilibrium.tangent import compliance, inverse, stability
 from kinetostat.equilibrium.tensions import tensioned
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints, solve_joints
@@ -105,7 +105,7 @@ def loaded_numbers(
     result["compliance"][rested] = np.diagonal(soft, axis1=1, axis2=2)[there]
     stiffness = np.full((len(rows), 6), np.nan)
     square = soft[:, parts[:, None], parts]
-    stiffness[:, parts] = np.diagonal(np.linalg.pinv(square), axis1=1, axis2=2)
+    stiffness[:, parts] = np.diagonal(inverse(square), axis1=1, axis2=2)
     result["stiffness"][rested] = stiffness[there]
     pairs = zip(mechanism.legs, equations.legs, strict=True)
     slack = [((leg.sign != 0.0) & (terms.carrying == 0.0)).sum(axis=1) for leg, terms in pairs]

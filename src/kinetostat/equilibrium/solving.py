@@ -18,7 +18,7 @@ from kinetostat.tolerances import AT_REST, STIFFEST_LEG
 
 Rows = npt.NDArray[np.int64]
 
-MOST_ITERATIONS = 40
+MOST_ITERATIONS = 25
 """Of Newton's method for one step of the load."""
 LONGEST_STEP = 0.2
 """Motion in one iteration, rad or in units of the machine's length: beyond it, the linear equations mean little."""
@@ -70,6 +70,8 @@ def at_rest(mechanism: Mechanism, start: State | None = None) -> Solution:
         for number in range(1, steps + 1):
             solution = _newton(_with_share(part, number / steps), state_of_part)
             state_of_part = solution.balance.state
+            if not solution.settled.any():
+                break
         reached = _put(mechanism, reached, rows, solution)
     return reached
 

@@ -33,6 +33,18 @@ def compliance(equations: Balance) -> Array:
     return np.asarray(0.5 * (moved + np.swapaxes(moved, 1, 2)))
 
 
+def inverse(compliances: Array) -> Array:
+    """The stiffness of each compliance [n x m x m]; infinite where a direction is rigid."""
+    sizes = np.sqrt(np.abs(np.diagonal(compliances, axis1=1, axis2=2)))
+    products = sizes[:, :, None] * sizes[:, None]
+    scaled = compliances / np.where(products > 0.0, products, 1.0)
+    held = (sizes > 0.0).all(axis=1) & (np.linalg.cond(scaled) < 1.0 / UNRESISTED)
+    usable = np.where(held[:, None, None], scaled, np.eye(compliances.shape[1]))
+    return np.asarray(
+        np.where(held[:, None, None], np.linalg.inv(usable) / np.where(products > 0.0, products, 1.0), np.inf)
+    )
+
+
 def elastic_stiffness(equations: Balance) -> Array:
     """The stiffness of the springs where they are, leg by leg, at the loaded tool point [n x 6 x 6].
 

@@ -57,6 +57,8 @@ def _chosen(equations: Balance, pose: int, least: float, most: float) -> Array |
         weight.append(np.where(passive, 0.0, terms.left[pose]))
         signs.append(leg.sign)
     matrix, right = np.concatenate(conditions), np.concatenate(given)
+    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+        return None
     start = np.linalg.lstsq(matrix, right, rcond=UNRESISTED)[0]
     if np.abs(matrix @ start - right).max() > BALANCED * max(np.abs(right).max(), least):
         return None

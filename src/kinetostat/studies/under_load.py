@@ -17,7 +17,7 @@ from kinetostat.equilibrium.mechanism import Chain, Mechanism
 from kinetostat.equilibrium.motion import Array, Motions, logarithm
 from kinetostat.equilibrium.numbers import loaded_mechanism
 from kinetostat.equilibrium.solving import Rest, at_rest, solve
-from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, stability
+from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, inverse, stability
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.singularity import describe
 from kinetostat.kinematics.status import Status
@@ -149,7 +149,7 @@ def _state(machine: Machine, response: Response, equations: Balance) -> LoadedSt
         tuple(states),
         slack,
         _cleaned(springs_alone),
-        _cleaned(_inverse(soft)),
+        _cleaned(inverse(soft[None])[0]),
         clean_matrix(soft.tolist()),
         None if math.isnan(judged.factor) else judged.factor,
         tuple((judged.mode * units)[parts].tolist()),
@@ -189,14 +189,6 @@ def _in_si(mechanism: Mechanism, twist: Array, parts: list[int]) -> tuple[float,
     seen = np.where(np.abs(twist) < UNMOVED_TOOL, 0.0, twist).tolist()
     cleaned = clean_screw(Twist(Vector(*seen[:3]), Vector(*seen[3:])), 1.0).components()
     return tuple(float(cleaned[i] * mechanism.twist_units[0, i]) for i in parts)
-
-
-def _inverse(matrix: Array) -> Array:
-    """The stiffness of a compliance; infinite where a direction is rigid."""
-    sizes = np.sqrt(np.abs(np.diag(matrix)))
-    if not (sizes > 0.0).all():
-        return np.full(matrix.shape, np.inf)
-    return np.asarray(np.linalg.inv(matrix / np.outer(sizes, sizes)) / np.outer(sizes, sizes))
 
 
 def _cleaned(stiffness: Array) -> list[list[float]] | None:
