@@ -204,6 +204,13 @@ def test_only_so_many_at_a_time(runs):
         runs.delete(1)
 
 
+def test_a_tab_has_one_search_at_a_time_and_leaves_the_other_place_to_others(runs):
+    runs.start(written(SMALL, *LONG), "tab")
+    with refused(r"search 1 .* of this tab is running; a tab has one search at a time"):
+        runs.start(written(SMALL, *QUICK), "tab")
+    assert runs.start(written(SMALL, *QUICK), "another tab").number == 2
+
+
 def test_a_search_that_is_deleted_is_gone(kept):
     runs, run = kept
     runs.delete(run.number)

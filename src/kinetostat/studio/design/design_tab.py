@@ -83,6 +83,6 @@ class DesignTab:
         self.favourites.close()
 
     def _start(self, draft: Draft) -> None:
-        run = self._workshop.runs.start(draft.problem(self._session.machine))
+        run = self._workshop.runs.start(draft.problem(self._session.machine), self.tabs.client.id)
         self.tabs.set_value(RESULT)
         self.runs.follow(run)

@@ -181,7 +181,7 @@ class RunPanel:
         self._attempt(self._runs.stop)
 
     def _go_on(self) -> None:
-        self._attempt(self._runs.go_on)
+        self._attempt(lambda number: self._runs.go_on(number, self.choice.client.id))
 
     def _delete(self) -> None:
         confirm(f"Delete search {self.choice.value} and all its designs?", lambda: self._attempt(self._forget))

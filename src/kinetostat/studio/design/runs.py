@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Hashable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -24,7 +25,7 @@ from kinetostat.studio.design.state_folder import RUNS, numbered, slug
 from kinetostat.studio.turns import make_modest
 
 MOST_RUNNING = 2
-"""Searches at a time; each of them uses all cores."""
+"""Searches at a time; each of them uses all cores. A tab has one, so that none keeps the others from searching."""
 MOST_RUNS = 60
 """Searches that are kept."""
 WORKER = "kinetostat.studio.design.runs"
@@ -78,6 +79,7 @@ class Runs:
         self._folder = state / RUNS
         self._processes: dict[Path, subprocess.Popen[bytes]] = {}
         self._names: dict[Path, str] = {}
+        self._tabs: dict[Path, Hashable] = {}
         self._lock = threading.Lock()
 
     def every(self) -> list[Run]:
@@ -112,35 +114,43 @@ class Runs:
         except UNREADABLE:
             return Run(number, path, path.name, Stage.DAMAGED)
 
-    def start(self, problem: Problem) -> Run:
+    def start(self, problem: Problem, tab: Hashable = None) -> Run:
         """Begin a search in a new process, and return at once.
 
+        Args:
+            problem: to search.
+            tab: names the tab that asks for it; None where no tab does.
+
         Raises:
-            InputError: too many searches run or are kept, or the folder cannot be written.
+            InputError: too many searches run or are kept, this tab has one, or the folder cannot be written.
         """
         with self._lock:
-            self._check_free()
+            self._check_free(tab)
             present = numbered(self._folder)
             if len(present) >= MOST_RUNS:
                 raise InputError(f"{MOST_RUNS} searches are kept, the most there may be; delete one of them.")
             number = max(present, default=0) + 1
             folder = self._folder / f"{number:04d}-{slug(problem.study.name, 'study')}"
             begin_search(problem, folder)
-            self._work(folder)
+            self._work(folder, tab)
         return self.of(number)
 
-    def go_on(self, number: int) -> None:
+    def go_on(self, number: int, tab: Hashable = None) -> None:
         """Resume a search that was stopped.
 
+        Args:
+            number: of the search.
+            tab: as for `start`.
+
         Raises:
-            InputError: too many searches run, or this one runs already or is done.
+            InputError: too many searches run, this tab has one, or this search runs already or is done.
         """
         with self._lock:
             run = self.of(number)
             if run.stage not in (Stage.STOPPED, Stage.FAILED):
                 raise InputError(f"search {number} is {run.stage}; only a search that was stopped can be resumed.")
-            self._check_free()
-            self._work(run.folder)
+            self._check_free(tab)
+            self._work(run.folder, tab)
 
     def stop(self, number: int) -> None:
         """Let a search end after its present step; all results are kept.
@@ -179,13 +189,20 @@ class Runs:
         if process is not None:
             process.wait()
 
-    def _check_free(self) -> None:
+    def _check_free(self, tab: Hashable) -> None:
         active = [run for run in self.every() if run.stage.active]
+        for run in active:
+            if tab is not None and self._tabs.get(run.folder) == tab:
+                raise InputError(
+                    f"search {run.number} ({run.name}) of this tab is {run.stage}; a tab has one search at a time, so "
+                    "that others can search as well: wait until it is done, or stop it."
+                )
         if len(active) >= MOST_RUNNING:
             names = " and ".join(f"{run.number} ({run.name})" for run in active)
             raise InputError(f"searches {names} are running; wait until one of them is done, or stop one.")
 
-    def _work(self, folder: Path) -> None:
+    def _work(self, folder: Path, tab: Hashable) -> None:
+        self._tabs[folder] = tab
         (folder / FAILURE).unlink(missing_ok=True)
         ended = self._processes.pop(folder, None)
         if ended is not None and ended.stdin is not None:
