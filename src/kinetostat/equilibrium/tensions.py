@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import nnls
 
 from kinetostat.equilibrium.balance import Balance, balance, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
@@ -83,6 +82,8 @@ def _least_norm(base: Array, turn: Array, least: float, most: float) -> Array | 
 
     Source: C. Lawson and R. Hanson, Solving Least Squares Problems (1974), chapter 23, algorithm LDP.
     """
+    from scipy.optimize import nnls  # half a second to import: only for machines that need it
+
     scale = max(np.abs(base).max(initial=0.0), least, UNRESISTED)
     if not turn.shape[1]:
         return np.zeros(0) if _within(base, least, most, BALANCED * scale) else None
