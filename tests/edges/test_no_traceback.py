@@ -58,6 +58,11 @@ def test_a_word_as_long_as_a_file_is_cut_in_a_message(text):
     assert len(str(refusal.value)) < 2000
 
 
+def test_more_copies_than_legs_are_refused_before_they_are_made():
+    with refused("copies is 9223372036854775808; it must be the number of legs, 1 to 24"):
+        build(COAXIAL.replace('name = "only"', 'name = "only"\ncopies = 9223372036854775808'))
+
+
 def test_a_list_without_entries_among_rigidities_is_refused():
     with refused(r"stiffness\.passive_links"):
         load("zhang-gosselin-4dof", ["stiffness.passive_links=[[], 5]"])

@@ -22,6 +22,9 @@ KEYS = ("copies", "angles", "mirrored")
 SNAP = 1e-15
 """Distance from 0, 1/2 or 1 at which a cosine or sine is meant to be that number: multiples of 30 deg are exact."""
 
+MOST_COPIES = 24
+"""Legs that a machine may have; more copies would only be made to be refused."""
+
 
 @dataclass(frozen=True)
 class Placing:
@@ -90,9 +93,11 @@ def copies_in(leg: dict[str, Any], where: str) -> Copies | None:
         raise InputError(f'{where}: angles is {shorten(angles)}; give a list, e.g. ["0 deg", "120 deg", "240 deg"].')
     each = 2 if mirrored else 1
     count = count if count is not None else each * max(1, len(angles))
-    if isinstance(count, bool) or not isinstance(count, int) or count < 1 or count % each:
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_COPIES or count % each:
         even = ", and even, as mirrored legs come in pairs" if mirrored else ""
-        raise InputError(f"{where}: copies is {shorten(count)}; it must be the number of legs, at least {each}{even}.")
+        raise InputError(
+            f"{where}: copies is {shorten(count)}; it must be the number of legs, {each} to {MOST_COPIES}{even}."
+        )
     if angles and len(angles) * each != count:
         raise InputError(
             f"{where}: angles has {len(angles)} entries for {count} copies; give {count // each}, or leave it out "
