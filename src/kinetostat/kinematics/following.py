@@ -1,7 +1,9 @@
 """Joint coordinates followed from the home pose to a pose, each problem with steps of its own.
 
 A problem is a leg at a pose, or a whole machine where the pose leaves coordinates open (`leg_gaps`). What comes out for
-it does not depend on the other problems of the batch. The ways that are tried are in `ways`.
+it does not depend on the other problems of the batch. The ways that are tried are in `ways`. The assembly mode of a leg
+is a sign: that of the determinant of its joints' twists, which vanishes where two modes meet. A solution whose sign
+differs from that of the home pose is not taken.
 
 Source: theory (22) and section 6; P. Deuflhard, Newton Methods for Nonlinear Problems (2011), section 5.1, for steps
 that are accepted by the contraction of Newton's method.
@@ -10,11 +12,11 @@ that are accepted by the contraction of Newton's method.
 import numpy as np
 
 from kinetostat.kinematics.closing import Array
-from kinetostat.kinematics.leg_gaps import Coordinates, Mask, Numbers, Problems, least_norm
-from kinetostat.kinematics.signature import same_mode
+from kinetostat.kinematics.leg_gaps import Coordinates, Mask, Numbers, Problems, least_norm, stays_in_plane
 from kinetostat.kinematics.status import Status
-from kinetostat.kinematics.ways import Plan, Way, some, ways
-from kinetostat.tolerances import CLOSED, LEAST_GAP_SETTLED, NEWTON_SETTLED
+from kinetostat.kinematics.ways import Plan, Way, rows_of, some, ways
+from kinetostat.machine.leg import rows_about_one_point
+from kinetostat.tolerances import CLOSED, DEPENDENT, LEAST_GAP_SETTLED, NEWTON_SETTLED
 
 MOST_TRIALS = 80
 """Steps that are tried on one way, accepted or not."""
@@ -41,6 +43,9 @@ DESCENT = 0.3
 """Change of an unknown in such a step, in the same units, so that it stays in the valley where it starts."""
 ASIDE = 1e-2
 """Displacement of the unknowns from which these steps start, rad or in units of the machine's length."""
+
+BALL_AXES = 3
+"""Revolutes of a ball joint."""
 
 
 def follow(problems: Problems, goal: Coordinates) -> tuple[Array, Numbers]:
@@ -221,3 +226,48 @@ def _curved(inverse: Array, step: Array, change: Array) -> Array:
     weight = np.where(sound, 1.0 / np.where(sound, work, 1.0), 0.0)[:, None, None]
     across = np.eye(step.shape[1]) - weight * step[:, :, None] * change[:, None, :]
     return np.asarray(across @ inverse @ np.swapaxes(across, 1, 2) + weight * step[:, :, None] * step[:, None, :])
+
+
+def same_mode(problems: Problems, unknowns: Array, goal: Coordinates) -> Mask:
+    """Tell which solutions may be in the assembly mode of the home pose: all those whose sign does not differ.
+
+    Args:
+        problems: that have been solved.
+        unknowns: their solutions [problems x unknowns].
+        goal: coordinates of the platform in each of them.
+    """
+    if problems.free:
+        return np.ones(len(unknowns), dtype=bool)
+    here, home = signs(problems, unknowns, goal), signs(problems, 0.0 * unknowns, problems.at_home())
+    return np.asarray(here * home >= 0.0)
+
+
+def signs(problems: Problems, unknowns: Array, goal: Coordinates) -> Array:
+    """Return the sign of each leg: 1 or -1, or 0 where it has none or is singular.
+
+    A leg has one if there are as many coordinates as motions of its end, six or, in a plane, three. Nothing
+    happens to a leg where the three axes of a ball joint come to lie in a plane: their own sign is left out.
+
+    Args:
+        problems: each of one leg.
+        unknowns: its coordinates [problems x coordinates].
+        goal: coordinates of the platform, which only say how many problems there are.
+    """
+    rates = problems.gaps(unknowns, goal)[1]
+    rows = [2, 3, 4] if stays_in_plane(problems.chains) else [0, 1, 2, 3, 4, 5]
+    if len(rows) != rates.shape[2]:
+        return np.zeros(len(rates))
+    result = np.linalg.det(rates[:, rows])
+    result = np.where(np.abs(result) > DEPENDENT, result, 0.0)
+    for ball in _balls(problems):
+        result = result * np.linalg.det(rates[:, :3, ball])
+    return np.asarray(np.sign(result))
+
+
+def _balls(problems: Problems) -> list[list[int]]:
+    """The numbers of three coordinates each that are the revolutes of a ball joint."""
+    (part,) = problems.parts
+    first = np.zeros(1, dtype=int)
+    joints = [step.element.mover for step in part.build.steps(first, first)]
+    centres = [None if joint.point is None else rows_of(joint.point, 1)[0] for joint in joints]
+    return [list(row) for row in rows_about_one_point(centres) if len(row) == BALL_AXES]
