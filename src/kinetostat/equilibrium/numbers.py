@@ -89,9 +89,9 @@ def loaded_numbers(
         return result, status
     posed = with_values(machine, {path: np.asarray(values)[rows] for path, values in columns.items()})
     joints = solve_joints(posed) if posed.family.chains else None
-    mechanism, held = loaded_mechanism(posed, respond(posed, joints), joints, len(rows))
+    mechanism, balanced = loaded_mechanism(posed, respond(posed, joints), joints, len(rows))
     solution = at_rest(mechanism)
-    there = solution.settled & held
+    there = solution.settled & balanced
     status[rows] = np.where(there, Status.OK, Status.NO_REST)
     rested = rows[there]
     equations, units = solution.balance, mechanism.twist_units

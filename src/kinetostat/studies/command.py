@@ -123,13 +123,13 @@ def _at(machine: Machine) -> tuple[list[Actuator], list[float] | None]:
     else:
         placed = joint_actuators(machine.chains(), leg_names(machine))
         actuators, senses = [each.at(joints.coordinates) for each in placed], [each.sign for each in placed]
-    mechanism, held = loaded_mechanism(machine, response, joints)
+    mechanism, balanced = loaded_mechanism(machine, response, joints)
     by_name = {actuator.name: (actuator, sense) for actuator, sense in zip(actuators, senses, strict=True)}
     driven = [by_name[name] for name in mechanism.actuators]
     if not driven:
         return [], None
     answer = commanded(mechanism)
-    if not (answer.solution.settled[0] and held[0]):
+    if not (answer.solution.settled[0] and balanced[0]):
         return [actuator for actuator, _ in driven], None
     length, state = float(mechanism.length[0]), answer.solution.balance.state
     amounts = [

@@ -113,8 +113,8 @@ def under_load(machine: Machine) -> LoadedState:
     names = machine.family.component_names
     if int(response.status) in (Status.OUT_OF_REACH, Status.NOT_CONVERGED):
         return LoadedState(machine, Rest.NO_REST, why_not(machine, response, []), names)
-    mechanism, held = loaded_mechanism(machine, response, joints)
-    if not held[0]:
+    mechanism, balanced = loaded_mechanism(machine, response, joints)
+    if not balanced[0]:
         return LoadedState(machine, Rest.NO_REST, _not_held(machine), names)
     solution = at_rest(mechanism)
     if not solution.settled[0]:
