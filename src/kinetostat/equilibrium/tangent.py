@@ -38,10 +38,10 @@ def inverse(compliances: Array) -> Array:
     sizes = np.sqrt(np.abs(np.diagonal(compliances, axis1=1, axis2=2)))
     products = sizes[:, :, None] * sizes[:, None]
     scaled = compliances / np.where(products > 0.0, products, 1.0)
-    held = (sizes > 0.0).all(axis=1) & (np.linalg.cond(scaled) < 1.0 / UNRESISTED)
-    usable = np.where(held[:, None, None], scaled, np.eye(compliances.shape[1]))
+    firm = (sizes > 0.0).all(axis=1) & (np.linalg.cond(scaled) < 1.0 / UNRESISTED)
+    usable = np.where(firm[:, None, None], scaled, np.eye(compliances.shape[1]))
     return np.asarray(
-        np.where(held[:, None, None], np.linalg.inv(usable) / np.where(products > 0.0, products, 1.0), np.inf)
+        np.where(firm[:, None, None], np.linalg.inv(usable) / np.where(products > 0.0, products, 1.0), np.inf)
     )
 
 
