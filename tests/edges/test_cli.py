@@ -65,6 +65,7 @@ REFUSED = [
     (["map", MACHINE, "--over", "x=0:1:3", "--over", "x=0:1:3"], ["pose.x is varied twice"]),
     (["map", MACHINE, "--over", "x=0:1:3000", "--over", "z=0:1:3000"], ["9,000,000", "lower the counts"]),
     (["map", MACHINE, "--over", "x=0:1:3", "--over", "z=0:1:3", "--quantity", "q"], ['"q" is not a quantity']),
+    (["sweep", MACHINE, "--vary", "x=0:1:3", "--quantity", "compliance_x_ry"], ["did you mean compliance_ry_x?"]),
 ]
 
 

@@ -43,7 +43,9 @@ def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Seq
     """The sentence about an unknown quantity: which was probably meant, or all that there are."""
     others = (other for other, quantity in QUANTITIES.items() if not quantity.components)
     known = [*groups, *(member for group in groups.values() for member in group), *others]
-    near = difflib.get_close_matches(name, known, 1)
+    matrix, _, parts = name.partition("_")
+    turned = "_".join([matrix, *reversed(parts.split("_"))])  # compliance_x_ry is written compliance_ry_x
+    near = [turned] if turned in QUANTITIES else difflib.get_close_matches(name, known, 1)
     every = f"choose from {', '.join(known)}, or an entry such as compliance_{components[0]}_{components[-1]}."
     return f'"{name}" is not a quantity; ' + (f"did you mean {near[0]}?" if near else every)
 
