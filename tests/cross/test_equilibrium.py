@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinetostat import analyze, build, command, evaluate, forward, sensitivity, under_load
+from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.validation import exudyn_machine
@@ -97,10 +98,14 @@ def test_exudyn_comes_to_the_same_state(name, size, agreed):
     planar = name.startswith("planar")
     force = np.array([0.3, 0.5, 0.0 if planar else -0.8]) * size
     moment = np.array([0.0, 0.0, 0.01] if planar else [0.02, 0.01, 0.015]) * size
-    state = loaded(name, force, moment)
+    mass, centre, gravity = size / 20.0, [0.01, 0.02, 0.0 if planar else 0.05], [2.0, -3.0, 0.0 if planar else -9.0]
+    weight = [f"tool.mass={mass}", f"tool.centre_of_mass={centre}", f"load.gravity={gravity}"]
+    if name == "tripteron":  # its links weigh as well, which the engine's do not here
+        weight.append("sections.bar.density=0")
+    state = loaded(name, force, moment, *weight)
     assert state.linear != pytest.approx(state.displacement, rel=1e-5)
     response = exudyn_response(load_without_limits(name))
-    theirs = exudyn_displacement(response, np.concatenate([moment, force]))
+    theirs = exudyn_displacement(response, np.concatenate([moment, force]), centre, mass * np.array(gravity))
     parts = list(state.machine.family.components)
     ours = np.array(state.displacement)
     angles = np.zeros(3)
@@ -117,7 +122,8 @@ def exudyn_response(machine):
     return respond(machine, solve_joints(machine) if machine.family.chains else None)
 
 
-def exudyn_displacement(response, wrench):
+def exudyn_displacement(response, wrench, centre, weight):
+    """Displacement of the platform under a wrench at the tool point and a weight at a centre in platform axes."""
     model, _ = exudyn_machine.build(response.configuration, response.reference)
     model.system.Assemble()
     settings = exudyn_machine._settings(model)
@@ -126,6 +132,9 @@ def exudyn_displacement(response, wrench):
     marker = model.marker(platform, platform.at, np.eye(3))
     kinds = (model.items.Torque, model.items.Force)
     loads = [model.system.AddLoad(kind(markerNumber=marker, loadVector=[0.0] * 3)) for kind in kinds]
+    at = response.configuration.platform.apply(Vector(*centre))
+    heavy = model.marker(platform, np.array(at.components(), dtype=float), np.eye(3))
+    model.system.AddLoad(model.items.Force(markerNumber=heavy, loadVector=(weight / model.unit).tolist()))
     model.system.Assemble()
     rest = model.system.systemData.GetODE2Coordinates()
     return exudyn_machine._displacement(model, platform, loads, rest, wrench / model.unit)
