@@ -12,6 +12,7 @@ PAGES = {
         "guidelines",
         "workspace",
         "poses",
+        "loads",
         "design",
         "report",
         "export",
