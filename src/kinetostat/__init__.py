@@ -43,6 +43,8 @@ _SHOWN = {
     "Machine": "kinetostat.machine.machine",
     "Analysis": "kinetostat.studies.analysis",
     "Forward": "kinetostat.studies.assembly",
+    "LoadedState": "kinetostat.studies.under_load",
+    "Command": "kinetostat.studies.command",
     "Workspace": "kinetostat.studies.workspace.workspace",
     "Sensitivity": "kinetostat.studies.sensitivity",
     "Guidelines": "kinetostat.studies.guidelines.guidelines",

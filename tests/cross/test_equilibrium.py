@@ -1,16 +1,19 @@
 """Machines at rest under their loads: against linear answers, differences, an independent engine, and derivations."""
 
+import json
 import math
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from kinetostat import analyze, build, command, evaluate, forward, sensitivity, under_load
+from kinetostat import analyze, build, command, evaluate, forward, plot, save, sensitivity, under_load
 from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.exchange.leg_by_leg import document_of
+from kinetostat.studies.under_load import load_curve
 from kinetostat.validation import exudyn_machine
+from kinetostat.views.notebook import html_of
 from machines import load_without_limits
 from refusals import refused
 
@@ -432,3 +435,20 @@ def test_a_table_of_loaded_states_is_each_of_them(name):
 def test_what_is_about_the_loaded_machine_has_no_derivative():
     with refused(r'"displacement_z" is about the machine under load.*sweep or a map'):
         sensitivity(load_without_limits("hexapod"), ["displacement_z"])
+
+
+def test_a_curve_over_the_load_ends_in_the_state_and_shows_where_cables_go_slack():
+    machine = cables(HANGING, dict.fromkeys(HANGING, 100.0), "[load]\nforce = [0, -500, 0]\n")
+    curve, state = load_curve(machine, [0.0, 0.5, 0.9, 1.0]), under_load(machine)
+    assert curve.displacement[-1] == pytest.approx(state.displacement, rel=1e-9, abs=1e-15)
+    lower = curve.loads[:, curve.springs.index("bottom left winch actuator")]
+    assert lower == pytest.approx([100.0, 37.5, 0.0, 0.0], abs=1e-6)
+    assert len(plot(state).axes) == 3, "rotation, displacement, and forces"
+
+
+def test_answers_are_saved_and_shown_in_notebooks(tmp_path):
+    machine = load_without_limits("hexapod", ["load.force=[20, 30, -50]"])
+    for answer, key in ((under_load(machine), "tangent_stiffness"), (command(machine), "coordinates")):
+        data = json.loads(save(answer, tmp_path / "answer.json").read_text())
+        assert np.isfinite(np.array(data[key], dtype=float)).all()
+        assert "leg 1 actuator" in html_of(answer)

@@ -68,7 +68,7 @@ def at_rest(mechanism: Mechanism, start: State | None = None) -> Solution:
         part, state_of_part = mechanism.taken(rows), free_state(mechanism.taken(rows))
         state_of_part = replace(state_of_part, amounts=state.amounts[rows])
         for number in range(1, steps + 1):
-            solution = _newton(_with_share(part, number / steps), state_of_part)
+            solution = _newton(with_share(part, number / steps), state_of_part)
             state_of_part = solution.balance.state
             if not solution.settled.any():
                 break
@@ -76,8 +76,10 @@ def at_rest(mechanism: Mechanism, start: State | None = None) -> Solution:
     return reached
 
 
-def _with_share(mechanism: Mechanism, share: float) -> Mechanism:
-    legs = tuple(replace(leg, preload=leg.preload * share) for leg in mechanism.legs)
+def with_share(mechanism: Mechanism, share: float, preload: float | None = None) -> Mechanism:
+    """The mechanism with a share of its loads, and with one of its preloads: the same unless another one is given."""
+    tension = share if preload is None else preload
+    legs = tuple(replace(leg, preload=leg.preload * tension) for leg in mechanism.legs)
     return replace(mechanism, legs=legs, wrench=mechanism.wrench * share, gravity=mechanism.gravity * share)
 
 

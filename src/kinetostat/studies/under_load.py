@@ -4,6 +4,7 @@ The equations are in `equilibrium`; the command is `analyze --loaded`.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,11 +13,11 @@ import numpy as np
 from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
-from kinetostat.equilibrium.balance import Balance, LegTerms, balance, free_state
+from kinetostat.equilibrium.balance import Balance, LegTerms, State, balance, free_state
 from kinetostat.equilibrium.mechanism import Chain, Mechanism
 from kinetostat.equilibrium.motion import Array, Motions, logarithm
 from kinetostat.equilibrium.numbers import loaded_mechanism
-from kinetostat.equilibrium.solving import Rest, at_rest, solve
+from kinetostat.equilibrium.solving import Rest, at_rest, solve, with_share
 from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, inverse, stability
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.singularity import describe
@@ -29,6 +30,9 @@ from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.refusal import why_not
 from kinetostat.studies.rounding import clean_matrix, clean_screw
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY, UNMOVED_TOOL
+
+SHARES = tuple(i / 12 for i in range(16))
+"""Of the loads, at which a curve is drawn: up to 125 %."""
 
 
 @dataclass(frozen=True)
@@ -122,11 +126,61 @@ def under_load(machine: Machine) -> LoadedState:
     return _state(machine, response, solution.balance)
 
 
+@dataclass(frozen=True, eq=False)
+class LoadCurve(Immutable):
+    """How a preloaded machine gives way while its loads grow in proportion.
+
+    Attributes:
+        shares: of the loads.
+        displacement: rotation vector (rad) and displacement of the tool point (m), components of the machine
+            [shares x components]; NaN from where it comes to no rest.
+        springs: names of the springs.
+        loads: that each carries [shares x springs], N or N·m.
+    """
+
+    shares: Array
+    displacement: Array
+    springs: tuple[str, ...]
+    loads: Array
+
+
+def load_curve(machine: Machine, shares: Sequence[float] = SHARES) -> LoadCurve:
+    """Follow the state of rest while the loads grow, each share from the one before.
+
+    Args:
+        machine: that comes to rest under all of them.
+        shares: of the loads, from the least to the greatest.
+
+    Raises:
+        InputError: as for `under_load`.
+    """
+    joints = solve_joints(machine) if machine.family.chains else None
+    mechanism, _ = loaded_mechanism(machine, respond(machine, joints), joints)
+    parts, state = list(machine.family.components), free_state(mechanism)
+    moved, loads = [], []
+    for share in shares:
+        solution = at_rest(with_share(mechanism, share, preload=1.0), state)
+        state = solution.balance.state
+        springs = [
+            spring
+            for leg, terms, q in zip(mechanism.legs, solution.balance.legs, state.coordinates, strict=True)
+            for spring in _springs(mechanism, leg, terms, q)
+        ]
+        known = 1.0 if solution.settled[0] else math.nan
+        moved.append([known * c for c in _in_si(mechanism, _motion(state), parts)])
+        loads.append([known * spring.load for spring in springs])
+    return LoadCurve(np.array(shares), np.array(moved), tuple(s.name for s in springs), np.array(loads))
+
+
+def _motion(state: State) -> Array:
+    """Rotation vector and displacement of the tool point at the first pose, in units of the mechanism."""
+    platform = state.platform
+    turned = logarithm(Motions(platform.rotation, np.zeros_like(platform.translation)))[0, :3]
+    return np.concatenate([turned, platform.translation[0]])
+
+
 def _state(machine: Machine, response: Response, equations: Balance) -> LoadedState:
     mechanism, parts = equations.mechanism, list(machine.family.components)
-    platform = equations.state.platform
-    turned = logarithm(Motions(platform.rotation, np.zeros_like(platform.translation)))[0, :3]
-    moved = np.concatenate([turned, platform.translation[0]])
     units = mechanism.twist_units[0]
     size = np.outer(units, units) / (mechanism.length[0] * mechanism.force[0])
     soft = (compliance(equations)[0] * size)[np.ix_(parts, parts)]
@@ -144,7 +198,7 @@ def _state(machine: Machine, response: Response, equations: Balance) -> LoadedSt
         Rest.OK if judged.stable else Rest.UNSTABLE,
         " ".join([_message(judged, slack, judged.mode * units), *_passed_limit(machine, response)]),
         machine.family.component_names,
-        _in_si(mechanism, moved, parts),
+        _in_si(mechanism, _motion(equations.state), parts),
         _linear(response, mechanism, parts),
         tuple(states),
         slack,

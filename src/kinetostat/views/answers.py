@@ -18,9 +18,10 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.studies import analysis, assembly, sensitivity
+from kinetostat.studies import analysis, assembly, command, sensitivity, under_load
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.assembly import Forward
+from kinetostat.studies.command import Command
 from kinetostat.studies.comparison import designs
 from kinetostat.studies.comparison.designs import Comparison
 from kinetostat.studies.grid import grid
@@ -30,6 +31,7 @@ from kinetostat.studies.optimisation import result_data
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.sensitivity import Sensitivity
 from kinetostat.studies.storage import write_bytes, write_dataset, write_json, write_text
+from kinetostat.studies.under_load import LoadedState
 from kinetostat.studies.workspace import workspace
 from kinetostat.studies.workspace.workspace import Workspace
 from kinetostat.tolerances import AGREED
@@ -45,6 +47,8 @@ from kinetostat.views.figures import FORMATS, Drawings, contour_maps, curves, sa
 from kinetostat.views.grid_tables import print_dataset, print_workspace
 from kinetostat.views.influence_figures import guideline_figures, sensitivity_figure
 from kinetostat.views.influence_tables import print_guidelines, print_sensitivity
+from kinetostat.views.loaded_figures import load_figure
+from kinetostat.views.loaded_tables import print_command, print_loaded
 from kinetostat.views.optimisation_tables import print_result
 from kinetostat.views.picture import Picture, machine_picture
 from kinetostat.views.scene.glb import glb
@@ -94,10 +98,16 @@ def _sensitivity_figures(sensitivity: Sensitivity) -> Drawings:
     return {"influences": partial(sensitivity_figure, sensitivity)} if sensitivity.parameters else {}
 
 
+def _loaded_figures(state: LoadedState) -> Drawings:
+    return {"growing load": partial(load_figure, state)} if state.displacement else {}
+
+
 KINDS = (
     Kind(Machine, print_machine, _views),
     Kind(Analysis, print_analysis, data=analysis.as_json),
     Kind(Forward, print_forward, data=assembly.as_json),
+    Kind(LoadedState, print_loaded, _loaded_figures, under_load.as_json),
+    Kind(Command, print_command, data=command.as_json),
     Kind(
         xr.Dataset,
         lambda console, dataset: print_dataset(console, dataset, _names(dataset)),
