@@ -215,7 +215,7 @@ def measured(unit: str, known: Collection[str], example: str) -> tuple[str, floa
         target = _in_root_units(si)
         if given is not None and target is not None and given.units == target.units:
             return si, float(given.magnitude / target.magnitude)
-    shown = unit if len(unit) <= _LONGEST else f"{unit[:_LONGEST]}..."
+    shown = unit if len(unit) <= _LONGEST else f"{unit[:_LONGEST]}…"
     raise UnitError(f'"{shown}" is not a unit of any result; write for example "{example}"')
 
 

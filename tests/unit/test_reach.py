@@ -47,6 +47,7 @@ def test_the_codes_of_a_status_are_those_of_saved_files():
         "joint_limit": 2,
         "singular": 3,
         "not_converged": 4,
+        "no_rest": 5,
     }
 
 

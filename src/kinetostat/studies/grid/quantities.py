@@ -45,7 +45,8 @@ def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Seq
     known = [*groups, *(member for group in groups.values() for member in group), *others]
     matrix, _, parts = name.partition("_")
     turned = "_".join([matrix, *reversed(parts.split("_"))])  # compliance_x_ry is written compliance_ry_x
-    near = [turned] if turned in QUANTITIES else difflib.get_close_matches(name, known, 1)
+    there = turned != name and turned in QUANTITIES and _exists(turned, components)
+    near = [turned] if there else difflib.get_close_matches(name, known, 1)
     every = f"choose from {', '.join(known)}, or an entry such as compliance_{components[0]}_{components[-1]}."
     return f'"{name}" is not a quantity; ' + (f"did you mean {near[0]}?" if near else every)
 
