@@ -20,7 +20,15 @@ MARKERS = {
     "engines": ("test_validation", "test_mujoco"),
     "attack": ("test_attack",),
     "packaging": ("test_packaging",),
-    "numbers": ("test_derivatives", "test_scalars", "test_engine", "test_limited_poses"),
+    "numbers": (
+        "test_derivatives",
+        "test_derivatives_leg_by_leg",
+        "test_engine",
+        "test_limited_poses",
+        "test_optimisers",
+        "test_scalars",
+        "test_struts",
+    ),
     "reports": ("test_report",),
     "step": ("test_glb", "test_step_file", "test_step_outlines", "test_step_solids"),
 }
