@@ -25,6 +25,15 @@ USUAL_STIFFNESS = 1e6
 """Middle of the range of a stiffness that is rigid or free, SI."""
 LARGEST_LOAD = {"force": 1000.0, "moment": 100.0}
 """Ends of the range of a load that is zero: N, N·m."""
+OF_LOADED_STATES = (
+    "load.gravity",
+    "load.min_tension",
+    "load.max_tension",
+    "tool.centre_of_mass",
+    "tool.payload",
+    "tool.payload_centre",
+)
+"""Fields that change nothing that the page shows: it is about machines without weight. The text pane has them."""
 LEAST_SHARE = 0.02
 """Lower end of a number that must be positive, as a share of the upper end."""
 
@@ -99,6 +108,8 @@ def controls(machine: Machine, length: float) -> tuple[Control, ...]:
 def _offered(machine: Machine, present: dict[str, float]) -> Iterator[Parameter]:
     """Offer every number, and a field of several as one control where its entries are alike in kind and value."""
     for parameter in parameters(machine.family):
+        if parameter.path.startswith(OF_LOADED_STATES):
+            continue
         several = len(parameter.leaves) > 1
         alike = len({present[leaf] for leaf in parameter.leaves}) == 1
         vector = parameter.path.split(".")[-1] in VECTORS
