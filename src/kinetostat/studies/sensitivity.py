@@ -31,8 +31,8 @@ from kinetostat.units import KINDS
 if TYPE_CHECKING:
     import pandas as pd
 
-WITHOUT_INFLUENCE = ("load", "limits")
-"""Tables of a machine file on which no index depends."""
+WITHOUT_INFLUENCE = ("load.", "limits.", "tool.centre_of_mass", "tool.payload")
+"""How the fields begin on which no index depends: loads, limits, and weights."""
 MOST_NAMED = 12
 """Greatest number of parameters without influence that are named."""
 
@@ -219,7 +219,7 @@ def _without_round_off(name: str, value: float, response: Response) -> float:
 def _decides(parameter: Parameter, names: Sequence[str]) -> bool:
     if KINDS[parameter.quantity.kind].heavy and "mass" not in names:
         return False
-    return parameter.path.split(".")[0] not in WITHOUT_INFLUENCE
+    return not parameter.path.startswith(WITHOUT_INFLUENCE)
 
 
 def _no_derivative(parameter: Parameter, here: dict[str, float], slopes: dict[str, list[float]]) -> str:
