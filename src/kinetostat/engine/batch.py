@@ -165,7 +165,7 @@ def _numpy_fill(machine: Machine, _paths: Sequence[str], quantities: Sequence[st
 def _loaded_fill(machine: Machine, _paths: Sequence[str], quantities: Sequence[str]) -> Fill:
     def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         with np.errstate(all="ignore"):
-            loaded, status[:] = loaded_numbers(machine, columns, len(status), "load_factor" in quantities)
+            loaded, status[:] = loaded_numbers(machine, columns, len(status))
             response = replace(respond(with_values(machine, columns)), loaded=loaded)
             for row, name in zip(results, quantities, strict=True):
                 row[:] = QUANTITIES[name].value(response)

@@ -97,7 +97,6 @@ class Mechanism:
     Attributes:
         legs: of it.
         actuators: names of the actuators that can be driven, in the order of the legs.
-        slides: whether each is linear.
         platform: masses of platform, tool and payload.
         wrench: moment and force at the tool point, base axes [n x 6].
         gravity: [n x 3].
@@ -109,7 +108,6 @@ class Mechanism:
 
     legs: tuple[Chain, ...]
     actuators: tuple[str, ...]
-    slides: tuple[bool, ...]
     platform: Masses
     wrench: Array
     gravity: Array
@@ -135,6 +133,12 @@ class Mechanism:
         """Units of the components of twists, rad and m [n x 6]."""
         return np.concatenate([np.ones((len(self.length), 3)), np.repeat(self.length[:, None], 3, axis=1)], axis=1)
 
+    @property
+    def compliance_units(self) -> Array:
+        """Units of the entries of compliances, SI [n x 6 x 6]."""
+        units = self.twist_units
+        return units[:, :, None] * units[:, None] / (self.length * self.force)[:, None, None]
+
 
 def _wrench_units(length: Array, force: Array) -> Array:
     return np.stack([force * length] * 3 + [force] * 3, axis=1)
@@ -157,7 +161,7 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
     """
     configuration, origin = response.configuration, response.reference
     length = stacked([configuration.length], count)[:, 0]
-    known = [k for leg in configuration.legs for s in leg.springs for k in [_linear(s, configuration.length)]]
+    known = [_linear(spring, configuration.length) for leg in configuration.legs for spring in leg.springs]
     typical = _typical(stacked(known, count)) if known else np.ones(count)
     force = typical * length
     units = _Units(origin, length, force, count)
@@ -186,7 +190,6 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
     return Mechanism(
         tuple(legs),
         tuple(spring.joint.name or spring.of for spring in actuators),
-        tuple(spring.joint.point is None for spring in actuators),
         units.masses(weights),
         wrench,
         stacked(load.gravity, count),

@@ -44,6 +44,11 @@ class Motions:
         moving = np.einsum("nij,nj->ni", self.rotation, twists[:, 3:])
         return np.concatenate([turning, moving + np.cross(self.translation, turning)], axis=1)
 
+    def amounts(self) -> Array:
+        """Rotation vectors and translations [n x 6]: how far bodies are turned, and where their origins are."""
+        turned = logarithm(Motions(self.rotation, np.zeros_like(self.translation)))
+        return np.concatenate([turned[:, :3], self.translation], axis=1)
+
     def inverse(self) -> "Motions":
         """The displacements that undo these."""
         back = np.swapaxes(self.rotation, 1, 2)

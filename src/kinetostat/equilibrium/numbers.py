@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
-from kinetostat.equilibrium.motion import Array, Motions, logarithm
+from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.solving import at_rest
 from kinetostat.equilibrium.tangent import compliance, inverse, stability
 from kinetostat.equilibrium.tensions import tensioned
@@ -61,7 +61,7 @@ def loaded_mechanism(
 
 
 def loaded_numbers(
-    machine: Machine, columns: Mapping[str, Array], count: int, factors: bool = False
+    machine: Machine, columns: Mapping[str, Array], count: int
 ) -> tuple[dict[str, Array], npt.NDArray[np.int64]]:
     """Find the loaded states at n poses.
 
@@ -69,15 +69,14 @@ def loaded_numbers(
         machine: with its loads; gives all parameters that do not vary.
         columns: values of those that vary by leaf path, SI [n].
         count: n.
-        factors: whether load factors are wanted, which take longer.
 
     Returns:
         For each name its values [n] or [n x 6], SI, at the loaded tool point in base axes: "displacement" (rotation
         vector and displacement of the tool), "compliance" (diagonal), "stiffness" (diagonal), "slack" (how many
-        springs), "factor"; NaN where there is no state of rest. And `Status` codes [n].
+        springs), "factor"; NaN where there is no state of rest that is stable. And `Status` codes [n].
 
     Raises:
-        InputError: there is gravity, but nothing says a mass.
+        InputError: as for `loaded_mechanism`.
     """
     result: dict[str, Array] = {
         **{name: np.full((count, 6), np.nan) for name in ("displacement", "compliance", "stiffness")},
@@ -91,25 +90,26 @@ def loaded_numbers(
     joints = solve_joints(posed) if posed.family.chains else None
     mechanism, balanced = loaded_mechanism(posed, respond(posed, joints), joints, len(rows))
     solution = at_rest(mechanism)
-    there = solution.settled & balanced
-    status[rows] = np.where(there, Status.OK, Status.NO_REST)
-    rested = rows[there]
-    equations, units = solution.balance, mechanism.twist_units
-    platform = equations.state.platform
-    turned = logarithm(Motions(platform.rotation, np.zeros_like(platform.translation)))[:, :3]
-    soft = (
-        compliance(equations) * units[:, :, None] * units[:, None] / (mechanism.length * mechanism.force)[:, None, None]
-    )
+    settled = np.flatnonzero(solution.settled & balanced)
+    equations = solution.at(settled)
+    judged = [stability(equations, i) for i in range(len(settled))]
+    stable = np.array([each.stable for each in judged], dtype=bool)
+    status[rows], rested = Status.NO_REST, rows[settled[stable]]
+    status[rested] = Status.OK
+    moved = equations.state.platform.amounts() * equations.mechanism.twist_units
+    soft = compliance(equations) * equations.mechanism.compliance_units
     parts = np.array(machine.family.components)
-    result["displacement"][rested] = (np.concatenate([turned, platform.translation], axis=1) * units)[there]
-    result["compliance"][rested] = np.diagonal(soft, axis1=1, axis2=2)[there]
-    stiffness = np.full((len(rows), 6), np.nan)
-    square = soft[:, parts[:, None], parts]
-    stiffness[:, parts] = np.diagonal(inverse(square), axis1=1, axis2=2)
-    result["stiffness"][rested] = stiffness[there]
-    pairs = zip(mechanism.legs, equations.legs, strict=True)
-    slack = [((leg.sign != 0.0) & (terms.carrying == 0.0)).sum(axis=1) for leg, terms in pairs]
-    result["slack"][rested] = np.sum(slack, axis=0)[there]
-    if factors:
-        result["factor"][rested] = [stability(equations, i).factor for i in np.flatnonzero(there).tolist()]
+    stiffness = np.full((len(settled), 6), np.nan)
+    stiffness[:, parts] = np.diagonal(inverse(soft[:, parts[:, None], parts]), axis1=1, axis2=2)
+    pairs = zip(equations.mechanism.legs, equations.legs, strict=True)
+    slack = np.sum([((leg.sign != 0.0) & (terms.carrying == 0.0)).sum(axis=1) for leg, terms in pairs], axis=0)
+    numbers = {
+        "displacement": moved,
+        "compliance": np.diagonal(soft, axis1=1, axis2=2),
+        "stiffness": stiffness,
+        "slack": slack,
+        "factor": np.array([each.factor for each in judged]),
+    }
+    for name, values in numbers.items():
+        result[name][rested] = values[stable]
     return result, status

@@ -51,6 +51,10 @@ class Solution:
     balance: Balance
     settled: npt.NDArray[np.bool_]
 
+    def at(self, rows: Rows) -> Balance:
+        """The equations at some of the poses [rows]."""
+        return balance(self.balance.mechanism.taken(rows), self.balance.state.taken(rows))
+
 
 def at_rest(mechanism: Mechanism, start: State | None = None) -> Solution:
     """Find the states of rest under the full load.
@@ -65,8 +69,8 @@ def at_rest(mechanism: Mechanism, start: State | None = None) -> Solution:
         rows = np.flatnonzero(~reached.settled)
         if not len(rows):
             break
-        part, state_of_part = mechanism.taken(rows), free_state(mechanism.taken(rows))
-        state_of_part = replace(state_of_part, amounts=state.amounts[rows])
+        part = mechanism.taken(rows)
+        state_of_part = replace(free_state(part), amounts=state.amounts[rows])
         for number in range(1, steps + 1):
             solution = _newton(with_share(part, number / steps), state_of_part)
             state_of_part = solution.balance.state
@@ -167,7 +171,12 @@ def _together(equations: Balance, right: Array, loaded: bool) -> Array:
 
 
 def _solved(rates: Array, right: Array) -> Array:
+    """Solutions of linear equations; NaN where these are not finite, which a pose without a place leaves behind."""
+    sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2))
+    result = np.full((*rates.shape[:2], right.shape[2]), np.nan)
     try:
-        return np.asarray(np.linalg.solve(rates, right))
+        result[sound] = np.linalg.solve(rates[sound], right[sound])
     except np.linalg.LinAlgError:
-        return np.stack([np.linalg.lstsq(a, b, rcond=None)[0] for a, b in zip(rates, right, strict=True)])
+        for row in np.flatnonzero(sound):
+            result[row] = np.linalg.lstsq(rates[row], right[row], rcond=None)[0]
+    return result

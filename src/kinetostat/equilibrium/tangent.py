@@ -21,7 +21,10 @@ from kinetostat.tolerances import UNRESISTED
 
 
 def compliance(equations: Balance) -> Array:
-    """The twist of the platform per unit of a further wrench, at the loaded tool point [n x 6 x 6]."""
+    """The twist of the platform per unit of a further wrench, at the loaded tool point [n x 6 x 6].
+
+    Entries that are round-off beside the compliance of a typical spring are 0: something rigid holds there.
+    """
     ways = equations.mechanism.ways
     size = ways.shape[1]
     right = np.zeros((len(equations.left), equations.left.shape[1], size))
@@ -30,19 +33,19 @@ def compliance(equations: Balance) -> Array:
     shift = np.broadcast_to(np.eye(6), moved.shape).copy()
     shift[:, 3:, :3] = -skew_of(equations.state.platform.translation)
     moved = shift @ moved @ np.swapaxes(shift, 1, 2)
-    return np.asarray(0.5 * (moved + np.swapaxes(moved, 1, 2)))
+    moved = 0.5 * (moved + np.swapaxes(moved, 1, 2))
+    return np.where(np.abs(moved) < UNRESISTED, 0.0, moved)
 
 
 def inverse(compliances: Array) -> Array:
     """The stiffness of each compliance [n x m x m]; infinite where a direction is rigid."""
     sizes = np.sqrt(np.abs(np.diagonal(compliances, axis1=1, axis2=2)))
     products = sizes[:, :, None] * sizes[:, None]
-    scaled = compliances / np.where(products > 0.0, products, 1.0)
-    firm = (sizes > 0.0).all(axis=1) & (np.linalg.cond(scaled) < 1.0 / UNRESISTED)
-    usable = np.where(firm[:, None, None], scaled, np.eye(compliances.shape[1]))
-    return np.asarray(
-        np.where(firm[:, None, None], np.linalg.inv(usable) / np.where(products > 0.0, products, 1.0), np.inf)
-    )
+    products = np.where(products > 0.0, products, 1.0)
+    scaled = compliances / products
+    finite = ((sizes > 0.0).all(axis=1) & (np.linalg.cond(scaled) < 1.0 / UNRESISTED))[:, None, None]
+    usable = np.where(finite, scaled, np.eye(compliances.shape[1]))
+    return np.where(finite, np.linalg.inv(usable) / products, np.inf)
 
 
 def elastic_stiffness(equations: Balance) -> Array:
@@ -98,6 +101,8 @@ def stability(equations: Balance, pose: int = 0) -> Stability:
     _, values, rows_of_all = np.linalg.svd(conditions)
     rank = int((values > UNRESISTED * values[0]).sum()) if len(values) else 0
     allowed = rows_of_all[rank:].T
+    if not allowed.size:
+        return Stability(True, np.inf, np.zeros(6), np.zeros(len(sizes)))  # nothing can move at all
     stiff, turning = (allowed.T @ (m + m.T) @ allowed * 0.5 for m in (elastic, geometric))
     stable = bool(np.linalg.eigvalsh(stiff + turning)[0] > 0.0)
     least, ways_of_springs = np.linalg.eigh(stiff)

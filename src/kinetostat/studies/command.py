@@ -5,7 +5,8 @@ The equations are in `equilibrium.commanding`; the command is `command`.
 
 import csv
 import io
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy.typing as npt
 from kinetostat.equilibrium.commanding import commanded
 from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import loaded_mechanism
+from kinetostat.equilibrium.tangent import stability
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import Status
@@ -78,8 +80,14 @@ def command(machine: Machine, poses: Any = None) -> Command:
             for `evaluate`.
 
     Raises:
-        InputError: there is gravity but no mass, no actuator, or the poses cannot be read.
+        InputError: there is gravity but no mass, no actuator, tensions are to be chosen, or the poses cannot be read.
     """
+    if not all(math.isinf(bound) for bound in (machine.tables["load"].min_tension, machine.tables["load"].max_tension)):
+        raise InputError(
+            f"{machine.name}: commands are coordinates of actuators, but load.min_tension and load.max_tension choose "
+            "forces, which winches are driven by instead; leave the bounds out, or read the tensions from "
+            "`analyze --loaded`."
+        )
     columns = None if poses is None else given_poses(machine, poses)
     count = 1 if columns is None else columns.count
     rows = [_at(machine if columns is None else _posed(machine, columns, i)) for i in range(count)]
@@ -123,14 +131,15 @@ def _at(machine: Machine) -> tuple[list[Actuator], list[float] | None]:
     else:
         placed = joint_actuators(machine.chains(), leg_names(machine))
         actuators, senses = [each.at(joints.coordinates) for each in placed], [each.sign for each in placed]
-    mechanism, balanced = loaded_mechanism(machine, response, joints)
+    mechanism, _ = loaded_mechanism(machine, response, joints)
     by_name = {actuator.name: (actuator, sense) for actuator, sense in zip(actuators, senses, strict=True)}
     driven = [by_name[name] for name in mechanism.actuators]
     if not driven:
         return [], None
     answer = commanded(mechanism)
-    if not (answer.solution.settled[0] and balanced[0]):
-        return [actuator for actuator, _ in driven], None
+    actuators = [actuator for actuator, _ in driven]
+    if not (answer.solution.settled[0] and stability(answer.solution.balance).stable):
+        return actuators, None
     length, state = float(mechanism.length[0]), answer.solution.balance.state
     amounts = [
         sense * float(amount) * (length if actuator.slides else 1.0)
@@ -141,7 +150,7 @@ def _at(machine: Machine) -> tuple[list[Actuator], list[float] | None]:
     errors = [before, left if left > ROUND_OFF_OF_ENTRY * length else 0.0]
     turned = float(np.linalg.norm(answer.off[0, :3]))
     commands = [stand + amount for stand, amount in zip(stands, amounts, strict=True)]
-    return [replace(actuator) for actuator, _ in driven], [*commands, *stands, *errors, turned]
+    return actuators, [*commands, *stands, *errors, turned]
 
 
 def _message(machine: Machine, settled: npt.NDArray[np.bool_], before: Array, left: Array) -> str:

@@ -13,9 +13,9 @@ import numpy as np
 from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
-from kinetostat.equilibrium.balance import Balance, LegTerms, State, balance, free_state
-from kinetostat.equilibrium.mechanism import Chain, Mechanism
-from kinetostat.equilibrium.motion import Array, Motions, logarithm
+from kinetostat.equilibrium.balance import Balance, balance, free_state
+from kinetostat.equilibrium.mechanism import Mechanism
+from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import loaded_mechanism
 from kinetostat.equilibrium.solving import Rest, at_rest, solve, with_share
 from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, inverse, stability
@@ -75,7 +75,7 @@ class LoadedState(Immutable):
             None where springs alone hold nothing.
         mode: small motion of the tool point when it becomes unstable, of any size, rad and m.
         mode_legs: the legs that move most then.
-        residual: what is left of the equations, as a share of the loads.
+        residual: what is left of the equations, as a share of what the load and the legs carry.
     """
 
     machine: Machine
@@ -161,36 +161,20 @@ def load_curve(machine: Machine, shares: Sequence[float] = SHARES) -> LoadCurve:
     for share in shares:
         solution = at_rest(with_share(mechanism, share, preload=1.0), state)
         state = solution.balance.state
-        springs = [
-            spring
-            for leg, terms, q in zip(mechanism.legs, solution.balance.legs, state.coordinates, strict=True)
-            for spring in _springs(mechanism, leg, terms, q)
-        ]
+        springs = _springs(solution.balance)
         known = 1.0 if solution.settled[0] else math.nan
-        moved.append([known * c for c in _in_si(mechanism, _motion(state), parts)])
+        moved.append([known * c for c in _in_si(mechanism, state.platform.amounts()[0], parts)])
         loads.append([known * spring.load for spring in springs])
     return LoadCurve(np.array(shares), np.array(moved), tuple(s.name for s in springs), np.array(loads))
 
 
-def _motion(state: State) -> Array:
-    """Rotation vector and displacement of the tool point at the first pose, in units of the mechanism."""
-    platform = state.platform
-    turned = logarithm(Motions(platform.rotation, np.zeros_like(platform.translation)))[0, :3]
-    return np.concatenate([turned, platform.translation[0]])
-
-
 def _state(machine: Machine, response: Response, equations: Balance) -> LoadedState:
     mechanism, parts = equations.mechanism, list(machine.family.components)
-    units = mechanism.twist_units[0]
-    size = np.outer(units, units) / (mechanism.length[0] * mechanism.force[0])
-    soft = (compliance(equations)[0] * size)[np.ix_(parts, parts)]
-    springs_alone = (elastic_stiffness(equations)[0] / size)[np.ix_(parts, parts)]
+    units, square = mechanism.twist_units[0], np.ix_(parts, parts)
+    soft = (compliance(equations) * mechanism.compliance_units)[0][square]
+    springs_alone = (elastic_stiffness(equations) / mechanism.compliance_units)[0][square]
     judged = stability(equations)
-    states = [
-        state
-        for leg, terms, q in zip(mechanism.legs, equations.legs, equations.state.coordinates, strict=True)
-        for state in _springs(mechanism, leg, terms, q)
-    ]
+    states = _springs(equations)
     slack = tuple(dict.fromkeys(state.leg for state in states if state.slack))
     moving = [leg.name for leg, size in zip(mechanism.legs, judged.legs, strict=True) if size > 0.5 * max(judged.legs)]
     return LoadedState(
@@ -198,7 +182,7 @@ def _state(machine: Machine, response: Response, equations: Balance) -> LoadedSt
         Rest.OK if judged.stable else Rest.UNSTABLE,
         " ".join([_message(judged, slack, judged.mode * units), *_passed_limit(machine, response)]),
         machine.family.component_names,
-        _in_si(mechanism, _motion(equations.state), parts),
+        _in_si(mechanism, equations.state.platform.amounts()[0], parts),
         _linear(response, mechanism, parts),
         tuple(states),
         slack,
@@ -208,22 +192,30 @@ def _state(machine: Machine, response: Response, equations: Balance) -> LoadedSt
         None if math.isnan(judged.factor) else judged.factor,
         tuple((judged.mode * units)[parts].tolist()),
         tuple(moving) if math.isfinite(judged.factor) else (),
-        float(np.abs(equations.left).max() / max(np.abs(equations.load).max(), 1e-300)),
+        float(np.abs(equations.left).max() / max(_largest_wrench(equations), 1e-300)),
     )
 
 
-def _springs(mechanism: Mechanism, leg: Chain, terms: LegTerms, coordinates: Array) -> list[SpringState]:
+def _largest_wrench(equations: Balance) -> float:
+    """The largest component of the load and of what the legs carry, which preloads alone may be."""
+    return float(max(np.abs(wrench).max() for wrench in (equations.load, *equations.state.wrenches)))
+
+
+def _springs(equations: Balance) -> list[SpringState]:
+    """All springs that deform, leg by leg."""
+    mechanism, coordinates = equations.mechanism, equations.state.coordinates
     length, force = float(mechanism.length[0]), float(mechanism.force[0])
     states = []
-    for i, spring in enumerate(leg.springs):
-        if spring is None:
-            continue
-        turning = spring.joint.point is not None
-        load = float(terms.loads[0, i]) * force * (length if turning else 1.0)
-        amount = float(coordinates[0, i]) * (1.0 if turning else length)
-        amount = 0.0 if abs(coordinates[0, i]) < UNMOVED_TOOL else amount
-        slack = bool(leg.sign[i]) and terms.carrying[0, i] == 0.0
-        states.append(SpringState(spring.name, leg.name, turning, load, amount, slack))
+    for leg, terms, moved in zip(mechanism.legs, equations.legs, coordinates, strict=True):
+        for i, spring in enumerate(leg.springs):
+            if spring is None:
+                continue
+            turning = spring.joint.point is not None
+            load = float(terms.loads[0, i]) * force * (length if turning else 1.0)
+            amount = float(moved[0, i]) * (1.0 if turning else length)
+            amount = 0.0 if abs(moved[0, i]) < UNMOVED_TOOL else amount
+            slack = bool(leg.sign[i]) and terms.carrying[0, i] == 0.0
+            states.append(SpringState(spring.name, leg.name, turning, load, amount, slack))
     return states
 
 

@@ -81,7 +81,7 @@ def _with_free_twist(scene: Scene, response: Response, sizes: Proportions) -> Sc
     """Add the twist that the platform keeps with all actuators locked; there is none where a leg itself is singular."""
     if not all(leg.singularity_margin > SINGULAR for leg in response.legs):
         return scene
-    twist = free_twist(response.legs, float(response.configuration.length))
+    twist = free_twist(response.legs, float(response.configuration.length), response.guide)
     arrows = twist_solids([twist], response.reference, sizes)
     return Scene((*scene.solids, *arrows), scene.labels, scene.centre, scene.size, scene.floor)
 
