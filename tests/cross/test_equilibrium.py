@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from kinetostat import analyze, build, command, evaluate, forward, plot, save, sensitivity, under_load
+from kinetostat import analyze, build, command, evaluate, forward, save, sensitivity, under_load
 from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.exchange.leg_by_leg import document_of
-from kinetostat.studies.under_load import load_curve
 from kinetostat.validation import exudyn_machine
 from kinetostat.views.notebook import html_of
 from machines import load_without_limits
@@ -201,216 +200,9 @@ def test_commands_for_many_poses_are_those_for_each(tmp_path):
     assert (answer.left[:2] < 1e-3 * answer.before[:2]).all()
 
 
-CABLES = """
-schema = 1
-name = "cables"
-family = "legs"
-space = "planar"
-[platform]
-point = [0, 0, 0]
-[pose]
-x = 0
-y = 0
-yaw = 0
-"""
-ANCHORS = {"a": ((-2.0, 1.5), (-0.2, 0.1)), "b": ((2.0, 1.5), (0.2, -0.1)), "c": ((0.3, -1.6), (0.05, -0.1))}
-STRETCH = 2e5
-
-
-def cables(ends, preload, *more):
-    legs = "".join(
-        f'[[legs]]\nname = "{name}"\ntype = "cable"\nfrom = {[*base, 0.0]}\nto = {[*eye, 0.0]}\n'
-        f"stiffness = {STRETCH}\npreload = {preload[name]}\n"
-        for name, (base, eye) in ends.items()
-    )
-    return build("\n".join([CABLES, *more, legs]))
-
-
-def stretched(ends, tensions):
-    """Gradient and second derivative of the energy of cables by yaw, x, y of the platform, from their lengths alone."""
-    gradient, elastic, geometric = np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
-    for name, (base, eye) in ends.items():
-        span, arm = np.subtract(eye, base), np.array(eye)
-        length = np.linalg.norm(span)
-        along = span / length
-        moves = np.array([[-arm[1], 1.0, 0.0], [arm[0], 0.0, 1.0]])
-        rate = along @ moves
-        across = (np.eye(2) - np.outer(along, along)) / length
-        turned = np.zeros((3, 3))
-        turned[0, 0] = -along @ arm
-        gradient += tensions[name] * rate
-        elastic += STRETCH * np.outer(rate, rate)
-        geometric += tensions[name] * (moves.T @ across @ moves + turned)
-    return gradient, elastic, geometric
-
-
-def test_three_cables_hold_a_weight_with_the_tensions_and_the_stiffness_of_their_derivation():
-    """Preloads that balance 600 N and a moment at the free pose: nothing moves, and K has both parts."""
-    rates = np.array([stretched({n: e}, {n: 1.0})[0] for n, e in ANCHORS.items()]).T
-    pull = 400.0
-    tensions = dict(zip(ANCHORS, np.linalg.solve(rates, [5.0, 0.0, -pull]), strict=True))
-    tensions = {name: float(t) for name, t in tensions.items()}
-    assert min(tensions.values()) < 0.0, "as they lie, one would have to push"
-    tensions = {"a": 900.0, "b": 800.0, "c": 700.0}
-    gradient, elastic, geometric = stretched(ANCHORS, tensions)
-    load = f"[load]\nforce = [{gradient[1]}, {gradient[2]}, 0]\nmoment = [0, 0, {gradient[0]}]\n"
-    state = under_load(cables(ANCHORS, tensions, load))
-    assert state.rest is Rest.OK
-    assert state.displacement == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
-    assert {s.leg: s.load for s in state.springs} == pytest.approx(tensions, rel=1e-9)
-    assert np.array(state.elastic) == pytest.approx(elastic, rel=1e-9, abs=1e-3)
-    assert np.array(state.tangent) == pytest.approx(elastic + geometric, rel=1e-9, abs=1e-3)
-
-
-HANGING = {
-    "top left": ((-1.0, 2.0), (-1.0, 0.2)),
-    "top right": ((1.0, 2.0), (1.0, 0.2)),
-    "bottom left": ((-1.0, -2.0), (-1.0, -0.2)),
-    "bottom right": ((1.0, -2.0), (1.0, -0.2)),
-}
-
-
-@pytest.mark.parametrize(("share", "slack"), [(0.99, 0), (1.01, 2), (3.0, 2)])
-def test_cables_go_slack_at_the_load_of_their_derivation(share, slack):
-    """Upright cables of one stiffness, each with 100 N: a weight takes as much from the lower ones as it adds above."""
-    preload, weight = 100.0, 400.0 * share
-    force = f"[load]\nforce = [0, {-weight}, 0]\n"
-    state = under_load(cables(HANGING, dict.fromkeys(HANGING, preload), force))
-    upper, lower = (weight / 2, 0.0) if slack else (preload + weight / 4, preload - weight / 4)
-    assert state.rest is Rest.OK
-    assert len(state.slack_legs) == slack
-    loads = {s.leg: s.load for s in state.springs}
-    assert [loads["top left"], loads["top right"]] == pytest.approx([upper] * 2, rel=1e-9)
-    assert [loads["bottom left"], loads["bottom right"]] == pytest.approx([lower] * 2, abs=1e-6)
-    sag = (weight / 4 / STRETCH) if not slack else (weight / 2 - preload) / STRETCH
-    assert state.displacement[2] == pytest.approx(-sag, rel=1e-9)
-
-
-HINGE = "actuated = true, stiffness = 5e3"
-
-
-@pytest.mark.parametrize(("least", "most"), [(50.0, None), (120.0, 500.0)])
-def test_tensions_are_the_least_within_their_bounds(least, most):
-    """Two cables up and two down under 500 N: each lower one pulls as little as it may, each upper one 250 N more."""
-    bounds = f"min_tension = {least}" + (f"\nmax_tension = {most}" if most else "")
-    state = under_load(cables(HANGING, dict.fromkeys(HANGING, 0.0), f"[load]\nforce = [0, -500, 0]\n{bounds}\n"))
-    loads = [s.load for s in state.springs]
-    assert loads == pytest.approx([least + 250.0, least + 250.0, least, least], rel=1e-9)
-    assert state.displacement == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
-
-
-def test_tensions_of_a_spatial_machine_balance_its_weight_and_no_smaller_ones_do():
-    """Eight cables in the corners of a room: balance from points alone, and no feasible direction lowers the norm."""
-    rng = np.random.default_rng(3)
-    corners = np.array([[x, y, z] for x in (-3.0, 3.0) for y in (-2.0, 2.0) for z in (0.0, 4.0)])
-    eyes = np.array([[x, y, z] for x in (-0.2, 0.2) for y in (0.3, -0.3) for z in (2.3, 1.8)])
-    eyes[:, 2] += 0.05 * rng.normal(size=8)
-    legs = "".join(
-        f'[[legs]]\nname = "c{i}"\ntype = "cable"\nfrom = {a}\nto = {b}\nstiffness = 2e5\n'
-        for i, (a, b) in enumerate(zip(corners.tolist(), eyes.tolist(), strict=True))
-    )
-    head = 'schema = 1\nname = "room"\nfamily = "legs"\n[platform]\npoint = [0, 0, 2]\n[pose]\n'
-    pose = "x = 0\ny = 0\nz = 2\nroll = 0\npitch = 0\nyaw = 0\n"
-    load = "[tool]\nmass = 20\ncentre_of_mass = [0.02, 0, 0]\n[load]\ngravity = [0, 0, -9.81]\nmin_tension = 40\n"
-    state = under_load(build(head + pose + load + legs))
-    assert state.rest is Rest.OK
-    tensions = np.array([s.load for s in state.springs])
-    along = (corners - eyes) / np.linalg.norm(corners - eyes, axis=1)[:, None]
-    pulls = np.concatenate([np.cross(eyes - [0.0, 0.0, 2.0], along), along], axis=1).T
-    weight = np.array([0.0, 0.0, -20 * 9.81])
-    assert pulls @ tensions == pytest.approx(-np.concatenate([np.cross([0.02, 0.0, 0.0], weight), weight]), abs=1e-6)
-    assert tensions.min() == pytest.approx(40.0, rel=1e-9)
-    internal = np.linalg.svd(pulls)[2][6:]
-    for direction in rng.normal(size=(200, 2)) @ internal:
-        moved = tensions + 1e-3 * direction
-        if (moved >= 40.0 - 1e-9).all():
-            assert np.linalg.norm(moved) > np.linalg.norm(tensions) - 1e-9
-
-
-@pytest.mark.parametrize(
-    ("bounds", "pattern"),
-    [
-        ("min_tension = 50\nmax_tension = 20", "min_tension is 50 N, more than load.max_tension, 20 N"),
-        ("max_tension = -1", "more than load.max_tension"),
-    ],
-)
-def test_bounds_of_tensions_that_contradict_each_other_are_refused(bounds, pattern):
-    with refused(pattern):
-        under_load(cables(HANGING, dict.fromkeys(HANGING, 0.0), f"[load]\nforce = [0, -5, 0]\n{bounds}\n"))
-
-
-def test_a_load_beyond_all_tensions_is_said_with_its_bounds():
-    bounds = "[load]\nforce = [0, -500, 0]\nmin_tension = 50\nmax_tension = 200\n"
-    state = under_load(cables(HANGING, dict.fromkeys(HANGING, 0.0), bounds))
-    assert state.rest is Rest.NO_REST
-    assert "No tensions of 50 N to 200 N hold this load" in state.message
-
-
-def test_a_planar_machine_that_only_tension_holds_says_how_it_moves_without():
-    machine = cables(HANGING, dict.fromkeys(HANGING, 100.0))
-    assert "can still move by the twist x" in analyze(machine).message
-    state = under_load(machine)
-    assert state.factor is None
-    # Four cables of 1.8 m with 100 N each: 4 T / L sideways, and nothing from springs.
-    assert state.tangent[1][1] == pytest.approx(4 * 100.0 / 1.8, rel=1e-9)
-    assert state.elastic[1] == [0.0, 0.0, 0.0]
-
-
-COLUMN = """
-schema = 1
-name = "column"
-family = "legs"
-[platform]
-point = [0, 0, 2]
-[pose]
-roll = 0
-[[legs]]
-name = "column"
-joints = [
-  { name = "hinge", type = "revolute", joins = ["base", "platform"], point = [0, 0, 0], axis = [1, 0, 0], %s },
-]
-[load]
-force = [0, 0, %s]
-"""
-
-
-def test_a_column_on_a_spring_falls_at_the_load_of_its_derivation():
-    """Of height h on a hinge of stiffness k, it stands up to k / h."""
-    standing = under_load(build(COLUMN % (HINGE, -1000)))
-    assert standing.rest is Rest.OK
-    assert standing.factor == pytest.approx(2.5, rel=1e-9)
-    assert standing.mode[4] == pytest.approx(-2.0 * standing.mode[0], rel=1e-9), "it tilts about the hinge"
-    fallen = under_load(build(COLUMN % (HINGE, -2600)))
-    assert fallen.rest is Rest.UNSTABLE
-    assert "not stable" in fallen.message
-    assert np.isinf(under_load(build(COLUMN % (HINGE, 1000))).factor)
-
-
-def test_what_only_pulls_does_not_push():
-    machine = cables(ANCHORS, dict.fromkeys(ANCHORS, 0.0), "[load]\nforce = [0, 900, 0]\n")
-    state = under_load(machine)
-    assert state.rest is not Rest.OK or set(state.slack_legs) <= {"a", "b"}
-
-
 def test_gravity_without_any_mass_is_refused():
     with refused(r"load.gravity pulls at masses, but none is known.*\[tool\] mass"):
         under_load(load_without_limits("hexapod", [GRAVITY]))
-
-
-@pytest.mark.parametrize(
-    ("line", "pattern"),
-    [
-        ('type = "rope"', r"type.*cable"),
-        ('type = "cable"\nfrom = [0, 0, 1]', r"a cable without to and stiffness"),
-        (
-            'type = "cable"\nfrom = [0, 0, 1]\nto = [0, 0, 0]\nstiffness = 1e5\nslack = 1',
-            "slack is not known; a cable has",
-        ),
-    ],
-)
-def test_a_cable_that_is_not_one_is_refused(line, pattern):
-    with refused(pattern):
-        build(f'{CABLES}\n[[legs]]\nname = "a"\n{line}\n')
 
 
 @pytest.mark.parametrize("name", ["hexapod", "planar-3rrr", "delta", "tripteron"])
@@ -437,18 +229,24 @@ def test_what_is_about_the_loaded_machine_has_no_derivative():
         sensitivity(load_without_limits("hexapod"), ["displacement_z"])
 
 
-def test_a_curve_over_the_load_ends_in_the_state_and_shows_where_cables_go_slack():
-    machine = cables(HANGING, dict.fromkeys(HANGING, 100.0), "[load]\nforce = [0, -500, 0]\n")
-    curve, state = load_curve(machine, [0.0, 0.5, 0.9, 1.0]), under_load(machine)
-    assert curve.displacement[-1] == pytest.approx(state.displacement, rel=1e-9, abs=1e-15)
-    lower = curve.loads[:, curve.springs.index("bottom left winch actuator")]
-    assert lower == pytest.approx([100.0, 37.5, 0.0, 0.0], abs=1e-6)
-    assert len(plot(state).axes) == 3, "rotation, displacement, and forces"
-
-
 def test_answers_are_saved_and_shown_in_notebooks(tmp_path):
     machine = load_without_limits("hexapod", ["load.force=[20, 30, -50]"])
     for answer, key in ((under_load(machine), "tangent_stiffness"), (command(machine), "coordinates")):
         data = json.loads(save(answer, tmp_path / "answer.json").read_text())
         assert np.isfinite(np.array(data[key], dtype=float)).all()
         assert "leg 1 actuator" in html_of(answer)
+
+
+def test_a_rigid_machine_does_not_move_by_round_off():
+    state = under_load(load_without_limits("hexapod", ["load.force=[20, 30, -50]", "stiffness.actuator=rigid"]))
+    assert state.rest is Rest.OK
+    assert not np.any(state.displacement)
+    assert not np.any(state.compliance)
+    assert state.tangent is None
+
+
+def test_poses_without_a_place_leave_the_others_of_a_table_alone():
+    machine = load_without_limits("delta", ["load.force=[2, 3, -5]"])
+    table = evaluate(machine, {"x": [0.0, 9.0, 0.1]}, ["displacement_z", "tangent_stiffness_z"])
+    assert table.status.values.tolist() == [0, 1, 0]
+    assert np.isfinite(table["displacement_z"].values[[0, 2]]).all()
