@@ -82,8 +82,8 @@ AT_REST = 1e-10
 are round-off: the next one is the square of it."""
 
 UNMOVED_TOOL = 1e-13
-"""Displacement, rad or in units of the machine's length, below which the tool of a loaded machine has not moved: a tenth
-of a picometre of a metre, and what round-off leaves of a rigid machine."""
+"""Displacement, rad or in units of the machine's length, below which the tool of a loaded machine has not moved: a
+tenth of a picometre of a metre, and what round-off leaves of a rigid machine."""
 BALANCED = 1e-9
 """Share of the load that may be left over where tensions are chosen: least squares keep some twelve digits."""
 STIFFEST_LEG = 1e9
