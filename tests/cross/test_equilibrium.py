@@ -200,6 +200,16 @@ def test_commands_for_many_poses_are_those_for_each(tmp_path):
     assert (answer.left[:2] < 1e-3 * answer.before[:2]).all()
 
 
+def test_gravity_turns_about_its_axis():
+    weights = ["tool.mass=20 kg", "tool.centre_of_mass=[0.01, 0.02, 0.05]", GRAVITY]
+    tilted = load_without_limits("hexapod", [*weights, "load.gravity_axis=[0, 3, 0]", "load.gravity_angle=30 deg"])
+    down = np.array([-math.sin(math.radians(30.0)), 0.0, -math.cos(math.radians(30.0))]) * 9.81
+    turned = load_without_limits("hexapod", [*weights, f"load.gravity={down.tolist()}"])
+    assert under_load(tilted).displacement == pytest.approx(under_load(turned).displacement, rel=1e-12, abs=1e-16)
+    with refused("load.gravity_axis is .0, 0, 0."):
+        under_load(tilted.with_values(gravity_axis=[0, 0, 0]))
+
+
 def test_gravity_without_any_mass_is_refused():
     with refused(r"load.gravity pulls at masses, but none is known.*\[tool\] mass"):
         under_load(load_without_limits("hexapod", [GRAVITY]))

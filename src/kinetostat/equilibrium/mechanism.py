@@ -17,13 +17,13 @@ import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import Vector
-from kinetostat.equilibrium.motion import Array
+from kinetostat.equilibrium.motion import Array, exponential
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Load, Machine
 from kinetostat.machine.mass import located_members
 from kinetostat.tolerances import DEPENDENT
 
@@ -192,12 +192,20 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
         tuple(spring.joint.name or spring.of for spring in actuators),
         units.masses(weights),
         wrench,
-        stacked(load.gravity, count),
+        _gravity(load, count),
         ways,
         length,
         force,
         bool(weights) or any(leg.masses.carried for leg in legs),
     )
+
+
+def _gravity(load: Load, count: int) -> Array:
+    """Acceleration by gravity, turned as the machine is tilted, m/s² [n x 3]."""
+    axis = stacked(load.gravity_axis, count)
+    sizes = np.linalg.norm(axis, axis=1, keepdims=True)
+    turn = axis / np.where(sizes > 0.0, sizes, 1.0) * stacked([load.gravity_angle], count)
+    return exponential(np.concatenate([turn, np.zeros_like(turn)], axis=1)).point(stacked(load.gravity, count))
 
 
 @dataclass(frozen=True)

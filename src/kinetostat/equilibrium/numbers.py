@@ -42,7 +42,14 @@ def loaded_mechanism(
             f"{machine.name}: load.gravity pulls at masses, but none is known; give the platform's as [tool] mass, or "
             "links a cross-section with a density."
         )
-    least, most = (stacked([getattr(machine.tables["load"], f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
+    load = machine.tables["load"]
+    turned = np.any(stacked([load.gravity_angle], count))
+    if turned and not stacked(load.gravity_axis, count).any(axis=1).all():
+        raise InputError(
+            f"{machine.name}: load.gravity_axis is [0, 0, 0], so that gravity cannot be turned by load.gravity_angle; "
+            "give the axis of the base about which the machine is tilted, e.g. [1, 0, 0]."
+        )
+    least, most = (stacked([getattr(load, f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
     if np.isinf(least).all() and np.isinf(most).all():
         return mechanism, np.ones(count, dtype=bool)
     least = np.where(np.isinf(least), 0.0, least)

@@ -161,6 +161,10 @@ class Load:
         tuple[float, float, float],
         Quantity("acceleration", "along x, y, z: pulls at all masses of a loaded machine", count=3, apart=True),
     ] = (0.0, 0.0, 0.0)
+    gravity_angle: Annotated[float, Quantity("angle", "by which gravity is turned about gravity_axis")] = 0.0
+    gravity_axis: Annotated[
+        tuple[float, float, float], Quantity("direction", "axis of that turn, of any length", count=3, apart=True)
+    ] = (1.0, 0.0, 0.0)
     min_tension: Annotated[
         float, Quantity("force", "least load of what only pulls or pushes; chooses preloads", unset=math.inf)
     ] = math.inf

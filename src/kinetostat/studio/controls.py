@@ -27,6 +27,8 @@ LARGEST_LOAD = {"force": 1000.0, "moment": 100.0}
 """Ends of the range of a load that is zero: N, N·m."""
 OF_LOADED_STATES = (
     "load.gravity",
+    "load.gravity_angle",
+    "load.gravity_axis",
     "load.min_tension",
     "load.max_tension",
     "tool.centre_of_mass",
