@@ -10,7 +10,6 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import (
     BAD_INPUT,
@@ -27,6 +26,7 @@ from kinetostat.commands.common import (
     stopped,
     takes_json,
     takes_machine,
+    verdicts_of,
 )
 from kinetostat.commands.compare import add_compare_commands
 from kinetostat.commands.doctor import add_doctor_command
@@ -43,10 +43,6 @@ from kinetostat.spec.installation import as_typed
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of the system where standard output is a file on a full or failing disk; other files say it by themselves."""
-
-if TYPE_CHECKING:
-    from kinetostat.machine.machine import Machine
-    from kinetostat.studies.requirements import Verdict
 
 EXAMPLES = """examples:
   kinetostat list
@@ -193,7 +189,8 @@ def _parser() -> Parser:
     analyze.add_argument("--full", action="store_true", help="also show eigenscrews and every single spring")
     analyze.add_argument(
         "--loaded", action="store_true",
-        help="at rest under gravity, preload and [load], with exact geometry: displacement, springs, tangent stiffness",
+        help="at rest under gravity, preload and [load], with exact geometry: displacement, springs, tangent stiffness "
+        '(default where [load] says state = "loaded")',
     )  # fmt: skip
     takes_json(analyze)
     add_forward_command(commands)
@@ -283,15 +280,6 @@ def _check(options: argparse.Namespace) -> int:
     return no_answer(analysis.message) if analysis.status is not Status.OK else code
 
 
-def _verdicts(machine: "Machine") -> "tuple[Verdict, ...]":
-    """Judge the requirements of a machine; what judges them is loaded only where there are any."""
-    if not machine.requirements:
-        return ()
-    from kinetostat.studies.requirements import requirements
-
-    return requirements(machine)
-
-
 def _check_folder(folder: Path) -> int:
     from kinetostat.studies.folder_check import check_folder
 
@@ -317,9 +305,9 @@ def _analyze(options: argparse.Namespace) -> int:
     from kinetostat.views.analysis_tables import print_analysis
 
     machine = load_machine(options)
-    if options.loaded:
+    if options.loaded or machine.loaded:
         return analyze_loaded(options, machine)
-    verdicts = _verdicts(machine)
+    verdicts = verdicts_of(machine)
     analysis = analyze(machine, options.axes)
     answered = analysis.status is Status.OK
     along = [analysis.along(direction) for direction in options.along] if answered else []

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from kinetostat.engine.batch import Progress
     from kinetostat.machine.machine import Machine
+    from kinetostat.studies.requirements import Verdict
     from kinetostat.views.figures import Drawings
 
     Commands: TypeAlias = argparse._SubParsersAction["Parser"]
@@ -36,7 +37,8 @@ QUANTITIES = (
     "greatest_rotational_stiffness, frobenius_condition (of K), singularity_margin (0: singular, 1: best), "
     "aspect (1 or -1; the sign changes at singularities), shortest_leg, longest_leg, actuator_force, "
     "actuator_moment (the greatest under [load]), mass (of all moving parts); of the machine at rest under its loads: "
-    "displacement, tangent_stiffness, tangent_free_stiffness, load_factor, slack_springs; repeatable"
+    'displacement (the default where [load] says state = "loaded"), tangent_stiffness, tangent_free_stiffness, '
+    "load_factor, slack_springs; repeatable"
 )
 """Help on the quantities of sweeps, maps and sensitivities."""
 MACHINE = "a machine file, or the name of a bundled machine (see `kinetostat list`)"
@@ -131,6 +133,11 @@ def takes_quantities(command: Parser, default: str) -> None:
     command.add_argument(
         "--quantity", metavar="NAME", action="append", dest="quantities", help=QUANTITIES.format(default=default)
     )
+
+
+def quantities_of(options: argparse.Namespace, machine: "Machine", usual: str) -> list[str]:
+    """Return the quantities that the options name; without any the usual one, or how far a loaded machine moves."""
+    return options.quantities or ["displacement" if machine.loaded else usual]
 
 
 def takes_output(command: Parser, what: str) -> None:
@@ -275,16 +282,22 @@ def search_bar(what: str) -> "Iterator[Callable[[int, int, str], None]]":
         )
 
 
+def verdicts_of(machine: "Machine") -> "tuple[Verdict, ...]":
+    """Judge the requirements of a machine; what judges them is loaded only where there are any."""
+    if not machine.requirements:
+        return ()
+    from kinetostat.studies.requirements import requirements
+
+    return requirements(machine)
+
+
 def judged(machine: "Machine", printing: bool = True) -> int:
     """Judge the requirements of a machine's file, print the verdicts, and return the exit code."""
-    if not machine.requirements:
-        return DONE
-    from kinetostat.studies.requirements import requirements
-    from kinetostat.views.requirement_lines import print_requirements
-    from kinetostat.views.tables import terminal
+    verdicts = verdicts_of(machine)
+    if verdicts and printing:
+        from kinetostat.views.requirement_lines import print_requirements
+        from kinetostat.views.tables import terminal
 
-    verdicts = requirements(machine)
-    if printing:
         print_requirements(terminal(), verdicts, machine.display)
     return DONE if all(verdict.met for verdict in verdicts) else NO_ANSWER
 

@@ -13,6 +13,7 @@ from kinetostat.commands.common import (
     load_machine,
     note_damage,
     progress_bar,
+    quantities_of,
     stopped,
     takes_figures,
     takes_json,
@@ -108,7 +109,9 @@ def _map(options: argparse.Namespace) -> int:
 def _grid(options: argparse.Namespace, stem: str) -> int:
     from kinetostat.studies.grid.grid import grid_question
 
-    question = grid_question(load_machine(options), options.ranges, options.quantities or [options.default_quantity])
+    machine = load_machine(options)
+    quantities = quantities_of(options, machine, options.default_quantity)
+    question = grid_question(machine, options.ranges, quantities)
     if options.output and not question.fits_memory:
         return _stored(options, question, stem)
     return _in_memory(options, question, stem)

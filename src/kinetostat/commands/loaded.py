@@ -4,7 +4,15 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kinetostat.commands.common import add_command, give, load_machine, takes_json, takes_machine
+from kinetostat.commands.common import (
+    NO_ANSWER,
+    add_command,
+    give,
+    load_machine,
+    takes_json,
+    takes_machine,
+    verdicts_of,
+)
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
@@ -12,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def analyze_loaded(options: argparse.Namespace, machine: "Machine") -> int:
-    """Answer `analyze --loaded` and return the exit code.
+    """Answer `analyze` about the machine under its loads and return the exit code.
 
     Raises:
         InputError: options that only the unloaded machine has.
@@ -22,15 +30,19 @@ def analyze_loaded(options: argparse.Namespace, machine: "Machine") -> int:
     from kinetostat.views.loaded_tables import print_loaded
 
     if options.along or options.axes != "base":
-        raise InputError("--loaded gives results in base axes only; leave --along and --axes out.")
-    state = under_load(machine)
-    return give(
+        which = "--loaded" if options.loaded else 'state = "loaded" in [load]'
+        raise InputError(
+            f"{which} gives results in base axes only; leave --along and --axes out, or add --set load.state=free."
+        )
+    state, verdicts = under_load(machine), verdicts_of(machine)
+    code = give(
         options,
         bool(state.displacement),
-        lambda: as_json(state),
-        lambda console: print_loaded(console, state),
+        lambda: as_json(state, verdicts),
+        lambda console: print_loaded(console, state, verdicts),
         message=state.message,
     )
+    return code if all(verdict.met for verdict in verdicts) else NO_ANSWER
 
 
 def add_command_command(commands: "Commands") -> None:

@@ -9,6 +9,7 @@ from kinetostat.commands.common import (
     give,
     load_machine,
     progress_bar,
+    quantities_of,
     takes_json,
     takes_machine,
     takes_quantities,
@@ -51,7 +52,7 @@ def _path(options: argparse.Namespace) -> int:
     machine = load_machine(options)
     poses = read_poses(machine, options.poses)
     with progress_bar("computing") as progress:
-        answers = answers_at(machine, poses, options.quantities or ["free_stiffness"], progress)
+        answers = answers_at(machine, poses, quantities_of(options, machine, "free_stiffness"), progress)
     for path in options.output:
         _WRITERS.get(path.suffix.lower(), _draw)(path, answers)
     return give(

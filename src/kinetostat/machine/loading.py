@@ -19,7 +19,7 @@ from kinetostat.machine import pickling as _pickling  # noqa: F401  # machines t
 from kinetostat.machine.catalogue import families, family_named
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.limits import Parts, check_limits
-from kinetostat.machine.machine import Family, Machine, Written
+from kinetostat.machine.machine import STATES, Family, Machine, Written
 from kinetostat.machine.orientation import ANGLES, form_of, make_room, orientation_schema, with_angles
 from kinetostat.machine.parameters import POSE, check_contrast, find, with_values
 from kinetostat.machine.rigidities import resolve
@@ -33,7 +33,7 @@ from kinetostat.machine.written.tables import written_schema
 from kinetostat.spec import document as documents
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.document import Document
-from kinetostat.spec.errors import InputError, several, shorten
+from kinetostat.spec.errors import InputError, choice, several, shorten
 from kinetostat.spec.fields import NO_LIMIT, optional, quantities
 from kinetostat.spec.immutable import FixedDict
 from kinetostat.spec.requirements import TABLE, requirement_lines, requirements_schema, take_requirements
@@ -124,6 +124,7 @@ def _whole_path(document: Document, name: str) -> str:
         return name
 
 
+STATE = "what is shown where no quantity is named: the free machine, or the machine at rest under its loads"
 KEYS = ("schema", "name", "family", "display", "sections", TABLE)
 """What a file may hold at its top beside the tables of its family."""
 
@@ -135,13 +136,13 @@ def _build_family(document: Document, origin: str, settings: Sequence[str]) -> M
     counts = _counts(family_with_parts(family, named))
     changed = _overridden(named, settings, counts, tuple(quantities(family.tables["pose"])), origin)
     changed = with_named_parts(changed, family, origin)
-    display = _display(changed, origin)
+    display, loaded = _display(changed, origin), _loaded(changed, origin)
     resolved = resolve(changed, family, origin)
     machine = _validated(family_with_parts(family, changed), resolved, origin, display)
     placed = machine.configure()
     parts = Parts(placed.legs, placed.platform.rotation.z, family.planar, (), _unloaded(placed.legs))
     check_limits(machine.tables["limits"], parts, origin)
-    return machine
+    return replace(machine, loaded=loaded)
 
 
 def _build_written(document: Document, origin: str, settings: Sequence[str]) -> Machine:
@@ -150,7 +151,7 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     check_paths(named, settings)
     coordinates = PLANAR_POSE if named.get("space") == "planar" else SPATIAL_POSE
     changed = with_parts(_overridden(named, settings, {}, coordinates, origin), origin)
-    display = _display(changed, origin)
+    display, loaded = _display(changed, origin), _loaded(changed, origin)
     plan, numbers = separate(changed, origin)
     machine = _validated(written.family_of(plan), numbers, origin, display)
     check_numbers(plan, machine.tables, origin)
@@ -161,7 +162,7 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     slides = [(leg.name, 0.0) for leg in legs for _ in driven_slides(leg.chain)]
     parts = Parts(legs, chains.home.rotation.z, plan.planar, slides, _unloaded(legs))
     check_limits(machine.tables["limits"], parts, origin)
-    return whole
+    return replace(whole, loaded=loaded)
 
 
 def _overridden(
@@ -192,6 +193,15 @@ def _display(document: Document, origin: str) -> Display:
         return read_display(document.pop("display", {}))
     except UnitError as error:
         raise InputError(f'"{origin}": {error}.') from None
+
+
+def _loaded(document: Document, origin: str) -> bool:
+    """Take `state` out of the table [load] of a document: whether the machine is meant under its loads."""
+    load = document.get("load")
+    if not isinstance(load, dict) or "state" not in load:
+        return False
+    document["load"] = {key: value for key, value in load.items() if key != "state"}
+    return STATES[choice(load["state"], STATES, f'"{origin}": load.state')]
 
 
 def _counts(family: Family) -> dict[str, int]:
@@ -234,9 +244,11 @@ def as_toml(machine: Machine, readable: bool = False) -> str:
     ]
     literals = machine.family.literals
     lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get("", {}).items()]
+    if machine.loaded:
+        literals = {**literals, "load": {"state": machine.state}}
     for name in [*machine.tables, *(name for name in literals if name and name not in machine.tables)]:
         table = machine.tables.get(name)
-        if table is not None and _left_out(machine.family.every_table[name], table):
+        if table is not None and name not in literals and _left_out(machine.family.every_table[name], table):
             continue
         lines += ["", f"[{'.'.join(documents.toml_key(part) for part in name.split('.'))}]"]
         lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get(name, {}).items()]
@@ -293,6 +305,8 @@ def machine_schema() -> dict[str, Any]:
     for table in schema["$defs"].values():
         if {*ANGLES} <= table.get("properties", {}).keys():
             table["properties"] |= orientation_schema()
+        if "gravity" in table.get("properties", {}):
+            table["properties"]["state"] = {"enum": [*STATES], "default": "free", "description": STATE}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "kinetostat machine file",

@@ -171,6 +171,9 @@ class Load:
     max_tension: Annotated[float, Quantity("force", "greatest load of them", unset=math.inf)] = math.inf
 
 
+STATES = {"free": False, "loaded": True}
+"""What `state` of the table [load] may be, and whether the machine is then shown at rest under its loads."""
+
 COMMON = {"tool": Tool, "load": Load, "limits": Limits}
 """Tables that every machine file may have."""
 
@@ -289,6 +292,8 @@ class Machine(Immutable):
         display: units and digits in which people read its results, from the table [display].
         written: the file it was read from; None where it was made of data. Comparisons leave it out.
         requirements: of its file's table [requirements], by name; they change no number (`studies.requirements`).
+        loaded: whether its file says `state = "loaded"` in [load]: what is shown where no quantity is named is then the
+            machine at rest under its loads.
     """
 
     name: str
@@ -297,6 +302,7 @@ class Machine(Immutable):
     display: Display = ENGINEERING
     written: Written | None = field(default=None, compare=False, repr=False)
     requirements: Mapping[str, Requirement] = field(default_factory=dict)
+    loaded: bool = False
 
     sections = renamed_property("tables")
     own_sections = renamed_property("family_tables")
@@ -353,6 +359,11 @@ class Machine(Immutable):
     def family_tables(self) -> dict[str, Any]:
         """The tables that its family asks for, by name."""
         return {name: self.tables[name] for name in self.family.tables}
+
+    @property
+    def state(self) -> str:
+        """The word of its file for `loaded`, a key of `STATES`."""
+        return next(word for word, loaded in STATES.items() if loaded is self.loaded)
 
     @property
     def load(self) -> Wrench:

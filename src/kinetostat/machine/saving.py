@@ -64,7 +64,12 @@ def _edited(written: Written, machine: Machine) -> str | None:
 
 def _same(first: Machine, second: Machine) -> bool:
     alike = first.name == second.name and first.family.literals == second.family.literals
-    alike = alike and first.display == second.display and first.requirements == second.requirements
+    alike = (
+        alike
+        and first.loaded == second.loaded
+        and first.display == second.display
+        and first.requirements == second.requirements
+    )
     return alike and first.family.name == second.family.name and values(first) == values(second)
 
 
@@ -74,6 +79,8 @@ def _bring(document: Any, present: Machine, machine: Machine) -> None:
         _put(document, "name", machine.name)
     if machine.requirements != present.requirements:
         document.update(tomlkit.parse("\n".join(requirement_lines(machine.requirements))))
+    if machine.loaded != present.loaded:
+        _put(_place(document, ["load"]), "state", machine.state)
     for table, literals in machine.family.literals.items():
         known = present.family.literals.get(table, {})
         for key in (key for key, value in literals.items() if known.get(key) != value):

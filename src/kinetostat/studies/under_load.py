@@ -284,8 +284,8 @@ def _without_rest(machine: Machine) -> str:
     )
 
 
-def as_json(state: LoadedState) -> dict[str, Any]:
-    """Return the state as plain data, SI."""
+def as_json(state: LoadedState, requirements: Sequence[object] = ()) -> dict[str, Any]:
+    """Return the state as plain data, SI, with verdicts on requirements."""
     machine = state.machine
     return as_answer(
         {
@@ -305,5 +305,6 @@ def as_json(state: LoadedState) -> dict[str, Any]:
             "mode": state.mode,
             "mode_legs": state.mode_legs,
             "residual": state.residual,
+            "requirements": list(requirements),
         }
     )

@@ -1,6 +1,7 @@
 """A machine under load as tables on a terminal: the answer first, then springs and stiffness. Nothing is computed."""
 
 import math
+from collections.abc import Sequence
 
 from rich.console import Console
 from rich.table import Table
@@ -8,15 +9,17 @@ from rich.text import Text
 
 from kinetostat.display import DASH, Display, number
 from kinetostat.studies.command import Command
+from kinetostat.studies.requirements import Verdict
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.under_load import LoadedState
 from kinetostat.views.analysis_tables import matrix_table
 from kinetostat.views.assembly_tables import precise
+from kinetostat.views.requirement_lines import print_requirements
 from kinetostat.views.tables import numeric_table, print_doubts
 
 
-def print_loaded(console: Console, state: LoadedState) -> None:
-    """Print the state of rest under load: what is the case, displacement, springs, and stiffness."""
+def print_loaded(console: Console, state: LoadedState, requirements: Sequence[Verdict] = ()) -> None:
+    """Print the state of rest under load: what is the case, requirements, displacement, springs, and stiffness."""
     machine, display = state.machine, state.machine.display
     console.print(Text.assemble((machine.name, "bold"), f"  under load: {state.rest.word}"))
     answer = Table.grid(padding=(0, 2, 0, 0))
@@ -24,6 +27,8 @@ def print_loaded(console: Console, state: LoadedState) -> None:
     if state.displacement:
         answer.add_row(Text("Stability", "bold"), _stability(state))
     console.print(answer)
+    if requirements:
+        print_requirements(console, requirements, display)
     print_doubts(console, machine)
     if not state.displacement:
         return

@@ -72,6 +72,8 @@ def machine_table(machine: Machine) -> Table:
     for parameter in whole:
         shown = readable([numbers[leaf] for leaf in parameter.leaves], parameter.quantity, machine.display)
         table.add_row(parameter.path, shown, parameter.quantity.meaning)
+    if machine.loaded:
+        table.add_row("load.state", machine.state, "what is shown where no quantity is named")
     return table
 
 

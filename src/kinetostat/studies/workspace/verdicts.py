@@ -84,8 +84,9 @@ class Judge:
 
     @property
     def quantities(self) -> list[str]:
-        """Quantities that decide beside the status of a pose."""
-        return list(dict.fromkeys(["aspect", *(condition.quantity for condition in self.conditions)]))
+        """Quantities that decide beside the status of a pose, which is that under load if one is about the load."""
+        rest = ["load_factor"] if self.machine.loaded else []
+        return list(dict.fromkeys(["aspect", *rest, *(condition.quantity for condition in self.conditions)]))
 
     def inside(self, status: Codes, values: Mapping[str, Any]) -> Mask:
         """Tell which poses are inside, from their status and quantities."""

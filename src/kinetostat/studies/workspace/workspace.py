@@ -87,7 +87,8 @@ def workspace(
     """Determine the region of pose space where a machine can work.
 
     A pose is inside if it can be reached within the limits of the file, is not singular, lies on the same side of the
-    singularities as the file's pose, and meets the conditions.
+    singularities as the file's pose, and meets the conditions. Where the machine is meant under its loads
+    (`machine.loaded`), or a condition is about these, it must also come to rest there.
 
     Args:
         machine: with its limits; its pose gives the coordinates that do not vary.
