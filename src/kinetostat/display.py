@@ -5,7 +5,7 @@ Only units and digits change here; files and JSON stay SI, and what people write
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -41,6 +41,8 @@ UNIT_OF = {
 }
 """The engineering unit of each SI unit. In N, N·m, µm and µrad every entry of K is a millionth of that in SI, so that K
 stays symmetric and K C = 1 also as printed."""
+SMALL_MOTIONS = {"m": 1e3, "rad": 1e3}
+"""Values of these units that are all below so many µm and µrad are read in µm and µrad."""
 DUAL = {"N/m": "m/N", "N·m/rad": "rad/(N·m)", "N/rad": "rad/N"}
 """Stiffnesses and the compliances whose units follow from theirs."""
 EXAMPLE = "mm, deg, N/um, N*m/urad"
@@ -78,6 +80,23 @@ class Display:
         """Return the scale of a small motion in m or rad: that of the compliances, µm and µrad unless chosen."""
         compliance = {"m": "m/N", "rad": "rad/(N·m)"}[unit]
         return _small(self.scale(compliance).unit.partition("/")[0])
+
+    def fitting(self, unit: str, values: Iterable[float]) -> Scale:
+        """Return the scale for values of one quantity: lengths and angles that are all small are small motions.
+
+        Args:
+            unit: their SI unit.
+            values: SI; those that are not finite do not count.
+        """
+        if unit not in SMALL_MOTIONS or self.scale(unit).unit != UNIT_OF[unit] or UNIT_OF[unit] in self._named:
+            return self.scale(unit)
+        small = self.deflection(unit)
+        largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+        return small if largest * small.factor < SMALL_MOTIONS[unit] else self.scale(unit)
+
+    @property
+    def _named(self) -> set[str]:
+        return {_spelled(word) for word in self.units.split(",")}
 
     def number(self, value: float | None, unit: str = "1", endless: str = INFINITE) -> str:
         """Return an SI value as a number in the unit of `scale`, without the unit."""

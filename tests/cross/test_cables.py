@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from matplotlib.collections import QuadMesh
 
-from kinetostat import analyze, build, command, evaluate, plot, under_load
+from kinetostat import analyze, build, command, evaluate, evaluate_grid, plot, under_load
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.under_load import load_curve
@@ -237,3 +238,14 @@ def test_chosen_tensions_are_forces_and_no_commands():
     bounds = "[load]\nforce = [0, -500, 0]\nmin_tension = 50\n"
     with refused("choose forces"):
         command(cables(HANGING, dict.fromkeys(HANGING, 0.0), bounds))
+
+
+def test_counts_have_a_colour_each_in_maps_and_small_displacements_are_in_micrometres():
+    """Beyond 400 N down or up two of the upright cables are slack; no line is drawn between 0 and 2."""
+    machine = cables(HANGING, dict.fromkeys(HANGING, 100.0), "[load]\nforce = [0, -1, 0]\n")
+    grid = evaluate_grid(machine, ["load.force.1=-500:500:5", "y=0:1 mm:2"], ["slack_springs", "displacement_y"])
+    assert grid["slack_springs"].values[:, 0].tolist() == [2, 0, 0, 0, 2]
+    counts, moved = (axes for axes in plot(grid).axes if axes.get_title())
+    assert [type(part) for part in counts.collections] == [QuadMesh]
+    assert [text.get_text() for text in counts.collections[0].colorbar.ax.get_yticklabels()] == ["0", "2"]
+    assert moved.get_title() == "$u_{\\mathrm{y}}$ (µm)"

@@ -64,6 +64,24 @@ def test_small_motions_are_in_the_unit_of_the_compliance():
     assert Display("si, mm").show_deflection(2e-3, "m") == "0.002 m"
 
 
+@pytest.mark.parametrize(
+    ("units", "unit", "values", "shown"),
+    [
+        ("", "m", [-9e-6, 2e-6, math.nan], "µm"),
+        ("", "m", [-9e-6, 2e-3], "mm"),
+        ("", "rad", [3e-4], "µrad"),
+        ("", "rad", [0.1], "deg"),
+        ("mm", "m", [9e-6], "mm"),
+        ("si", "m", [9e-6], "m"),
+        ("", "N/m", [9e-6], "N/µm"),
+    ],
+)
+def test_motions_that_are_all_small_are_read_in_small_units_unless_chosen(units, unit, values, shown):
+    scale = read_display({"units": units}).fitting(unit, values)
+    assert scale.unit == shown
+    assert measured(scale.unit, [unit], "mm")[1] * scale.factor == pytest.approx(1.0)
+
+
 def test_units_are_chosen_one_by_one_and_the_dual_unit_follows():
     display = Display("kN m/rad, inch, arcsec")
     assert display.scale("N·m/rad").unit == "kN·m/rad"

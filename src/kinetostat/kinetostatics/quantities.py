@@ -42,6 +42,7 @@ class MapQuantity:
         better: whether more or less of it is better for a design; None where that depends on the machine.
         needs: what a machine must have for it to mean something; empty if nothing. It is NaN where that is missing.
         loaded: whether it is about the machine at rest under its loads, which takes an iteration at each pose.
+        whole: whether it counts, so that its values are whole numbers.
     """
 
     name: str
@@ -52,6 +53,7 @@ class MapQuantity:
     better: Better = None
     needs: str = ""
     loaded: bool = False
+    whole: bool = False
 
 
 def _compliance(response: Response, i: int, j: int) -> Scalar:
@@ -150,7 +152,7 @@ def _of_loaded_state() -> list[MapQuantity]:
     return [
         *sorted(entries, key=lambda entry: entry.name.rpartition("_")[0]),
         MapQuantity("load_factor", "1", "load factor", factor, better="more", loaded=True),
-        MapQuantity("slack_springs", "1", "slack springs", slack, better="less", loaded=True),
+        MapQuantity("slack_springs", "1", "slack springs", slack, better="less", loaded=True, whole=True),
     ]
 
 
@@ -162,7 +164,7 @@ QUANTITIES = {
         *_free_stiffnesses(),
         MapQuantity("singularity_margin", "1", "singularity margin", _singularity_margin, better="more"),
         MapQuantity("mass", "kg", "moving mass", _mass, better="less"),
-        MapQuantity("aspect", "1", "aspect", aspect),
+        MapQuantity("aspect", "1", "aspect", aspect, whole=True),
         *_extremes(),
         MapQuantity("frobenius_condition", "1", "condition of K (Frobenius)", frobenius_condition, better="less"),
         MapQuantity("shortest_leg", "m", "shortest leg", shortest_leg, needs=LIMITS["shortest_leg"].needs),

@@ -109,7 +109,7 @@ class MapPanel:
         values = maps[quantity]
         known = values[np.isfinite(values)]
         ends = np.array(usual_range(known) if known.size else (0.0, 0.0))
-        scale = self._session.machine.display.scale(QUANTITIES[quantity].unit)
+        scale = self._session.machine.display.fitting(QUANTITIES[quantity].unit, known)
         self.view.run_method(
             "show",
             {

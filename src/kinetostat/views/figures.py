@@ -12,13 +12,14 @@ import numpy.typing as npt
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import QuadMesh
 from matplotlib.colorbar import Colorbar
-from matplotlib.colors import LogNorm
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 
 from kinetostat.display import Scale, number, with_unit
-from kinetostat.kinetostatics.quantities import group_of, spoken
+from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.studies.grid.grid import failures, field_of
 from kinetostat.studies.storage import replacing
 from kinetostat.views.grid_tables import display_of
@@ -58,6 +59,8 @@ MARGIN = 0.04
 """Inches around a figure that stands in a page."""
 FLAT = 1e-9
 """Relative spread below which a map is constant and has no contours."""
+MOST_COUNTS = 12
+"""Whole numbers that have a colour each; more of them are drawn as contours."""
 
 Array = npt.NDArray[np.float64]
 Drawings: TypeAlias = dict[str, Callable[[], Figure]]
@@ -84,8 +87,9 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
         y, y_label = axis_values(dataset, str(up))
         lines = []
         for panel, name in zip(panels, names, strict=False):
-            scale = display_of(dataset).scale(dataset[name].attrs["units"])
-            lines += _contour_panel(panel, x, y, dataset[name].transpose(up, across), scale)
+            scale = display_of(dataset).fitting(dataset[name].attrs["units"], dataset[name].values.flat)
+            panel_of = _count_panel if _is_count(dataset[name]) else _contour_panel
+            lines += panel_of(panel, x, y, dataset[name].transpose(up, across), scale)
             panel.set(xlabel=x_label, ylabel=y_label)
             set_axis_scales(panel, dataset, str(across), str(up))
         for unused in list(figure.axes)[len(names) : rows * columns]:
@@ -235,6 +239,43 @@ def _contour_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: S
     return [panel.contour(filled, levels=levels.bounds[::2], colors="white", linewidths=0.5)]
 
 
+def _is_count(data: xr.DataArray) -> bool:
+    """Whether a quantity counts, and takes so few values that each can have a colour."""
+    name = str(data.name)
+    return name in QUANTITIES and QUANTITIES[name].whole and np.unique(data.values).size <= MOST_COUNTS
+
+
+def _count_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: Scale) -> list[QuadContourSet]:
+    """Fill a panel with a colour for each whole number; between two poses there is no line to draw."""
+    values = np.unique(data.values[np.isfinite(data.values)])
+    if values.size < 2:
+        return _contour_panel(panel, x, y, data, scale)
+    panel.set_title(scale.label(data.attrs["symbol"]))
+    colours = mpl.colormaps["viridis"](np.linspace(0.1, 0.95, values.size))
+    mesh = fill_regions(panel, x, y, np.searchsorted(values, data.values), np.isfinite(data.values), colours)
+    bar = panel.figure.colorbar(mesh, ax=panel, shrink=0.85, pad=0.03, ticks=np.arange(values.size))
+    bar.set_ticklabels([f"{value:g}" for value in values])
+    slim_bar(bar)
+    return []
+
+
+def fill_regions(panel: Axes, x: Array, y: Array, places: Array, known: Any, colours: Any) -> QuadMesh:
+    """Fill a panel pose by pose, without any value between two poses.
+
+    Args:
+        panel: to fill.
+        x, y: of the poses, as the axes show them.
+        places: of each pose's colour [y x x].
+        known: where there is a result; elsewhere the panel is grey [y x x].
+        colours: from which they are taken.
+    """
+    panel.set_facecolor("#eeeeee")
+    panel.grid(visible=False)
+    shown, most = np.ma.masked_array(places, ~known), len(colours) - 0.5
+    palette = ListedColormap(colours)
+    return panel.pcolormesh(x, y, shown, cmap=palette, vmin=-0.5, vmax=most, shading="nearest", rasterized=True)
+
+
 def slim_bar(bar: Colorbar) -> None:
     """Give a colour bar thin lines, small numbers, and ticks at its numbers alone."""
     bar.outline.set_linewidth(0.4)
@@ -265,7 +306,7 @@ def _curve_panel(panel: Axes, dataset: xr.Dataset, across: str, names: Sequence[
     logarithmic = bool(dataset[across].attrs["log"])
     values = np.concatenate([dataset[name].values for name in names])
     unit = dataset[names[0]].attrs["units"]
-    scale = display_of(dataset).scale(unit)
+    scale = display_of(dataset).fitting(unit, values)
     for name, colour, dash in zip(names, COLOURS, DASHES, strict=False):
         panel.plot(x, dataset[name].values * scale.factor, dash, color=colour, label=dataset[name].attrs["symbol"])
     if logarithmic:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import xarray as xr
 from rich.console import Console
 
-from kinetostat.display import Display
+from kinetostat.display import Display, Scale, number
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.machine.limits import Limits, unlimited
@@ -64,18 +64,24 @@ def _print_curve(console: Console, dataset: xr.Dataset, names: Sequence[str]) ->
     coordinate, display = dataset[across], display_of(dataset)
     group = group_of(names)
     title = f"{dataset.attrs['machine']}: {spoken(group)}".removesuffix(": ")
-    units = {name: QUANTITIES[name].unit for name in names}
-    heads = [f"{spoken(name.removeprefix(f'{group}_'))}\n{_head(display, units[name])}" for name in names]
+    scales = {name: display.fitting(QUANTITIES[name].unit, _of_unit(dataset, name, names)) for name in names}
+    heads = [f"{spoken(name.removeprefix(f'{group}_'))}\n{_head(scales[name])}" for name in names]
     unit = coordinate.attrs["units"]
-    table = numeric_table(title, f"{shown(field_of(coordinate))}\n{_head(display, unit)}", heads)
+    table = numeric_table(title, f"{shown(field_of(coordinate))}\n{_head(display.scale(unit))}", heads)
     for i, value in enumerate(coordinate.values):
-        cells = (display.number(float(dataset[name].values[i]), units[name]) for name in names)
+        cells = (number(float(dataset[name].values[i]) * scales[name].factor) for name in names)
         table.add_row(display.number(float(value), unit), *cells)
     console.print(table)
 
 
-def _head(display: Display, unit: str) -> str:
-    return "" if unit == "1" else display.scale(unit).unit
+def _of_unit(dataset: xr.Dataset, name: str, names: Sequence[str]) -> Iterator[float]:
+    """All values of the quantities that have the unit of one of them."""
+    unit = QUANTITIES[name].unit
+    return (float(v) for other in names if QUANTITIES[other].unit == unit for v in dataset[other].values.flat)
+
+
+def _head(scale: Scale) -> str:
+    return "" if scale.unit == "1" else scale.unit
 
 
 def _extremes(data: xr.DataArray) -> Extremes:
@@ -88,8 +94,9 @@ def _print_extremes(
     size = " × ".join(f"{dim} ({count})" for dim, count in sizes.items())
     table = numeric_table(f"{machine}: {size}", "quantity", ["unit", "least", "mean", "largest"])
     for name, extreme in extremes.items():
-        unit, statistics = QUANTITIES[name].unit, (extreme.least, extreme.mean, extreme.largest)
-        table.add_row(name, _head(display, unit), *(display.number(value, unit) for value in statistics))
+        statistics = (extreme.least, extreme.mean, extreme.largest)
+        scale = display.fitting(QUANTITIES[name].unit, statistics)
+        table.add_row(name, _head(scale), *(number(value * scale.factor) for value in statistics))
     console.print(table)
 
 

@@ -35,7 +35,8 @@ def path_figure(answers: PoseAnswers) -> Figure:
         ratios = [1.9] * len(groups) + [1.25] * len(kinds)
         panels = list(figure.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=ratios).flat)
         for panel, (unit, members) in zip(panels, groups.items(), strict=False):
-            scale = answers.machine.display.scale(unit)
+            every = (v for name in members for v in answers.values[name])
+            scale = answers.machine.display.fitting(unit, every)
             curves = {QUANTITIES[name].symbol: answers.values[name] * scale.factor for name in members}
             _panel(panel, answers, curves, scale.label(spoken(group_of(members) or members[0])))
         for panel, kind in zip(panels[len(groups) :], kinds, strict=True):

@@ -3,6 +3,7 @@
 import numpy as np
 from rich.console import Console
 
+from kinetostat.display import number
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.studies.evaluation.evaluation import PoseAnswers
 from kinetostat.views.tables import numeric_table
@@ -25,8 +26,8 @@ def print_path(console: Console, answers: PoseAnswers) -> None:
     )
     for name, values in answers.values.items():
         low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
-        unit = QUANTITIES[name].unit
-        least, largest = (display.number(float(values[k]), unit) for k in (low, high))
-        head = "" if unit == "1" else display.scale(unit).unit
+        scale = display.fitting(QUANTITIES[name].unit, (values[low], values[high]))
+        least, largest = (number(float(values[k]) * scale.factor, digits=display.digits) for k in (low, high))
+        head = "" if scale.unit == "1" else scale.unit
         table.add_row(name, head, least, str(low + 1), largest, str(high + 1))
     console.print(table)

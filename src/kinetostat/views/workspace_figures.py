@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, LogNorm, Normalize
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -31,6 +31,7 @@ from kinetostat.views.figures import (
     Array,
     Drawings,
     axis_values,
+    fill_regions,
     fix_layout,
     set_axis_scales,
     set_title,
@@ -141,9 +142,7 @@ def _fill(panel: Axes, cut: xr.Dataset, labels: Sequence[str], conditions: Seque
     across, up = (str(dim) for dim in cut["verdict"].dims)
     (x, x_label), (y, y_label) = axis_values(cut, across), axis_values(cut, up)
     verdict = cut["verdict"].transpose(up, across).values
-    palette = ListedColormap(_colours(labels))
-    panel.grid(visible=False)
-    panel.pcolormesh(x, y, verdict, cmap=palette, vmin=-0.5, vmax=len(labels) - 0.5, shading="nearest", rasterized=True)
+    fill_regions(panel, x, y, verdict, np.ones_like(verdict, dtype=bool), _colours(labels))
     shares = [cut[f"{BORDER}{dim}"].transpose(up, across).values for dim in (up, across)]
     for code in sorted(np.unique(verdict), reverse=True):
         within = depth(verdict == code, shares)
