@@ -63,6 +63,9 @@ KINDS = {
         Kind("density", "kg/m**3", "7850 kg/m**3"),
         Kind("linear density", "kg/m", "3.5 kg/m"),
         Kind("mass", "kg", "12 kg"),
+        Kind("E I", "N·m**2", "5e4 N*m**2"),
+        Kind("temperature difference", "K", "15 K"),
+        Kind("thermal expansion", "m/(m·K)", "12 um/(m*K)"),
         Kind("acceleration", "m/s**2", "9.81 m/s**2"),
         Kind("direction", "", "1.0"),
     )
@@ -89,6 +92,8 @@ USUAL = {
     "kg/m": {"kg/m": 1.0, "g/m": 1e-3},
     "kg": {"kg": 1.0, "g": 1e-3},
     "m/s**2": {"m/s**2": 1.0},
+    "K": {"K": 1.0},
+    "m/(m*K)": {"m/(m*K)": 1.0, "um/(m*K)": 1e-6},
 }
 """SI values of the units that most files use, by SI unit. They are pint's to the last bit, which a test compares; pint
 itself takes longer to import than a thousand poses take to compute, and is only asked about all other units."""

@@ -60,12 +60,12 @@ class LegTerms:
     Attributes:
         end: displacement of its end.
         rates: twist of its end per unit of each coordinate [n x 6 x coordinates].
-        driven: the same per unit of each actuator [n x 6 x actuators].
+        driven: the same per unit of each given amount [n x 6 x amounts].
         loads: in its springs [n x coordinates], 0 of a passive coordinate.
         carrying: stiffness of each spring that carries, 0 of those that are slack [n x coordinates].
         left: what is left of the equilibrium of its coordinates [n x coordinates].
         geometric: change of `left` by the coordinates through weight and wrenches alone [n x c x c].
-        by_actuators: change of `left` by the actuators [n x coordinates x actuators].
+        by_given: change of `left` by the given amounts [n x coordinates x amounts].
     """
 
     end: Motions
@@ -75,7 +75,7 @@ class LegTerms:
     carrying: Array
     left: Array
     geometric: Array
-    by_actuators: Array
+    by_given: Array
 
 
 def leg_terms(leg: Chain, coordinates: Array, wrench: Array, amounts: Array, gravity: Array) -> LegTerms:
@@ -85,12 +85,12 @@ def leg_terms(leg: Chain, coordinates: Array, wrench: Array, amounts: Array, gra
         leg: the leg.
         coordinates: of it [n x coordinates].
         wrench: that the platform exerts on it, at the origin [n x 6].
-        amounts: of all actuators of the machine [n x actuators].
+        amounts: that are given: of all actuators of the machine, then of its links that grow [n x amounts].
         gravity: [n x 3].
     """
     count = len(coordinates)
     placed, columns = [still(count)], []
-    for number, (by, driven) in enumerate(zip(leg.coordinate, leg.actuator, strict=True)):
+    for number, (by, driven) in enumerate(zip(leg.coordinate, leg.given, strict=True)):
         twist = leg.twists[:, number]
         amount = amounts[:, driven] if by < 0 else coordinates[:, by]
         columns.append(placed[-1].twist(twist))
@@ -101,7 +101,7 @@ def leg_terms(leg: Chain, coordinates: Array, wrench: Array, amounts: Array, gra
     changing = np.einsum("nc,njkc->nkj", wrench, brackets(screws))
     change = change - np.tril(changing, -1)
     follows = leg.follows(leg.coordinate, leg.size)
-    drives = leg.follows(leg.actuator, amounts.shape[1])
+    drives = leg.follows(leg.given, amounts.shape[1])
     loads = leg.stiffness * coordinates + leg.preload
     carries = leg.sign * loads >= 0.0
     loads = np.where(carries, loads, 0.0)
@@ -208,11 +208,12 @@ class Balance:
     def by_actuators(self) -> Array:
         """Rates of the equations by the amounts of the actuators [n x unknowns x actuators]."""
         ways, starts = self.mechanism.ways, self.starts
-        result = np.zeros((len(self.left), starts[-1], self.state.amounts.shape[1]))
+        count = self.state.amounts.shape[1]
+        result = np.zeros((len(self.left), starts[-1], count))
         for leg, terms, start in zip(self.mechanism.legs, self.legs, starts, strict=False):
             moving, wrench = slice(start, start + leg.size), slice(start + leg.size, start + leg.size + ways.shape[1])
-            result[:, moving] = terms.by_actuators
-            result[:, wrench] = ways.T @ terms.driven
+            result[:, moving] = terms.by_given[:, :, :count]
+            result[:, wrench] = ways.T @ terms.driven[:, :, :count]
         return result
 
     def moved(self, step: Array) -> State:
@@ -240,8 +241,9 @@ def balance(mechanism: Mechanism, state: State) -> Balance:
     ways = mechanism.ways
     load, change = platform_load(mechanism, state.platform)
     terms, carried, left = [], np.zeros_like(load), []
+    amounts = np.concatenate([state.amounts, mechanism.growth], axis=1)
     for leg, coordinates, wrench in zip(mechanism.legs, state.coordinates, state.wrenches, strict=True):
-        terms.append(leg_terms(leg, coordinates, wrench, state.amounts, mechanism.gravity))
+        terms.append(leg_terms(leg, coordinates, wrench, amounts, mechanism.gravity))
         carried = carried + wrench
         left += [terms[-1].left, -logarithm(state.platform @ terms[-1].end.inverse()) @ ways]
     return Balance(

@@ -9,21 +9,21 @@ times it. Arrays have the poses first [n]. The origin is the tool point of the f
 Source: theory (35).
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.scalar import Scalar, is_zero
+from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.motion import Array, exponential
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.leg import Element, Joint, Leg, Spring
+from kinetostat.machine.leg import Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Parallelogram
-from kinetostat.machine.machine import Load, Machine
+from kinetostat.machine.machine import Load, Machine, Member
 from kinetostat.machine.mass import located_members
 from kinetostat.tolerances import DEPENDENT
 
@@ -53,8 +53,9 @@ class Chain:
     Attributes:
         name: of the leg.
         twists: unit twist of each motion in the free state [n x motions x 6].
-        coordinate: which coordinate of the leg each motion follows [motions]; -1 where an actuator drives it.
-        actuator: which actuator of the machine drives each motion [motions]; -1 where a coordinate does.
+        coordinate: which coordinate of the leg each motion follows [motions]; -1 where its amount is given.
+        given: which of the given amounts of the machine each motion follows [motions]: those of its actuators, then
+            the growths of its links; -1 where a coordinate moves it.
         springs: the spring of each coordinate [coordinates]; None of a passive one.
         stiffness: of each coordinate, 0 of a passive one [n x coordinates].
         preload: what each carries where it is zero [n x coordinates].
@@ -67,7 +68,7 @@ class Chain:
     name: str
     twists: Array
     coordinate: tuple[int, ...]
-    actuator: tuple[int, ...]
+    given: tuple[int, ...]
     springs: tuple[Spring | None, ...]
     stiffness: Array
     preload: Array
@@ -81,10 +82,10 @@ class Chain:
         return len(self.springs)
 
     def follows(self, which: tuple[int, ...], count: int) -> Array:
-        """1 where a motion follows a coordinate, or an actuator [motions x count]; 0 elsewhere.
+        """1 where a motion follows a coordinate, or a given amount [motions x count]; 0 elsewhere.
 
         Args:
-            which: `coordinate` or `actuator`.
+            which: `coordinate` or `given`.
             count: how many there are.
         """
         return (np.array(which, dtype=int)[:, None] == np.arange(count)).astype(float)
@@ -97,6 +98,7 @@ class Mechanism:
     Attributes:
         legs: of it.
         actuators: names of the actuators that can be driven, in the order of the legs.
+        growth: by which links are longer because they are warmer, in units of length [n x links].
         platform: masses of platform, tool and payload.
         wrench: moment and force at the tool point, base axes [n x 6].
         gravity: [n x 3].
@@ -108,6 +110,7 @@ class Mechanism:
 
     legs: tuple[Chain, ...]
     actuators: tuple[str, ...]
+    growth: Array
     platform: Masses
     wrench: Array
     gravity: Array
@@ -122,6 +125,7 @@ class Mechanism:
             self,
             legs=tuple(_taken(leg, rows) for leg in self.legs),
             platform=replace(self.platform, point=self.platform.point[rows], mass=self.platform.mass[rows]),
+            growth=self.growth[rows],
             wrench=self.wrench[rows],
             gravity=self.gravity[rows],
             length=self.length[rows],
@@ -166,13 +170,12 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
     force = typical * length
     units = _Units(origin, length, force, count)
     members = located_members(machine, configuration, None if joints is None else joints.coordinates)
-    actuators: list[Spring] = []
+    driven = [s for leg in configuration.legs for s in leg.springs if s.actuated and not is_zero(s.stiffness)]
+    amounts = _Given(len(driven))
     legs = []
     for leg in configuration.legs:
         here = [m for m in members if m.leg == leg.name or (not m.leg and leg.number is None)]
-        # The potential of a straight uniform link is that of half its mass at either end.
-        halves = [(carried, p, 0.5 * m.length * m.linear_density) for m in here if m.ends for carried, p in m.ends()]
-        legs.append(_chain(leg, units, actuators, halves))
+        legs.append(_chain(leg, units, amounts, here))
     platform = configuration.platform
     tool = machine.tables["tool"]
     centres = [
@@ -189,7 +192,8 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
         ways = np.column_stack([[*turn, 0.0, 0.0, 0.0], *([0.0, 0.0, 0.0, *axis] for axis in slides)])
     return Mechanism(
         tuple(legs),
-        tuple(spring.joint.name or spring.of for spring in actuators),
+        tuple(spring.joint.name or spring.of for spring in amounts.actuators),
+        stacked(amounts.growth, count) / length[:, None],
         units.masses(weights),
         wrench,
         _gravity(load, count),
@@ -257,71 +261,135 @@ def _typical(stiffness: Array) -> Array:
     return np.asarray(np.exp(logs / np.maximum(usable.sum(axis=1), 1)))
 
 
-def _chain(
-    leg: Leg,
-    units: _Units,
-    actuators: list[Spring],
-    weights: Sequence[tuple[int, Vector, Scalar]],
-) -> Chain:
-    twists: list[Array] = []
-    coordinate: list[int] = []
-    actuator: list[int] = []
-    springs: list[Spring | None] = []
-    stiffness, preload = [], []
-    before = [0]
-    nothing = np.zeros(units.count)
+@dataclass
+class _Given:
+    """The motions of given amounts that the legs have so far.
 
-    def moves(row: Array, by: int, driven: int = -1) -> None:
-        twists.append(row)
-        coordinate.append(by)
-        actuator.append(driven)
+    Attributes:
+        most: how many actuators there will be.
+        actuators: so far.
+        growth: of links so far, m.
+    """
 
-    def free(rows: Iterable[Array]) -> None:
-        for row in rows:
-            moves(row, len(springs))
-        springs.append(None)
-        stiffness.append(nothing)
-        preload.append(nothing)
+    most: int
+    actuators: list[Spring] = field(default_factory=list)
+    growth: list[Scalar] = field(default_factory=list)
 
-    for element in leg.chain:
-        for rows in _passive(element, units):
-            free(rows)
+    def actuator(self, spring: Spring) -> int:
+        """Count another actuator and return its number."""
+        self.actuators.append(spring)
+        return len(self.actuators) - 1
+
+    def link(self, growth: Scalar) -> int:
+        """Count another link that grows and return its number."""
+        self.growth.append(growth)
+        return self.most + len(self.growth) - 1
+
+
+@dataclass
+class _Row:
+    """The motions of a leg from base to platform as they come, see `Chain`.
+
+    Attributes:
+        carried: for each number of elements, how many motions carry what these carry: without the growth of the links
+            that end there, and with it.
+    """
+
+    units: _Units
+    amounts: _Given
+    links: list[tuple[Member, Station, Station]]
+    twists: list[Array] = field(default_factory=list)
+    coordinate: list[int] = field(default_factory=list)
+    given: list[int] = field(default_factory=list)
+    springs: list[Spring | None] = field(default_factory=list)
+    stiffness: list[Array] = field(default_factory=list)
+    preload: list[Array] = field(default_factory=list)
+    carried: list[tuple[int, int]] = field(default_factory=list)
+
+    def add(self, element: Element, number: int) -> None:
+        """Add an element, which is the number-th from the base, and the growth of the links that end behind it."""
+        if isinstance(element, Parallelogram):
+            self._parallelogram(element, number)
+        else:
+            for joint in element.freedoms:
+                self._move(self.units.twist(joint), self._coordinate(None))
         for spring in element.springs:
-            row = units.twist(spring.joint)
-            if spring.actuated and not is_zero(spring.stiffness):
-                moves(row, -1, len(actuators))
-                actuators.append(spring)
-            if is_zero(spring.stiffness):
-                free([row])
-            elif not (isinstance(spring.stiffness, float) and np.isinf(spring.stiffness)):
-                moves(row, len(springs))
-                springs.append(spring)
-                stiffness.append(units.stiffness(spring))
-                preload.append(units.load(spring, spring.preload))
-        before.append(len(twists))
+            self._spring(spring)
+        before = len(self.twists)
+        if not isinstance(element, Parallelogram):
+            self.grow(number)
+        self.carried.append((before, len(self.twists)))
+
+    def grow(self, number: int) -> None:
+        """Add the growth of the links that end behind so many elements: slides along them."""
+        for link, (_, start), (behind, end) in self.links:
+            if behind == number and not is_zero(link.growth):
+                span = end - start
+                slide = Joint(span * reciprocal(span.norm()))
+                self._move(self.units.twist(slide), -1, self.amounts.link(link.growth))
+
+    def masses(self) -> Masses:
+        """The masses of the links: the potential of a straight uniform one is that of half its mass at either end."""
+        halves = []
+        for link, (first, start), (last, end) in self.links:
+            half = 0.5 * link.length * link.linear_density
+            if not is_zero(half):
+                begins = self.carried[first][first < last]  # a rigid link begins before it grows
+                halves += [(begins, start, half), (self.carried[last][1], end, half)]
+        return self.units.masses(halves)
+
+    def _move(self, twist: Array, coordinate: int, given: int = -1) -> None:
+        self.twists.append(twist)
+        self.coordinate.append(coordinate)
+        self.given.append(given)
+
+    def _coordinate(self, spring: Spring | None) -> int:
+        """Count another coordinate, with a spring or passive, and return its number."""
+        nothing = np.zeros(self.units.count)
+        self.springs.append(spring)
+        self.stiffness.append(nothing if spring is None else self.units.stiffness(spring))
+        self.preload.append(nothing if spring is None else self.units.load(spring, spring.preload))
+        return len(self.springs) - 1
+
+    def _parallelogram(self, bars: Parallelogram, number: int) -> None:
+        """Turn about the near side and back about the far one; in between, the bars grow."""
+        rate = 1.0 / (bars.far - bars.near).norm() * self.units.length
+        near, far = (Joint(bars.normal, point) for point in (bars.near, bars.far))
+        coordinate = self._coordinate(None)
+        self._move(self.units.twist(near, rate), coordinate)
+        self.grow(number)
+        self._move(-self.units.twist(far, rate), coordinate)
+
+    def _spring(self, spring: Spring) -> None:
+        twist = self.units.twist(spring.joint)
+        if is_zero(spring.stiffness):
+            self._move(twist, self._coordinate(None))
+            return
+        if spring.actuated:
+            self._move(twist, -1, self.amounts.actuator(spring))
+        if not (isinstance(spring.stiffness, float) and np.isinf(spring.stiffness)):
+            self._move(twist, self._coordinate(spring))
+
+
+def _chain(leg: Leg, units: _Units, amounts: _Given, members: Sequence[Member]) -> Chain:
+    links = [(link, *stations) for link in members if (stations := link.ends and link.ends())]
+    row = _Row(units, amounts, links)
+    row.grow(0)
+    row.carried.append((0, len(row.twists)))
+    for number, element in enumerate(leg.chain, 1):
+        row.add(element, number)
     return Chain(
         leg.name,
-        np.stack(twists, axis=1) if twists else np.zeros((units.count, 0, 6)),
-        tuple(coordinate),
-        tuple(actuator),
-        tuple(springs),
-        np.stack(stiffness, axis=1) if stiffness else np.zeros((units.count, 0)),
-        np.stack(preload, axis=1) if preload else np.zeros((units.count, 0)),
-        np.array([SIGNS[spring.acts] if spring else 0.0 for spring in springs]),
-        _idle(twists, coordinate, springs, units.count),
-        units.masses([(before[carried], point, mass) for carried, point, mass in weights]),
+        np.stack(row.twists, axis=1) if row.twists else np.zeros((units.count, 0, 6)),
+        tuple(row.coordinate),
+        tuple(row.given),
+        tuple(row.springs),
+        np.stack(row.stiffness, axis=1) if row.stiffness else np.zeros((units.count, 0)),
+        np.stack(row.preload, axis=1) if row.preload else np.zeros((units.count, 0)),
+        np.array([SIGNS[spring.acts] if spring else 0.0 for spring in row.springs]),
+        _idle(row.twists, row.coordinate, row.springs, units.count),
+        row.masses(),
     )
-
-
-def _passive(element: Element, units: _Units) -> Iterator[list[Array]]:
-    """The motions of each passive coordinate of an element: one; two of a parallelogram, which turns there and back."""
-    if isinstance(element, Parallelogram):
-        rate = 1.0 / (element.far - element.near).norm() * units.length
-        near, far = (Joint(element.normal, point) for point in (element.near, element.far))
-        yield [units.twist(near, rate), -units.twist(far, rate)]
-        return
-    for joint in element.freedoms:
-        yield [units.twist(joint)]
 
 
 def _idle(twists: Sequence[Array], coordinate: Sequence[int], springs: Sequence[Spring | None], count: int) -> Array:

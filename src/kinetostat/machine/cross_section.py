@@ -20,6 +20,7 @@ class Material:
         name: as written in files.
         youngs_modulus, shear_modulus: E and G, Pa.
         density: kg/m³.
+        expansion: relative growth per kelvin, 1/K.
         source: where the values come from.
     """
 
@@ -27,20 +28,36 @@ class Material:
     youngs_modulus: float
     shear_modulus: float
     density: float
+    expansion: float
     source: str
 
 
 MATERIALS = {
     material.name: material
     for material in (
-        Material("steel", 210e9, 81e9, 7850.0, "EN 1993-1-1:2005, 3.2.6 (E, G), EN 1991-1-1 Table A.4 (density)"),
-        Material("aluminium", 70e9, 27e9, 2700.0, "EN 1999-1-1:2007, 3.2.5"),
-        Material("cast-iron", 110e9, 43.7e9, 7200.0, "EN 1561:2011, annex A, EN-GJL-250: E 103 to 118 GPa, nu 0.26"),
+        Material(
+            "steel",
+            210e9,
+            81e9,
+            7850.0,
+            12e-6,
+            "EN 1993-1-1:2005, 3.2.6; EN 1991-1-1 Table A.4 (density)",
+        ),
+        Material("aluminium", 70e9, 27e9, 2700.0, 23e-6, "EN 1999-1-1:2007, 3.2.5"),
+        Material(
+            "cast-iron",
+            110e9,
+            43.7e9,
+            7200.0,
+            11.7e-6,
+            "EN 1561:2011, annex A, EN-GJL-250: E 103 to 118 GPa, nu 0.26, expansion between 20 and 200 °C",
+        ),
         Material(
             "cfrp",
             70e9,
             5e9,
             1600.0,
+            2.1e-6,
             "woven standard-modulus carbon/epoxy 0/90, 50 % fibre: Performance Composites, mechanical properties of "
             "carbon fibre composite materials",
         ),
@@ -155,6 +172,12 @@ def rigidity_of(shape: str, data: Any, shear: bool) -> Rigidity:
 def linear_density_of(shape: str, data: Any) -> Scalar:
     """Mass per length of such a bar, kg/m; arguments as for `rigidity_of`."""
     return data.density * _profile(shape, data).area
+
+
+def least_bending_of(shape: str, data: Any) -> Scalar:
+    """E I of such a bar about its weaker axis, N·m²; arguments as for `rigidity_of`."""
+    profile = _profile(shape, data)
+    return data.youngs_modulus * smaller(profile.second_moment_y, profile.second_moment_z)
 
 
 def _profile(shape: str, data: Any) -> CrossSection:

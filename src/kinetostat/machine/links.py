@@ -39,14 +39,27 @@ class LinkKind:
     count: int | None = None
 
 
-def density_table(kinds: Sequence[LinkKind]) -> type:
-    """Make the table [linear_density] of a family with these links; it may be left out."""
-    fields = {}
-    for kind in kinds:
-        words = kind.name.replace("_", " ")
-        quantity = Quantity("linear density", f"mass per length of the {words}; 0: not counted", count=kind.count)
-        fields[kind.name] = Field(quantity, 0.0 if kind.count is None else (0.0,) * kind.count)
-    return made_table("LinearDensity", fields)
+LINK_TABLES = {
+    "linear_density": ("linear density", "mass per length of the {}; 0: not counted"),
+    "bending_rigidity": ("E I", "least E I of the {}, which says when they buckle; 0: not known"),
+    "expansion": ("thermal expansion", "relative growth of the {} per kelvin; 0: not known"),
+    "temperature_rise": ("temperature difference", "how much warmer the {} are than the machine was when built"),
+}
+"""Tables with one number for each kind of links, all of which may be left out: kind of quantity, and what it means."""
+OF_CROSS_SECTIONS = ("linear_density", "bending_rigidity", "expansion")
+"""Those that a cross-section with its material gives."""
+
+
+def link_tables(kinds: Sequence[LinkKind]) -> dict[str, type]:
+    """Make the tables about the links of a family, see `LINK_TABLES`; none without links."""
+    tables = {}
+    for name, (quantity, meaning) in LINK_TABLES.items() if kinds else ():
+        fields = {}
+        for kind in kinds:
+            what = Quantity(quantity, meaning.format(kind.name.replace("_", " ")), count=kind.count)
+            fields[kind.name] = Field(what, 0.0 if kind.count is None else (0.0,) * kind.count)
+        tables[name] = made_table(name.title().replace("_", ""), fields)
+    return tables
 
 
 def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[Placed]:

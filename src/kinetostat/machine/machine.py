@@ -17,7 +17,7 @@ from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.machine.leg import Joint, Leg, Spring, Station, Turn
 from kinetostat.machine.limits import Limits
-from kinetostat.machine.links import LinkKind, density_table
+from kinetostat.machine.links import LinkKind, link_tables
 from kinetostat.machine.orientation import numbers_for, single_angles
 from kinetostat.machine.parameters import Given, check_contrast, read_numbers, with_values
 from kinetostat.spec.arguments import checked
@@ -108,6 +108,8 @@ class Member:
         name: unique within the machine.
         length: from joint to joint, m.
         linear_density: kg/m; 0 where nothing says it.
+        bending: least E I, N·m²; 0 where nothing says it.
+        growth: by which it makes its leg longer because it is warmer than when the machine was built, m.
         ends: gives both ends of its axis at the pose; None where they are not known.
     """
 
@@ -115,6 +117,8 @@ class Member:
     name: str
     length: Scalar
     linear_density: Scalar
+    bending: Scalar = 0.0
+    growth: Scalar = 0.0
     ends: Callable[[], tuple[Station, ...]] | None = None
 
 
@@ -264,8 +268,7 @@ class Family:
     @cached_property
     def every_table(self) -> dict[str, type]:
         """Its own tables and the common ones."""
-        densities = {"linear_density": density_table(self.links)} if self.links else {}
-        return FixedDict({**self.tables, **densities, **COMMON})
+        return FixedDict({**self.tables, **link_tables(self.links), **COMMON})
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, is_zero, total
 from kinetostat.machine.leg import Turn
+from kinetostat.machine.links import LINK_TABLES
 from kinetostat.machine.machine import Configuration, Machine, Member
 
 PLATFORM = "platform and tool"
@@ -50,7 +51,7 @@ def moving_mass(machine: Machine, configuration: Configuration) -> Scalar:
 def located_members(
     machine: Machine, configuration: Configuration, joints: Sequence[Scalar | Turn] | None
 ) -> list[Member]:
-    """The links of which a mass is known, with both ends of each at the pose.
+    """The links, with both ends of each at the pose.
 
     Args:
         machine, configuration: see `moving_masses`.
@@ -60,7 +61,7 @@ def located_members(
         links = _members(machine, configuration)
     else:
         links = machine.family.members(joints=joints, **machine.family_tables)
-    return [link for link in links if link.ends is not None and not is_zero(link.linear_density)]
+    return [link for link in links if link.ends is not None]
 
 
 def _weighed(link: Member) -> Scalar | None:
@@ -73,8 +74,11 @@ def _members(machine: Machine, configuration: Configuration) -> list[Member]:
         return family.members(**machine.family_tables)
     members = []
     for kind in family.links:
-        density = getattr(machine.tables["linear_density"], kind.name)
-        placed = configuration.legs, configuration.platform.translation, machine.tables["geometry"]
-        for i, (leg, name, length, ends) in enumerate(kind.lengths(*placed)):
-            members.append(Member(leg, name, length, density if kind.count is None else density[i], ends))
+        given = [getattr(machine.tables[table], kind.name) for table in LINK_TABLES]
+        placed = kind.lengths(configuration.legs, configuration.platform.translation, machine.tables["geometry"])
+        for i, (leg, name, length, ends) in enumerate(placed):
+            density, bending, expansion, rise = given if kind.count is None else (entries[i] for entries in given)
+            beside = sum(other == leg for other, *_ in placed) if leg else 1  # pairs of bars lengthen their leg once
+            growth = expansion * rise * length * (1.0 / beside)
+            members.append(Member(leg, name, length, density, bending, growth, ends))
     return members

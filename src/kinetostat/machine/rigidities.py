@@ -10,7 +10,15 @@ from typing import TypeAlias
 
 import numpy as np
 
-from kinetostat.machine.cross_section import MATERIALS, SHAPE_KINDS, SHAPES, linear_density_of, rigidity_of
+from kinetostat.machine.cross_section import (
+    MATERIALS,
+    SHAPE_KINDS,
+    SHAPES,
+    least_bending_of,
+    linear_density_of,
+    rigidity_of,
+)
+from kinetostat.machine.links import OF_CROSS_SECTIONS
 from kinetostat.machine.machine import Family
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
@@ -20,17 +28,21 @@ from kinetostat.units import UnitError, parse
 WHICH = {"axial rigidity": "axial", "torsional rigidity": "torsion", "bending rigidity": "bending_y"}
 """Kinds of rigidity, and which of a cross-section's rigidities they are."""
 MODULI = ("youngs_modulus", "shear_modulus")
+OF_MATTER = {"density": "density", "expansion": "thermal expansion"}
+"""What else a material says, and its kind of quantity."""
 SAME = 1e-9
 """Relative difference up to which two linear densities are one."""
 
-Densities: TypeAlias = float | list[float]
-"""Mass per length, kg/m, of a field or of each of its entries; 0 where it is not known."""
+Known: TypeAlias = Mapping[str, float | list[float]]
+"""What cross-sections say about links beside their rigidity: a number of each of `OF_CROSS_SECTIONS`, SI, or a list of
+them for a field with several entries; 0 where it is not known. Empty where no cross-section is written."""
 
 
 def resolve(document: Document, family: Family, origin: str) -> Document:
     """A copy of a document in which each rigidity written as a cross-section is a number, SI.
 
-    What such a link weighs per length goes into [linear_density], unless the document says it there.
+    What such a link weighs per length, its least E I and its expansion go into the tables of the links, unless the
+    document says them there.
 
     Raises:
         InputError: an unknown shape, size or material, or two cross-sections for one link; names the field.
@@ -44,34 +56,39 @@ def resolve(document: Document, family: Family, origin: str) -> Document:
         if quantity.kind in WHICH and name in stiffness
     }
     result = {**document, "stiffness": {**stiffness, **{name: numbers for name, (numbers, _) in resolved.items()}}}
-    heavy = _densities(family, {name: density for name, (_, density) in resolved.items()}, origin)
-    written = document.get("linear_density", {})
-    return {**result, "linear_density": {**heavy, **written}} if heavy and isinstance(written, dict) else result
+    for table in OF_CROSS_SECTIONS:
+        known = _of_links(family, table, {name: numbers for name, (_, numbers) in resolved.items()}, origin)
+        written = document.get(table, {})
+        if known and isinstance(written, dict):
+            result[table] = {**known, **written}
+    return result
 
 
-def _densities(family: Family, resolved: Mapping[str, Densities], origin: str) -> dict[str, Densities]:
-    """Mass per length of each kind of links whose cross-section is known, kg/m."""
-    heavy: dict[str, Densities] = {}
+def _of_links(family: Family, table: str, resolved: Mapping[str, Known], origin: str) -> dict[str, float | list[float]]:
+    """The numbers of one table of each kind of links whose cross-section is known, SI."""
+    numbers: dict[str, float | list[float]] = {}
     for kind in family.links:
-        known = {name: resolved[name] for name in kind.rigidities if np.any(resolved.get(name, 0.0))}
-        for density in known.values():
-            if not np.allclose(density, heavy.setdefault(kind.name, density), rtol=SAME, atol=0.0):
+        given = {name: resolved.get(name, {}).get(table, 0.0) for name in kind.rigidities}
+        known = {name: number for name, number in given.items() if np.any(number)}
+        for number in known.values():
+            if not np.allclose(number, numbers.setdefault(kind.name, number), rtol=SAME, atol=0.0):
                 raise InputError(
                     f'"{origin}": stiffness.{" and stiffness.".join(known)} describe the same {kind.name}, but '
                     "their cross-sections differ in mass; give both the same cross-section, or one of them as a number."
                 )
-    return heavy
+    return numbers
 
 
-def _resolved(value: object, which: str, where: str) -> tuple[object, Densities]:
-    """A field as numbers, and the linear densities of what stood there as cross-sections."""
+def _resolved(value: object, which: str, where: str) -> tuple[object, Known]:
+    """A field as numbers, and what else the cross-sections say that stood there."""
     if not isinstance(value, list):
-        return _rigidity(value, which, where) if isinstance(value, dict) else (value, 0.0)
+        return _rigidity(value, which, where) if isinstance(value, dict) else (value, {})
     entries = [_resolved(entry, which, f"{where}, entry {i}") for i, entry in enumerate(value)]
-    return [number for number, _ in entries], [float(np.max(density, initial=0.0)) for _, density in entries]
+    known = {t: [float(np.max(each.get(t, 0.0))) for _, each in entries] for t in OF_CROSS_SECTIONS}
+    return [number for number, _ in entries], known
 
 
-def _rigidity(table: Mapping[str, object], which: str, where: str) -> tuple[float, float]:
+def _rigidity(table: Mapping[str, object], which: str, where: str) -> tuple[float, Known]:
     rest = dict(table)
     shape = choice(rest.pop("shape", None), SHAPES, f"{where}: shape")
     numbers = {
@@ -80,22 +97,25 @@ def _rigidity(table: Mapping[str, object], which: str, where: str) -> tuple[floa
     }
     if "material" in rest or not rest.keys() & set(MODULI):
         material = MATERIALS[choice(rest.pop("material", None), MATERIALS, f"{where}: material")]
-        numbers |= {name: getattr(material, name) for name in (*MODULI, "density")}
+        numbers |= {name: getattr(material, name) for name in (*MODULI, *OF_MATTER)}
     else:
         numbers |= {name: _size(rest.pop(name, None), "elastic modulus", f"{where}: {name}") for name in MODULI}
-        numbers["density"] = 0.0
-    if "density" in rest:
-        numbers["density"] = _size(rest.pop("density"), "density", f"{where}: density")
+        numbers |= dict.fromkeys(OF_MATTER, 0.0)
+    for name, kind in OF_MATTER.items():
+        if name in rest:
+            numbers[name] = _size(rest.pop(name), kind, f"{where}: {name}")
     for key in rest:
         raise InputError(
             f"{where}: {key} is not known; a {shape} cross-section has "
-            f"{', '.join(SHAPES[shape])}, material and density."
+            f"{', '.join(SHAPES[shape])}, material, density and expansion."
         )
     if shape == "tube" and not numbers["inner_diameter"] < numbers["outer_diameter"]:
         inner, outer = numbers["inner_diameter"], numbers["outer_diameter"]
         raise InputError(f"{where}: inner_diameter is {inner:g} m; it must be less than outer_diameter, {outer:g} m.")
     data = SimpleNamespace(**numbers)
-    return float(getattr(rigidity_of(shape, data, shear=False), which)), float(linear_density_of(shape, data))
+    known = map(float, (linear_density_of(shape, data), least_bending_of(shape, data), data.expansion))
+    rigid = rigidity_of(shape, data, shear=False)
+    return float(getattr(rigid, which)), dict(zip(OF_CROSS_SECTIONS, known, strict=True))
 
 
 def _size(value: object, kind: str, where: str, may_be_zero: bool = False) -> float:

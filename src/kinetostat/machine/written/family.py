@@ -10,7 +10,7 @@ from typing import Any, cast
 
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
-from kinetostat.machine.cross_section import linear_density_of, rigidity_of
+from kinetostat.machine.cross_section import least_bending_of, linear_density_of, rigidity_of
 from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Station, Turn
 from kinetostat.machine.link import Beam, any_up, lumped_springs, matrix_springs, seat_springs
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
@@ -169,10 +169,18 @@ def members(plan: Plan, joints: Sequence[Scalar | Turn] | None = None, **tables:
             if moves:
                 section = _section(leg, joint.joins[1])
                 data = tables[f"sections.{section}"] if section else None
-                density = linear_density_of(plan.shapes[section], data) if section else 0.0
-                name = f"{leg.name} {joint.joins[1]}"
-                links.append(Member(leg.name, name, (end - start).norm(), density, ends))
+                name, length = f"{leg.name} {joint.joins[1]}", (end - start).norm()
+                links.append(Member(leg.name, name, length, *_of_section(plan, section, data, length), ends))
     return links
+
+
+def _of_section(plan: Plan, section: str, data: Any, length: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """Linear density, least E I and growth of a link of this length with a cross-section, SI; zeros without one."""
+    if not section:
+        return 0.0, 0.0, 0.0
+    shape = plan.shapes[section]
+    growth = data.expansion * data.temperature_rise * length
+    return linear_density_of(shape, data), least_bending_of(shape, data), growth
 
 
 def _link_ends(

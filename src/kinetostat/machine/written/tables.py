@@ -69,6 +69,10 @@ def _shape_fields(shape: str, material: str) -> dict[str, Field]:
     fields["youngs_modulus"] = Field(modulus, known.youngs_modulus if known else None)
     fields["shear_modulus"] = Field(shear, known.shear_modulus if known else None)
     fields["density"] = Field(density, known.density if known else 0.0)
+    expansion = Quantity("thermal expansion", "relative growth of the material per kelvin; 0: not known")
+    rise = Quantity("temperature difference", "how much warmer these links are than the machine was when built")
+    fields["expansion"] = Field(expansion, known.expansion if known else 0.0)
+    fields["temperature_rise"] = Field(rise, 0.0)
     return fields
 
 
@@ -107,7 +111,7 @@ def _table(properties: dict[str, Any], required: list[str] | None = None) -> dic
 def _cross_section() -> dict[str, Any]:
     sizes = {name: {**QUANTITY, "examples": [KINDS[kind].example]} for name, kind in SHAPE_KINDS.items()}
     known = {"shape": {"enum": list(SHAPES)}, "material": {"enum": list(MATERIALS)}}
-    moduli = dict.fromkeys(("youngs_modulus", "shear_modulus", "density"), QUANTITY)
+    moduli = dict.fromkeys(("youngs_modulus", "shear_modulus", "density", "expansion", "temperature_rise"), QUANTITY)
     return _table({**known, **sizes, **moduli}, ["shape"])
 
 

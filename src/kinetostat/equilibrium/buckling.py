@@ -1,0 +1,102 @@
+"""When a strut that is pressed bends away: Euler's load, beside the load factor, which knows springs only.
+
+A strut is what carries forces along one line: the straight part of a leg between its only two passive joints, or a bar
+of a parallelogram. Both its ends are free to turn, so that it bends like a column between two hinges. A telescopic leg
+counts as if its weakest part were as long as the whole leg, which is on the safe side.
+
+Source: theory (43).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinetostat.algebra.vector import Vector
+from kinetostat.equilibrium.balance import Balance
+from kinetostat.equilibrium.motion import Array
+from kinetostat.machine.leg import Leg, Line
+from kinetostat.machine.link import Parallelogram
+from kinetostat.machine.machine import Member
+from kinetostat.machine.rods import rods
+
+
+@dataclass(frozen=True)
+class Strut:
+    """What presses a strut, and what it can hold.
+
+    Attributes:
+        name: of the link.
+        leg: that it belongs to.
+        length: between its hinges, m.
+        compression: N; negative where it is pulled.
+        euler_load: at which it bends away, N.
+    """
+
+    name: str
+    leg: str
+    length: float
+    compression: float
+    euler_load: float
+
+    @property
+    def factor(self) -> float:
+        """By which its compression may grow until it bends away; infinite where it is pulled."""
+        return self.euler_load / self.compression if self.compression > 0.0 else math.inf
+
+
+def struts(legs: Sequence[Leg], members: Sequence[Member], reference: Vector, equations: Balance) -> list[Strut]:
+    """Find the struts whose E I is known, and what presses them at a state of rest.
+
+    Args:
+        legs: of the machine at its pose, base frame.
+        members: its links.
+        reference: the tool point, base frame, m.
+        equations: at the state of rest of one pose.
+    """
+    result = []
+    force, length = float(equations.mechanism.force[0]), float(equations.mechanism.length[0])
+    units = np.array([force * length] * 3 + [force] * 3)
+    for leg, wrench in zip(legs, equations.state.wrenches, strict=True):
+        links = [link for link in members if link.leg == leg.name and float(link.bending) > 0.0]
+        lines = _lines(leg)
+        if not (links and lines):
+            continue
+        pulls = _along(lines, wrench[0] * units, reference)
+        if len(lines) == 1:
+            size = float(rods([leg])[0].length)
+            weakest = min(float(link.bending) for link in links)
+            result.append(Strut(leg.name, leg.name, size, -pulls[0], _euler(weakest, size)))
+            continue
+        bars = [link for link in links if _across_parallelogram(leg, link)]
+        for bar, pull in zip(bars, pulls, strict=False):
+            size = float(bar.length)
+            result.append(Strut(bar.name, leg.name, size, -pull, _euler(float(bar.bending), size)))
+    return result
+
+
+def _lines(leg: Leg) -> list[Line]:
+    """The lines along which a leg carries forces, each from base to platform; none of other legs."""
+    rod = next(iter(rods([leg])), None)
+    if rod is None:
+        return list(leg.lines) if len(leg.lines) > 1 else []
+    return [Line(rod.end, rod.span * (1.0 / rod.length))]
+
+
+def _across_parallelogram(leg: Leg, link: Member) -> bool:
+    """Tell whether a link is a bar of a leg's parallelogram: its ends are on both sides of it."""
+    if link.ends is None:
+        return False
+    (first, _), (last, _) = link.ends()
+    return any(isinstance(element, Parallelogram) for element in leg.chain[first:last])
+
+
+def _along(lines: Sequence[Line], wrench: Array, reference: Vector) -> list[float]:
+    """What each line pulls with, so that together they come nearest to a wrench of the platform on their leg, N."""
+    columns = np.array([line.wrench(reference).components() for line in lines], dtype=float).T
+    return [float(pull) for pull in np.linalg.lstsq(columns, wrench, rcond=None)[0]]
+
+
+def _euler(bending: float, length: float) -> float:
+    return math.pi**2 * bending / length**2
