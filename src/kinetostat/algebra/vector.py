@@ -47,6 +47,11 @@ class Vector:
             self.x * other.y - self.y * other.x,
         )
 
+    def is_at(self, other: "Vector") -> bool:
+        """Whether this is the same point as another one, at every pose."""
+        pairs = zip(self.components(), other.components(), strict=True)
+        return all(a is b or (same if isinstance(same := a == b, bool) else bool(same.all())) for a, b in pairs)
+
     def norm(self) -> Scalar:
         """Euclidean length."""
         return sqrt(self.dot(self))

@@ -60,7 +60,7 @@ def struts(legs: Sequence[Leg], members: Sequence[Member], reference: Vector, eq
     units = np.array([force * length] * 3 + [force] * 3)
     for leg, wrench in zip(legs, equations.state.wrenches, strict=True):
         links = [link for link in members if link.leg == leg.name and float(link.bending) > 0.0]
-        lines = _lines(leg)
+        lines = _lines(leg, equations.mechanism.ways.shape[1])
         if not (links and lines):
             continue
         pulls = _along(lines, wrench[0] * units, reference)
@@ -76,12 +76,17 @@ def struts(legs: Sequence[Leg], members: Sequence[Member], reference: Vector, eq
     return result
 
 
-def _lines(leg: Leg) -> list[Line]:
-    """The lines along which a leg carries forces, each from base to platform; none of other legs."""
-    rod = next(iter(rods([leg])), None)
-    if rod is None:
-        return list(leg.lines) if len(leg.lines) > 1 else []
-    return [Line(rod.end, rod.span * (1.0 / rod.length))]
+def _lines(leg: Leg, ways: int) -> list[Line]:
+    """The lines along which a leg carries forces and nothing else, each from base to platform; none of other legs.
+
+    Args:
+        leg: at its pose.
+        ways: how many freedoms a body has in the machine: 6, or 3 in a plane.
+    """
+    if len(leg.lines) > 1:
+        return list(leg.lines)
+    free = len(leg.passive) - len(leg.idle)
+    return [Line(rod.end, rod.span * (1.0 / rod.length)) for rod in rods([leg]) if free == ways - 1]
 
 
 def _across_parallelogram(leg: Leg, link: Member) -> bool:

@@ -11,8 +11,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-import numpy as np
-
 from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin, where
 from kinetostat.algebra.screw import Twist, Wrench, force_along, pure_moment, rotation_about, translation_along
 from kinetostat.algebra.solve import complement
@@ -264,12 +262,6 @@ def rows_about_one_point(centres: Sequence[Sequence[float] | None]) -> tuple[tup
     return tuple(tuple(row) for row in rows if len(row) > 1)
 
 
-def _same(a: Vector, b: Vector) -> bool:
-    """Tell whether two points are one, at every pose."""
-    pairs = zip(a.components(), b.components(), strict=True)
-    return all(p is q or bool(np.all(p == q)) for p, q in pairs)
-
-
 @dataclass(frozen=True)
 class Leg:
     """A serial chain from base to platform.
@@ -324,7 +316,7 @@ class Leg:
     def stations(self) -> tuple[Station, ...]:
         """The points of its path, and how many elements of the chain carry each."""
         every = [(i + k, p) for i, element in enumerate(self.chain) for k, p in enumerate(element.path)]
-        return tuple(each for n, each in enumerate(every) if n == 0 or not _same(each[1], every[n - 1][1]))
+        return tuple(each for n, each in enumerate(every) if n == 0 or not each[1].is_at(every[n - 1][1]))
 
     def displaced(self, motion: Displacement) -> "Leg":
         """The leg after a rigid displacement of the whole machine."""

@@ -13,7 +13,9 @@ from typing import Any
 from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.machine.leg import Leg, Station
+from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Field, Quantity, made_table
+from kinetostat.units import KINDS
 
 Ends = Callable[[], tuple[Station, ...]]
 Placed = tuple[str, str, Scalar, Ends]
@@ -60,6 +62,25 @@ def link_tables(kinds: Sequence[LinkKind]) -> dict[str, type]:
             fields[kind.name] = Field(what, 0.0 if kind.count is None else (0.0,) * kind.count)
         tables[name] = made_table(name.title().replace("_", ""), fields)
     return tables
+
+
+def growth_of(expansion: Scalar, rise: Scalar, links: str) -> Scalar:
+    """Compute the share of its length by which a link grows.
+
+    Args:
+        expansion: 1/K; 0 where it is not known.
+        rise: how much warmer the link is, K.
+        links: names it in the message.
+
+    Raises:
+        InputError: it is warmer, and nothing says how its material grows.
+    """
+    if is_zero(expansion) and not is_zero(rise):
+        raise InputError(
+            f"The temperature_rise of {links} is given, but nothing says how its material grows: give its expansion, "
+            f'e.g. "{KINDS["thermal expansion"].example}", or a cross-section with a material.'
+        )
+    return expansion * rise
 
 
 def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[Placed]:

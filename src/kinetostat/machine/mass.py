@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, is_zero, total
 from kinetostat.machine.leg import Turn
-from kinetostat.machine.links import LINK_TABLES
+from kinetostat.machine.links import LINK_TABLES, growth_of
 from kinetostat.machine.machine import Configuration, Machine, Member
 
 PLATFORM = "platform and tool"
@@ -79,6 +79,6 @@ def _members(machine: Machine, configuration: Configuration) -> list[Member]:
         for i, (leg, name, length, ends) in enumerate(placed):
             density, bending, expansion, rise = given if kind.count is None else (entries[i] for entries in given)
             beside = sum(other == leg for other, *_ in placed) if leg else 1  # pairs of bars lengthen their leg once
-            growth = expansion * rise * length * (1.0 / beside)
+            growth = growth_of(expansion, rise, kind.name) * length * (1.0 / beside)
             members.append(Member(leg, name, length, density, bending, growth, ends))
     return members

@@ -31,8 +31,10 @@ from kinetostat.units import KINDS
 if TYPE_CHECKING:
     import pandas as pd
 
-WITHOUT_INFLUENCE = ("load.", "limits.", "tool.centre_of_mass", "tool.payload")
-"""How the fields begin on which no index depends: loads, limits, and weights."""
+WITHOUT_INFLUENCE = (
+    "load.", "limits.", "tool.centre_of_mass", "tool.payload", "bending_rigidity.", "expansion.", "temperature_rise.",
+)  # fmt: skip
+"""How the fields begin on which no index depends: loads, limits, weights, buckling and growth."""
 MOST_NAMED = 12
 """Greatest number of parameters without influence that are named."""
 

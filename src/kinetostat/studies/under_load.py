@@ -5,7 +5,7 @@ The equations are in `equilibrium`; the command is `analyze --loaded`.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.balance import Balance, balance, free_state
+from kinetostat.equilibrium.buckling import Strut, struts
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import loaded_mechanism
@@ -24,6 +25,7 @@ from kinetostat.kinematics.singularity import describe
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.mass import located_members
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.plain_data import as_answer
@@ -75,6 +77,7 @@ class LoadedState(Immutable):
             None where springs alone hold nothing.
         mode: small motion of the tool point when it becomes unstable, of any size, rad and m.
         mode_legs: the legs that move most then.
+        struts: what presses each strut whose E I is known, and Euler's load at which it bends away.
         residual: what is left of the equations, as a share of what the load and the legs carry.
     """
 
@@ -92,6 +95,7 @@ class LoadedState(Immutable):
     factor: float | None = None
     mode: tuple[float, ...] = ()
     mode_legs: tuple[str, ...] = ()
+    struts: tuple[Strut, ...] = ()
     residual: float = 0.0
 
     def __repr__(self) -> str:
@@ -123,7 +127,9 @@ def under_load(machine: Machine) -> LoadedState:
     solution = at_rest(mechanism)
     if not solution.settled[0]:
         return LoadedState(machine, Rest.NO_REST, _without_rest(machine), names)
-    return _state(machine, response, solution.balance)
+    members = located_members(machine, response.configuration, None if joints is None else joints.coordinates)
+    pressed = struts(response.configuration.legs, members, response.reference, solution.balance)
+    return _state(machine, response, solution.balance, tuple(pressed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +174,7 @@ def load_curve(machine: Machine, shares: Sequence[float] = SHARES) -> LoadCurve:
     return LoadCurve(np.array(shares), np.array(moved), tuple(s.name for s in springs), np.array(loads))
 
 
-def _state(machine: Machine, response: Response, equations: Balance) -> LoadedState:
+def _state(machine: Machine, response: Response, equations: Balance, pressed: tuple[Strut, ...]) -> LoadedState:
     mechanism, parts = equations.mechanism, list(machine.family.components)
     units, square = mechanism.twist_units[0], np.ix_(parts, parts)
     soft = (compliance(equations) * mechanism.compliance_units)[0][square]
@@ -180,7 +186,13 @@ def _state(machine: Machine, response: Response, equations: Balance) -> LoadedSt
     return LoadedState(
         machine,
         Rest.OK if judged.stable else Rest.UNSTABLE,
-        " ".join([_message(judged, slack, judged.mode * units), *_passed_limit(machine, response)]),
+        " ".join(
+            [
+                _message(judged, slack, judged.mode * units),
+                *_buckled(machine, pressed),
+                *_passed_limit(machine, response),
+            ]
+        ),
         machine.family.component_names,
         _in_si(mechanism, equations.state.platform.amounts()[0], parts),
         _linear(response, mechanism, parts),
@@ -192,13 +204,15 @@ def _state(machine: Machine, response: Response, equations: Balance) -> LoadedSt
         None if math.isnan(judged.factor) else judged.factor,
         tuple((judged.mode * units)[parts].tolist()),
         tuple(moving) if math.isfinite(judged.factor) else (),
+        pressed,
         float(np.abs(equations.left).max() / max(_largest_wrench(equations), 1e-300)),
     )
 
 
 def _largest_wrench(equations: Balance) -> float:
-    """The largest component of the load and of what the legs carry, which preloads alone may be."""
-    return float(max(np.abs(wrench).max() for wrench in (equations.load, *equations.state.wrenches)))
+    """The largest component of the load, of what the legs carry, which preloads alone may be, and of the growths."""
+    sizes = (equations.load, *equations.state.wrenches, equations.mechanism.growth)
+    return float(max(np.abs(size).max(initial=0.0) for size in sizes))
 
 
 def _springs(equations: Balance) -> list[SpringState]:
@@ -262,6 +276,18 @@ def _message(judged: Stability, slack: tuple[str, ...], mode: Array) -> str:
     return " ".join(sentences) or "At rest and stable."
 
 
+def _buckled(machine: Machine, pressed: Sequence[Strut]) -> list[str]:
+    """A sentence about each strut that is pressed with more than Euler's load, which the springs do not know."""
+    show = machine.display.show
+    return [
+        f"{strut.name} bends away: it is pressed with {show(strut.compression, 'N')}, and Euler's load of a column of "
+        f"{show(strut.length, 'm')} between two hinges is {show(strut.euler_load, 'N')}. Make it shorter or its "
+        "cross-section stiffer."
+        for strut in pressed
+        if strut.factor < 1.0
+    ]
+
+
 def _passed_limit(machine: Machine, response: Response) -> list[str]:
     """The sentence about a limit that the machine passes without its weights, if it does."""
     return [why_not(machine, response, [])] if int(response.status) == Status.JOINT_LIMIT else []
@@ -304,6 +330,7 @@ def as_json(state: LoadedState, requirements: Sequence[object] = ()) -> dict[str
             "load_factor": state.factor,
             "mode": state.mode,
             "mode_legs": state.mode_legs,
+            "struts": [{**asdict(strut), "factor": strut.factor} for strut in state.struts],
             "residual": state.residual,
             "requirements": list(requirements),
         }

@@ -34,6 +34,7 @@ OF_LOADED_STATES = (
     "tool.centre_of_mass",
     "tool.payload",
     "tool.payload_centre",
+    *(f"{table}." for table in ("bending_rigidity", "expansion", "temperature_rise")),
 )
 """Fields that change nothing that the page shows: it is about machines without weight. The text pane has them."""
 LEAST_SHARE = 0.02

@@ -34,6 +34,8 @@ def print_loaded(console: Console, state: LoadedState, requirements: Sequence[Ve
         return
     console.print(_displacements(state, display))
     console.print(_springs(state, display))
+    if state.struts:
+        console.print(_struts(state, display))
     about = f"Components {' '.join(state.components)} at the loaded {machine.reference}, base axes."
     console.print(about, style="dim", highlight=False)
     for title, kind, rows in (
@@ -71,6 +73,15 @@ def _springs(state: LoadedState, display: Display) -> Table:
         load = display.show(spring.load, "N·m" if spring.turning else "N")
         amount = display.show_deflection(spring.deformation, "rad" if spring.turning else "m")
         table.add_row(spring.name, load, amount, "slack" if spring.slack else "carries")
+    return table
+
+
+def _struts(state: LoadedState, display: Display) -> Table:
+    """What presses each strut, and at which load it would bend away."""
+    table = numeric_table("Struts: columns between two hinges", "strut", ["compression", "Euler's load", "reserve"])
+    for strut in state.struts:
+        reserve = DASH if math.isinf(strut.factor) else f"{number(strut.factor)} x"
+        table.add_row(strut.name, display.show(strut.compression, "N"), display.show(strut.euler_load, "N"), reserve)
     return table
 
 

@@ -13,6 +13,7 @@ from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.cross_section import least_bending_of, linear_density_of, rigidity_of
 from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Station, Turn
 from kinetostat.machine.link import Beam, any_up, lumped_springs, matrix_springs, seat_springs
+from kinetostat.machine.links import growth_of
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
 from kinetostat.machine.series import springs_in_a_row
 from kinetostat.machine.written.copies import direction_in, joint_numbers, matrix_in
@@ -179,7 +180,7 @@ def _of_section(plan: Plan, section: str, data: Any, length: Scalar) -> tuple[Sc
     if not section:
         return 0.0, 0.0, 0.0
     shape = plan.shapes[section]
-    growth = data.expansion * data.temperature_rise * length
+    growth = growth_of(data.expansion, data.temperature_rise, f'the links of section "{section}"') * length
     return linear_density_of(shape, data), least_bending_of(shape, data), growth
 
 
