@@ -85,8 +85,8 @@ def _lines(leg: Leg, ways: int) -> list[Line]:
     """
     if len(leg.lines) > 1:
         return list(leg.lines)
-    free = len(leg.passive) - len(leg.idle)
-    return [Line(rod.end, rod.span * (1.0 / rod.length)) for rod in rods([leg]) if free == ways - 1]
+    alone = len(leg.lines) == 1 or len(leg.passive) - len(leg.idle) == ways - 1
+    return [Line(rod.end, rod.span * (1.0 / rod.length)) for rod in rods([leg]) if alone]
 
 
 def _across_parallelogram(leg: Leg, link: Member) -> bool:

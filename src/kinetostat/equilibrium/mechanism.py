@@ -372,7 +372,11 @@ class _Row:
 
 
 def _chain(leg: Leg, units: _Units, amounts: _Given, members: Sequence[Member]) -> Chain:
-    links = [(link, *stations) for link in members if (stations := link.ends and link.ends())]
+    links: list[tuple[Member, Station, Station]] = []
+    for link in members:
+        if link.ends is not None:
+            start, end = link.ends()
+            links.append((link, start, end))
     row = _Row(units, amounts, links)
     row.grow(0)
     row.carried.append((0, len(row.twists)))
