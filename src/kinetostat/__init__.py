@@ -18,6 +18,7 @@ _HOMES = {
     "forward": "kinetostat.studies.assembly",
     "under_load": "kinetostat.studies.under_load",
     "command": "kinetostat.studies.command",
+    "correction_table": "kinetostat.studies.correction.table",
     "evaluate": "kinetostat.studies.evaluation.dataset",
     "evaluate_grid": "kinetostat.studies.grid.grid",
     "workspace": "kinetostat.studies.workspace.workspace",
@@ -45,6 +46,7 @@ _SHOWN = {
     "Forward": "kinetostat.studies.assembly",
     "LoadedState": "kinetostat.studies.under_load",
     "Command": "kinetostat.studies.command",
+    "CorrectionTable": "kinetostat.studies.correction.table",
     "Workspace": "kinetostat.studies.workspace.workspace",
     "Sensitivity": "kinetostat.studies.sensitivity",
     "Guidelines": "kinetostat.studies.guidelines.guidelines",
@@ -56,8 +58,8 @@ _SHOWN = {
 
 __all__ = [
     "InputError", "Machine", "Status", "analyze", "build", "bundled", "changed", "command", "compare",
-    "evaluate", "evaluate_grid", "export", "forward", "guidelines", "load", "load_problem", "machine_picture",
-    "optimize", "plot", "register", "report", "reproduce", "requirements", "save", "sensitivity",
+    "correction_table", "evaluate", "evaluate_grid", "export", "forward", "guidelines", "load", "load_problem",
+    "machine_picture", "optimize", "plot", "register", "report", "reproduce", "requirements", "save", "sensitivity",
     "under_load", "validate", "workspace",
 ]  # fmt: skip
 

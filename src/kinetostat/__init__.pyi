@@ -15,6 +15,7 @@ from kinetostat.studies.analysis import analyze as analyze
 from kinetostat.studies.assembly import forward as forward
 from kinetostat.studies.command import command as command
 from kinetostat.studies.comparison.designs import compare as compare
+from kinetostat.studies.correction.table import correction_table as correction_table
 from kinetostat.studies.evaluation.dataset import evaluate as evaluate
 from kinetostat.studies.grid.grid import evaluate_grid as evaluate_grid
 from kinetostat.studies.guidelines.guidelines import guidelines as guidelines

@@ -94,6 +94,9 @@ UNRESISTED = 1e-12
 
 COMMANDED = 1e-14
 """Change of an actuator, rad or in units of the machine's length, below which a correction is round-off."""
+EXACT_LAW = 1e-9
+"""Share of the largest correction below which a coefficient, or the error of a law, is round-off of the states of rest
+that the law was fitted to."""
 
 # Engine: derivatives
 

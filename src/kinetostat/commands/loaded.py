@@ -9,6 +9,7 @@ from kinetostat.commands.common import (
     add_command,
     give,
     load_machine,
+    progress_bar,
     takes_json,
     takes_machine,
     verdicts_of,
@@ -49,19 +50,32 @@ def add_command_command(commands: "Commands") -> None:
     """Add `command`."""
     command = add_command(
         commands, "command", _command, "compute where actuators must stand to bring a loaded tool to its pose",
-        "kinetostat command hexapod poses.csv --set 'load.force=[0, 0, \"-400 N\"]' -o commands.csv",
+        "kinetostat command hexapod --set 'load.gravity=[0, 0, \"-9.81 m/s**2\"]' --set tool.mass=\"20 kg\" "
+        '--over "gravity_angle=0 deg:90 deg:7" -o corrections.csv',
     )  # fmt: skip
     takes_machine(command)
     command.add_argument(
         "poses", metavar="POSES", type=Path, nargs="?",
         help="a CSV file of wanted poses, as `path` takes it (default: the pose of the machine)",
     )  # fmt: skip
-    command.add_argument("-o", "--output", metavar="FILE", type=Path, help="write the commands as CSV")
+    command.add_argument(
+        "--over", metavar="FIELD=from:to:count", action="append", default=[], dest="ranges",
+        help="an axis of a table of corrections: a coordinate of the pose, gravity_angle, or any other field, as `map` "
+        "takes it; repeatable",
+    )  # fmt: skip
+    command.add_argument(
+        "--tolerance", metavar="LENGTH",
+        help='error at the tool that the law of the corrections may have, e.g. "0.1 um" (default: a thousandth of the '
+        "error without corrections)",
+    )  # fmt: skip
+    command.add_argument(
+        "-o", "--output", metavar="FILE", type=Path, help="write the commands, and the corrections of a table, as CSV"
+    )
     takes_json(command)
 
 
 def _command(options: argparse.Namespace) -> int:
-    from kinetostat.spec.errors import choice
+    from kinetostat.spec.errors import InputError, choice
     from kinetostat.studies.command import as_csv, as_json, command
     from kinetostat.studies.storage import write_text
     from kinetostat.views.loaded_tables import print_command
@@ -69,9 +83,29 @@ def _command(options: argparse.Namespace) -> int:
     written = [] if options.output is None else [options.output]
     for path in written:
         choice(path.suffix.lower(), (".csv",), f'the suffix of "{path}"')
+    if options.ranges:
+        return _corrections(options, written)
+    if options.tolerance is not None:
+        raise InputError("--tolerance is about the law of a table of corrections; give its axes with --over.")
     answer = command(load_machine(options), options.poses)
     for path in written:
         write_text(path, as_csv(answer))
     return give(
         options, bool(answer.settled.any()), lambda: as_json(answer), lambda c: print_command(c, answer), written
     )
+
+
+def _corrections(options: argparse.Namespace, written: list[Path]) -> int:
+    from kinetostat.spec.errors import InputError
+    from kinetostat.studies.command import as_csv
+    from kinetostat.studies.correction.table import as_json, correction_table
+    from kinetostat.studies.storage import write_text
+    from kinetostat.views.correction_tables import print_corrections
+
+    if options.poses is not None:
+        raise InputError("the poses come from a file or from --over, not from both; leave one of them out.")
+    with progress_bar("computing") as progress:
+        table = correction_table(load_machine(options), options.ranges, options.tolerance, progress)
+    for path in written:
+        write_text(path, as_csv(table.command, corrections=True))
+    return give(options, True, lambda: as_json(table), lambda console: print_corrections(console, table), written)

@@ -27,11 +27,13 @@ class Commanded:
         solution: the machine at rest with these amounts; they are in its state.
         off: twist from the wanted to the reached pose, at the origin [n x 6]: what no actuator can change.
         before: the same without a correction [n x 6].
+        rates: twist of the platform per unit of each amount, at the origin [n x 6 x actuators].
     """
 
     solution: Solution
     off: Array
     before: Array
+    rates: Array
 
 
 def commanded(mechanism: Mechanism) -> Commanded:
@@ -48,4 +50,4 @@ def commanded(mechanism: Mechanism) -> Commanded:
         solution = at_rest(mechanism, replace(equations.state, amounts=equations.state.amounts + change))
         if np.abs(change).max(initial=0.0) < COMMANDED:
             break
-    return Commanded(solution, logarithm(solution.balance.state.platform), before)
+    return Commanded(solution, logarithm(solution.balance.state.platform), before, ways @ rates)

@@ -79,9 +79,13 @@ def actuators_of(configuration: Configuration) -> list[Actuator]:
     return result
 
 
-def senses_of(configuration: Configuration) -> list[float]:
-    """Tell for each of `actuators_of` whether its coordinate grows (1) or falls (-1) as its joint moves forward."""
-    senses: list[float] = []
+def senses_of(configuration: Configuration) -> list[Scalar]:
+    """Tell for each of `actuators_of` whether its coordinate grows (1) or falls (-1) as its joint moves forward.
+
+    Args:
+        configuration: of a machine in closed form, over floats or columns.
+    """
+    senses: list[Scalar] = []
     for number, leg in enumerate(configuration.legs):
         for place, spring in enumerate(leg.chain):
             if not (isinstance(spring, Spring) and spring.actuated):
@@ -92,8 +96,8 @@ def senses_of(configuration: Configuration) -> list[float]:
             legs = (*configuration.legs[:number], moved, *configuration.legs[number + 1 :])
             there = replace(configuration, platform=motion @ configuration.platform, legs=legs)
             pairs = zip(actuators_of(configuration), actuators_of(there), strict=True)
-            changes = [float(b.coordinate) - float(a.coordinate) for a, b in pairs]
-            senses.append(float(np.sign(changes[len(senses)])))
+            changes = [np.asarray(b.coordinate, dtype=float) - a.coordinate for a, b in pairs]
+            senses.append(np.sign(changes[len(senses)]))
     return senses
 
 

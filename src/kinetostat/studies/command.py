@@ -12,24 +12,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.equilibrium.commanding import commanded
 from kinetostat.equilibrium.motion import Array
-from kinetostat.equilibrium.numbers import loaded_mechanism
-from kinetostat.equilibrium.tangent import stability
-from kinetostat.kinematics.closure import solve_joints
-from kinetostat.kinematics.forward import leg_names
-from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators, senses_of
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.driven import Driven, driven
 from kinetostat.studies.evaluation.columns import PoseColumns
 from kinetostat.studies.evaluation.given_poses import given_poses
 from kinetostat.studies.plain_data import as_answer
-from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +53,11 @@ class Command(Immutable):
     settled: npt.NDArray[np.bool_]
     message: str
 
+    @property
+    def corrections(self) -> Array:
+        """By how much the coordinates differ from those without loads, m or rad [poses x actuators]."""
+        return self.coordinates - self.unloaded
+
     def __repr__(self) -> str:
         return f"<Command of {self.machine.name!r}: {len(self.coordinates)} poses>"
 
@@ -82,75 +78,47 @@ def command(machine: Machine, poses: Any = None) -> Command:
     Raises:
         InputError: there is gravity but no mass, no actuator, tensions are to be chosen, or the poses cannot be read.
     """
+    refuse_tensions(machine)
+    columns = None if poses is None else given_poses(machine, poses)
+    leaves, count = ({}, 1) if columns is None else (columns.leaves, columns.count)
+    return answer_of(machine, columns, driven(machine, leaves, count))
+
+
+def refuse_tensions(machine: Machine) -> None:
+    """Refuse a machine whose tensions are to be chosen: its actuators are driven by forces.
+
+    Raises:
+        InputError: it is such a machine.
+    """
     if not all(math.isinf(bound) for bound in (machine.tables["load"].min_tension, machine.tables["load"].max_tension)):
         raise InputError(
             f"{machine.name}: commands are coordinates of actuators, but load.min_tension and load.max_tension choose "
             "forces, which winches are driven by instead; leave the bounds out, or read the tensions from "
             "`analyze --loaded`."
         )
-    columns = None if poses is None else given_poses(machine, poses)
-    count = 1 if columns is None else columns.count
-    rows = [_at(machine if columns is None else _posed(machine, columns, i)) for i in range(count)]
-    driven = next((names for names, _ in rows if names), None)
-    if driven is None:
-        raise InputError(
-            f"{machine.name} reaches none of these poses, or has no actuator that could be commanded; change the pose."
-        )
-    table = np.array([values if values is not None else [np.nan] * (2 * len(driven) + 3) for _, values in rows])
-    size = len(driven)
-    settled = np.isfinite(table).all(axis=1)
-    before, left, turned = table[:, 2 * size :].T
+
+
+def answer_of(machine: Machine, poses: PoseColumns | None, answer: Driven) -> Command:
+    """What is solved at some poses as the answer to people.
+
+    Args:
+        machine: with its loads.
+        poses: that it is solved at; None for the pose of the machine alone.
+        answer: of them.
+    """
     return Command(
         machine,
-        columns,
-        tuple(actuator.name for actuator in driven),
-        tuple(actuator.unit for actuator in driven),
-        table[:, :size],
-        table[:, size : 2 * size],
-        before,
-        left,
-        turned,
-        settled,
-        _message(machine, settled, before, left),
+        poses,
+        tuple(actuator.name for actuator in answer.actuators),
+        tuple(actuator.unit for actuator in answer.actuators),
+        answer.coordinates,
+        answer.unloaded,
+        answer.before,
+        answer.left,
+        answer.turned,
+        answer.settled,
+        _message(machine, answer.settled, answer.before, answer.left),
     )
-
-
-def _posed(machine: Machine, poses: PoseColumns, number: int) -> Machine:
-    return with_values(machine, {path: float(column[number]) for path, column in poses.leaves.items()})
-
-
-def _at(machine: Machine) -> tuple[list[Actuator], list[float] | None]:
-    """The actuators of a machine, and at its pose: commands, places without loads, errors before and after, tilt."""
-    joints = solve_joints(machine) if machine.family.chains else None
-    response = respond(machine, joints)
-    if int(response.status) in (Status.OUT_OF_REACH, Status.NOT_CONVERGED):
-        return [], None
-    if joints is None:
-        actuators = actuators_of(response.configuration)
-        senses = senses_of(response.configuration)
-    else:
-        placed = joint_actuators(machine.chains(), leg_names(machine))
-        actuators, senses = [each.at(joints.coordinates) for each in placed], [each.sign for each in placed]
-    mechanism, _ = loaded_mechanism(machine, response, joints)
-    by_name = {actuator.name: (actuator, sense) for actuator, sense in zip(actuators, senses, strict=True)}
-    driven = [by_name[name] for name in mechanism.actuators]
-    if not driven:
-        return [], None
-    answer = commanded(mechanism)
-    actuators = [actuator for actuator, _ in driven]
-    if not (answer.solution.settled[0] and stability(answer.solution.balance).stable):
-        return actuators, None
-    length, state = float(mechanism.length[0]), answer.solution.balance.state
-    amounts = [
-        sense * float(amount) * (length if actuator.slides else 1.0)
-        for (actuator, sense), amount in zip(driven, state.amounts[0], strict=True)
-    ]
-    stands = [float(actuator.coordinate) for actuator, _ in driven]
-    before, left = (float(np.linalg.norm(twist[0, 3:])) * length for twist in (answer.before, answer.off))
-    errors = [before, left if left > ROUND_OFF_OF_ENTRY * length else 0.0]
-    turned = float(np.linalg.norm(answer.off[0, :3]))
-    commands = [stand + amount for stand, amount in zip(stands, amounts, strict=True)]
-    return actuators, [*commands, *stands, *errors, turned]
 
 
 def _message(machine: Machine, settled: npt.NDArray[np.bool_], before: Array, left: Array) -> str:
@@ -164,17 +132,22 @@ def _message(machine: Machine, settled: npt.NDArray[np.bool_], before: Array, le
     )
 
 
-def as_csv(answer: Command) -> str:
-    """Write the commands as CSV in SI: a row with the number of each pose (from 1), its fields, and its commands."""
+def as_csv(answer: Command, corrections: bool = False) -> str:
+    """Write the commands as CSV in SI: a row with the number of each pose (from 1), its fields, and its commands.
+
+    Args:
+        answer: the commands.
+        corrections: whether to add by how much they differ from the coordinates without loads.
+    """
     columns: dict[str, Any] = {"pose": range(1, len(answer.coordinates) + 1)}
     if answer.poses is not None:
         for field, values in zip(answer.poses.fields, answer.poses.values, strict=True):
             columns[f"{field.shown} [{field.unit}]"] = values.tolist()
-    for k, (name, unit) in enumerate(zip(answer.actuators, answer.units, strict=True)):
-        columns[f"{name} [{unit}]"] = [
-            value if known else ""
-            for value, known in zip(answer.coordinates[:, k].tolist(), answer.settled, strict=True)
-        ]
+    tables = {"": answer.coordinates, " correction": answer.corrections if corrections else answer.coordinates[:, :0]}
+    for what, table in tables.items():
+        for name, unit, values in zip(answer.actuators, answer.units, table.T, strict=False):
+            pairs = zip(values.tolist(), answer.settled, strict=True)
+            columns[f"{name}{what} [{unit}]"] = [value if known else "" for value, known in pairs]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)

@@ -24,6 +24,8 @@ from kinetostat.studies.assembly import Forward
 from kinetostat.studies.command import Command
 from kinetostat.studies.comparison import designs
 from kinetostat.studies.comparison.designs import Comparison
+from kinetostat.studies.correction import table
+from kinetostat.studies.correction.table import CorrectionTable
 from kinetostat.studies.grid import grid
 from kinetostat.studies.guidelines import sentences
 from kinetostat.studies.guidelines.guidelines import Guidelines
@@ -42,6 +44,7 @@ from kinetostat.views.analysis_tables import print_analysis
 from kinetostat.views.assembly_tables import print_forward
 from kinetostat.views.comparison_figure import comparison_figure
 from kinetostat.views.comparison_tables import print_comparison, print_validation
+from kinetostat.views.correction_tables import print_corrections
 from kinetostat.views.drawing import three_views
 from kinetostat.views.figures import FORMATS, Drawings, contour_maps, curves, save_figure
 from kinetostat.views.grid_tables import print_dataset, print_workspace
@@ -108,6 +111,7 @@ KINDS = (
     Kind(Forward, print_forward, data=assembly.as_json),
     Kind(LoadedState, print_loaded, _loaded_figures, under_load.as_json),
     Kind(Command, print_command, data=command.as_json),
+    Kind(CorrectionTable, print_corrections, data=table.as_json),
     Kind(
         xr.Dataset,
         lambda console, dataset: print_dataset(console, dataset, _names(dataset)),

@@ -15,10 +15,11 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import Parameter, dimension, find
+from kinetostat.machine.parameters import Parameter, dimension
 from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError, several
-from kinetostat.spec.ranges import Range, parse_range
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.ranges import Range
+from kinetostat.studies.grid.axes import chosen_axes
 from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.setting import frame_of, pose_of
@@ -26,7 +27,6 @@ from kinetostat.units import KINDS
 
 IN_MEMORY = 5_000_000
 """Points of a grid that is answered in memory: a dozen quantities of them fit in half a gigabyte."""
-MOST_DIMENSIONS = 6
 
 
 @dataclass(frozen=True)
@@ -65,19 +65,9 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
         InputError: an unknown field or quantity, one that the machine cannot have, a bad range, a field twice, or more
             than six dimensions.
     """
-    ranges = several(ranges)
-    if len(ranges) > MOST_DIMENSIONS:
-        raise InputError(
-            f"the grid has {len(ranges)} dimensions; at most {MOST_DIMENSIONS} are allowed: "
-            "give the others one value each with --set."
-        )
-    wanted = [parse_range(text) for text in ranges]
-    chosen = [find(machine.family, span.field) for span in wanted]
+    pairs = chosen_axes(machine, ranges)
+    chosen = [parameter for _, parameter in pairs]
     taken = [leaf for parameter in chosen for leaf in parameter.leaves]
-    for leaf in taken:
-        if taken.count(leaf) > 1:
-            raise InputError(f"{leaf} is varied twice; give each field one range.")
-    pairs = list(zip(wanted, chosen, strict=True))
     grid = Grid([Axis(parameter.leaves, span.values(parameter.quantity)) for span, parameter in pairs])
     names = resolve_quantities(quantities, machine.family.component_names)
     refuse_absent(machine, names, chosen)

@@ -21,7 +21,8 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.grid.grid import IN_MEMORY, MOST_DIMENSIONS, GridQuestion, answer, field_of, grid_question
+from kinetostat.studies.grid.axes import MOST_DIMENSIONS
+from kinetostat.studies.grid.grid import IN_MEMORY, GridQuestion, answer, field_of, grid_question
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.workspace.borders import Shares, borders
 from kinetostat.studies.workspace.conditions import Condition, parse_condition

@@ -1,0 +1,242 @@
+"""Corrections of actuators over a grid, for a controller that interpolates between its points; with their error.
+
+The grid may run over the pose, the angle of gravity, or any other parameter. Between its points the table is compared
+with what is solved at the middle of each cell.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kinetostat.engine.batch import Progress, silent
+from kinetostat.engine.points import Axis, Grid
+from kinetostat.equilibrium.motion import Array
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import Parameter
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.command import Command, answer_of, refuse_tensions
+from kinetostat.studies.correction.law import Law, shortest_law
+from kinetostat.studies.driven import Driven, driven
+from kinetostat.studies.evaluation.columns import PoseColumns
+from kinetostat.studies.grid.axes import chosen_axes
+from kinetostat.studies.plain_data import as_answer
+from kinetostat.tolerances import EXACT_LAW
+from kinetostat.units import UnitError, parse
+
+MOST_POINTS = 200_000
+"""Points of a table: an hour or less."""
+GOOD_ENOUGH = 1e-3
+"""Share of the error without corrections that a law may leave, if no tolerance is given."""
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectionTable(Immutable):
+    """Corrections of the actuators' coordinates over a grid.
+
+    Attributes:
+        command: coordinates with and without loads at each point, the last axis fastest.
+        fields: of the axes.
+        axes: values along each, SI.
+        before: the largest error of the tool point without corrections, at points and middles of cells, m.
+        left: the largest error that exact commands leave, m: what no actuator of the machine can change.
+        error: the largest further error by interpolation, at the middles of cells, m; NaN if no cell is complete.
+        unknown: how many cells have a corner or middle without a state of rest.
+        law: the shortest law of the corrections.
+        law_error: its largest error at points and middles of cells, m.
+        tolerance: for the error of the law, m.
+        exact: whether that error is only round-off.
+        message: what is the case, in sentences.
+    """
+
+    command: Command
+    fields: tuple[Parameter, ...]
+    axes: tuple[Array, ...]
+    before: float
+    left: float
+    error: float
+    unknown: int
+    law: Law
+    law_error: float
+    tolerance: float
+    exact: bool
+    message: str
+
+    def __repr__(self) -> str:
+        return f"<CorrectionTable of {self.command.machine.name!r}: {' x '.join(map(str, map(len, self.axes)))} points>"
+
+    @property
+    def corrections(self) -> Array:
+        """What is added to the coordinates of the actuators without loads, m or rad [points along axes x actuators]."""
+        return self.command.corrections.reshape(*map(len, self.axes), -1)
+
+
+@checked
+def correction_table(
+    machine: Machine,
+    over: str | Sequence[str],
+    tolerance: float | str | None = None,
+    progress: Progress = silent,
+) -> CorrectionTable:
+    """Compute by how much the actuators of a loaded machine must be corrected, over a grid.
+
+    A controller adds the corrections to the coordinates that an unloaded machine would need; between the points of the
+    table it interpolates. The error of this is measured where it is largest, at the middles of the cells. A law as
+    short as the tolerance allows is fitted as well: over the angle of gravity with its cosine and sine, over all else
+    with powers.
+
+    Args:
+        machine: with its loads.
+        over: one axis each, "FIELD=from:to:count[:log]", as for `evaluate_grid`; for instance
+            "gravity_angle=0 deg:90 deg:7".
+        tolerance: for the error of the law at the tool, m or text with a unit; a thousandth of the error without
+            corrections if None.
+        progress: receives how far the work is.
+
+    Raises:
+        InputError: a bad range or tolerance, too many points, no place or no actuator, gravity without a mass, or
+            tensions that are to be chosen.
+    """
+    refuse_tensions(machine)
+    ranges = [over] if isinstance(over, str) else over
+    pairs = chosen_axes(machine, ranges)
+    grid = Grid([Axis(parameter.leaves, span.values(parameter.quantity)) for span, parameter in pairs])
+    if grid.size > MOST_POINTS:
+        raise InputError(f"the table has {grid.size:,} points; at most {MOST_POINTS:,} are computed: lower the counts.")
+    wanted = None if tolerance is None else _length(tolerance)
+    middles = Grid([Axis(axis.paths, 0.5 * (axis.values[1:] + axis.values[:-1])) for axis in grid.axes])
+    # Together, so that a table whose cells have no place is still a table.
+    every = middles.columns(0, middles.size)
+    columns = {path: np.concatenate([values, every[path]]) for path, values in grid.columns(0, grid.size).items()}
+    answers = driven(machine, columns, grid.size + middles.size, progress)
+    fields = tuple(parameter for _, parameter in pairs)
+    return _judged(machine, fields, grid, middles, answers.parted(grid.size), wanted)
+
+
+def _length(text: float | str) -> float:
+    try:
+        value = parse(text, "length")
+    except UnitError as error:
+        raise InputError(f'tolerance is "{text}": {error}.') from None
+    if not value > 0.0:
+        raise InputError(f'tolerance is "{text}"; give a length greater than 0, e.g. "0.1 um".')
+    return value
+
+
+def _judged(
+    machine: Machine,
+    fields: tuple[Parameter, ...],
+    grid: Grid,
+    middles: Grid,
+    answers: Sequence[Driven],
+    wanted: float | None,
+) -> CorrectionTable:
+    """The table with its errors and its law, of what is solved at points and at middles of cells."""
+    nodes, cells = answers
+    axes, points = tuple(axis.values for axis in grid.axes), _points(grid)
+    if not nodes.settled.any():
+        raise InputError(
+            f"{machine.name} comes to rest at no point of this table; reduce the load, or preload what only pulls."
+        )
+    errors = _errors(cells, _between(nodes.corrections, grid.shape))
+    before, left = (
+        float(np.nanmax(np.concatenate([getattr(nodes, name), getattr(cells, name)]))) for name in ("before", "left")
+    )
+    tolerance = GOOD_ENOUGH * before if wanted is None else wanted
+
+    def error(law: Law) -> float:
+        ends = [_errors(nodes, law.at(points)), _errors(cells, law.at(_points(middles)))]
+        return float(np.nanmax(np.concatenate(ends)))
+
+    law, law_error = shortest_law([field.path for field in fields], axes, nodes.corrections, error, tolerance)
+    largest = float(np.nanmax(errors)) if np.isfinite(errors).any() else float("nan")
+    unknown = int((~np.isfinite(errors)).sum())
+    command = answer_of(machine, PoseColumns(fields, points, {}), nodes)
+    message = _message(machine, before, left, largest, unknown, len(errors))
+    return CorrectionTable(
+        command,
+        fields,
+        axes,
+        before,
+        left,
+        largest,
+        unknown,
+        law,
+        law_error,
+        tolerance,
+        law_error <= EXACT_LAW * before,
+        message,
+    )
+
+
+def _points(grid: Grid) -> tuple[Array, ...]:
+    """The values of each axis at all points of a grid."""
+    columns = grid.columns(0, grid.size)
+    return tuple(np.array(columns[axis.paths[0]]) for axis in grid.axes)
+
+
+def _between(values: Array, shape: Sequence[int]) -> Array:
+    """Values at the points of a grid, interpolated linearly at the middles of its cells [n x k] -> [cells x k]."""
+    table = values.reshape(*shape, -1)
+    for axis in range(len(shape)):
+        ahead, behind = (np.take(table, range(a, shape[axis] - 1 + a), axis) for a in (1, 0))
+        table = 0.5 * (ahead + behind)
+    return table.reshape(-1, values.shape[1])
+
+
+def _errors(solved: Driven, corrections: Array) -> Array:
+    """How far corrections leave the tool point from where exact ones bring it, m [n]; to first order in the error."""
+    off = np.einsum("nca,na->nc", solved.rates, corrections - solved.corrections)
+    return np.asarray(np.linalg.norm(off, axis=1))
+
+
+def _message(machine: Machine, before: float, left: float, error: float, unknown: int, cells: int) -> str:
+    show = machine.display.show_deflection
+    if not before:
+        return (
+            "No load moves the tool, so that there is nothing to correct; give [load] a force, or gravity and masses."
+        )
+    sentences = [f"Without corrections the tool point is off by at most {show(before, 'm')}."]
+    if np.isfinite(error):
+        sentences.append(
+            f"Interpolated linearly, the table leaves at most {show(error, 'm')} (at the middles of its cells)"
+            + (f", beside the {show(left, 'm')} that no actuator can change." if left > 0.0 else ".")
+        )
+    if unknown:
+        sentences.append(f"{unknown} of {cells} cells have a corner or a middle without a state of rest.")
+    return " ".join(sentences)
+
+
+def as_json(table: CorrectionTable) -> dict[str, Any]:
+    """Return the table as plain data, SI; null at points without a state of rest."""
+    law = table.law
+    return as_answer(
+        {
+            "name": table.command.machine.name,
+            "message": table.message,
+            "axes": {field.path: values for field, values in zip(table.fields, table.axes, strict=True)},
+            "actuators": table.command.actuators,
+            "units": table.command.units,
+            "corrections": table.corrections,
+            "coordinates": table.command.coordinates.reshape(table.corrections.shape),
+            "error_before": table.before,
+            "error_left": table.left,
+            "error_of_table": table.error,
+            "cells_unknown": table.unknown,
+            "law": {
+                "terms": [
+                    {path: list(part) for path, part in zip(law.paths, term, strict=True) if part != ("power", 0)}
+                    for term in law.terms
+                ],
+                "middles": dict(zip(law.paths, law.middles, strict=True)),
+                "halves": dict(zip(law.paths, law.halves, strict=True)),
+                "coefficients": law.coefficients,
+                "error": table.law_error,
+                "tolerance": table.tolerance,
+                "exact": table.exact,
+            },
+        }
+    )
