@@ -17,6 +17,7 @@ _HOMES = {
     "analyze": "kinetostat.studies.analysis",
     "forward": "kinetostat.studies.assembly",
     "under_load": "kinetostat.studies.under_load",
+    "carrying_legs": "kinetostat.studies.carrying",
     "command": "kinetostat.studies.command",
     "correction_table": "kinetostat.studies.correction.table",
     "evaluate": "kinetostat.studies.evaluation.dataset",
@@ -48,6 +49,7 @@ _SHOWN = {
     "Command": "kinetostat.studies.command",
     "CorrectionTable": "kinetostat.studies.correction.table",
     "Workspace": "kinetostat.studies.workspace.workspace",
+    "Carrying": "kinetostat.studies.carrying",
     "Sensitivity": "kinetostat.studies.sensitivity",
     "Guidelines": "kinetostat.studies.guidelines.guidelines",
     "Comparison": "kinetostat.studies.comparison.designs",
@@ -57,7 +59,7 @@ _SHOWN = {
 """Classes that notebooks show as HTML, with their modules: IPython gets names only, so that nothing is imported."""
 
 __all__ = [
-    "InputError", "Machine", "Status", "analyze", "build", "bundled", "changed", "command", "compare",
+    "InputError", "Machine", "Status", "analyze", "build", "bundled", "carrying_legs", "changed", "command", "compare",
     "correction_table", "evaluate", "evaluate_grid", "export", "forward", "guidelines", "load", "load_problem",
     "machine_picture", "optimize", "plot", "register", "report", "reproduce", "requirements", "save", "sensitivity",
     "under_load", "validate", "workspace",

@@ -13,6 +13,7 @@ from kinetostat.machine.machine import Machine as Machine
 from kinetostat.spec.errors import InputError as InputError
 from kinetostat.studies.analysis import analyze as analyze
 from kinetostat.studies.assembly import forward as forward
+from kinetostat.studies.carrying import carrying_legs as carrying_legs
 from kinetostat.studies.command import command as command
 from kinetostat.studies.comparison.designs import compare as compare
 from kinetostat.studies.correction.table import correction_table as correction_table

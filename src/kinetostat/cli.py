@@ -24,6 +24,7 @@ from kinetostat.commands.common import (
     no_answer,
     print_json,
     stopped,
+    takes_figures,
     takes_json,
     takes_machine,
     verdicts_of,
@@ -192,6 +193,7 @@ def _parser() -> Parser:
         help="at rest under gravity, preload and [load], with exact geometry: displacement, springs, tangent stiffness "
         '(default where [load] says state = "loaded")',
     )  # fmt: skip
+    takes_figures(analyze, "figures of the loaded machine: its shape, and the curve while the load grows")
     takes_json(analyze)
     add_forward_command(commands)
     add_command_command(commands)
@@ -307,6 +309,8 @@ def _analyze(options: argparse.Namespace) -> int:
     machine = load_machine(options)
     if options.loaded or machine.loaded:
         return analyze_loaded(options, machine)
+    if options.output:
+        raise InputError("analyze draws figures of the machine under load only; add --loaded, or leave -o out.")
     verdicts = verdicts_of(machine)
     analysis = analyze(machine, options.axes)
     answered = analysis.status is Status.OK

@@ -51,6 +51,10 @@ def add_grid_commands(commands: "Commands") -> None:
         "--over", metavar=VARY, required=True, action="append", dest="ranges", help="an axis of the map"
     )
     mapping.set_defaults(default_quantity="compliance")
+    mapping.add_argument(
+        "--carrying", action="store_true",
+        help="instead of quantities: which legs carry under load and which are slack, as regions of the map",
+    )  # fmt: skip
     for command in (sweep, mapping):
         takes_machine(command)
         takes_quantities(command, command.get_default("default_quantity"))
@@ -103,7 +107,32 @@ def _map(options: argparse.Namespace) -> int:
 
     if len(options.ranges) < 2:
         raise InputError("map needs two --over ranges or more; for one parameter use `kinetostat sweep --vary ...`.")
-    return _grid(options, "map")
+    return _carrying(options) if options.carrying else _grid(options, "map")
+
+
+def _carrying(options: argparse.Namespace) -> int:
+    from kinetostat.spec.errors import InputError
+    from kinetostat.studies.carrying import as_json, carrying_legs
+    from kinetostat.studies.storage import write_dataset
+    from kinetostat.views.carrying_views import carrying_map, print_carrying
+
+    if options.quantities or options.workers or options.cluster or options.resume:
+        raise InputError(
+            "--carrying shows which legs carry, not a quantity, and computes in this process; leave out --quantity, "
+            "--workers, --cluster and --resume."
+        )
+    machine = load_machine(options)
+    with progress_bar("computing") as progress:
+        answer = carrying_legs(machine, options.ranges, progress)
+    written = []
+    if options.output:
+        written.append(options.output / "carrying.nc")
+        write_dataset(written[0], answer.dataset)
+        if answer.is_map:
+            written += write_figures(options, {"carrying": lambda: carrying_map(answer)})
+    return give(
+        options, bool(answer.sets), lambda: as_json(answer), lambda console: print_carrying(console, answer), written
+    )
 
 
 def _grid(options: argparse.Namespace, stem: str) -> int:

@@ -13,11 +13,13 @@ from kinetostat.commands.common import (
     takes_json,
     takes_machine,
     verdicts_of,
+    write_figures,
 )
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
     from kinetostat.machine.machine import Machine
+    from kinetostat.studies.under_load import LoadedState
 
 
 def analyze_loaded(options: argparse.Namespace, machine: "Machine") -> int:
@@ -41,9 +43,19 @@ def analyze_loaded(options: argparse.Namespace, machine: "Machine") -> int:
         bool(state.displacement),
         lambda: as_json(state, verdicts),
         lambda console: print_loaded(console, state, verdicts),
+        _drawn(options, state),
         message=state.message,
     )
     return code if all(verdict.met for verdict in verdicts) else NO_ANSWER
+
+
+def _drawn(options: argparse.Namespace, state: "LoadedState") -> list[Path]:
+    """Write the figures of a loaded machine, if a folder is given and it is at rest."""
+    if not options.output or not state.displacement:
+        return []
+    from kinetostat.views.loaded_figures import load_figure, shape_figure
+
+    return write_figures(options, {"shape": lambda: shape_figure(state), "growing-load": lambda: load_figure(state)})
 
 
 def add_command_command(commands: "Commands") -> None:

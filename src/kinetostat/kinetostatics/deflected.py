@@ -3,8 +3,9 @@
 Source: theory (31) and (32).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isinf
 
 import numpy as np
@@ -66,8 +67,29 @@ def deflected_links(response: Response, load: Wrench) -> list[DeflectedLink]:
         turned = _following([*passive, *free], left, float(response.configuration.length))
         freed = iter(turned[len(passive) :])
         given = [next(freed) if twist is None else twist for twist in elastic]
-        links += _links(leg, response.reference, iter(turned[: len(passive)]), iter(given))
+        bodies = _bodies(leg, iter(turned[: len(passive)]), iter(given))
+        links += leg_links(leg, partial(_moved, bodies, response.reference))
     return links
+
+
+def leg_links(leg: Leg, moved: Callable[[int, Vector], Twist]) -> Iterator[DeflectedLink]:
+    """The links between the points of a chain.
+
+    Args:
+        leg: at the pose.
+        moved: the motion, in base axes (rad, m), of a point of the body after so many elements.
+    """
+    at: Vector | None = None
+    leaving = 0
+    for number, element in enumerate(leg.chain):
+        points = _points(element)
+        for n, point in enumerate(points):
+            body = number + (n > 0)
+            if at is not None and (point - at).norm() > 0.0:
+                yield DeflectedLink(leg.name, at, point, moved(leaving, at), moved(body, point))
+            at, leaving = point, body
+        if len(points) == 1:
+            leaving = number + 1
 
 
 def _following(passive: Sequence[Twist], left: Twist, length: float) -> list[Twist]:
@@ -80,24 +102,17 @@ def _following(passive: Sequence[Twist], left: Twist, length: float) -> list[Twi
     return [twist * float(amount) for twist, amount in zip(passive, amounts, strict=True)]
 
 
-def _links(leg: Leg, reference: Vector, turned: Iterator[Twist], given: Iterator[Twist]) -> Iterator[DeflectedLink]:
-    """The links between the points of a chain, motions added up from the base."""
-    motion = Twist(ZERO, ZERO)
-    at: Vector | None = None
-    leaving = motion
+def _bodies(leg: Leg, turned: Iterator[Twist], given: Iterator[Twist]) -> list[Twist]:
+    """Motions of the bodies before, between and after the elements of a chain, added up from the base."""
+    motions = [Twist(ZERO, ZERO)]
     for element in leg.chain:
-        points = _points(element)
-        for n, point in enumerate(points):
-            if n == 1:
-                motion = motion + _sum(
-                    [next(turned) for _ in element.freedoms] + [next(given) for _ in element.springs]
-                )
-            if at is not None and (point - at).norm() > 0.0:
-                yield DeflectedLink(leg.name, at, point, leaving.moved(at - reference), motion.moved(point - reference))
-            at, leaving = point, motion
-        if len(points) < 2:
-            motion = motion + _sum([next(turned) for _ in element.freedoms] + [next(given) for _ in element.springs])
-            leaving = motion if points else leaving
+        moves = [next(turned) for _ in element.freedoms] + [next(given) for _ in element.springs]
+        motions.append(motions[-1] + _sum(moves))
+    return motions
+
+
+def _moved(bodies: Sequence[Twist], reference: Vector, body: int, point: Vector) -> Twist:
+    return bodies[body].moved(point - reference)
 
 
 def _points(element: Element) -> tuple[Vector, ...]:

@@ -18,11 +18,13 @@ from kinetostat.equilibrium.buckling import Strut, struts
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import loaded_mechanism
+from kinetostat.equilibrium.shape import loaded_links
 from kinetostat.equilibrium.solving import Rest, at_rest, solve, with_share
 from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, inverse, stability
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.singularity import describe
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.deflected import DeflectedLink
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.mass import located_members
@@ -79,6 +81,7 @@ class LoadedState(Immutable):
         mode_legs: the legs that move most then.
         struts: what presses each strut whose E I is known, and Euler's load at which it bends away.
         residual: what is left of the equations, as a share of what the load and the legs carry.
+        links: of all legs, with the exact motions of their ends.
     """
 
     machine: Machine
@@ -97,6 +100,7 @@ class LoadedState(Immutable):
     mode_legs: tuple[str, ...] = ()
     struts: tuple[Strut, ...] = ()
     residual: float = 0.0
+    links: tuple[DeflectedLink, ...] = ()
 
     def __repr__(self) -> str:
         return f"<{self.machine.name!r} under load: {self.rest.word}>"
@@ -206,6 +210,7 @@ def _state(machine: Machine, response: Response, equations: Balance, pressed: tu
         tuple(moving) if math.isfinite(judged.factor) else (),
         pressed,
         float(np.abs(equations.left).max() / max(_largest_wrench(equations), 1e-300)),
+        loaded_links(equations, response.configuration.legs, response.reference),
     )
 
 

@@ -18,9 +18,10 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.studies import analysis, assembly, command, sensitivity, under_load
+from kinetostat.studies import analysis, assembly, carrying, command, sensitivity, under_load
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.assembly import Forward
+from kinetostat.studies.carrying import Carrying
 from kinetostat.studies.command import Command
 from kinetostat.studies.comparison import designs
 from kinetostat.studies.comparison.designs import Comparison
@@ -42,6 +43,7 @@ from kinetostat.validation.comparison import Validation
 from kinetostat.views import optimisation_figures, workspace_figures
 from kinetostat.views.analysis_tables import print_analysis
 from kinetostat.views.assembly_tables import print_forward
+from kinetostat.views.carrying_views import carrying_map, print_carrying
 from kinetostat.views.comparison_figure import comparison_figure
 from kinetostat.views.comparison_tables import print_comparison, print_validation
 from kinetostat.views.correction_tables import print_corrections
@@ -50,7 +52,7 @@ from kinetostat.views.figures import FORMATS, Drawings, contour_maps, curves, sa
 from kinetostat.views.grid_tables import print_dataset, print_workspace
 from kinetostat.views.influence_figures import guideline_figures, sensitivity_figure
 from kinetostat.views.influence_tables import print_guidelines, print_sensitivity
-from kinetostat.views.loaded_figures import load_figure
+from kinetostat.views.loaded_figures import load_figure, shape_figure
 from kinetostat.views.loaded_tables import print_command, print_loaded
 from kinetostat.views.optimisation_tables import print_result
 from kinetostat.views.picture import Picture, machine_picture
@@ -102,7 +104,9 @@ def _sensitivity_figures(sensitivity: Sensitivity) -> Drawings:
 
 
 def _loaded_figures(state: LoadedState) -> Drawings:
-    return {"growing load": partial(load_figure, state)} if state.displacement else {}
+    """Return the curve over the growing load, and the shape; a machine without rest has neither."""
+    drawn = {"growing load": partial(load_figure, state), "shape": partial(shape_figure, state)}
+    return drawn if state.displacement else {}
 
 
 KINDS = (
@@ -112,6 +116,12 @@ KINDS = (
     Kind(LoadedState, print_loaded, _loaded_figures, under_load.as_json),
     Kind(Command, print_command, data=command.as_json),
     Kind(CorrectionTable, print_corrections, data=table.as_json),
+    Kind(
+        Carrying,
+        print_carrying,
+        lambda answer: {"map": partial(carrying_map, answer)} if answer.is_map else {},
+        carrying.as_json,
+    ),
     Kind(
         xr.Dataset,
         lambda console, dataset: print_dataset(console, dataset, _names(dataset)),
@@ -218,6 +228,6 @@ def _writers(what: object) -> dict[str, Writer]:
     match what:
         case xr.Dataset():
             written[".nc"] = lambda path: write_dataset(path, what)
-        case Workspace():
+        case Workspace() | Carrying():
             written[".nc"] = lambda path: write_dataset(path, what.dataset)
     return written

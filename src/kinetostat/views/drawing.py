@@ -1,6 +1,8 @@
 """Drawing of a machine at its pose: front, side and plan. Geometry comes from the configuration, style is set here."""
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -32,35 +34,46 @@ def three_views(machine: Machine, title: str) -> Figure:
     """
     response = respond(machine)
     configuration, tool = response.configuration, response.reference
-    views = VIEWS if configuration.plane is None else VIEWS[2:]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.6 if len(views) > 1 else 4.0, 3.3), layout="constrained")
-        for panel, (name, across, up) in zip(figure.subplots(1, len(views), squeeze=False).flat, views, strict=True):
-            _draw_view(panel, configuration, tool, across, up)
-            panel.set(title=name, xlabel=f"{across} (mm)", ylabel=f"{up} (mm)", aspect="equal")
-            panel.margins(0.12)
+        figure = views_of(configuration, partial(_draw_view, configuration, tool))
         set_title(figure, title)
         fix_layout(figure)
     return figure
 
 
-def _draw_view(panel: Axes, configuration: Configuration, tool: Vector, across: str, up: str) -> None:
+def views_of(configuration: Configuration, draw: Callable[[Axes, str, str], None]) -> Figure:
+    """Begin a figure with front, side and plan, of a planar machine only the plan, to scale in mm.
+
+    Args:
+        configuration: of the machine.
+        draw: fills a panel, given the axes across and up.
+    """
+    views = VIEWS if configuration.plane is None else VIEWS[2:]
+    figure = Figure(figsize=(7.6 if len(views) > 1 else 4.0, 3.3), layout="constrained")
+    for panel, (name, across, up) in zip(figure.subplots(1, len(views), squeeze=False).flat, views, strict=True):
+        draw(panel, across, up)
+        panel.set(title=name, xlabel=f"{across} (mm)", ylabel=f"{up} (mm)", aspect="equal")
+        panel.margins(0.12)
+    return figure
+
+
+def _draw_view(configuration: Configuration, tool: Vector, panel: Axes, across: str, up: str) -> None:
     reference = configuration.platform.translation
     actuated = [leg for leg in configuration.legs if leg.actuated]
     standing = [leg for leg in actuated if len(leg.path) > 1]
-    for plate in (_loop([leg.path[0] for leg in standing]), _loop([leg.path[-1] for leg in standing])):
-        panel.fill(*_flat(plate, across, up), facecolor="#dddddd", edgecolor=PLATE, linewidth=0.8, alpha=0.8)
+    for plate in (loop([leg.path[0] for leg in standing]), loop([leg.path[-1] for leg in standing])):
+        panel.fill(*flat(plate, across, up), facecolor="#dddddd", edgecolor=PLATE, linewidth=0.8, alpha=0.8)
     for leg in configuration.legs:
         _draw_leg(panel, leg, across, up, leg in actuated)
     marks = {"P": reference} if (tool - reference).norm() == 0.0 else {"P": reference, "T": tool}
     for name, point in marks.items():
-        (x,), (y,) = _flat([point], across, up)
+        (x,), (y,) = flat([point], across, up)
         panel.plot(x, y, "+", color="black", markersize=7, markeredgewidth=1.2)
         panel.annotate(name, (x, y), textcoords="offset points", xytext=OFFSETS[name])
 
 
 def _draw_leg(panel: Axes, leg: Leg, across: str, up: str, actuated: bool) -> None:
-    x, y = _flat(list(leg.path), across, up)
+    x, y = flat(list(leg.path), across, up)
     colour = LEG if actuated else CONSTRAINT
     panel.plot(x, y, "-", color=colour, linewidth=1.4 if actuated else 2.2, solid_capstyle="round")
     panel.plot(x, y, "o", color="white", markeredgecolor=colour, markersize=4 if actuated else 5, markeredgewidth=1.0)
@@ -73,7 +86,7 @@ def _draw_leg(panel: Axes, leg: Leg, across: str, up: str, actuated: bool) -> No
 
 def _number(panel: Axes, leg: Leg, x: float, y: float, colour: str) -> None:
     """Write the name of a leg beside its base joint: away from the leg, or from the origin where the leg goes up."""
-    ends = list(zip(*_flat(list(leg.path), "x", "y"), strict=True))
+    ends = list(zip(*flat(list(leg.path), "x", "y"), strict=True))
     ways = [*((x - end[0], y - end[1]) for end in ends[1:]), (x, y), (-1.0, 0.0)]
     across, up = next(
         (dx / far, dy / far) for dx, dy in ways if (far := math.hypot(dx, dy)) > MILLIMETRES * SAME_TO_THE_EYE
@@ -91,13 +104,14 @@ def _alignment(part: float, low: str, high: str) -> str:
     return "center" if abs(part) < 0.38 else high if part > 0.0 else low
 
 
-def _loop(points: Loop) -> Loop:
-    """Points sorted by their angle about their centre in the x-y plane."""
+def loop(points: Loop) -> Loop:
+    """Return points sorted by their angle about their centre in the x-y plane."""
     if not points:
         return []
     cx, cy = sum(p.x for p in points) / len(points), sum(p.y for p in points) / len(points)
     return sorted(points, key=lambda p: math.atan2(p.y - cy, p.x - cx))
 
 
-def _flat(points: Loop, across: str, up: str) -> tuple[list[float], list[float]]:
+def flat(points: Loop, across: str, up: str) -> tuple[list[float], list[float]]:
+    """Return the coordinates of points along two axes, mm."""
     return [MILLIMETRES * getattr(p, across) for p in points], [MILLIMETRES * getattr(p, up) for p in points]

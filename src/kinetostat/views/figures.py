@@ -95,7 +95,7 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
         for unused in list(figure.axes)[len(names) : rows * columns]:
             unused.remove()
         set_title(figure, title)
-        note_setting(figure, *_setting(dataset))
+        note_setting(figure, *setting_lines(dataset))
         fix_layout(figure)
         for contours in lines:
             _write_levels(contours)
@@ -118,7 +118,7 @@ def curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
             shown = [name for name in names if dataset[name].attrs["units"] == unit]
             _curve_panel(panel, dataset, str(across), shown)
         set_title(figure, title)
-        note_setting(figure, *_setting(dataset))
+        note_setting(figure, *setting_lines(dataset))
         fix_layout(figure)
     return figure
 
@@ -182,7 +182,7 @@ def note_setting(figure: Figure, *lines: str) -> None:
     figure.supxlabel("\n".join(shown), fontsize=6.5, color="#555555")
 
 
-def _setting(dataset: xr.Dataset) -> tuple[str, str]:
+def setting_lines(dataset: xr.Dataset) -> tuple[str, str]:
     """Frame and pose of a grid, and how many of its poses have no result."""
     counts = [f"{status.word.replace('_', ' ')}: {count:,}" for status, count in failures(dataset).items()]
     missing = f"no result at {', '.join(counts)} of {dataset['status'].size:,} poses" if counts else ""

@@ -31,6 +31,11 @@ def print_dataset(console: Console, dataset: xr.Dataset, names: Sequence[str]) -
         extremes = {name: _extremes(dataset[name]) for name in names}
         sizes = {shown(field_of(dataset[d])): n for d, n in dataset.sizes.items()}
         _print_extremes(console, dataset.attrs["machine"], sizes, extremes, display_of(dataset))
+    print_failures(console, dataset)
+
+
+def print_failures(console: Console, dataset: xr.Dataset) -> None:
+    """Print how many points of a grid have no result, and why."""
     _print_failures(console, failures(dataset), dataset["status"].size)
 
 

@@ -1,17 +1,25 @@
-"""The curve of a machine under growing load: how far its tool moves, and what its springs carry."""
+"""Pictures of a machine under load: its shape over the unloaded one, and the curve while the load grows."""
 
 from collections.abc import Sequence
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from kinetostat.display import Scale
 from kinetostat.engine.points import Array
+from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.under_load import LoadedState, load_curve
+from kinetostat.views.drawing import flat, loop, views_of
 from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.scene.analysis_overlays import exaggerated, exaggeration_of, motions_of
+from kinetostat.views.scene.proportions import proportions_of
 
+UNLOADED, LOADED, SLACK = "#9a9a9a", COLOURS[0], COLOURS[1]
+BENDS = 12
+"""Pieces of which a bent link is drawn."""
 MOST_SPRINGS = 12
 """Springs of which a curve is drawn, those with the greatest loads: more cannot be told apart."""
 
@@ -34,7 +42,7 @@ def load_figure(state: LoadedState) -> Figure:
         figure = Figure(figsize=(6.6, 0.7 + 1.8 * (2 + len(kinds))), layout="constrained")
         panels = list(figure.subplots(2 + len(kinds), 1, sharex=True, squeeze=False).flat)
         for panel, (rows, what, unit) in zip(panels, groups, strict=False):
-            scale = display.deflection(unit)
+            scale = display.fitting(unit, curve.displacement[:, rows].flat)
             named = {state.components[i]: curve.displacement[:, i] * scale.factor for i in rows}
             _curves(panel, share, named, scale.label(what))
             if state.linear is not None:
@@ -49,6 +57,50 @@ def load_figure(state: LoadedState) -> Figure:
         note_setting(figure, setting_of(machine, []), "thin lines: to first order" if state.linear else "")
         fix_layout(figure)
     return figure
+
+
+def shape_figure(state: LoadedState) -> Figure:
+    """Draw the loaded machine over the unloaded one, in front, side and plan; slack legs are dashed.
+
+    Args:
+        state: of a machine that is at rest.
+    """
+    machine, configuration, moved = state.machine, respond(state.machine).configuration, motions_of(state)
+    factor = exaggeration_of(state, moved, proportions_of(machine, configuration).diagonal)
+    point = machine.tool_point(configuration.platform)
+    motion = exaggerated(moved.motion, point, factor)
+    heads = loop([leg.path[-1] for leg in configuration.legs if leg.actuated and leg.path])
+
+    def draw(panel: Axes, across: str, up: str) -> None:
+        for leg in configuration.legs:
+            panel.plot(*flat(list(leg.path), across, up), color=UNLOADED, linewidth=1.6, solid_capstyle="round")
+        for points, colour in ((heads, UNLOADED), ([motion.apply(head) for head in heads], LOADED)):
+            panel.fill(*flat(points, across, up), facecolor=colour, alpha=0.25, edgecolor=colour, linewidth=0.8)
+        for link in moved.links:
+            bent = [link.point(i / BENDS, factor) for i in range(BENDS + 1)]
+            slack = link.leg in state.slack_legs
+            dash, wide = ("--", 0.9) if slack else ("-", 1.6)
+            panel.plot(*flat(bent, across, up), dash, color=SLACK if slack else LOADED, linewidth=wide)
+        for tip, colour in ((point, UNLOADED), (motion.apply(point), LOADED)):
+            panel.plot(*flat([tip], across, up), "+", color=colour, markersize=7, markeredgewidth=1.2)
+
+    with mpl.rc_context(STYLE):
+        figure = views_of(configuration, draw)
+        styles = [("without loads", UNLOADED, "-"), ("at rest under load", LOADED, "-")]
+        styles += [("slack", SLACK, "--")] if state.slack_legs else []
+        figure.legend(
+            handles=[Line2D([], [], color=colour, linestyle=dash, label=text) for text, colour, dash in styles],
+            loc="outside lower center", ncols=len(styles), title_fontsize=6.5,
+            title=f"{setting_of(machine, [])}\n{drawn_larger(factor)}",
+        )  # fmt: skip
+        set_title(figure, f"{machine.name}: under load")
+        fix_layout(figure)
+    return figure
+
+
+def drawn_larger(factor: float) -> str:
+    """Say how much larger than they are displacements are drawn."""
+    return "displacements to scale" if factor == 1.0 else f"displacements drawn {factor:,.0f} times larger"
 
 
 def _curves(panel: Axes, share: Array, curves: dict[str, Array], label: str) -> None:

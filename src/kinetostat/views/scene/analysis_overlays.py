@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import cos, sin
-from kinetostat.algebra.screw import Twist, Wrench
+from kinetostat.algebra.screw import COMPONENTS, Twist, Wrench
 from kinetostat.algebra.vector import IDENTITY, Displacement, Vector, rotation_along
 from kinetostat.kinetostatics.deflected import DeflectedLink, deflected_links
 from kinetostat.kinetostatics.indices import Principal
@@ -16,6 +16,7 @@ from kinetostat.kinetostatics.loading import deflection
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.under_load import LoadedState
 from kinetostat.tolerances import NO_TURN
 from kinetostat.views.scene import overlays
 from kinetostat.views.scene.anatomy import anatomy
@@ -71,6 +72,26 @@ def overlays_of(
     moved = Deflection(load, deflection(response.statics, load), tuple(deflected_links(response, load)))
     ghost, chosen = deflection_overlays(machine, configuration, sizes, moved, factor)
     return solids + ghost, chosen
+
+
+def motions_of(state: LoadedState) -> Deflection:
+    """The motions of a machine from its unloaded pose to its rest."""
+    by_name = dict(zip(state.components, state.displacement, strict=True))
+    turned, moved = ([by_name.get(name, 0.0) for name in COMPONENTS[part]] for part in (slice(3), slice(3, 6)))
+    return Deflection(state.machine.load, Twist(Vector(*turned), Vector(*moved)), state.links)
+
+
+def exaggeration_of(state: LoadedState, moved: Deflection, diagonal: float) -> float:
+    """A round factor, at least 1, that makes the motions of a loaded machine visible.
+
+    Args:
+        state, moved: of the machine.
+        diagonal: of it, m.
+    """
+    configuration = respond(state.machine).configuration
+    point = state.machine.tool_point(configuration.platform)
+    reach = max(((leg.path[-1] - point).norm() for leg in configuration.legs if leg.path), default=0.0)
+    return max(1.0, _exaggeration(moved, float(reach), diagonal))
 
 
 def compliance_overlays(
@@ -143,12 +164,12 @@ def _ghost(
         points = [link.point(i / GHOST_POINTS, factor) for i in range(GHOST_POINTS + 1)]
         path = tuple((p.x, p.y, p.z) for p in points)
         wires.append(Solid(f"ghost/link {n}", Swept(path, GHOST_WIDTH * radii[link.leg]), "ghost", layer="deflection"))
-    motion = _exaggerated(moved.motion, point, factor)
+    motion = exaggerated(moved.motion, point, factor)
     body = [s.moved(motion, name=f"ghost/{s.name}", material="ghost", layer="deflection") for s in platform]
     return [*wires, *body]
 
 
-def _exaggerated(motion: Twist, point: Vector, factor: float) -> Displacement:
+def exaggerated(motion: Twist, point: Vector, factor: float) -> Displacement:
     """A small motion of a body at a point, times a factor, as a rigid displacement of the body."""
     angle = motion.rotational.norm() * factor
     axis = unit(motion.rotational)

@@ -1,0 +1,126 @@
+"""Which legs carry a machine over a grid of poses or loads: each state of rest by the set of legs that are not slack.
+
+Source: theory section 12.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from kinetostat.engine.batch import LOADED_SLAB, Progress, silent
+from kinetostat.engine.points import Array
+from kinetostat.equilibrium.numbers import FREE, loaded_mechanism
+from kinetostat.equilibrium.solving import at_rest
+from kinetostat.equilibrium.tangent import stability
+from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.machine import Machine, springs
+from kinetostat.machine.parameters import with_values
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.grid.grid import ABOUT_STATUS, grid_question
+from kinetostat.studies.grid.grid import as_json as of_grid
+
+
+@dataclass(frozen=True, eq=False)
+class Carrying(Immutable):
+    """Which legs carry at each point of a grid.
+
+    Attributes:
+        dataset: over the grid: `carrying` (place in `sets`, -1 where the machine comes to no rest) and `status`.
+        legs: names of all legs.
+        sets: names of the legs that carry together, the most frequent set first.
+        points: how many points of the grid have each set.
+    """
+
+    dataset: xr.Dataset
+    legs: tuple[str, ...]
+    sets: tuple[tuple[str, ...], ...]
+    points: tuple[int, ...]
+
+    def __repr__(self) -> str:
+        return f"<Carrying of {self.dataset.attrs['machine']!r}: {len(self.sets)} sets of legs>"
+
+    @property
+    def is_map(self) -> bool:
+        """Whether the grid has two dimensions, so that a map shows it."""
+        return len(self.dataset["status"].dims) == 2
+
+
+@checked
+def carrying_legs(machine: Machine, ranges: Sequence[str], progress: Progress = silent) -> Carrying:
+    """Find which legs carry the machine at rest under its loads, over all combinations of some ranges.
+
+    A leg is slack where one of its springs could only carry loads of the other sign; all other legs carry.
+
+    Args:
+        machine: with its loads; gives all parameters that do not vary.
+        ranges: one axis each, "FIELD=from:to:count[:log]".
+        progress: receives how far the work is.
+
+    Raises:
+        InputError: no leg of the machine can go slack, a range that `evaluate_grid` refuses, or loads that
+            `under_load` refuses.
+    """
+    question = grid_question(machine, ranges, ["slack_springs"])
+    placed = respond(machine).configuration
+    if not any(spring.acts for spring in springs(placed)):
+        raise InputError(
+            f'all legs of {machine.name} pull and push, so that all of them carry; write acts = "pulls" at an '
+            'actuator, or a leg of type = "cable".'
+        )
+    names, size = [leg.name for leg in placed.legs], question.grid.size
+    carries, status = np.zeros((size, len(names)), dtype=bool), np.zeros(size, dtype=np.int8)
+    for start in range(0, size, LOADED_SLAB):
+        part = slice(start, min(start + LOADED_SLAB, size))
+        carries[part], status[part] = _slab(machine, question.grid.columns(part.start, part.stop), len(names))
+        progress(part.stop, size)
+    rested = [tuple(row) for row in carries[status == Status.OK].tolist()]
+    ranked = Counter(rested).most_common()
+    places = {row: place for place, (row, _) in enumerate(ranked)}
+    codes = np.full(size, -1, dtype=np.int16)
+    codes[status == Status.OK] = [places[row] for row in rested]
+    sets = tuple(tuple(n for n, carried in zip(names, row, strict=True) if carried) for row, _ in ranked)
+    meanings = " ".join("+".join("_".join(name.split()) for name in names) or "none" for names in sets)
+    about = {"units": "1", "flag_values": list(range(len(sets))), "flag_meanings": meanings}
+    shape = question.grid.shape
+    dataset = question.labels.assign(
+        carrying=(question.dims, codes.reshape(shape), about),
+        status=(question.dims, status.reshape(shape), ABOUT_STATUS),
+    )
+    return Carrying(dataset, tuple(names), sets, tuple(count for _, count in ranked))
+
+
+def _slab(machine: Machine, columns: dict[str, Array], legs: int) -> tuple[Any, Any]:
+    """Which legs carry at some points [points x legs], and `Status` codes [points]."""
+    count = len(next(iter(columns.values())))
+    carries = np.zeros((count, legs), dtype=bool)
+    status = np.broadcast_to(respond(with_values(machine, columns)).status, (count,)).astype(np.int8)
+    rows = np.flatnonzero(np.isin(status, FREE))
+    if not len(rows):
+        return carries, status
+    posed = with_values(machine, {path: np.asarray(values)[rows] for path, values in columns.items()})
+    joints = solve_joints(posed) if posed.family.chains else None
+    mechanism, balanced = loaded_mechanism(posed, respond(posed, joints), joints, len(rows))
+    solution = at_rest(mechanism)
+    settled = np.flatnonzero(solution.settled & balanced)
+    equations = solution.at(settled)
+    stable = np.array([stability(equations, i).stable for i in range(len(settled))], dtype=bool)
+    status[rows], rested = Status.NO_REST, rows[settled[stable]]
+    status[rested] = Status.OK
+    pairs = zip(equations.mechanism.legs, equations.legs, strict=True)
+    slack = [((leg.sign != 0.0) & (terms.carrying == 0.0)).any(axis=1)[stable] for leg, terms in pairs]
+    carries[rested] = ~np.stack(slack, axis=1)
+    return carries, status
+
+
+def as_json(carrying: Carrying) -> dict[str, Any]:
+    """The sets of legs that carry, with the share of the points of each, and the grid of places in this list."""
+    points = zip(carrying.sets, carrying.points, strict=True)
+    return {**of_grid(carrying.dataset), "sets": [{"legs": list(legs), "points": count} for legs, count in points]}
