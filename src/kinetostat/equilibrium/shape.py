@@ -27,8 +27,9 @@ def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> t
     """
     mechanism, state = equations.mechanism, equations.state
     length, links = float(mechanism.length[0]), []
+    given = np.concatenate([state.amounts, mechanism.growth], axis=1)
     for leg, chain, coordinates in zip(legs, mechanism.legs, state.coordinates, strict=True):
-        bodies = list(_bodies(leg, chain, coordinates))
+        bodies = list(_bodies(leg, chain, coordinates, given))
 
         def moved(body: int, point: Vector, bodies: list[Motions] = bodies) -> Twist:
             at = np.array([(point - origin).components()], dtype=float) / length
@@ -39,19 +40,16 @@ def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> t
     return tuple(links)
 
 
-def _bodies(leg: Leg, chain: Chain, coordinates: Array) -> Iterator[Motions]:
-    """Displacements of the bodies before, between and after the elements of a leg.
-
-    Motions that no coordinate moves, but an actuator, stay out of it: actuators stand still here.
-    """
+def _bodies(leg: Leg, chain: Chain, coordinates: Array, given: Array) -> Iterator[Motions]:
+    """Displacements of the bodies before, between and after the elements of a leg."""
     placed, number, known = still(1), 0, 0
     yield placed
     for element in leg.chain:
         known += _size(element)
         while number < len(chain.coordinate) and chain.coordinate[number] < known:
             by = chain.coordinate[number]
-            if by >= 0:
-                placed = placed @ exponential(chain.twists[:, number] * coordinates[:, by, None])
+            amount = given[:, chain.given[number]] if by < 0 else coordinates[:, by]
+            placed = placed @ exponential(chain.twists[:, number] * amount[:, None])
             number += 1
         yield placed
 
