@@ -140,9 +140,10 @@ def platform_load(mechanism: Mechanism, platform: Motions) -> tuple[Array, Array
     Forces keep their direction and go with their points; the moment keeps its axis.
     """
     count = len(mechanism.length)
-    points = [np.zeros((count, 3)), *np.swapaxes(mechanism.platform.point, 0, 1)]
+    others, masses = (np.swapaxes(p, 0, 1) for p in (mechanism.pushed, mechanism.platform.point))
+    points = [np.zeros((count, 3)), *others, *masses]
     weights = mechanism.platform.mass.T[:, :, None] * mechanism.gravity[None]
-    forces = [mechanism.wrench[:, 3:], *weights]
+    forces = [mechanism.wrench[:, 3:], *np.swapaxes(mechanism.forces, 0, 1), *weights]
     wrench = np.concatenate([mechanism.wrench[:, :3], np.zeros((count, 3))], axis=1)
     change = np.zeros((count, 6, 6))
     for point, force in zip(points, forces, strict=True):

@@ -100,7 +100,9 @@ class Mechanism:
         actuators: names of the actuators that can be driven, in the order of the legs.
         growth: by which links are longer because they are warmer, in units of length [n x links].
         platform: masses of platform, tool and payload.
-        wrench: moment and force at the tool point, base axes [n x 6].
+        wrench: the moment of all loads, and the force at the tool point, base axes [n x 6].
+        pushed: points of the platform at which further forces act, in the free state [n x forces x 3].
+        forces: that act there, base axes [n x forces x 3].
         gravity: [n x 3].
         ways: orthonormal twists that exist, as columns [6 x 6, or 6 x 3 of a planar machine].
         length: m [n].
@@ -113,6 +115,8 @@ class Mechanism:
     growth: Array
     platform: Masses
     wrench: Array
+    pushed: Array
+    forces: Array
     gravity: Array
     ways: Array
     length: Array
@@ -127,6 +131,8 @@ class Mechanism:
             platform=replace(self.platform, point=self.platform.point[rows], mass=self.platform.mass[rows]),
             growth=self.growth[rows],
             wrench=self.wrench[rows],
+            pushed=self.pushed[rows],
+            forces=self.forces[rows],
             gravity=self.gravity[rows],
             length=self.length[rows],
             force=self.force[rows],
@@ -185,7 +191,11 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
     pairs = zip(centres, (tool.mass, tool.payload), strict=True)
     weights = [(0, point, mass) for point, mass in pairs if not is_zero(mass)]
     load = machine.tables["load"]
-    wrench = stacked([*load.moment, *load.force], count) / _wrench_units(length, force)
+    named = machine.named_loads
+    moment = machine.load.rotational
+    for _, other in named:
+        moment = moment + other.rotational
+    wrench = stacked([*moment.components(), *load.force], count) / _wrench_units(length, force)
     ways = np.eye(6)
     if configuration.plane is not None:
         turn, *slides = (np.array(joint.axis.components(), dtype=float) for joint in configuration.plane.freedoms)
@@ -196,6 +206,8 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
         stacked(amounts.growth, count) / length[:, None],
         units.masses(weights),
         wrench,
+        units.points([platform.apply(point) for point, _ in named]),
+        units.forces([other.translational for _, other in named]),
         _gravity(load, count),
         ways,
         length,
@@ -231,6 +243,11 @@ class _Units:
     def points(self, points: Sequence[Vector]) -> Array:
         """Points [n x m x 3]."""
         rows = [stacked((point - self.origin).components(), self.count) / self.length[:, None] for point in points]
+        return np.stack(rows, axis=1) if rows else np.zeros((self.count, 0, 3))
+
+    def forces(self, forces: Sequence[Vector]) -> Array:
+        """Forces [n x m x 3]."""
+        rows = [stacked(force.components(), self.count) / self.force[:, None] for force in forces]
         return np.stack(rows, axis=1) if rows else np.zeros((self.count, 0, 3))
 
     def masses(self, given: Sequence[tuple[int, Vector, Scalar]]) -> Masses:

@@ -84,7 +84,7 @@ def with_share(mechanism: Mechanism, share: float, preload: float | None = None)
     """The mechanism with a share of its loads, and with one of its preloads: the same unless another one is given."""
     tension = share if preload is None else preload
     legs = tuple(replace(leg, preload=leg.preload * tension) for leg in mechanism.legs)
-    loads = {name: getattr(mechanism, name) * share for name in ("wrench", "gravity", "growth")}
+    loads = {name: getattr(mechanism, name) * share for name in ("wrench", "forces", "gravity", "growth")}
     return replace(mechanism, legs=legs, **loads)
 
 

@@ -98,7 +98,7 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
         compliance_matrix(statics),
         singularity_margin,
         pose_status(joints.status, reached, singularity_margin, within(geometric), within(loaded)),
-        machine.load,
+        machine.load_at(configuration.platform),
         (*geometric, *loaded),
         moving_mass(machine, configuration),
         joints.status,
@@ -157,8 +157,8 @@ def actuator_checks(machine: Machine, configuration: Configuration, statics: Sta
         machine: with [limits] and [load].
         configuration, statics: of it at its pose.
     """
-    limits = machine.tables["limits"]
+    limits, load = machine.tables["limits"], machine.load_at(configuration.platform)
     limited = is_set(limits.actuator_force) or is_set(limits.actuator_moment)
-    if not limited or all(is_zero(component) for component in machine.load.components()):
+    if not limited or all(is_zero(component) for component in load.components()):
         return []
-    return load_checks(machine, configuration, actuator_loads(configuration, statics, machine.load))
+    return load_checks(machine, configuration, actuator_loads(configuration, statics, load))

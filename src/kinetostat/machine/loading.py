@@ -19,7 +19,8 @@ from kinetostat.machine import pickling as _pickling  # noqa: F401  # machines t
 from kinetostat.machine.catalogue import families, family_named
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.limits import Parts, check_limits
-from kinetostat.machine.machine import STATES, Family, Machine, Written
+from kinetostat.machine.machine import STATES, Family, Machine, NamedLoad, Written
+from kinetostat.machine.named_loads import family_with_loads
 from kinetostat.machine.orientation import ANGLES, form_of, make_room, orientation_schema, with_angles
 from kinetostat.machine.parameters import POSE, check_contrast, find, with_values
 from kinetostat.machine.rigidities import resolve
@@ -138,7 +139,8 @@ def _build_family(document: Document, origin: str, settings: Sequence[str]) -> M
     changed = with_named_parts(changed, family, origin)
     display, loaded = _display(changed, origin), _loaded(changed, origin)
     resolved = resolve(changed, family, origin)
-    machine = _validated(family_with_parts(family, changed), resolved, origin, display)
+    whole = family_with_loads(family_with_parts(family, changed), changed, origin)
+    machine = _validated(whole, resolved, origin, display)
     placed = machine.configure()
     parts = Parts(placed.legs, placed.platform.rotation.z, family.planar, (), _unloaded(placed.legs))
     check_limits(machine.tables["limits"], parts, origin)
@@ -153,9 +155,9 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     changed = with_parts(_overridden(named, settings, {}, coordinates, origin), origin)
     display, loaded = _display(changed, origin), _loaded(changed, origin)
     plan, numbers = separate(changed, origin)
-    machine = _validated(written.family_of(plan), numbers, origin, display)
+    machine = _validated(family_with_loads(written.family_of(plan), numbers, origin), numbers, origin, display)
     check_numbers(plan, machine.tables, origin)
-    family = written.family_of(completed(plan, machine.family_tables))
+    family = family_with_loads(written.family_of(completed(plan, machine.family_tables)), numbers, origin)
     whole = with_values(replace(machine, family=family), {})  # its tables are then those of this family
     chains = whole.chains()
     legs = [Leg(leg.name, tuple(s.element for s in steps)) for leg, steps in zip(plan.legs, chains.legs, strict=True)]
@@ -306,6 +308,7 @@ def machine_schema() -> dict[str, Any]:
         if {*ANGLES} <= table.get("properties", {}).keys():
             table["properties"] |= orientation_schema()
         if "gravity" in table.get("properties", {}):
+            table["additionalProperties"] = TypeAdapter(NamedLoad).json_schema()
             table["properties"]["state"] = {"enum": [*STATES], "default": "free", "description": STATE}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

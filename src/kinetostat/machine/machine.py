@@ -175,6 +175,26 @@ class Load:
     max_tension: Annotated[float, Quantity("force", "greatest load of them", unset=math.inf)] = math.inf
 
 
+@table
+class NamedLoad:
+    """Table [load.NAME], in any machine file: another wrench on the platform, at a point of it; base axes."""
+
+    point: Annotated[
+        tuple[float, float, float],
+        Quantity("length", "where it acts: from P, in platform axes: x, y, z", count=3, apart=True),
+    ] = (0.0, 0.0, 0.0)
+    moment: Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3, apart=True)] = (
+        0.0,
+        0.0,
+        0.0,
+    )
+    force: Annotated[tuple[float, float, float], Quantity("force", "force along x, y, z", count=3, apart=True)] = (
+        0.0,
+        0.0,
+        0.0,
+    )
+
+
 STATES = {"free": False, "loaded": True}
 """What `state` of the table [load] may be, and whether the machine is then shown at rest under its loads."""
 
@@ -236,6 +256,7 @@ class Family:
         literals: what its machine files say beside numbers, by table.
         links: those with a mass, of a family in closed form.
         members: of a machine written leg by leg, from the tables to all links that can move.
+        loads: names of the loads at other points of the platform that its files have, see `named_loads`.
         recipe: of a family that is made while the program runs, a function and its arguments that make it again
             elsewhere; other families are pickled by name.
     """
@@ -249,6 +270,7 @@ class Family:
     literals: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     links: tuple[LinkKind, ...] = ()
     members: Callable[..., list[Member]] | None = None
+    loads: tuple[str, ...] = ()
     recipe: tuple[Callable[..., "Family"], tuple[Any, ...]] | None = None
 
     def __post_init__(self) -> None:
@@ -268,7 +290,8 @@ class Family:
     @cached_property
     def every_table(self) -> dict[str, type]:
         """Its own tables and the common ones."""
-        return FixedDict({**self.tables, **link_tables(self.links), **COMMON})
+        named = {f"load.{name}": NamedLoad for name in self.loads}
+        return FixedDict({**self.tables, **link_tables(self.links), **COMMON, **named})
 
 
 @dataclass(frozen=True)
@@ -371,8 +394,22 @@ class Machine(Immutable):
     @property
     def load(self) -> Wrench:
         """The wrench of the file's table [load], at the tool point, base axes (N·m, N)."""
-        given = self.tables["load"]
-        return Wrench(Vector(*given.moment), Vector(*given.force))
+        return _wrench(self.tables["load"])
+
+    @property
+    def named_loads(self) -> list[tuple[Vector, Wrench]]:
+        """Of each table [load.NAME], its point from P in platform axes (m), and its wrench there, base axes."""
+        tables = [self.tables[f"load.{name}"] for name in self.family.loads]
+        return [(Vector(*table.point), _wrench(table)) for table in tables]
+
+    def load_at(self, platform: Displacement) -> Wrench:
+        """All loads on the platform together, at the tool point, base axes (N·m, N)."""
+        load, tool = self.load, self.tool_point(platform)
+        for point, wrench in self.named_loads:
+            arm = platform.apply(point) - tool
+            moment = load.rotational + wrench.rotational + arm.cross(wrench.translational)
+            load = Wrench(moment, load.translational + wrench.translational)
+        return load
 
     @property
     def reference(self) -> str:
@@ -382,6 +419,10 @@ class Machine(Immutable):
     def tool_point(self, platform: Displacement) -> Vector:
         """The tool point T in the base frame, m: P itself unless the file has a table [tool]."""
         return platform.apply(Vector(*self.tables["tool"].offset))
+
+
+def _wrench(table: Any) -> Wrench:
+    return Wrench(Vector(*table.moment), Vector(*table.force))
 
 
 def springs(configuration: Configuration) -> list[Spring]:

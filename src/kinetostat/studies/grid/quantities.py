@@ -95,7 +95,10 @@ def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Param
         if np.isnan(QUANTITIES[name].value(response)) and response.status == Status.OK:
             lacking = QUANTITIES[name].needs
             raise InputError(f'"{name}" has no meaning here: {machine.name} lacks {lacking}; leave it out.')
-    loaded = any(machine.load.components()) or any(parameter.path.startswith("load.") for parameter in varied)
+    wrenches = [machine.load, *(wrench for _, wrench in machine.named_loads)]
+    loaded = any(any(wrench.components()) for wrench in wrenches) or any(
+        parameter.path.startswith("load.") for parameter in varied
+    )
     for name in UNDER_LOAD:
         if name in names and not loaded:
             raise InputError(

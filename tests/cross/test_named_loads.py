@@ -1,0 +1,86 @@
+"""Loads at named points of the platform: the same machine as with one wrench, with a weight, or with none of them."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.loading import as_toml, build, bundled, load, machine_schema
+from kinetostat.machine.parameters import with_values
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.analysis import analyze
+from kinetostat.studies.under_load import under_load
+from machines import load_without_limits
+
+SPINDLE = """
+[load.spindle]
+point = ["30 mm", "10 mm", "-40 mm"]
+force = ["100 N", 0, "-300 N"]
+moment = [0, 0, "2 N*m"]
+[load.drag]
+point = [0, "50 mm", 0]
+force = [0, "20 N", "10 N"]
+"""
+TILTED = ["pose.roll=10 deg", "pose.pitch=-7 deg", "tool.offset=[0, 0, 0.05]"]
+
+
+def with_loads(name, more=SPINDLE, settings=()):
+    return build(bundled()[name] + more, name, settings)
+
+
+def test_to_first_order_they_are_one_wrench_at_the_tool_point():
+    machine = with_loads("hexapod", settings=TILTED)
+    platform = machine.configure().platform
+    tool = np.array(machine.tool_point(platform).components())
+    moment, force = np.array([0.0, 0.0, 2.0]), np.array([100.0, 20.0, -290.0])
+    for point, push in (((0.03, 0.01, -0.04), (100, 0, -300)), ((0, 0.05, 0), (0, 20, 10))):
+        rows = np.array([row.components() for row in (platform.rotation.x, platform.rotation.y, platform.rotation.z)])
+        arm = np.array(platform.translation.components()) + rows.T @ np.array(point) - tool
+        moment = moment + np.cross(arm, push)
+    assert respond(machine).load.components() == pytest.approx([*moment, *force], rel=1e-12)
+    alone = load("hexapod", [*TILTED, f"load.moment={moment.tolist()}", f"load.force={force.tolist()}"])
+    assert analyze(machine).load.deflection == pytest.approx(analyze(alone).load.deflection, rel=1e-9, abs=1e-18)
+    assert under_load(machine).linear == pytest.approx(under_load(alone).linear, rel=1e-6, abs=1e-15)
+
+
+def test_a_force_at_a_point_is_the_weight_of_a_mass_there():
+    """Both keep their direction and go with their point, however far the machine moves."""
+    soft = ["stiffness.actuator=2e5 N/m", *TILTED[:2]]
+    weight = [*soft, "tool.mass=30", "tool.centre_of_mass=[0.03, 0.01, -0.04]", "load.gravity=[0, 0, -10]"]
+    pushed = with_loads("hexapod", '[load.weight]\npoint = [0.03, 0.01, -0.04]\nforce = [0, 0, "-300 N"]\n', soft)
+    state, expected = under_load(pushed), under_load(load_without_limits("hexapod", weight))
+    assert np.abs(expected.displacement).max() > 1e-3
+    assert state.displacement == pytest.approx(expected.displacement, rel=1e-9, abs=1e-15)
+    assert np.array(state.tangent) == pytest.approx(np.array(expected.tangent), rel=1e-9, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", ["hexapod", "tripteron", "planar-3rrr"])
+def test_they_are_kept_by_files_pickles_and_sweeps(name):
+    machine = with_loads(name)
+    for again in (pickle.loads(pickle.dumps(machine)), build(as_toml(machine))):
+        assert respond(again).load == respond(machine).load
+    paths = ["load.spindle.force.2", "load.spindle.point.0"]
+    columns = {paths[0]: np.array([-300.0, -600.0]), paths[1]: np.array([0.03, 0.06])}
+    loads = np.array([np.broadcast_to(c, 2) for c in respond(with_values(machine, columns)).load.components()]).T
+    values = {"load.spindle.force": [100.0, 0.0, -600.0], "load.spindle.point": [0.06, 0.01, -0.04]}
+    changed = machine.with_values(values)
+    for row, each in zip(loads, (machine, changed), strict=True):
+        assert row == pytest.approx([float(c) for c in respond(each).load.components()], rel=1e-12)
+
+
+def test_names_and_fields_are_checked():
+    for more, message in (
+        ('[load."a b"]\nforce = [0, 0, 1]', r"\[load.\"a b\"\] cannot be the name of a load"),
+        ("[load.spindle]\nforces = [0, 0, 1]", "load.spindle.forces is not known; did you mean force"),
+        ("[load.spindle]\nforce = [0, 1]", "load.spindle.force is .* it has 2 entries; give 3"),
+        ("".join(f"[load.n{i}]\nforce = [0, 0, 1]\n" for i in range(17)), "17 named loads; at most 16"),
+    ):
+        with pytest.raises(InputError, match=message):
+            with_loads("hexapod", more)
+
+
+def test_the_schema_of_files_has_them():
+    loads = [table for table in machine_schema()["$defs"].values() if "gravity" in table.get("properties", {})]
+    assert all({"point", "force", "moment"} == set(table["additionalProperties"]["properties"]) for table in loads)
+    assert loads
