@@ -46,6 +46,7 @@ class SpringState:
     Attributes:
         name, leg: of it.
         turning: whether it is a rotation: N·m and rad, otherwise N and m.
+        actuated: whether it is an actuator.
         load: that it carries, positive where it pulls its ends together.
         deformation: from the free state.
         slack: whether it could carry loads of the other sign only, and carries nothing.
@@ -54,6 +55,7 @@ class SpringState:
     name: str
     leg: str
     turning: bool
+    actuated: bool
     load: float
     deformation: float
     slack: bool
@@ -234,7 +236,7 @@ def _springs(equations: Balance) -> list[SpringState]:
             amount = float(moved[0, i]) * (1.0 if turning else length)
             amount = 0.0 if abs(moved[0, i]) < UNMOVED_TOOL else amount
             slack = bool(leg.sign[i]) and terms.carrying[0, i] == 0.0
-            states.append(SpringState(spring.name, leg.name, turning, load, amount, slack))
+            states.append(SpringState(spring.name, leg.name, turning, bool(spring.actuated), load, amount, slack))
     return states
 
 

@@ -9,11 +9,12 @@ It is text from anywhere, and is checked like a file.
 import base64
 import zlib
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from urllib.parse import quote, urlencode
 
 from kinetostat.machine.changing import changed, rebuilt
 from kinetostat.machine.loading import as_toml, build, bundled, load
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import STATES, Machine
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError, choice
@@ -21,6 +22,8 @@ from kinetostat.studio.session import Memory
 
 MACHINE, FILE = "machine", "file"
 """Keys of a bundled machine's name, and of a compressed machine file."""
+STATE = "load.state"
+"""Key of the state in which the machine is shown, if that is not the one of its file."""
 LONGEST = 8000
 """Characters of an address; browsers and servers take some more. A machine that needs more has no link."""
 
@@ -32,7 +35,8 @@ def address_of(memory: Memory) -> str:
         origin = machine
     bundled_origin = memory.name and origin is memory.origin
     start = (MACHINE, memory.name) if bundled_origin else (FILE, _packed(as_toml(origin)))
-    query = urlencode([start, *_changes(origin, machine)], quote_via=quote, safe="/*")
+    state = [] if origin.loaded is machine.loaded else [(STATE, machine.state)]
+    query = urlencode([start, *state, *_changes(origin, machine)], quote_via=quote, safe="/*")
     return query if len(query) <= LONGEST else ""
 
 
@@ -64,7 +68,11 @@ def memory_of(query: Iterable[tuple[str, str]]) -> Memory:
         name, origin = "", build(_unpacked(text), "the machine in the address")
     else:
         raise InputError(f"the address names no machine; it must begin with ?{MACHINE}=... or ?{FILE}=... .")
-    return Memory(origin, name, rebuilt(changed(origin, dict(changes))) if changes else None)
+    if not changes:
+        return Memory(origin, name)
+    numbers = dict(changes)
+    state = choice(numbers.pop(STATE, origin.state), STATES, f"{STATE} in the address")
+    return Memory(origin, name, rebuilt(replace(changed(origin, numbers), loaded=STATES[state])))
 
 
 def _packed(text: str) -> str:

@@ -18,12 +18,14 @@ from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Load, Machine
 from kinetostat.machine.parameters import find, values
+from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.sensitivity import Sensitivity, sensitivity
+from kinetostat.studies.under_load import LoadedState, under_load
 from kinetostat.studio.pulling import handles
 from kinetostat.tolerances import SINGULAR
 from kinetostat.views.scene import machine_scene as scenes
-from kinetostat.views.scene.analysis_overlays import overlays_of
+from kinetostat.views.scene.analysis_overlays import loaded_overlays, overlays_of
 from kinetostat.views.scene.overlays import twist_solids
 from kinetostat.views.scene.proportions import Proportions
 from kinetostat.views.scene.solids import Scene, as_data, solid_data
@@ -65,7 +67,7 @@ def picture(request: PictureRequest) -> Picture:
     if status is not Status.OK and not _drawable(status, response):
         return Picture(status, None)
     scene = scenes.machine_scene(request.machine, response.configuration, request.sizes)
-    if status is Status.SINGULAR:
+    if status is Status.SINGULAR and not request.machine.loaded:
         scene = _with_free_twist(scene, response, request.sizes)
     grips = [handle.as_data() for handle in handles(response.configuration, request.axes)]
     return Picture(status, {**as_data(scene), "handles": grips, "fit": request.fit})
@@ -104,21 +106,44 @@ class Report:
         legs: name of the leg in which each joint or link is.
         solids: that show the answers in the picture.
         exaggeration: factor by which deflections are drawn larger; None without a load.
+        loaded: the state of rest, where the machine is to be shown under its loads.
+        refused: why its loads are refused; empty if they are not.
     """
 
     analysis: Analysis
     legs: Mapping[str, str]
     solids: list[dict[str, Any]]
     exaggeration: float | None
+    loaded: LoadedState | None = None
+    refused: str = ""
+
+    @property
+    def answered(self) -> bool:
+        """Whether there is something to show: the machine at rest if it is shown under its loads, else its K and C."""
+        if self.loaded is not None or self.refused:
+            return self.loaded is not None and bool(self.loaded.displacement)
+        return self.analysis.status is Status.OK
 
 
 def report(request: ReportRequest) -> Report:
     """Analyse the machine at its pose and make the solids that are drawn over it."""
     analysis = analyze(request.machine)
-    solids, factor = overlays_of(analysis, request.sizes, request.exaggeration)
     placed = respond(request.machine).configuration.legs
     legs = {str(spring.of): leg.name for leg in placed for spring in leg.springs}
-    return Report(analysis, legs, [solid_data(solid) for solid in solids], factor)
+    loaded, refused = _at_rest(request.machine) if request.machine.loaded else (None, "")
+    if loaded is None:
+        solids, factor = overlays_of(analysis, request.sizes, request.exaggeration)
+    else:
+        solids, factor = loaded_overlays(loaded, request.sizes, request.exaggeration)
+    return Report(analysis, legs, [solid_data(solid) for solid in solids], factor, loaded, refused)
+
+
+def _at_rest(machine: Machine) -> tuple[LoadedState | None, str]:
+    """The machine under its loads, or why these are refused."""
+    try:
+        return under_load(machine), ""
+    except InputError as error:
+        return None, str(error)
 
 
 @dataclass(frozen=True)

@@ -17,14 +17,14 @@ STEPS = 1000
 """Positions of a slider."""
 LENGTH_SHARE = 0.75
 """How far a length varies about its value: in units of the machine's length in the pose, of itself elsewhere."""
-TURN = {"pose": math.radians(40.0), "geometry": math.radians(30.0)}
+TURN = {"pose": math.radians(40.0), "geometry": math.radians(30.0), "load": math.pi}
 """How far an angle varies about its value."""
 STIFFNESS_FACTOR = 1e3
 """How far a stiffness varies about its value, up and down."""
 USUAL_STIFFNESS = 1e6
 """Middle of the range of a stiffness that is rigid or free, SI."""
-LARGEST_LOAD = {"force": 1000.0, "moment": 100.0}
-"""Ends of the range of a load that is zero: N, N·m."""
+LARGEST_LOAD = {"force": 1000.0, "moment": 100.0, "acceleration": 9.81}
+"""Ends of the range of a load that is zero: N, N·m, m/s²."""
 OF_LOADED_STATES = (
     "load.gravity",
     "load.gravity_angle",
@@ -36,7 +36,7 @@ OF_LOADED_STATES = (
     "tool.payload_centre",
     *(f"{table}." for table in ("bending_rigidity", "expansion", "temperature_rise")),
 )
-"""Fields that change nothing that the page shows: it is about machines without weight. The text pane has them."""
+"""Fields that change nothing unless the machine is shown under its loads: they are offered only then."""
 LEAST_SHARE = 0.02
 """Lower end of a number that must be positive, as a share of the upper end."""
 
@@ -68,6 +68,11 @@ class Control:
     @property
     def label(self) -> str:
         return label(self.parameter)
+
+    @property
+    def of_loads(self) -> bool:
+        """Whether it matters only to the machine under its loads."""
+        return self.path.startswith(OF_LOADED_STATES)
 
     @property
     def slides(self) -> bool:
@@ -111,8 +116,6 @@ def controls(machine: Machine, length: float) -> tuple[Control, ...]:
 def _offered(machine: Machine, present: dict[str, float]) -> Iterator[Parameter]:
     """Offer every number, and a field of several as one control where its entries are alike in kind and value."""
     for parameter in parameters(machine.family):
-        if parameter.path.startswith(OF_LOADED_STATES):
-            continue
         several = len(parameter.leaves) > 1
         alike = len({present[leaf] for leaf in parameter.leaves}) == 1
         vector = parameter.path.split(".")[-1] in VECTORS
@@ -124,7 +127,7 @@ def _control(parameter: Parameter, present: dict[str, float], length: float) -> 
     table = parameter.path.split(".")[0]
     value, quantity = present[parameter.leaves[0]], parameter.quantity
     panel = "Stiffness" if quantity.stiff else "Pose" if table == "pose" else "Geometry"
-    panel = "Load" if table in ("load", "tool", "limits") else panel
+    panel = "Load" if table in ("load", "tool", "limits") or parameter.path.startswith(OF_LOADED_STATES) else panel
     group = table_of(parameter)
     if quantity.unset is not None:
         return Control(parameter, panel, group, 0.0, 0.0, False)

@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 from nicegui import events, ui
 
-from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.machine import Machine
@@ -75,7 +74,7 @@ class StudioPage:
             with ui.element("section").classes("text-pane left").props('aria-label="machine file"'):
                 self.text = TextPane(self.session, lambda machine: self._take(machine, typed=True))
             with ui.element("section").classes("middle").props('aria-label="machine"'):
-                self.scene = ScenePanel(self._exaggerate, lambda: self.session.machine.name)
+                self.scene = ScenePanel(self._load, self._exaggerate, lambda: self.session.machine.name)
                 self.handles = Handles(self.session, self.scene.view, self.changed)
                 with self.scene.tools:
                     self.playback = Playback(self.session, self.changed, lambda: self._pictures.busy)
@@ -124,7 +123,11 @@ class StudioPage:
         """Request map and picture for new numbers of the machine; the report follows the picture."""
         self.map.refresh(time.perf_counter())
         self._pictures.ask(PictureRequest(self.session.machine, self._sizes, self._axes))
-        self.parameters.refresh()
+        if self.scene.loaded.value is not self.session.machine.loaded:
+            self._show_state()
+            self.parameters.fill()
+        else:
+            self.parameters.refresh()
         self.text.refresh()
         self._offer_history()
 
@@ -140,6 +143,7 @@ class StudioPage:
         self._sizes = proportions_of(machine, respond(self.session.origin).configuration)
         self._axes = free_axes(machine)
         self.playback.clear()
+        self._show_state()
         self.parameters.fill()
         self.text.renew()
         self.map.fill()
@@ -147,6 +151,19 @@ class StudioPage:
         self._offer_history()
         self.map.refresh()
         self._pictures.ask(PictureRequest(machine, self._sizes, self._axes, fit=True))
+
+    def _load(self, loaded: bool) -> None:
+        """Show the machine under its loads or without them, which is a step of its history."""
+        if self._listening and loaded is not self.session.machine.loaded:
+            self.session.show_loaded(loaded)
+            self.parameters.fill()
+            self.changed()
+
+    def _show_state(self) -> None:
+        """Bring the switch to the state of the machine."""
+        self._listening = False
+        self.scene.loaded.set_value(self.session.machine.loaded)
+        self._listening = True
 
     def _offer_history(self) -> None:
         self.undo.set_enabled(self.session.can_undo)
@@ -183,13 +200,14 @@ class StudioPage:
 
     def _show_report(self, request: ReportRequest, new: Report) -> None:
         self.scene.explain(new, request.exaggeration is None)
-        if new.analysis.status is Status.OK:
+        if new.answered:
             self._latest = new
             self._show_front()
 
     def _show_front(self) -> None:
-        if self._latest is not None and self.tabs.value in self.panels:
-            self.panels[str(self.tabs.value)].show(self._latest, self.session)
+        panel = self.panels.get(str(self.tabs.value))
+        if self._latest is not None and panel is not None and panel.shows(self._latest):
+            panel.show(self._latest, self.session)
 
     def _choose(self) -> None:
         if self._listening and self.machines.value != OTHER:

@@ -19,6 +19,8 @@ from kinetostat.studio.wording import shown
 
 OPEN = 12
 """Controls of a group up to which it is open from the start."""
+AT_ONCE = ("load", "tool")
+"""Groups that come first and are open however many controls there are: what moves a loaded machine."""
 
 
 class ParametersPanel:
@@ -54,6 +56,7 @@ class ParametersPanel:
         for panel, place in self._places.items():
             place.clear()
             chosen = [control for control in self._session.controls.values() if control.panel == panel]
+            chosen.sort(key=lambda control: AT_ONCE.index(control.group) if control.group in AT_ONCE else len(AT_ONCE))
             with place:
                 for group, members in groupby(chosen, key=lambda control: control.group):
                     self._group(group, list(members), len(chosen))
@@ -62,7 +65,11 @@ class ParametersPanel:
         if total <= OPEN or len(members) == total:
             self._make(members)
             return
-        with ui.expansion(group, value=total <= 2 * OPEN).classes("group").props("dense") as expansion:
+        with (
+            ui.expansion(group.replace("_", " "), value=total <= 2 * OPEN or group in AT_ONCE)
+            .classes("group")
+            .props("dense") as expansion
+        ):
             place = ui.element("div")
         if expansion.value:
             with place:

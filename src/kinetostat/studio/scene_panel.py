@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from kinetostat.kinematics.status import Status
+from kinetostat.equilibrium.solving import Rest
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, Report
@@ -30,6 +30,7 @@ LAYERS = {
 """Layers of the picture that can be hidden, and their names on the page."""
 GHOST = "Keep the present machine as a ghost behind later changes; click again to remove it"
 EXAGGERATION = "factor by which the deflected shape is drawn larger than it is: a number, or auto"
+UNDER_LOAD = "the machine at rest under its weight, preloads and load; gravity is set under Load on the left"
 KEPT = "The picture and the figures still show the last good pose."
 VIEWS = {"iso": "view from the corner", "front": "front view", "side": "side view", "top": "view from above"}
 
@@ -37,14 +38,17 @@ VIEWS = {"iso": "view from the corner", "front": "front view", "side": "side vie
 class ScenePanel:
     """The picture and figures of the machine; at a pose without an answer, they stay and the reason is shown."""
 
-    def __init__(self, exaggerate: Callable[[float | None], None], name: Callable[[], str]) -> None:
+    def __init__(
+        self, load: Callable[[bool], None], exaggerate: Callable[[float | None], None], name: Callable[[], str]
+    ) -> None:
         """Build the picture with its tools, the line about the pose, and the figures.
 
         Args:
+            load: shows the machine at rest under its loads, or without them.
             exaggerate: draws the deflected shape with another factor; None to choose one.
             name: gives the name of the machine, for saved pictures.
         """
-        self._exaggerate, self._name = exaggerate, name
+        self._load, self._exaggerate, self._name = load, exaggerate, name
         self._shown: dict[str, Any] | None = None
         self._ghost = False
         self._hidden: set[str] = set()
@@ -55,6 +59,8 @@ class ScenePanel:
     def _stage(self) -> None:
         self.view = MachineView("the machine in three dimensions; drag, or arrow keys, to turn it").mark("machine")
         with ui.element("div").classes("scene-tools"):
+            self.loaded = ui.switch("under load", on_change=lambda event: self._load(bool(event.value)))
+            self.loaded.props("dense").tooltip(UNDER_LOAD).mark("loaded")
             self.layers = {layer: self._layer(layer, text) for layer, text in LAYERS.items()}
         with ui.element("div").classes("scene-views") as self.tools:
             for view, text in VIEWS.items():
@@ -111,10 +117,10 @@ class ScenePanel:
             report: of the pose.
             automatic: whether the page chose the factor of the deflected shape.
         """
-        analysis = report.analysis
-        answered = analysis.status is Status.OK
-        self._tell(answered, analysis.status.word.replace("_", " "), analysis.message)
-        if not answered:
+        status, message = _verdict(report)
+        sound = report.loaded is None or report.loaded.rest is Rest.OK
+        self._tell(report.answered, status, message, sound)
+        if not report.answered:
             return
         self.view.run_method("overlay", report.solids, [])
         self.key.set_content(scene_key(report))
@@ -127,14 +133,25 @@ class ScenePanel:
         """Say that the machine could not be drawn or analysed because of a mistake of the program."""
         self._tell(False, "no answer", as_sentence(error))
 
-    def _tell(self, answered: bool, status: str, message: str) -> None:
-        self.line.classes(replace="pose-line" if answered else "pose-line refused")
+    def _tell(self, answered: bool, status: str, message: str, sound: bool = True) -> None:
+        self.line.classes(replace="pose-line" if answered and sound else "pose-line refused")
         self.status.set_text(status)
         self.message.set_text(message if answered else f"{message} {KEPT}")
 
 
+def _verdict(report: Report) -> tuple[str, str]:
+    """Say in a word and in sentences what is the case."""
+    if report.refused:
+        return "no answer", report.refused
+    if report.loaded is not None:
+        return f"under load: {report.loaded.rest.word}", report.loaded.message
+    return report.analysis.status.word.replace("_", " "), report.analysis.message
+
+
 def scene_key(report: Report) -> str:
-    """Return the key of the ellipsoids as HTML: the greatest compliance of each."""
+    """Return the key of the ellipsoids as HTML: the greatest compliance of each; none are drawn of a loaded machine."""
+    if report.loaded is not None:
+        return ""
     indices = report.analysis.indices
     units = {"translation": "m/N", "rotation": "rad/(N·m)"}
     display = report.analysis.machine.display
@@ -146,9 +163,21 @@ def scene_key(report: Report) -> str:
 
 
 def headline(report: Report) -> str:
-    """Return the diagonal of C as HTML: the motion along or about each axis under a unit load along or about it."""
+    """Return the diagonal of C as HTML: the motion along or about each axis under a unit load along or about it.
+
+    Of a loaded machine, the displacement of its tool point.
+    """
     tiles, display = [], report.analysis.machine.display
+    if report.loaded is not None:
+        for name, moved in zip(report.loaded.components, report.loaded.displacement, strict=True):
+            value, _, unit = display.show_deflection(moved, "rad" if name.startswith("r") else "m").partition(" ")
+            tiles.append(_tile(f"u {name}", value, unit))
+        return f"<dl>{''.join(tiles)}</dl>"
     for name, compliance in zip(report.analysis.components, report.analysis.compliance_diagonal, strict=True):
         value, _, unit = display.show(compliance, QUANTITIES[f"compliance_{name}"].unit).partition(" ")
-        tiles.append(f"<div><dt>C {name}</dt><dd>{value} <small>{unit or '&nbsp;'}</small></dd></div>")
+        tiles.append(_tile(f"C {name}", value, unit))
     return f"<dl>{''.join(tiles)}</dl>"
+
+
+def _tile(name: str, value: str, unit: str) -> str:
+    return f"<div><dt>{name}</dt><dd>{value} <small>{unit or '&nbsp;'}</small></dd></div>"

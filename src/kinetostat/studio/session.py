@@ -4,7 +4,7 @@ No element of a page is known here, so that tests drive a session directly.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.changing import rebuilt, related
@@ -51,7 +51,6 @@ class Session:
         machine: as it is now; its pose may be out of reach.
         origin: as it was loaded.
         name: of a bundled machine; empty for any other.
-        controls: its numbers with their ranges, which stay fixed so that sliders do not move under the hand.
         exaggeration: factor of its deflected shape, None to choose one for every load; it has no history.
     """
 
@@ -64,11 +63,17 @@ class Session:
         self.origin = machine
         self.machine = memory.now or machine
         length = float(respond(machine).configuration.length)
-        self.controls: dict[str, Control] = {control.path: control for control in controls(machine, length)}
+        self._controls = {control.path: control for control in controls(machine, length)}
         self.exaggeration = memory.exaggeration
         self._past = [*memory.past]
         self._future: list[Machine] = []
         self._dragged: tuple[str, ...] = ()
+
+    @property
+    def controls(self) -> dict[str, Control]:
+        """The machine's numbers with their ranges, which stay fixed so that sliders do not move under the hand."""
+        loaded = self.machine.loaded
+        return {path: control for path, control in self._controls.items() if loaded or not control.of_loads}
 
     @property
     def memory(self) -> Memory:
@@ -176,6 +181,13 @@ class Session:
         self._dragged = paths
         self._future.clear()
         self.machine = new
+
+    def show_loaded(self, loaded: bool) -> None:
+        """Show the machine at rest under its loads, or without them, as `state` in [load] says it."""
+        if loaded is not self.machine.loaded:
+            self.settle()
+            self._note()
+            self.machine = replace(self.machine, loaded=loaded)
 
     def _note(self) -> None:
         """Add the present machine to the history; a new branch begins, so nothing can be redone."""

@@ -15,7 +15,10 @@ from kinetostat.units import KINDS
 DIGITS = 6
 """Significant digits of a value that may be typed over."""
 AXES = ("x", "y", "z")
-VECTORS = ("offset", "moment", "force", "point", "axis", "first_axis", "second_axis", "far")
+VECTORS = (
+    "offset", "moment", "force", "gravity", "gravity_axis", "centre_of_mass", "payload_centre", "point", "axis",
+    "first_axis", "second_axis", "far",
+)  # fmt: skip
 """Fields whose entries are along x, y, z."""
 MINUS = "\u2212"
 LEAST_GAIN = 1e-3

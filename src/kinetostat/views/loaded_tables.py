@@ -11,7 +11,7 @@ from kinetostat.display import DASH, Display, number
 from kinetostat.studies.command import Command
 from kinetostat.studies.requirements import Verdict
 from kinetostat.studies.setting import pose_of
-from kinetostat.studies.under_load import LoadedState
+from kinetostat.studies.under_load import LoadedState, SpringState
 from kinetostat.views.analysis_tables import matrix_table
 from kinetostat.views.assembly_tables import precise
 from kinetostat.views.requirement_lines import print_requirements
@@ -25,7 +25,7 @@ def print_loaded(console: Console, state: LoadedState, requirements: Sequence[Ve
     answer = Table.grid(padding=(0, 2, 0, 0))
     answer.add_row(Text("Pose", "bold"), f"{pose_of(machine)}. {state.message}")
     if state.displacement:
-        answer.add_row(Text("Stability", "bold"), _stability(state))
+        answer.add_row(Text("Stability", "bold"), stability_of(state))
     console.print(answer)
     if requirements:
         print_requirements(console, requirements, display)
@@ -47,7 +47,8 @@ def print_loaded(console: Console, state: LoadedState, requirements: Sequence[Ve
             console.print(matrix_table(title, kind, state.components, rows, display))
 
 
-def _stability(state: LoadedState) -> str:
+def stability_of(state: LoadedState) -> str:
+    """Say how far the load may grow."""
     if state.factor is None:
         return "The springs alone hold nothing here: weight and tension do."
     if math.isinf(state.factor):
@@ -67,12 +68,17 @@ def _displacements(state: LoadedState, display: Display) -> Table:
     return table
 
 
+def word_of(spring: SpringState) -> str:
+    """Say whether a spring carries."""
+    return "slack" if spring.slack else "carries"
+
+
 def _springs(state: LoadedState, display: Display) -> Table:
     table = numeric_table("Springs", "spring", ["load", "deformation", "state"])
     for spring in state.springs:
         load = display.show(spring.load, "N·m" if spring.turning else "N")
         amount = display.show_deflection(spring.deformation, "rad" if spring.turning else "m")
-        table.add_row(spring.name, load, amount, "slack" if spring.slack else "carries")
+        table.add_row(spring.name, load, amount, word_of(spring))
     return table
 
 

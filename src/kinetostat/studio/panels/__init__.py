@@ -6,6 +6,7 @@ A panel shows results of `answers`; it holds no formula and knows nothing of the
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
+from kinetostat.kinematics.status import Status
 from kinetostat.studio.answers import Report
 from kinetostat.studio.session import Session
 
@@ -36,6 +37,10 @@ class Panel(ABC):
             report: the analysis and what is drawn of it.
             session: the machine with its controls, for panels that compute more.
         """
+
+    def shows(self, report: Report) -> bool:
+        """Whether the panel has something to say about a report; of a machine that only loads hold, few have."""
+        return report.analysis.status is Status.OK
 
     def close(self) -> None:  # noqa: B027 - most panels compute nothing, and need no `close`
         """Stop what is being computed; a panel that only shows the report has nothing to stop."""

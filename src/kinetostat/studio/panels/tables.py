@@ -3,18 +3,22 @@
 The tables are HTML made of an `Analysis`; nothing is computed but the rounding of its numbers.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 
 from nicegui import ui
 
+from kinetostat.algebra.scalar import reciprocal
 from kinetostat.display import DASH, Display
 from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.under_load import LoadedState
 from kinetostat.studio.answers import Report
 from kinetostat.studio.elements import toggle
 from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
-from kinetostat.studio.wording import engineering, entry, heading, paragraph, table
+from kinetostat.studio.wording import bars, engineering, entry, heading, paragraph, table
 from kinetostat.views.analysis_tables import entry_unit, matrix_units
+from kinetostat.views.loaded_tables import stability_of, word_of
 
 KINDS = {"C": "compliance", "K": "stiffness"}
 PRINCIPAL_UNITS = {"translation": "N/m", "rotation": "N·m/rad"}
@@ -151,15 +155,19 @@ def _centres(analysis: Analysis) -> str:
 
 
 class LoadsPanel(Panel):
-    """The deflection of the tool, and the load and deformation of every spring."""
+    """The deflection of the tool, and the load and deformation of each spring; under load, which legs carry."""
 
     name = "Loads"
 
     def build(self) -> None:
         self.content = ui.html("", sanitize=False).mark("under-load")
 
+    def shows(self, report: Report) -> bool:
+        return report.answered
+
     def show(self, report: Report, _session: Session) -> None:
-        self.content.set_content(load_text(report.analysis))
+        text = load_text(report.analysis) if report.loaded is None else loaded_text(report.loaded)
+        self.content.set_content(text)
 
 
 def load_text(analysis: Analysis) -> str:
@@ -180,6 +188,60 @@ def load_text(analysis: Analysis) -> str:
         + heading("Actuators and springs")
         + table("actuators and springs", ["", "load", "deformation"], springs)
     )
+
+
+def loaded_text(state: LoadedState) -> str:
+    """The state of rest: its verdict, a bar for each leg, displacement, springs, and how stiff it is now."""
+    display, units = state.machine.display, ["rad" if name.startswith("r") else "m" for name in state.components]
+    linear: Sequence[float | None] = state.linear or [None] * len(units)
+    moved = [
+        [name, display.show_deflection(now, unit), display.show_deflection(first, unit)]
+        for name, unit, now, first in zip(state.components, units, state.displacement, linear, strict=True)
+    ]
+    springs = [
+        [spring.name, *_loaded(spring.load, spring.deformation, spring.turning, display), word_of(spring)]
+        for spring in state.springs
+    ]
+    return (
+        paragraph(f"{state.message} {stability_of(state)}", "lead")
+        + heading("Which legs carry")
+        + tension_bars(state)
+        + heading("Displacement of the tool point")
+        + table("displacement", ["", "under load", "to first order"], moved)
+        + _tangents(state)
+        + heading("Springs")
+        + table("springs", ["", "load", "deformation", ""], springs)
+    )
+
+
+def tension_bars(state: LoadedState) -> str:
+    """A bar for each leg as long as the load of its actuator: blue where it pulls, orange where it pushes."""
+    shown = [spring for spring in state.springs if spring.actuated] or list(state.springs)
+    largest = {
+        turning: max((abs(s.load) for s in shown if s.turning is turning), default=0.0) for turning in (True, False)
+    }
+    named = Counter(spring.leg for spring in shown)
+    rows, legs = [], {}
+    for spring in shown:
+        name = spring.leg if named[spring.leg] == 1 else spring.name
+        load = "slack" if spring.slack else state.machine.display.show(spring.load, "N·m" if spring.turning else "N")
+        rows.append((name, spring.load / (largest[spring.turning] or 1.0), load))
+        legs[name] = spring.leg
+    return bars("load of each leg, positive where it pulls", rows, legs)
+
+
+def _tangents(state: LoadedState) -> str:
+    """The stiffness that a tool feels now, and that of the springs alone with all other motions held."""
+    if state.compliance is None or state.tangent is None:
+        return ""
+    display, rows = state.machine.display, []
+    for i, name in enumerate(state.components):
+        unit = entry_unit("stiffness", name, name)
+        free = reciprocal(state.compliance[i][i])
+        elastic = None if state.elastic is None else state.elastic[i][i]
+        numbers = (display.number(value, unit, "rigid") for value in (free, state.tangent[i][i], elastic))
+        rows.append([display.scale(unit).label(name), *numbers])
+    return heading("Stiffness to further loads") + table("stiffness", ["", "1/C", "K", "K of springs"], rows)
 
 
 def _loaded(load: float, motion: float, turning: bool, display: Display) -> list[str]:

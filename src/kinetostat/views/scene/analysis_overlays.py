@@ -74,6 +74,23 @@ def overlays_of(
     return solids + ghost, chosen
 
 
+def loaded_overlays(
+    state: LoadedState, sizes: Proportions, factor: float | None = None
+) -> tuple[list[Solid], float | None]:
+    """Draw a machine at rest under its loads over the unloaded one; the factor as `overlays_of`, never below 1.
+
+    Args:
+        state: of the machine; where it comes to no rest nothing is drawn.
+        sizes: of the machine.
+        factor: of exaggeration; None to choose a round one.
+    """
+    if not state.displacement:
+        return [], None
+    configuration, moved = respond(state.machine).configuration, motions_of(state)
+    chosen = factor or exaggeration_of(state, moved, sizes.diagonal)
+    return deflection_overlays(state.machine, configuration, sizes, moved, chosen)
+
+
 def motions_of(state: LoadedState) -> Deflection:
     """The motions of a machine from its unloaded pose to its rest."""
     by_name = dict(zip(state.components, state.displacement, strict=True))
