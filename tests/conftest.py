@@ -17,7 +17,7 @@ MARKERS = {
     "browser": ("test_studio_browser", "test_studio_reach", "test_report_browser"),
     "workers": ("test_workers", "test_hash_seeds", "test_large_sweeps", "test_studio_runs", "test_studio_search"),
     "studio": ("test_studio_design", "test_studio_files", "test_studio_loads", "test_studio_page"),
-    "engines": ("test_validation", "test_mujoco"),
+    "engines": ("test_validation", "test_mujoco", "test_loaded_engines"),
     "attack": ("test_attack",),
     "packaging": ("test_packaging",),
     "numbers": (

@@ -4,15 +4,21 @@ MuJoCo is stepped through time until a load has settled. Its constraints are sof
 of the machine's own compliance (`exchange.mjcf_pace`); the load is small but finite.
 """
 
+from xml.etree import ElementTree
+
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.exchange import mjcf_model
 from kinetostat.exchange.mjcf import text_of
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.written.plan import NAME
 from kinetostat.studies.analysis import analyze
+from kinetostat.studies.under_load import under_load
 
 AGREED = 1e-4
 """Of the deflection: ten times what the constraints give way; largest found 7e-5."""
@@ -24,7 +30,7 @@ class Loaded:
     """A model at rest, and what a wrench does to its tool."""
 
     def __init__(self, found):
-        self.model = mujoco.MjModel.from_xml_string(text_of(found))
+        self.model = mujoco.MjModel.from_xml_string(found if isinstance(found, str) else text_of(found))
         self.settled = self.model.numeric("settling_time").data[0]
         self.data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, self.data)
@@ -134,3 +140,38 @@ def test_known_masses_are_those_of_the_machine():
     assert model.body("platform").mass[0] == 12.0
     legs = sum(model.body_mass) - 12.0
     assert legs == pytest.approx(found.moving_mass - 12.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "weights"),
+    [("hexapod", ["tool.mass=2000 kg", "linear_density.legs=1000 kg/m"]), ("tricept", ["tool.mass=8000 kg"])],
+)
+def test_mujoco_sags_as_a_loaded_machine(name, weights):
+    """Gravity at an angle, millimetres of sag: the geometry of the loaded machine, and weight of platform and legs.
+
+    Masses of the exported links say nothing, so that gravity leaves them alone, but for half of each strut at its end.
+    """
+    gravity = [3.0, -2.0, -9.0]
+    machine = load(name, [*weights, f"load.gravity={gravity}"])
+    state = under_load(machine)
+    root = ElementTree.fromstring(text_of(analyze(machine)))
+    bodies = {body.name: body for body in mjcf_model.build(respond(machine).configuration).world.every()}
+    for element in root.iter("body"):
+        body = bodies.get(element.get("name"))
+        density = machine.tables["linear_density"].legs
+        if body is not None and body.name.endswith(" rod") and density:
+            end, start = body.reach[-1], bodies[body.name.removesuffix(" rod")].at
+            inertial = element.find("inertial")
+            inertial.set("mass", repr(0.5 * density * float(np.linalg.norm(end - start))))
+            inertial.set("pos", " ".join(map(repr, (end - body.at).tolist())))
+        elif body is not None:
+            element.set("gravcomp", "1")
+    root.find("option").set("gravity", " ".join(map(str, gravity)))
+    hanging = Loaded(ElementTree.tostring(root, encoding="unicode"))
+    before, axes = hanging.placement()
+    hanging.run(hanging.settled)
+    after, turned = hanging.placement()
+    sag = np.concatenate([Rotation.from_matrix(turned @ axes.T).as_rotvec(), after - before])
+    ours = np.array(state.displacement)
+    assert sag == pytest.approx(ours, abs=1e-5 * np.abs(ours).max())
+    assert state.linear != pytest.approx(ours, abs=1e-3 * np.abs(ours).max()), "geometry matters here"

@@ -12,7 +12,7 @@ from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import ZERO, Vector
-from kinetostat.machine.leg import Leg, Station
+from kinetostat.machine.leg import Leg, Spring, Station
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Field, Quantity, made_table
 from kinetostat.units import KINDS
@@ -94,8 +94,12 @@ def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[Pla
 
 
 def _stations(leg: Leg, segment: int | None = None) -> tuple[Station, ...]:
-    """Both ends of a piece of a leg's path, or of the whole path."""
-    return (leg.stations[0], leg.stations[-1]) if segment is None else leg.stations[segment : segment + 2]
+    """Both ends of a piece of a leg's path, or of the whole path; a driven joint at the base is its beginning."""
+    stations, first = leg.stations, leg.chain[0]
+    foot = first.joint.point if isinstance(first, Spring) else None
+    if foot is not None and not foot.is_at(stations[0][1]):
+        stations = ((0, foot), *stations)
+    return (stations[0], stations[-1]) if segment is None else stations[segment : segment + 2]
 
 
 def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:

@@ -42,15 +42,18 @@ class Multibody:
         ground: the base.
         unit: N per unit of force in the engine: with the greatest stiffness near 1 its solver tells small numbers that
             matter from round-off.
+        preloaded: whether springs carry their preloads.
+        chains: bodies of each leg from the base to the platform.
     """
 
-    def __init__(self, unit: float = 1.0) -> None:
+    def __init__(self, unit: float = 1.0, preloaded: bool = False) -> None:
         self.engine = import_module("exudyn")
         self.items: Any = import_module("exudyn.itemInterface")
         self.container = self.engine.SystemContainer()
         self.system = self.container.AddSystem()
         self.ground = Body(self.system.CreateGround(), None, np.zeros(3))
-        self.unit = unit
+        self.unit, self.preloaded = unit, preloaded
+        self.chains: list[list[Body]] = []
 
     def body(self, at: Array) -> Body:
         """Add a body with its frame at a point (m); mass and inertia (1 kg, 1 kg·m²) do not matter in statics."""
@@ -70,6 +73,7 @@ class Multibody:
         frame: tuple[Array, Array],
         constrained: Sequence[bool],
         stiffness: Array | None = None,
+        preload: Array | None = None,
     ) -> None:
         """Constrain some of rx ry rz x y z between two bodies exactly, and let springs act on the others.
 
@@ -77,7 +81,8 @@ class Multibody:
             bodies: near, far.
             frame: point (m) and axes (columns) of the six components, base frame.
             constrained: which of them are.
-            stiffness: between them, N·m/rad, N/rad, N/m [6 x 6].
+            stiffness: between them, N·m/rad, N/rad, N/m [6 x 6]; diagonal if there is a preload.
+            preload: of the springs, N·m and N [6].
         """
         markers = [self.marker(body, *frame) for body in bodies]
         if any(constrained):
@@ -85,9 +90,13 @@ class Multibody:
             self.system.AddObject(self.items.GenericJoint(markerNumbers=markers, constrainedAxes=axes))
         if stiffness is not None:
             matrix = stiffness[np.ix_(TRANSLATION_FIRST, TRANSLATION_FIRST)] / self.unit
-            self.system.AddObject(self.items.RigidBodySpringDamper(markerNumbers=markers, stiffness=matrix))
+            spring = self.items.RigidBodySpringDamper(markerNumbers=markers, stiffness=matrix)
+            if self.preloaded and preload is not None:
+                sizes = np.where(np.diag(stiffness) > 0.0, np.diag(stiffness), 1.0)
+                spring.offset = (-preload / sizes)[TRANSLATION_FIRST].tolist()  # it carries K (u - offset)
+            self.system.AddObject(spring)
 
-    def bar(self, bodies: Sequence[Body], ends: Sequence[Array], stiffness: float) -> None:
+    def bar(self, bodies: Sequence[Body], ends: Sequence[Array], stiffness: float, preload: float = 0.0) -> None:
         """Add a spring (N/m) between a point of the near and one of the far body (m), or a bar of constant length."""
         markers = [self.marker(body, end, np.eye(3)) for body, end in zip(bodies, ends, strict=True)]
         length = float(np.linalg.norm(ends[1] - ends[0]))
@@ -95,7 +104,10 @@ class Multibody:
             bar = self.items.DistanceConstraint(markerNumbers=markers, distance=length)
         else:
             bar = self.items.SpringDamper(
-                markerNumbers=markers, referenceLength=length, stiffness=stiffness / self.unit
+                markerNumbers=markers,
+                referenceLength=length,
+                stiffness=stiffness / self.unit,
+                force=preload / self.unit if self.preloaded else 0.0,
             )
         self.system.AddObject(bar)
 

@@ -152,16 +152,24 @@ def _settings(model: Multibody) -> Any:
     return settings
 
 
-def build(configuration: Configuration, reference: Vector, unit: float = 1.0) -> tuple[Multibody, Body]:
+def build(
+    configuration: Configuration, reference: Vector, unit: float = 1.0, preloaded: bool = False
+) -> tuple[Multibody, Body]:
     """Build the machine; return it and its platform, whose frame is at `reference` (base frame, m); `unit` in N.
+
+    Args:
+        configuration: placed machine.
+        reference: see above.
+        unit: see above.
+        preloaded: whether its springs carry their preloads; without them it is at rest unloaded.
 
     Raises:
         InputError: if the machine has a part that cannot be built.
     """
-    model = Multibody(unit)
+    model = Multibody(unit, preloaded)
     platform = _body(model, array(reference), configuration.plane)
     for leg in configuration.legs:
-        _leg(model, leg, platform, configuration.plane)
+        model.chains.append(_leg(model, leg, platform, configuration.plane))
     return model, platform
 
 
@@ -174,8 +182,8 @@ def _body(model: Multibody, at: Array, plane: Plane | None) -> Body:
     return body
 
 
-def _leg(model: Multibody, leg: Leg, platform: Body, plane: Plane | None) -> None:
-    """The bodies and connectors of one leg from ground to platform."""
+def _leg(model: Multibody, leg: Leg, platform: Body, plane: Plane | None) -> list[Body]:
+    """The bodies of one leg from ground to platform, with their connectors."""
     chain = pieces(leg, plane)
     bodies = [model.ground]
     for piece in chain[:-1]:
@@ -185,6 +193,7 @@ def _leg(model: Multibody, leg: Leg, platform: Body, plane: Plane | None) -> Non
         model.couple(bodies, (platform.at, np.eye(3)), ALL)
     for piece, near, far in zip(chain, bodies, bodies[1:], strict=False):
         _connect(model, piece, (near, far), plane)
+    return bodies
 
 
 def _far_point(piece: Piece, before: Array) -> Array:
@@ -199,19 +208,23 @@ def _connect(model: Multibody, piece: Piece, bodies: Sequence[Body], plane: Plan
     if isinstance(piece, Joint):
         _joint(model, piece, bodies, plane)
     elif isinstance(piece, Spring):
-        _joint(model, piece.joint, bodies, plane, float(piece.stiffness))
+        _joint(model, piece.joint, bodies, plane, (float(piece.stiffness), float(piece.preload)))
     elif isinstance(piece, Beam):
         _beam(model, piece, bodies, plane)
     elif isinstance(piece, Strut):
-        model.bar(bodies, (array(piece.start), array(piece.end)), piece.stiffness)
+        model.bar(bodies, (array(piece.start), array(piece.end)), piece.stiffness, piece.preload)
     else:
         _parallelogram(model, piece, bodies, plane)
 
 
 def _joint(
-    model: Multibody, joint: Joint, bodies: Sequence[Body], plane: Plane | None, stiffness: float | None = None
+    model: Multibody,
+    joint: Joint,
+    bodies: Sequence[Body],
+    plane: Plane | None,
+    spring: tuple[float, float] | None = None,
 ) -> None:
-    """A joint: all components but one are constrained; a spring (N/m, N·m/rad) may act on that one."""
+    """A joint: all components but one are constrained; on that one a spring may act (N/m, N·m/rad; preload N, N·m)."""
     normal = None if plane is None else array(plane.frame.rotation.z)
     axes = _axes_around(array(joint.axis), normal)
     slide = joint.point is None
@@ -223,9 +236,10 @@ def _joint(
     if joint.pitch != 0.0:
         constrained[5] = False
         model.thread(bodies, (point, axes[:, 2]), float(joint.pitch))
-    matrix = np.zeros((6, 6))
-    matrix[free, free] = stiffness or 0.0
-    model.couple(bodies, (point, axes), constrained, None if stiffness is None else matrix)
+    matrix, preload = np.zeros((6, 6)), np.zeros(6)
+    if spring is not None:
+        matrix[free, free], preload[free] = spring
+    model.couple(bodies, (point, axes), constrained, None if spring is None else matrix, preload)
 
 
 def _axes_around(axis: Array, normal: Array | None = None) -> Array:

@@ -31,12 +31,14 @@ class Strut:
         name: of the part.
         start, end: centres of the joints, base frame, m.
         stiffness: between them, N/m; infinity if rigid.
+        preload: tension at this length, N.
     """
 
     name: str
     start: Vector
     end: Vector
     stiffness: float
+    preload: float = 0.0
 
 
 Piece = Joint | Spring | Beam | Parallelogram | Strut
@@ -135,8 +137,8 @@ def _strut(name: str, chain: Sequence[Piece], at: int, near: float) -> tuple[Str
     for last in range(inside, len(chain)):
         second, after = _ball(chain, last, near)
         if second is not None and float(np.linalg.norm(array(second - first))) > near:
-            stiffness = _in_a_row(chain[inside:last], first, second, near)
-            return (None, at) if stiffness is None else (Strut(name, first, second, stiffness), after)
+            row = _in_a_row(chain[inside:last], first, second, near)
+            return (None, at) if row is None else (Strut(name, first, second, *row), after)
     return None, at
 
 
@@ -156,19 +158,20 @@ def _ball(chain: Sequence[Piece], at: int, near: float) -> tuple[Vector | None, 
     return None, at
 
 
-def _in_a_row(parts: Sequence[Piece], start: Vector, end: Vector, near: float) -> float | None:
-    """Stiffness (N/m) of parts in a row along their line; None if they do more than stretch along it."""
+def _in_a_row(parts: Sequence[Piece], start: Vector, end: Vector, near: float) -> tuple[float, float] | None:
+    """Stiffness (N/m) and preload (N) of parts in a row; None if they do more than stretch along their line."""
     span = array(end - start)
     along = span / np.linalg.norm(span)
-    compliance = 0.0
+    compliance = shorter = 0.0
     for part in parts:
         if isinstance(part, Spring) and part.joint.point is None and _parallel(array(part.joint.axis), along):
             compliance += 1.0 / float(part.stiffness)
+            shorter += float(part.preload) / float(part.stiffness)
         elif isinstance(part, Beam) and _spans(part, (start, end), near):
             compliance += float(np.linalg.norm(span)) / float(part.rigidity.axial)
         elif not (isinstance(part, Spring) and _turns_about(part.joint, (start, end), near)):
             return None
-    return 1.0 / compliance if compliance > 0.0 else RIGID
+    return (1.0 / compliance, shorter / compliance) if compliance > 0.0 else (RIGID, 0.0)
 
 
 def _parallel(a: Array, b: Array) -> bool:

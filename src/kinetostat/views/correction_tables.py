@@ -15,6 +15,8 @@ MOST_TERMS = 40
 """Terms of a law that are printed; a longer one is in JSON."""
 DIGITS = 7
 """Significant digits of coefficients, which are typed into a controller."""
+PLAIN = ("pose.", "load.")
+"""Tables whose names are left out."""
 RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -72,8 +74,8 @@ def _counted(terms: int) -> str:
 
 
 def _name(field: Parameter) -> str:
-    """The last word of a field's path."""
-    return field.path.split(".", 1)[1]
+    """The field by its path, without a table that says nothing."""
+    return field.path.split(".", 1)[1] if field.path.startswith(PLAIN) else field.shown
 
 
 def _letter(field: Parameter) -> str:

@@ -1,0 +1,271 @@
+"""Machines under large loads in independent engines: weights of links, preloads, cables, tangents; sag in MuJoCo.
+
+Exudyn solves its own nonlinear statics of rigid bodies and springs, MuJoCo runs until the machine hangs still.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from kinetostat import build, under_load
+from kinetostat.algebra.vector import Vector
+from kinetostat.equilibrium.solving import Rest
+from kinetostat.exchange.leg_by_leg import document_of
+from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.mass import located_members
+from kinetostat.validation import exudyn_machine
+from kinetostat.validation.pieces import pieces
+from machines import load_without_limits
+
+pytest.importorskip("exudyn")
+
+DENSITIES = {
+    "hexapod": {"legs": 3000.0},
+    "hexapod-rus": {"cranks": 60.0, "rods": 30.0},
+    "tricept": {"legs": 300.0, "tube": 900.0},
+    "passive-leg-5dof-rus": {"cranks": 0.08, "rods": 0.03, "passive_links": 0.1},
+    "planar-3rrr": {"proximal_links": 90.0, "distal_links": 60.0},
+}
+"""kg/m of the links: with them the weight of links moves the tool as much as its load does."""
+SIZES = {
+    "hexapod": 2e4,
+    "hexapod-rus": 3e3,
+    "tricept": 1e5,
+    "passive-leg-5dof-rus": 3.0,
+    "planar-3rrr": 2e3,
+    "tripteron": 2e3,
+    "delta": 300.0,
+    "orthoglide": 3e3,
+}
+"""N: loads that move the tool by millimetres."""
+
+
+class Engine:
+    """A machine with its weights and preloads in Exudyn."""
+
+    def __init__(self, machine):
+        self.machine = machine
+        self.joints = solve_joints(machine) if machine.family.chains else None
+        self.response = respond(machine, self.joints)
+        configuration, reference = self.response.configuration, self.response.reference
+        model, _ = exudyn_machine.build(configuration, reference)
+        model.system.Assemble()
+        unit = float(np.max(np.abs(model.system.ComputeLinearizedSystem(exudyn_machine._settings(model))[1])))
+        self.model, self.platform = exudyn_machine.build(configuration, reference, unit, preloaded=True)
+        kinds = (self.model.items.Torque, self.model.items.Force)
+        marker = self.model.marker(self.platform, self.platform.at, np.eye(3))
+        self.loads = [self.model.system.AddLoad(kind(markerNumber=marker, loadVector=[0.0] * 3)) for kind in kinds]
+        self._weigh()
+        self.model.system.Assemble()
+        self.start = self.model.system.systemData.GetODE2Coordinates()
+
+    def _weigh(self):
+        gravity, tool = np.array(self.machine.tables["load"].gravity), self.machine.tables["tool"]
+        configuration = self.response.configuration
+        centre = configuration.platform.apply(Vector(*tool.centre_of_mass))
+        self._pull(self.platform, centre, tool.mass * gravity)
+        amounts = None if self.joints is None else self.joints.coordinates
+        for link in located_members(self.machine, configuration, amounts):
+            number = next((i for i, leg in enumerate(configuration.legs) if leg.name == link.leg), None)
+            if number is None:
+                number = next(i for i, leg in enumerate(configuration.legs) if leg.number is None)
+            for carried, point in link.ends():
+                body = self._body(configuration.legs[number], self.model.chains[number], carried, point)
+                self._pull(body, point, 0.5 * float(link.length) * float(link.linear_density) * gravity)
+
+    def _body(self, leg, bodies, carried, point):
+        """The body that carries a point after so many elements of a leg; a strut's ends are its neighbours'."""
+        plane = self.response.configuration.plane
+        whole, part = pieces(leg, plane), pieces(replace(leg, chain=leg.chain[:carried]), plane)
+        same = next((i for i, (a, b) in enumerate(zip(whole, part, strict=False)) if a != b), len(part))
+        if same == len(part):
+            return bodies[same]
+        near, far = (float((end - point).norm()) for end in (whole[same].start, whole[same].end))
+        return bodies[same] if near < far else bodies[same + 1]
+
+    def _pull(self, body, point, force):
+        if body.node is None or not np.any(force):
+            return
+        marker = self.model.marker(body, np.array(point.components(), dtype=float), np.eye(3))
+        self.model.system.AddLoad(
+            self.model.items.Force(markerNumber=marker, loadVector=(force / self.model.unit).tolist())
+        )
+
+    def displacement(self, wrench):
+        """Rotation vector and displacement of the tool point under a wrench there [6]."""
+        moved = exudyn_machine._displacement(
+            self.model, self.platform, self.loads, self.start, wrench / self.model.unit
+        )
+        return np.concatenate([Rotation.from_euler("XYZ", moved[:3]).as_rotvec(), moved[3:]])
+
+
+def wrench_of(machine):
+    return np.array(machine.load.components(), dtype=float)
+
+
+def compare(machine, agreed):
+    """Compare the state of rest, in the components that the machine has."""
+    state, parts = under_load(machine), list(machine.family.components)
+    assert state.rest is not Rest.NO_REST
+    theirs = Engine(machine).displacement(wrench_of(machine))[parts]
+    sizes = np.abs(state.displacement).max()
+    assert theirs == pytest.approx(np.array(state.displacement), abs=agreed * sizes)
+    return state
+
+
+def loads(name, share=1.0):
+    """Force and moment, a mass beside the platform's centre, and gravity at an angle."""
+    size, planar = SIZES[name] * share, name.startswith("planar")
+    force = np.array([0.3, 0.5, 0.0 if planar else -0.8]) * size
+    moment = np.array([0.0, 0.0, 0.01] if planar else [0.02, 0.01, 0.015]) * size
+    gravity = [2.0, -3.0, 0.0 if planar else -9.0]
+    return [
+        f"load.force={force.tolist()}",
+        f"load.moment={moment.tolist()}",
+        f"tool.mass={size / 20.0}",
+        f"tool.centre_of_mass={[0.01, 0.02, 0.0 if planar else 0.05]}",
+        f"load.gravity={gravity}",
+    ]
+
+
+def weighing(name):
+    return [f"linear_density.{link}={density}" for link, density in DENSITIES[name].items()]
+
+
+@pytest.mark.parametrize("name", DENSITIES)
+def test_exudyn_comes_to_the_same_state_with_weights_of_links(name):
+    machine = load_without_limits(name, [*loads(name), *weighing(name)])
+    state = compare(machine, 1e-6)
+    assert state.linear != pytest.approx(state.displacement, rel=1e-5), "geometry matters here"
+    light = under_load(load_without_limits(name, loads(name)))
+    assert light.displacement != pytest.approx(state.displacement, rel=0.02), "and the links do"
+
+
+@pytest.mark.parametrize("name", ["hexapod", "hexapod-rus", "tricept", "planar-3rrr", "passive-leg-5dof-rus"])
+def test_exudyn_comes_to_the_same_state_with_preloads(name):
+    """Each leg by another preload, so that they do not balance: they move the tool, and stiffen it."""
+    document = document_of(load_without_limits(name, loads(name)))
+    driven = [joint for leg in document["legs"] for joint in leg["joints"] if joint.get("actuated")]
+    for number, joint in enumerate(driven):
+        arm = 0.1 if joint["type"] == "revolute" else 1.0
+        joint["preload"] = (0.4 - 0.15 * number) * SIZES[name] * arm
+    machine = build(document, "legs", loads(name))
+    state = compare(machine, 1e-6)
+    assert under_load(build(document_of(load_without_limits(name, loads(name))), "legs", loads(name))).displacement != (
+        pytest.approx(state.displacement, rel=0.02)
+    )
+
+
+@pytest.mark.parametrize("name", DENSITIES)
+def test_the_tangent_is_that_of_exudyn(name):
+    """Central differences of the engine's loaded states, extrapolated to no step; of translations, which have no frame.
+
+    A moment that keeps its axis has no potential, so that the engine's compliance is not symmetric; ours is its
+    symmetric part.
+    """
+    machine = load_without_limits(name, [*loads(name), *weighing(name)])
+    state, engine, here = under_load(machine), Engine(machine), wrench_of(machine)
+    parts = [i for i in machine.family.components if i > 2]
+    rows = [list(machine.family.components).index(i) for i in parts]
+    step = 0.02 * np.linalg.norm(here[3:])
+    columns = []
+    for i in parts:
+        unit = np.eye(6)[i]
+        wide, narrow = (
+            (engine.displacement(here + h * unit) - engine.displacement(here - h * unit)) / (2.0 * h)
+            for h in (step, 0.5 * step)
+        )
+        columns.append(((4.0 * narrow - wide) / 3.0)[parts])
+    theirs, ours = np.array(columns), np.array(state.compliance)[np.ix_(rows, rows)]
+    assert 0.5 * (theirs + theirs.T) == pytest.approx(ours, abs=1e-6 * np.abs(ours).max())
+
+
+@pytest.mark.parametrize("name", ["delta", "orthoglide", "tripteron"])
+def test_other_models_of_parallelograms_and_beams_differ_by_the_square_of_the_load(name):
+    """The engine has two bars in a parallelogram, and a beam's springs at its end; here both are at the middle."""
+    errors, moved = [], []
+    for share in (1.0, 0.5, 0.25):
+        gravity = f"load.gravity={(np.array([2.0, -3.0, -9.0]) * share).tolist()}"
+        machine = load_without_limits(name, [*loads(name, share)[:2], *loads(name)[2:4], gravity])
+        state = np.array(under_load(machine).displacement)
+        errors.append(np.abs(Engine(machine).displacement(wrench_of(machine)) - state).max())
+        moved.append(np.abs(state).max())
+    assert moved[0] > 1e-3
+    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx([2.0, 2.0], abs=0.3)
+
+
+ROOM = """
+schema = 1
+name = "room"
+family = "legs"
+[platform]
+point = [0, 0, 2]
+[pose]
+x = 0
+y = 0
+z = 2
+roll = 0
+pitch = 0
+yaw = 0
+[tool]
+mass = 60
+centre_of_mass = [0.02, 0.01, 0.05]
+[load]
+force = [150, -40, 0]
+gravity = [0, 0, -9.81]
+"""
+STRETCH, PRELOAD = 2e5, 60.0
+CORNERS = np.array([[x, y, z] for x in (-3.0, 3.0) for y in (-2.0, 2.0) for z in (0.0, 4.0)])
+EYES = np.array([[x, y, z] for x in (-0.2, 0.25) for y in (-0.3, 0.35) for z in (2.3, 1.8)])
+
+
+def test_cables_that_go_slack_are_those_of_exudyn():
+    """Eight cables in a room, in the engine as forces of its own between points of two bodies, which never push."""
+    legs = "".join(
+        f'[[legs]]\nname = "c{i}"\ntype = "cable"\nfrom = {a}\nto = {b}\nstiffness = {STRETCH}\npreload = {PRELOAD}\n'
+        for i, (a, b) in enumerate(zip(CORNERS.tolist(), EYES.tolist(), strict=True))
+    )
+    machine = build(ROOM + legs)
+    state = under_load(machine)
+    assert state.rest is Rest.OK
+    assert 1 <= len(state.slack_legs) <= 4
+    at = np.array([0.0, 0.0, 2.0])
+    model = exudyn_machine.Multibody(STRETCH)
+    platform = model.body(at)
+
+    def tension(mbs, t, item, stretch, speed, stiffness, damping, force):
+        return max(stiffness * stretch + force, 0.0)
+
+    for corner, eye in zip(CORNERS, EYES, strict=True):
+        markers = [model.marker(body, p, np.eye(3)) for body, p in ((model.ground, corner), (platform, eye))]
+        model.system.AddObject(
+            model.items.SpringDamper(
+                markerNumbers=markers,
+                referenceLength=float(np.linalg.norm(eye - corner)),
+                stiffness=1.0,
+                force=PRELOAD / STRETCH,
+                springForceUserFunction=tension,
+            )
+        )
+    tip = model.marker(platform, at, np.eye(3))
+    heavy = model.marker(platform, np.add(at, [0.02, 0.01, 0.05]), np.eye(3))
+    loads = [
+        model.system.AddLoad(kind(markerNumber=tip, loadVector=[0.0] * 3))
+        for kind in (model.items.Torque, model.items.Force)
+    ]
+    weight = [0.0, 0.0, -60 * 9.81 / STRETCH]
+    model.system.AddLoad(model.items.Force(markerNumber=heavy, loadVector=weight))
+    model.system.Assemble()
+    settings = exudyn_machine._settings(model)
+    settings.staticSolver.numberOfLoadSteps = 10
+    force, torque = wrench_of(machine)[3:], wrench_of(machine)[:3]
+    for load, part in zip(loads, (torque, force), strict=True):
+        model.system.SetLoadParameter(load, "loadVector", part / STRETCH)
+    assert model.engine.MainSolverStatic().SolveSystem(model.system, settings)
+    moved = np.array(model.system.GetNodeOutput(platform.node, model.engine.OutputVariableType.Coordinates))
+    turned = Rotation.from_euler("XYZ", moved[3:]).as_rotvec()
+    theirs = np.concatenate([turned, moved[:3]])
+    assert theirs == pytest.approx(np.array(state.displacement), abs=1e-6 * np.abs(state.displacement).max())
