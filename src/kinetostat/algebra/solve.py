@@ -220,3 +220,56 @@ def _product(felt: Sequence[Scalar], column: Sequence[Scalar]) -> Scalar:
 
 def _less(column: Sequence[Scalar], share: Scalar, other: Sequence[Scalar]) -> Row:
     return [a - share * b for a, b in zip(column, other, strict=True)]
+
+
+@dataclass(frozen=True)
+class Eliminated:
+    """A square matrix A = L U by Gauss's elimination without pivoting, L with ones on its diagonal.
+
+    Without pivoting it is stable for matrices that are positive definite, which their pivots show: all of them are then
+    positive (Sylvester's law of inertia).
+
+    Attributes:
+        lower: rows of L below the diagonal; row k has k entries.
+        upper: rows of U; what is left of the diagonal is not used.
+        shrink: reciprocals of the pivots.
+    """
+
+    lower: list[Row]
+    upper: list[Row]
+    shrink: Row
+
+    @property
+    def pivots(self) -> Row:
+        """The diagonal of U."""
+        return [row[k] for k, row in enumerate(self.upper)]
+
+    def forward(self, right: Sequence[Scalar]) -> Row:
+        """L^-1 b."""
+        result: Row = []
+        for row, value in zip(self.lower, right, strict=True):
+            result.append(value - total([a * b for a, b in zip(row, result, strict=True)]))
+        return result
+
+    def solve(self, right: Sequence[Scalar]) -> Row:
+        """A^-1 b."""
+        left = self.forward(right)
+        for k in reversed(range(len(left))):
+            known = total([self.upper[k][j] * left[j] for j in range(k + 1, len(left))])
+            left[k] = (left[k] - known) * self.shrink[k]
+        return left
+
+
+def eliminated(rows: Sequence[Sequence[Scalar]], symmetric: bool = True) -> Eliminated:
+    """Eliminate; of a symmetric matrix only the upper triangle is read."""
+    left, size = [list(row) for row in rows], len(rows)
+    lower: list[Row] = [[] for _ in rows]
+    shrink: Row = []
+    for k in range(size):
+        shrink.append(1.0 / left[k][k])
+        for i in range(k + 1, size):
+            share = (left[k][i] if symmetric else left[i][k]) * shrink[k]
+            lower[i].append(share)
+            for j in range(i if symmetric else k + 1, size):
+                left[i][j] = left[i][j] - share * left[k][j]
+    return Eliminated(lower, left, shrink)

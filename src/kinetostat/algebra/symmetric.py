@@ -9,6 +9,7 @@ nearly equal, and needs an arc.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 from kinetostat.algebra.scalar import Scalar, sqrt, total, weighted, where
 from kinetostat.algebra.screw import Screw
@@ -56,28 +57,28 @@ class Symmetric6:
 
 SWEEPS = 4
 """Sweeps of three rotations each. Each sweep cubes the entries off the diagonal, so that four leave only round-off."""
+SWEEPS_OF_LARGER = 7
+"""Sweeps of all rotations of larger matrices, which need a few more before they converge as fast."""
 
 
 def greatest_eigenvalue(rows: Sequence[Sequence[Scalar]]) -> Scalar:
-    """Return the greatest eigenvalue of a symmetric positive semi-definite matrix [n x n], n = 1, 2 or 3.
+    """Return the greatest eigenvalue of a symmetric matrix [n x n].
 
     Accurate to some units of round-off, also where eigenvalues are equal. NaN where an entry is infinite. Derivatives
     are those of the eigenvalue that is chosen.
     """
-    at = {(i, j): rows[i][j] for i in range(len(rows)) for j in range(i, len(rows))}
-    if len(rows) == 2:
-        _rotate(at, 0, 1, None)
-    if len(rows) == 3:
-        for _ in range(SWEEPS):
-            for p, q, other in ((0, 1, 2), (0, 2, 1), (1, 2, 0)):
-                _rotate(at, p, q, other)
+    size = len(rows)
+    at = {(i, j): rows[i][j] for i in range(size) for j in range(i, size)}
+    for _ in range({1: 0, 2: 1, 3: SWEEPS}.get(size, SWEEPS_OF_LARGER)):
+        for p, q in combinations(range(size), 2):
+            _rotate(at, p, q, [i for i in range(size) if i not in (p, q)])
     greatest = at[0, 0]
-    for i in range(1, len(rows)):
+    for i in range(1, size):
         greatest = where(at[i, i] > greatest, at[i, i], greatest)
     return greatest
 
 
-def _rotate(at: dict[tuple[int, int], Scalar], p: int, q: int, other: int | None) -> None:
+def _rotate(at: dict[tuple[int, int], Scalar], p: int, q: int, others: Sequence[int]) -> None:
     """Turn rows and columns p and q so that their common entry vanishes, by the smaller of the two angles."""
     apart, coupling = at[q, q] - at[p, p], at[p, q]
     square = apart * apart + 4.0 * (coupling * coupling)
@@ -86,8 +87,10 @@ def _rotate(at: dict[tuple[int, int], Scalar], p: int, q: int, other: int | None
     tangent = where(turned, where(apart < 0.0, -2.0, 2.0) * coupling / size, 0.0)
     # Where both diagonal entries are equal and nothing couples them, there is nothing to turn: the angle is 0.
     at[p, p], at[q, q], at[p, q] = at[p, p] - tangent * coupling, at[q, q] + tangent * coupling, 0.0
-    if other is not None:
-        cosine = 1.0 / sqrt(1.0 + tangent * tangent)
-        sine = tangent * cosine
+    if not others:
+        return
+    cosine = 1.0 / sqrt(1.0 + tangent * tangent)
+    sine = tangent * cosine
+    for other in others:
         first, second = (min(p, other), max(p, other)), (min(q, other), max(q, other))
         at[first], at[second] = cosine * at[first] - sine * at[second], sine * at[first] + cosine * at[second]

@@ -7,15 +7,16 @@ same functions.
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
 
 from kinetostat.engine.kernel import Fill, fill_some, slab_kernel
+from kinetostat.engine.loaded import loaded_fill, way_of
 from kinetostat.engine.points import Array, Part, Points
-from kinetostat.equilibrium.numbers import loaded_numbers
 from kinetostat.kinematics.limits import Check
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -29,9 +30,6 @@ NUMPY_SLAB = 4096
 """Points per NumPy call: intermediates stay in the second cache level."""
 NATIVE_SLAB = 32768
 """Points per call of machine code: 2 ms of work, so that calls cost little and an interrupt takes effect soon."""
-
-LOADED_SLAB = 256
-"""Poses under load that are solved together: their equations fill the third cache level."""
 
 Progress = Callable[[int, int], None]
 """Called with (points done, points in all) after each slab."""
@@ -81,7 +79,8 @@ def evaluate(
     """
     method: Method
     if any(QUANTITIES[name].loaded for name in quantities):
-        slab, most, method = LOADED_SLAB, threads or available_cores(), _loaded_fill
+        way = way_of(machine, points.paths, points.size, repeated)
+        slab, most, method = way.slab, threads or available_cores(), partial(loaded_fill, way=way)
     elif repeated or points.size >= NATIVE_FROM:
         slab, most, method = NATIVE_SLAB, threads or available_cores(), _program_fill
     else:
@@ -155,18 +154,6 @@ def _numpy_fill(machine: Machine, _paths: Sequence[str], quantities: Sequence[st
         with np.errstate(all="ignore"):
             response = respond(with_values(machine, columns))
             status[:] = response.status
-            for row, name in zip(results, quantities, strict=True):
-                row[:] = QUANTITIES[name].value(response)
-        results[:, status != Status.OK] = np.nan
-
-    return fill
-
-
-def _loaded_fill(machine: Machine, _paths: Sequence[str], quantities: Sequence[str]) -> Fill:
-    def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-        with np.errstate(all="ignore"):
-            loaded, status[:] = loaded_numbers(machine, columns, len(status))
-            response = replace(respond(with_values(machine, columns)), loaded=loaded)
             for row, name in zip(results, quantities, strict=True):
                 row[:] = QUANTITIES[name].value(response)
         results[:, status != Status.OK] = np.nan

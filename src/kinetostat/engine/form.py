@@ -5,7 +5,7 @@ Nothing is compiled or evaluated here, and nothing depends on a machine's number
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.engine.trace import Array, Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
+from kinetostat.equilibrium.reduced import reduced_machine
 from kinetostat.kinematics.closing import closing_equations
 from kinetostat.kinematics.closure import CLOSED_FORMS, Joints, solve_joints
 from kinetostat.kinematics.status import Status
@@ -158,14 +159,46 @@ def objectives_of(
         objectives: weighted sums of quantities.
         paths: leaf paths of the parameters to differentiate by.
         closed: whether joints are computed inside the program, in closed form. Otherwise their coordinates and a
-            status are further columns, unless the family places the joints itself.
+            status are further columns, unless the family places the joints itself. If quantities are about the machine
+            under load, coordinates of its state follow, see `step_of`.
     """
     given = traced(kind, form)
     joints, columns = _joints(given, closed)
     response = respond(given.machine, joints)
+    wanted = {QUANTITIES[name].loaded for weights in objectives for name, _ in weights} - {""}
+    if wanted:
+        equations = reduced_machine(given.machine, response, joints)
+        coordinates = _inputs(given.graph, equations.size)
+        columns = (*columns, *coordinates)
+        loaded, status = equations.numbers([*coordinates], wanted, response.place_status)
+        response = replace(response, loaded=loaded, status=status)
     accepted = response.status < Status.OK + 0.5
     results = [_number(where(accepted, _weighted(response, weights), math.nan)) for weights in objectives]
     return _formula(given, columns, results, _number(response.status), paths)
+
+
+def step_of(kind: Kind, form: Form, closed: bool, first: bool = False) -> Body:
+    """Trace a step of Newton's method towards rest: from coordinates of the state, which are the last columns, to them.
+
+    The last result is the square of the step's size.
+
+    Args:
+        kind: of a machine whose equations can be reduced.
+        form: how its parameters enter.
+        closed: as for `objectives_of`.
+        first: whether to begin at the free state, with two steps and without columns of coordinates.
+    """
+    given = traced(kind, form)
+    joints, columns = _joints(given, closed)
+    equations = reduced_machine(given.machine, respond(given.machine, joints), joints)
+    coordinates = () if first else _inputs(given.graph, equations.size)
+    stepped, square = equations.step(equations.start() if first else [*coordinates])
+    results = [_number(value) for value in (*stepped, square)]
+    return Body(given.fixed, [*given.columns.values(), *columns, *coordinates], results, 0.0)
+
+
+def _inputs(graph: Graph, count: int) -> tuple[Traced, ...]:
+    return tuple(graph.input() for _ in range(count))
 
 
 def equations_of(kind: Kind, form: Form, paths: Sequence[str]) -> Formula:
@@ -195,7 +228,7 @@ def _joints(given: Inputs, closed: bool) -> tuple[Joints | None, tuple[Traced, .
         return None, ()
     if closed:
         return CLOSED_FORMS.over_scalars(given.machine.chains()), ()
-    columns = tuple(given.graph.input() for _ in range(given.machine.chains().size + 1))
+    columns = _inputs(given.graph, given.machine.chains().size + 1)
     return Joints(columns[:-1], columns[-1]), columns
 
 

@@ -7,13 +7,15 @@ platform exerts on the legs. Nothing is solved here.
 Source: theory (35)-(38). Units, axes and origin are those of `mechanism`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.equilibrium.mechanism import Chain, Mechanism
-from kinetostat.equilibrium.motion import Array, Motions, brackets, exponential, logarithm, skew_of, still
+from kinetostat.equilibrium.chains import Chain
+from kinetostat.equilibrium.mechanism import Mechanism
+from kinetostat.equilibrium.motion import Array, Motions, along, brackets, exponential, logarithm, skew_of, still
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,32 @@ class LegTerms:
     by_given: Array
 
 
-def leg_terms(leg: Chain, coordinates: Array, wrench: Array, amounts: Array, gravity: Array) -> LegTerms:
+@dataclass(frozen=True)
+class Placed:
+    """Where the parts of a leg are, at n poses.
+
+    Attributes:
+        motions: displacement of what lies before each of its motions, and of its end.
+        screws: of each motion where it is [n x motions x 6].
+    """
+
+    motions: tuple[Motions, ...]
+    screws: Array
+
+
+def placed_leg(leg: Chain, coordinates: Array, amounts: Array) -> Placed:
+    """Move a leg by its coordinates [n x coordinates] and by all given amounts [n x amounts]."""
+    placed, columns = [still(len(coordinates))], []
+    for number, (by, driven) in enumerate(zip(leg.coordinate, leg.given, strict=True)):
+        twist = leg.twists[:, number]
+        columns.append(placed[-1].twist(twist))
+        placed.append(placed[-1] @ along(twist, amounts[:, driven] if by < 0 else coordinates[:, by]))
+    return Placed(tuple(placed), np.stack(columns, axis=1) if columns else np.zeros((len(coordinates), 0, 6)))
+
+
+def leg_terms(
+    leg: Chain, coordinates: Array, wrench: Array, amounts: Array, gravity: Array, placed: Placed | None = None
+) -> LegTerms:
     """Evaluate a leg.
 
     Args:
@@ -87,41 +114,39 @@ def leg_terms(leg: Chain, coordinates: Array, wrench: Array, amounts: Array, gra
         wrench: that the platform exerts on it, at the origin [n x 6].
         amounts: that are given: of all actuators of the machine, then of its links that grow [n x amounts].
         gravity: [n x 3].
+        placed: where its parts are, if that is known.
     """
-    count = len(coordinates)
-    placed, columns = [still(count)], []
-    for number, (by, driven) in enumerate(zip(leg.coordinate, leg.given, strict=True)):
-        twist = leg.twists[:, number]
-        amount = amounts[:, driven] if by < 0 else coordinates[:, by]
-        columns.append(placed[-1].twist(twist))
-        placed.append(placed[-1] @ exponential(twist * amount[:, None]))
-    screws = np.stack(columns, axis=1) if columns else np.zeros((count, 0, 6))
-    weight, change = _weight(leg, placed, screws, gravity)
+    placed = placed or placed_leg(leg, coordinates, amounts)
+    screws = placed.screws
+    weight, change = _weight(leg, placed.motions, screws, gravity)
     # A screw changes with the motions before it, so that the work of the wrench on it does.
     changing = np.einsum("nc,njkc->nkj", wrench, brackets(screws))
     change = change - np.tril(changing, -1)
     follows = leg.follows(leg.coordinate, leg.size)
     drives = leg.follows(leg.given, amounts.shape[1])
     loads = leg.stiffness * coordinates + leg.preload
-    carries = leg.sign * loads >= 0.0
-    loads = np.where(carries, loads, 0.0)
+    stiffness = leg.stiffness
+    if leg.sign.any():
+        carries = leg.sign * loads >= 0.0
+        loads, stiffness = np.where(carries, loads, 0.0), np.where(carries, stiffness, 0.0)
     work = np.einsum("nfc,nc->nf", screws, wrench)
     return LegTerms(
-        placed[-1],
+        placed.motions[-1],
         np.einsum("nfc,fk->nck", screws, follows),
         np.einsum("nfc,fk->nck", screws, drives),
         loads,
-        np.where(carries, leg.stiffness, 0.0),
+        stiffness,
         loads + (weight - work) @ follows,
         np.einsum("fk,nfg,gl->nkl", follows, change, follows),
         np.einsum("fk,nfg,gl->nkl", follows, change, drives),
     )
 
 
-def _weight(leg: Chain, placed: list[Motions], screws: Array, gravity: Array) -> tuple[Array, Array]:
+def _weight(leg: Chain, placed: Sequence[Motions], screws: Array, gravity: Array) -> tuple[Array, Array]:
     """Gradient of the potential of a leg's weight by its motions [n x motions], and the gradient's rates."""
     count, motions = screws.shape[:2]
-    gradient, rates = np.zeros((count, motions)), np.zeros((count, motions, motions))
+    kind = np.result_type(screws, gravity, leg.masses.mass)
+    gradient, rates = np.zeros((count, motions), dtype=kind), np.zeros((count, motions, motions), dtype=kind)
     for i, carried in enumerate(leg.masses.carried):
         force = gravity * leg.masses.mass[:, i, None]
         at = placed[carried].point(leg.masses.point[:, i])
@@ -147,10 +172,10 @@ def platform_load(mechanism: Mechanism, platform: Motions) -> tuple[Array, Array
     wrench = np.concatenate([mechanism.wrench[:, :3], np.zeros((count, 3))], axis=1)
     change = np.zeros((count, 6, 6))
     for point, force in zip(points, forces, strict=True):
-        at = platform.point(point)
+        at, across = platform.point(point), skew_of(force)
         wrench = wrench + np.concatenate([np.cross(at, force), force], axis=1)
-        change[:, :3, :3] += skew_of(force) @ skew_of(at)
-        change[:, :3, 3:] -= skew_of(force)
+        turning = np.concatenate([across @ skew_of(at), -across], axis=2)
+        change = change + np.concatenate([turning, 0.0 * turning], axis=1)
     return wrench, change
 
 

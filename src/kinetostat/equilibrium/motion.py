@@ -1,16 +1,21 @@
 """Finite displacements of many bodies at once: exponentials of screws, their inverse, and how screws change with them.
 
-Arrays of NumPy, rotation first, all screws at the origin and in base axes; leading axes are poses. The single pose over
-scalars is in `algebra`.
+Arrays of NumPy, rotation first, all screws at the origin and in base axes; leading axes are poses. An array may also
+hold scalars of any kind as objects, for one pose: the same sums and products are then traced.
 
 Source: R. M. Murray, Z. Li and S. S. Sastry, A Mathematical Introduction to Robotic Manipulation (1994), section 2.3
 and appendix A; theory section 12.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+
+from kinetostat.algebra.scalar import Scalar, cos, is_zero, sin
+from kinetostat.algebra.vector import Vector, rotation_along
+from kinetostat.kinematics.closing import stacked
 
 Array = npt.NDArray[np.float64]
 
@@ -72,6 +77,34 @@ def exponential(twists: Array) -> Motions:
     return Motions(rotation, np.einsum("nij,nj->ni", along, moving))
 
 
+def along(twists: Array, amounts: Array) -> Motions:
+    """The displacements by screw motions [n x 6] by some amounts [n]."""
+    if twists.dtype != object and amounts.dtype != object:
+        return exponential(twists * amounts[:, None])
+    turning, moving, amount = Vector(*twists[0, :3]), Vector(*twists[0, 3:]), amounts[0]
+    if is_zero(amount):
+        return still(1)
+    if all(is_zero(part) for part in turning.components()):
+        return Motions(np.eye(3)[None], of_scalars((moving * amount).components()))
+    size = turning.norm()
+    axis, moving, angle = turning * (1.0 / size), moving * (1.0 / size), size * amount
+    rotation = rotation_along(axis, cos(angle), sin(angle))
+    arm = axis.cross(moving)
+    shift = arm - rotation.apply(arm) + axis * (axis.dot(moving) * angle)
+    columns = [of_scalars(column.components())[0] for column in (rotation.x, rotation.y, rotation.z)]
+    return Motions(np.stack(columns, axis=1)[None], of_scalars(shift.components()))
+
+
+def of_scalars(scalars: Sequence[Scalar], count: int | None = None) -> Array:
+    """Scalars as columns [n x scalars]; without a count as objects, whatever they are [1 x scalars]."""
+    if count is not None:
+        return stacked(scalars, count)
+    result = np.empty((1, len(scalars)), dtype=object)
+    for place, scalar in enumerate(scalars):
+        result[0, place] = float(scalar) if isinstance(scalar, int | np.floating) else scalar
+    return result
+
+
 def logarithm(motions: Motions) -> Array:
     """The screw [n x 6] whose exponential a displacement is, for rotations below half a turn."""
     rotation = motions.rotation
@@ -110,7 +143,7 @@ def _quotients(angle: Array) -> tuple[Array, Array, Array]:
 
 def skew_of(vectors: Array) -> Array:
     """The matrices [n x 3 x 3] that multiply by vectors [n x 3]: skew_of(a) b = a x b."""
-    result = np.zeros((len(vectors), 3, 3))
+    result = np.zeros((len(vectors), 3, 3), dtype=vectors.dtype)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         result[:, k, j], result[:, j, k] = vectors[:, i], -vectors[:, i]
     return result

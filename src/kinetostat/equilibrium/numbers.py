@@ -37,18 +37,8 @@ def loaded_mechanism(
         InputError: there is gravity but nothing says a mass, or bounds of tensions contradict each other.
     """
     mechanism = mechanism_of(machine, response, joints, count)
-    if np.any(mechanism.gravity) and not mechanism.weighs:
-        raise InputError(
-            f"{machine.name}: load.gravity pulls at masses, but none is known; give the platform's as [tool] mass, or "
-            "links a cross-section with a density."
-        )
+    check_loads(machine, count, mechanism.weighs)
     load = machine.tables["load"]
-    turned = np.any(stacked([load.gravity_angle], count))
-    if turned and not stacked(load.gravity_axis, count).any(axis=1).all():
-        raise InputError(
-            f"{machine.name}: load.gravity_axis is [0, 0, 0], so that gravity cannot be turned by load.gravity_angle; "
-            "give the axis of the base about which the machine is tilted, e.g. [1, 0, 0]."
-        )
     least, most = (stacked([getattr(load, f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
     if np.isinf(least).all() and np.isinf(most).all():
         return mechanism, np.ones(count, dtype=bool)
@@ -65,6 +55,31 @@ def loaded_mechanism(
             'spring does; write acts = "pulls" at an actuator, or a leg of type = "cable".'
         )
     return tensioned(mechanism, least / mechanism.force, most / mechanism.force)
+
+
+def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:
+    """Refuse loads at n poses that say too little.
+
+    Args:
+        machine: with its loads.
+        count: of poses, n.
+        weighs: whether any of its masses is known.
+
+    Raises:
+        InputError: there is gravity but nothing says a mass, or it turns about no axis.
+    """
+    load = machine.tables["load"]
+    if not weighs and np.any(stacked(load.gravity, count)):
+        raise InputError(
+            f"{machine.name}: load.gravity pulls at masses, but none is known; give the platform's as [tool] mass, or "
+            "links a cross-section with a density."
+        )
+    turned = np.any(stacked([load.gravity_angle], count))
+    if turned and not stacked(load.gravity_axis, count).any(axis=1).all():
+        raise InputError(
+            f"{machine.name}: load.gravity_axis is [0, 0, 0], so that gravity cannot be turned by load.gravity_angle; "
+            "give the axis of the base about which the machine is tilted, e.g. [1, 0, 0]."
+        )
 
 
 def loaded_numbers(

@@ -11,7 +11,7 @@ from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.mechanism import Chain
+from kinetostat.equilibrium.chains import Chain
 from kinetostat.equilibrium.motion import Array, Motions, exponential, still
 from kinetostat.kinetostatics.deflected import DeflectedLink, leg_links
 from kinetostat.machine.leg import Element, Leg

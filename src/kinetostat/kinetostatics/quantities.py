@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Literal, TypeAlias
 
-from kinetostat.algebra.scalar import Scalar
+from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.symmetric import POSITIONS
 from kinetostat.kinetostatics.extremes import (
@@ -41,7 +41,7 @@ class MapQuantity:
         components: names of those that it is about: the machine must have them.
         better: whether more or less of it is better for a design; None where that depends on the machine.
         needs: what a machine must have for it to mean something; empty if nothing. It is NaN where that is missing.
-        loaded: whether it is about the machine at rest under its loads, which takes an iteration at each pose.
+        loaded: which number of the machine at rest under its loads it needs (`equilibrium.numbers`); empty if none.
         whole: whether it counts, so that its values are whole numbers.
     """
 
@@ -52,7 +52,7 @@ class MapQuantity:
     components: tuple[str, ...] = ()
     better: Better = None
     needs: str = ""
-    loaded: bool = False
+    loaded: str = ""
     whole: bool = False
 
 
@@ -125,11 +125,11 @@ def _under_load(response: Response, what: str, row: int | None = None) -> Scalar
     if response.loaded is None:
         return float("nan")
     values = response.loaded[what]
-    return values if row is None else values[:, row]
+    return values if row is None else values[row]
 
 
 def _tangent_free(response: Response, row: int) -> Scalar:
-    return 1.0 / _under_load(response, "compliance", row)
+    return reciprocal(_under_load(response, "compliance", row))
 
 
 def _of_loaded_state() -> list[MapQuantity]:
@@ -140,19 +140,25 @@ def _of_loaded_state() -> list[MapQuantity]:
         tangent, free = partial(_under_load, what="stiffness", row=i), partial(_tangent_free, row=i)
         stiff = _stiffness_unit(i, i)
         entries += [
-            MapQuantity(f"displacement_{name}", unit, rf"$u_{{{shown}}}$", moved, (name,), loaded=True),
+            MapQuantity(f"displacement_{name}", unit, rf"$u_{{{shown}}}$", moved, (name,), loaded="displacement"),
             MapQuantity(
-                f"tangent_stiffness_{name}", stiff, rf"$K_{{t,{shown}}}$", tangent, (name,), "more", loaded=True
+                f"tangent_stiffness_{name}", stiff, rf"$K_{{t,{shown}}}$", tangent, (name,), "more", loaded="stiffness"
             ),
             MapQuantity(
-                f"tangent_free_stiffness_{name}", stiff, rf"$1/C_{{t,{shown}}}$", free, (name,), "more", loaded=True
+                f"tangent_free_stiffness_{name}",
+                stiff,
+                rf"$1/C_{{t,{shown}}}$",
+                free,
+                (name,),
+                "more",
+                loaded="compliance",
             ),
         ]
     factor, slack = partial(_under_load, what="factor"), partial(_under_load, what="slack")
     return [
         *sorted(entries, key=lambda entry: entry.name.rpartition("_")[0]),
-        MapQuantity("load_factor", "1", "load factor", factor, better="more", loaded=True),
-        MapQuantity("slack_springs", "1", "slack springs", slack, better="less", loaded=True, whole=True),
+        MapQuantity("load_factor", "1", "load factor", factor, better="more", loaded="factor"),
+        MapQuantity("slack_springs", "1", "slack springs", slack, better="less", loaded="slack", whole=True),
     ]
 
 

@@ -46,6 +46,7 @@ class Response:
         checks: the limits of the machine that are set, each with what it is compared with.
         mass: of what moves, as far as it is known, kg.
         joint_status: `Status` code of the joints alone, before the pose is judged.
+        place_status: as `status`, but a singular pose may count as OK: loads can hold a machine there.
         loaded: numbers of the loaded state (`equilibrium.numbers`), where they have been computed.
     """
 
@@ -62,6 +63,7 @@ class Response:
     checks: tuple[Check, ...] = ()
     mass: Scalar = 0.0
     joint_status: Scalar = int(Status.OK)
+    place_status: Scalar = int(Status.OK)
     loaded: Mapping[str, Any] | None = None
     regularity = renamed_property("singularity_margin")
 
@@ -102,6 +104,7 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
         (*geometric, *loaded),
         moving_mass(machine, configuration),
         joints.status,
+        pose_status(joints.status, reached, singularity_margin if loaded else 1.0, within(geometric), within(loaded)),
     )
 
 

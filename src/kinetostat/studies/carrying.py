@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from kinetostat.engine.batch import LOADED_SLAB, Progress, silent
+from kinetostat.engine.batch import Progress, silent
+from kinetostat.engine.loaded import Way
 from kinetostat.engine.points import Array
 from kinetostat.equilibrium.numbers import FREE, loaded_mechanism
 from kinetostat.equilibrium.solving import at_rest
@@ -77,8 +78,8 @@ def carrying_legs(machine: Machine, ranges: Sequence[str], progress: Progress = 
         )
     names, size = [leg.name for leg in placed.legs], question.grid.size
     carries, status = np.zeros((size, len(names)), dtype=bool), np.zeros(size, dtype=np.int8)
-    for start in range(0, size, LOADED_SLAB):
-        part = slice(start, min(start + LOADED_SLAB, size))
+    for start in range(0, size, Way.ANY_MACHINE.slab):
+        part = slice(start, min(start + Way.ANY_MACHINE.slab, size))
         carries[part], status[part] = _slab(machine, question.grid.columns(part.start, part.stop), len(names))
         progress(part.stop, size)
     rested = [tuple(row) for row in carries[status == Status.OK].tolist()]

@@ -1,0 +1,322 @@
+"""Legs as rows of screw motions: what `mechanism` makes a machine of, and the units in which it is counted.
+
+Nothing is solved here. Units, axes and origin are those of `mechanism`.
+
+Source: theory (35).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
+from kinetostat.algebra.vector import Vector
+from kinetostat.equilibrium.motion import Array, of_scalars
+from kinetostat.machine.leg import Element, Joint, Leg, Spring, Station
+from kinetostat.machine.link import Parallelogram
+from kinetostat.machine.machine import Member
+from kinetostat.tolerances import DEPENDENT
+
+SIGNS = {"": 0.0, "pulls": 1.0, "pushes": -1.0}
+"""Sign of the loads that a spring carries if it carries those of one sign only, by what its file says."""
+
+
+@dataclass(frozen=True)
+class Masses:
+    """Point masses that move with a body.
+
+    Attributes:
+        carried: how many of the leg's screw motions carry each [m]; not used of the platform.
+        point: where they are in the free state [n x m x 3].
+        mass: in units of force per m/s² [n x m].
+    """
+
+    carried: tuple[int, ...]
+    point: Array
+    mass: Array
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A leg as a row of screw motions.
+
+    Attributes:
+        name: of the leg.
+        twists: unit twist of each motion in the free state [n x motions x 6].
+        coordinate: which coordinate of the leg each motion follows [motions]; -1 where its amount is given.
+        given: which of the given amounts of the machine each motion follows [motions]: those of its actuators, then
+            the growths of its links; -1 where a coordinate moves it.
+        springs: the spring of each coordinate [coordinates]; None of a passive one.
+        stiffness: of each coordinate, 0 of a passive one [n x coordinates].
+        preload: what each carries where it is zero [n x coordinates].
+        sign: of the loads that it can carry, 0 for both [coordinates].
+        idle: a basis of motions of the passive coordinates that move nothing [n x coordinates x coordinates], with
+            columns of zeros.
+        masses: that it carries.
+        rod: joint centres nearer to the base and to the platform in the free state [n x 3], of a leg that only carries
+            a force between them and has its masses there; None of others.
+    """
+
+    name: str
+    twists: Array
+    coordinate: tuple[int, ...]
+    given: tuple[int, ...]
+    springs: tuple[Spring | None, ...]
+    stiffness: Array
+    preload: Array
+    sign: Array
+    idle: Array
+    masses: Masses
+    rod: tuple[Array, Array] | None = None
+
+    @property
+    def size(self) -> int:
+        """How many coordinates it has."""
+        return len(self.springs)
+
+    def follows(self, which: tuple[int, ...], count: int) -> Array:
+        """1 where a motion follows a coordinate, or a given amount [motions x count]; 0 elsewhere.
+
+        Args:
+            which: `coordinate` or `given`.
+            count: how many there are.
+        """
+        return (np.array(which, dtype=int)[:, None] == np.arange(count)).astype(float)
+
+
+@dataclass(frozen=True)
+class Units:
+    """What lengths and forces are counted in, and where from."""
+
+    origin: Vector
+    length: Array
+    force: Array
+    count: int | None
+
+    @property
+    def nothing(self) -> Array:
+        """0 at each pose [n]."""
+        return of_scalars([0.0], self.count)[:, 0]
+
+    @property
+    def shrink(self) -> Array:
+        """Units of length in a metre [n x 1]; products with it keep what is zero by form."""
+        return (1.0 / self.length)[:, None]
+
+    def twist(self, joint: Joint, rate: Scalar = 1.0) -> Array:
+        """Unit twist of a joint at the origin, times a rate [n x 6]; a slide by one unit of length."""
+        components = of_scalars(joint.twist(self.origin).components(), self.count) * of_scalars([rate], self.count)
+        if joint.point is not None:
+            components[:, 3:] *= self.shrink
+        return components
+
+    def points(self, points: Sequence[Vector]) -> Array:
+        """Points [n x m x 3]."""
+        rows = [of_scalars((point - self.origin).components(), self.count) * self.shrink for point in points]
+        return np.stack(rows, axis=1) if rows else np.zeros((len(self.length), 0, 3))
+
+    def forces(self, forces: Sequence[Vector]) -> Array:
+        """Forces [n x m x 3]."""
+        rows = [of_scalars(force.components(), self.count) * (1.0 / self.force)[:, None] for force in forces]
+        return np.stack(rows, axis=1) if rows else np.zeros((len(self.length), 0, 3))
+
+    def masses(self, given: Sequence[tuple[int, Vector, Scalar]]) -> Masses:
+        """Masses in units of force per m/s²: how many motions carry each, where it is, kg."""
+        mass = of_scalars([m for _, _, m in given], self.count) * (1.0 / self.force)[:, None]
+        return Masses(tuple(n for n, _, _ in given), self.points([point for _, point, _ in given]), mass)
+
+    def stiffness(self, spring: Spring) -> Array:
+        """Of a spring [n]."""
+        unit = self.length / self.force if spring.joint.point is None else 1.0 / (self.force * self.length)
+        return of_scalars([spring.stiffness], self.count)[:, 0] * unit
+
+    def load(self, spring: Spring, load: Scalar) -> Array:
+        """In a spring [n]."""
+        unit = self.force if spring.joint.point is None else self.force * self.length
+        return of_scalars([load], self.count)[:, 0] * (1.0 / unit)
+
+
+@dataclass
+class Given:
+    """The motions of given amounts that the legs have so far.
+
+    Attributes:
+        most: how many actuators there will be.
+        actuators: so far.
+        growth: of links so far, m.
+    """
+
+    most: int
+    actuators: list[Spring] = field(default_factory=list)
+    growth: list[Scalar] = field(default_factory=list)
+
+    def actuator(self, spring: Spring) -> int:
+        """Count another actuator and return its number."""
+        self.actuators.append(spring)
+        return len(self.actuators) - 1
+
+    def link(self, growth: Scalar) -> int:
+        """Count another link that grows and return its number."""
+        self.growth.append(growth)
+        return self.most + len(self.growth) - 1
+
+
+@dataclass
+class _Row:
+    """The motions of a leg from base to platform as they come, see `Chain`.
+
+    Attributes:
+        carried: for each number of elements, how many motions carry what these carry: without the growth of the links
+            that end there, and with it.
+    """
+
+    units: Units
+    amounts: Given
+    links: list[tuple[Member, Station, Station]]
+    twists: list[Array] = field(default_factory=list)
+    coordinate: list[int] = field(default_factory=list)
+    given: list[int] = field(default_factory=list)
+    springs: list[Spring | None] = field(default_factory=list)
+    stiffness: list[Array] = field(default_factory=list)
+    preload: list[Array] = field(default_factory=list)
+    carried: list[tuple[int, int]] = field(default_factory=list)
+
+    def add(self, element: Element, number: int) -> None:
+        """Add an element, which is the number-th from the base, and the growth of the links that end behind it."""
+        if isinstance(element, Parallelogram):
+            self._parallelogram(element, number)
+        else:
+            for joint in element.freedoms:
+                self._move(self.units.twist(joint), self._coordinate(None))
+        for spring in element.springs:
+            self._spring(spring)
+        before = len(self.twists)
+        if not isinstance(element, Parallelogram):
+            self.grow(number)
+        self.carried.append((before, len(self.twists)))
+
+    def grow(self, number: int) -> None:
+        """Add the growth of the links that end behind so many elements: slides along them."""
+        for link, (_, start), (behind, end) in self.links:
+            if behind == number and not is_zero(link.growth):
+                span = end - start
+                slide = Joint(span * reciprocal(span.norm()))
+                self._move(self.units.twist(slide), -1, self.amounts.link(link.growth))
+
+    def masses(self) -> list[tuple[int, Vector, Scalar]]:
+        """The masses of the links: the potential of a straight uniform one is that of half its mass at either end."""
+        halves = []
+        for link, (first, start), (last, end) in self.links:
+            half = 0.5 * link.length * link.linear_density
+            if not is_zero(half):
+                begins = self.carried[first][first < last]  # a rigid link begins before it grows
+                halves += [(begins, start, half), (self.carried[last][1], end, half)]
+        return halves
+
+    def _move(self, twist: Array, coordinate: int, given: int = -1) -> None:
+        self.twists.append(twist)
+        self.coordinate.append(coordinate)
+        self.given.append(given)
+
+    def _coordinate(self, spring: Spring | None) -> int:
+        """Count another coordinate, with a spring or passive, and return its number."""
+        nothing = self.units.nothing
+        self.springs.append(spring)
+        self.stiffness.append(nothing if spring is None else self.units.stiffness(spring))
+        self.preload.append(nothing if spring is None else self.units.load(spring, spring.preload))
+        return len(self.springs) - 1
+
+    def _parallelogram(self, bars: Parallelogram, number: int) -> None:
+        """Turn about the near side and back about the far one; in between, the bars grow."""
+        rate = 1.0 / (bars.far - bars.near).norm() * self.units.length
+        near, far = (Joint(bars.normal, point) for point in (bars.near, bars.far))
+        coordinate = self._coordinate(None)
+        self._move(self.units.twist(near, rate), coordinate)
+        self.grow(number)
+        self._move(-self.units.twist(far, rate), coordinate)
+
+    def _spring(self, spring: Spring) -> None:
+        twist = self.units.twist(spring.joint)
+        if is_zero(spring.stiffness):
+            self._move(twist, self._coordinate(None))
+            return
+        if spring.actuated:
+            self._move(twist, -1, self.amounts.actuator(spring))
+        if not (isinstance(spring.stiffness, float) and np.isinf(spring.stiffness)):
+            self._move(twist, self._coordinate(spring))
+
+
+def chain_of(leg: Leg, units: Units, amounts: Given, members: Sequence[Member]) -> Chain:
+    """Read a leg as a row of motions.
+
+    Args:
+        leg: at the pose.
+        units: in which it is counted.
+        amounts: given ones of the legs before; those of this leg are added.
+        members: links that belong to it.
+    """
+    links: list[tuple[Member, Station, Station]] = []
+    for link in members:
+        ends = () if link.ends is None else link.ends()
+        if len(ends) == 2:  # a driven joint at the base is a spring, which gives the link behind it no first end
+            links.append((link, *ends))
+    row = _Row(units, amounts, links)
+    row.grow(0)
+    row.carried.append((0, len(row.twists)))
+    for number, element in enumerate(leg.chain, 1):
+        row.add(element, number)
+    count, masses = len(units.length), row.masses()
+    idle = np.zeros((count, len(row.springs), len(row.springs)))
+    if units.count is not None:
+        idle = _idle(row.twists, row.coordinate, row.springs, count)
+    return Chain(
+        leg.name,
+        np.stack(row.twists, axis=1) if row.twists else np.zeros((count, 0, 6)),
+        tuple(row.coordinate),
+        tuple(row.given),
+        tuple(row.springs),
+        np.stack(row.stiffness, axis=1) if row.stiffness else np.zeros((count, 0)),
+        np.stack(row.preload, axis=1) if row.preload else np.zeros((count, 0)),
+        np.array([SIGNS[spring.acts] if spring else 0.0 for spring in row.springs]),
+        idle,
+        units.masses(masses),
+        _rod(leg, units, [point for _, point, _ in masses]),
+    )
+
+
+def _rod(leg: Leg, units: Units, weights: Sequence[Vector]) -> tuple[Array, Array] | None:
+    """Both ends of a leg that is a rod between two joints with one centre each, and its springs along it."""
+    if len(leg.lines) != 1:
+        return None
+    (line,), turning = leg.lines, [number for number, element in enumerate(leg.chain) if element.freedoms]
+    slides = [number for number, element in enumerate(leg.chain) if element.springs]
+    ends = [leg.chain[n].freedoms[0].point for n in (0, -1) if leg.chain[n].freedoms]
+    if len(ends) != 2 or slides != list(range(slides[0], slides[-1] + 1)) or set(slides) & set(turning):
+        return None
+    points = [ends[number > slides[0]] for number in turning]
+    centred = all(j.point is p for n, p in zip(turning, points, strict=True) for j in leg.chain[n].freedoms)
+    straight = all(spring.joint.point is None and spring.joint.axis is line.direction for spring in leg.springs)
+    if not (centred and straight and all(any(point is end for end in ends) for point in weights)):
+        return None
+    near, far = (units.points([end])[:, 0] for end in ends if end is not None)
+    return near, far
+
+
+def _idle(twists: Sequence[Array], coordinate: Sequence[int], springs: Sequence[Spring | None], count: int) -> Array:
+    """Motions of the passive coordinates that leave the leg's end where it is, to first order [n x c x c]."""
+    passive = [i for i, spring in enumerate(springs) if spring is None]
+    result = np.zeros((count, len(springs), len(springs)))
+    if not passive:
+        return result
+    columns = np.stack(
+        [sum((t for t, c in zip(twists, coordinate, strict=True) if c == i), np.zeros((count, 6))) for i in passive],
+        axis=2,
+    )
+    columns = np.where(np.isfinite(columns), columns, 0.0)  # where a pose has no place, nothing is idle
+    _, sizes, rows = np.linalg.svd(columns, full_matrices=True)
+    weights = np.zeros((count, len(passive)))
+    weights[:, : sizes.shape[1]] = sizes
+    kept = rows * (weights < DEPENDENT)[:, :, None]
+    result[:, passive, : len(passive)] = np.swapaxes(kept, 1, 2)
+    return result

@@ -1,0 +1,412 @@
+"""Equilibrium in the coordinates of one leg, over scalars: what machine code does for many poses, and derivatives.
+
+Loops are cut at the rods: a leg that only carries a force between two joints is a spring between two points and has no
+unknowns. What remains is one chain that carries the platform, the leg that is none of these, or six free motions, and
+its coordinates are all the unknowns. Machines with more such legs, and what is chosen by inequalities, are left to
+`solving`, and so are poses at which these steps do not end at rest.
+
+Source: theory (44). Units, axes and origin are those of `mechanism`.
+"""
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, total, where
+from kinetostat.algebra.solve import Eliminated, Row, eliminated
+from kinetostat.algebra.symmetric import POSITIONS, greatest_eigenvalue
+from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.equilibrium.balance import LegTerms, leg_terms, placed_leg, platform_load
+from kinetostat.equilibrium.chains import Chain, Masses
+from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
+from kinetostat.equilibrium.motion import Array, Motions, of_scalars, skew_of
+from kinetostat.equilibrium.numbers import FREE
+from kinetostat.equilibrium.solving import LONGEST_STEP
+from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.machine import Machine
+from kinetostat.tolerances import AT_REST, UNRESISTED
+
+TENSIONS = ("load.min_tension", "load.max_tension")
+"""Leaf paths of what makes preloads a choice."""
+LARGEST_TURN = 0.2
+"""Sine of the turn of the platform up to which the series of the arc sine keeps all digits."""
+ARC_SINE = (1.0, 1 / 6, 3 / 40, 15 / 336, 105 / 3456, 945 / 42240, 10395 / 599040, 135135 / 9676800)
+"""Coefficients of asin(s) / s in powers of s²."""
+SURE = 1e-9
+"""Share of a diagonal entry below which its pivot says too little about stability."""
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A leg as a spring between two points; of its springs in a row, all carry the same.
+
+    Attributes:
+        near, far: its ends in the free state, on the base and on the platform [1 x 3].
+        softness: sum of the compliances of its springs.
+        given: by how much longer they would be free to be: what their preloads have stretched, less the rod's growth.
+        sign: of the loads that it can carry, 0 for both.
+    """
+
+    near: Array
+    far: Array
+    softness: Scalar
+    given: Scalar
+    sign: float
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A mechanism whose loops are cut at rods.
+
+    Attributes:
+        mechanism: with the masses of rods on its platform.
+        carrier: the chain that carries the platform.
+        rods: that hold it.
+    """
+
+    mechanism: Mechanism
+    carrier: Chain
+    rods: tuple[Rod, ...]
+
+
+def cut(mechanism: Mechanism) -> Cut | None:
+    """Cut the loops of a mechanism; None if legs that are no rods close some, or its form does not allow it."""
+    chains = [leg for leg in mechanism.legs if leg.rod is None]
+    carrier = chains[0] if chains else _free_motions(mechanism)
+    if len(chains) > 1 or carrier.sign.any() or carrier.idle.any():
+        return None
+    rods, points, masses = [], [mechanism.platform.point], [mechanism.platform.mass]
+    for leg in mechanism.legs:
+        if leg.rod is None:
+            continue
+        slides = [n for n in range(leg.twists.shape[1]) if all(is_zero(c) for c in leg.twists[0, n, :3].tolist())]
+        springs = [leg.coordinate[n] for n in slides if leg.coordinate[n] >= 0]
+        if not springs:
+            return None  # nothing of it deflects
+        heavy = [i for i, carried in enumerate(leg.masses.carried) if carried > slides[0]]
+        points.append(leg.masses.point[:, heavy])
+        masses.append(leg.masses.mass[:, heavy])
+        if all(leg.springs[number] is not None for number in springs):
+            soft = [1.0 / leg.stiffness[0, number] for number in springs]
+            given = [a * leg.preload[0, number] for a, number in zip(soft, springs, strict=True)]
+            given += [-mechanism.growth[0, n] for n in (i - len(mechanism.actuators) for i in leg.given) if n >= 0]
+            signs = [float(leg.sign[number]) for number in springs if leg.sign[number]]
+            rods.append(Rod(*leg.rod, total(soft), total(given), signs[0] if signs else 0.0))
+    count = sum(part.shape[1] for part in masses)
+    platform = Masses((0,) * count, np.concatenate(points, axis=1), np.concatenate(masses, axis=1))
+    return Cut(replace(mechanism, platform=platform), carrier, tuple(rods))
+
+
+def _free_motions(mechanism: Mechanism) -> Chain:
+    """A chain without springs in all motions that there are: slides first, so that turns are about the tool point."""
+    ways = mechanism.ways.T[::-1].astype(object)
+    size = len(ways)
+    nothing = np.zeros((1, size))
+    masses = Masses((), np.zeros((1, 0, 3)), np.zeros((1, 0)))
+    return Chain(
+        "platform",
+        ways[None],
+        tuple(range(size)),
+        (-1,) * size,
+        (None,) * size,
+        nothing,
+        nothing,
+        nothing[0],
+        np.zeros((1, size, size)),
+        masses,
+    )
+
+
+@dataclass(frozen=True)
+class _Pull:
+    """What a rod from a point b of the base to a point a of the platform does.
+
+    Attributes:
+        near, at: b and a.
+        moment: a x b.
+        density: its tension over its length, c: it pulls with c (b - a), and that is all but for its stretching.
+        stretching, elastic: k - c and k over the square of its length, with its stiffness k.
+        slack: 1 where it carries nothing, else 0.
+    """
+
+    near: Vector
+    at: Vector
+    moment: Vector
+    density: Scalar
+    stretching: Scalar
+    elastic: Scalar
+    slack: Scalar
+
+    @property
+    def line(self) -> tuple[Scalar, ...]:
+        """The gradient of half the square of its length by a twist of the platform."""
+        return (*(-self.moment).components(), *(self.at - self.near).components())
+
+
+def _pull(rod: Rod, platform: Motions | None) -> _Pull:
+    """A rod at a place of the platform, or in the free state."""
+    near, far = Vector(*rod.near[0]), Vector(*rod.far[0])
+    at = far if platform is None else Vector(*platform.point(rod.far)[0])
+    span, rest = at - near, far - near
+    square, longer = span.dot(span), 0.0
+    length = sqrt(square)
+    if platform is not None:  # the difference of both lengths, without the round-off of their size
+        longer = (at - far).dot(span + rest) * (1.0 / (length + rest.norm()))
+    stiffness = 1.0 / rod.softness
+    tension, slack = (longer + rod.given) * stiffness, 0.0
+    if rod.sign:
+        carries = rod.sign * tension >= 0.0
+        tension, stiffness, slack = (where(carries, *both) for both in ((tension, 0.0), (stiffness, 0.0), (0.0, 1.0)))
+    density, shrink = tension * (1.0 / length), 1.0 / square
+    stretching, elastic = (stiffness - density) * shrink, stiffness * shrink
+    return _Pull(near, at, at.cross(near), density, stretching, elastic, slack)
+
+
+def _pulled(pulls: Sequence[_Pull]) -> tuple[Array, Array]:
+    """The wrench of all rods at the origin [1 x 6], and its decrease by a twist [1 x 6 x 6]."""
+    pulled = [pull.at * pull.density for pull in pulls]
+    ends = _sum(pulled)
+    starts = _sum([pull.near * pull.density for pull in pulls])
+    turned = [
+        [total([getattr(a, i) * getattr(p.near, j) for a, p in zip(pulled, pulls, strict=True)]) for j in "xyz"]
+        for i in "xyz"
+    ]
+    moment = [turned[i][j] - turned[j][i] for i, j in ((1, 2), (2, 0), (0, 1))]
+    trace, density = turned[0][0] + turned[1][1] + turned[2][2], total([pull.density for pull in pulls])
+    fall = _stretched(pulls, [pull.stretching for pull in pulls])[None]
+    for i in range(3):
+        for j in range(3):
+            fall[0, i, j] = fall[0, i, j] + (trace if i == j else 0.0) - turned[i][j]
+        fall[0, 3 + i, 3 + i] = fall[0, 3 + i, 3 + i] + density
+    fall[:, :3, 3:] = fall[:, :3, 3:] + skew_of(of_scalars(starts.components()))
+    fall[:, 3:, :3] = fall[:, 3:, :3] - skew_of(of_scalars(ends.components()))
+    return of_scalars([*moment, *(starts - ends).components()]), fall
+
+
+def _sum(vectors: Sequence[Vector]) -> Vector:
+    return (
+        Vector(*(total(list(parts)) for parts in zip(*(v.components() for v in vectors), strict=True)))
+        if vectors
+        else ZERO
+    )
+
+
+@dataclass(frozen=True)
+class _Place:
+    """The equations at some coordinates of the carrier.
+
+    Attributes:
+        platform: where it is.
+        terms: of the carrier.
+        rates: change of what is left, by the coordinates [coordinates x coordinates].
+        elastic: the part of it that springs make.
+        slack: how many rods carry nothing.
+    """
+
+    platform: Motions
+    terms: LegTerms
+    rates: Array
+    elastic: Array
+    slack: Scalar
+
+
+def _place(machine: Cut, coordinates: Row) -> _Place:
+    mechanism, carrier = machine.mechanism, machine.carrier
+    moved = of_scalars(coordinates)
+    amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
+    placed = placed_leg(carrier, moved, amounts)
+    platform = placed.motions[-1]
+    grows = any(number >= len(mechanism.actuators) for number in carrier.given)
+    free = not grows and all(is_zero(coordinate) for coordinate in coordinates)
+    pulls = [_pull(rod, None if free else platform) for rod in machine.rods]
+    (load, change), (hold, fall) = platform_load(mechanism, platform), _pulled(pulls)
+    terms = leg_terms(carrier, moved, load + hold, amounts, mechanism.gravity, placed)
+    twists = terms.rates[0]
+    springs = terms.carrying[0][:, None] * np.eye(carrier.size)
+    rates = springs + terms.geometric[0] + twists.T @ (fall - change)[0] @ twists
+    elastic = springs + twists.T @ _stretched(pulls, [pull.elastic for pull in pulls]) @ twists
+    return _Place(platform, terms, rates, elastic, total([pull.slack for pull in pulls]))
+
+
+def _stretched(pulls: Sequence[_Pull], weights: Row) -> Array:
+    """The weighted sum of the dyads of all lines [6 x 6]."""
+    result = np.zeros((6, 6), dtype=object)
+    for i, j in POSITIONS:
+        pairs = zip(pulls, weights, strict=True)
+        result[i, j] = result[j, i] = total([pull.line[i] * pull.line[j] * weight for pull, weight in pairs])
+    return result
+
+
+def cut_machine(machine: Machine, varying: Collection[str] = ()) -> Cut | None:
+    """Cut the loops of a machine, if that can be done wherever its varying parameters (leaf paths) are."""
+    load = machine.tables["load"]
+    if any(path in varying or math.isfinite(getattr(load, path.partition(".")[2])) for path in TENSIONS):
+        return None
+    joints = solve_joints(machine) if machine.family.chains else None
+    with np.errstate(all="ignore"):
+        return cut(mechanism_of(machine, respond(machine, joints), joints))
+
+
+def reduced_machine(machine: Machine, response: Response, joints: Joints | None) -> "Reduced":
+    """The equations of a machine that `cut_machine` can cut, with numbers of any kind.
+
+    Args:
+        machine: with its loads.
+        response: of it without them.
+        joints: coordinates that close its legs, if it is written leg by leg.
+    """
+    machine_cut = cut(mechanism_of(machine, response, joints, None))
+    if machine_cut is None:
+        raise ValueError("loops that rods do not cut have no equations over scalars")
+    return Reduced(machine_cut, machine.family.components)
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Equilibrium of a machine in the coordinates of its carrier.
+
+    Attributes:
+        cut: the machine.
+        components: of twists that it has.
+    """
+
+    cut: Cut
+    components: tuple[int, ...]
+
+    @property
+    def size(self) -> int:
+        """How many coordinates there are."""
+        return self.cut.carrier.size
+
+    def start(self) -> Row:
+        """The coordinates after the first step, which linear equations give; NaN where it is too long."""
+        return self.step([0.0] * self.size)[0]
+
+    def step(self, coordinates: Row) -> tuple[Row, Scalar]:
+        """The coordinates after a step of Newton's method, and the square of its size; NaN where it is too long."""
+        step = _Tangent(self.cut, _place(self.cut, coordinates)).step
+        square = _square(step)
+        near = square < LONGEST_STEP**2
+        return [where(near, a + b, math.nan) for a, b in zip(coordinates, step, strict=True)], square
+
+    def numbers(self, coordinates: Row, wanted: Collection[str], status: Scalar) -> tuple[dict[str, Any], Scalar]:
+        """The numbers of the loaded state, see `numbers.loaded_numbers`.
+
+        Args:
+            coordinates: of the state, up to a last step.
+            wanted: which of the numbers are needed.
+            status: of the pose without loads.
+
+        Returns:
+            The numbers by name, and the status of the pose: NOT_CONVERGED where this is not surely a stable state of
+            rest.
+        """
+        tangent, mechanism = _Tangent(self.cut, _place(self.cut, coordinates)), self.cut.mechanism
+        displacement, good = tangent.displacement()
+        good = (_square(tangent.step) < AT_REST**2) & tangent.stable & good
+        compliance, units = tangent.compliance(), mechanism.compliance_units[0]
+        result: dict[str, Any] = {
+            "slack": tangent.place.slack,
+            "displacement": [a * b for a, b in zip(displacement, mechanism.twist_units[0], strict=True)],
+            "compliance": [compliance[i][i] * units[i, i] for i in range(6)],
+        }
+        if "stiffness" in wanted:
+            parts = self.components
+            stiffness, sure = _inverse_diagonal([[compliance[i][j] for j in parts] for i in parts], self.size)
+            by_part = {part: k * reciprocal(units[part, part]) for part, k in zip(parts, stiffness, strict=True)}
+            result["stiffness"], good = [by_part.get(part, math.nan) for part in range(6)], good & sure
+        if "factor" in wanted:
+            result["factor"], sure = tangent.factor()
+            good = good & sure
+        code = where(good, int(Status.OK), int(Status.NOT_CONVERGED))
+        for kept in sorted(set(Status) - set(FREE)):
+            code = where(abs(status - float(kept)) < 0.5, int(kept), code)
+        return result, code
+
+
+def _square(step: Row) -> Scalar:
+    return total([part * part for part in step])
+
+
+class _Tangent:
+    """How a machine resists at a place, and Newton's step from there."""
+
+    def __init__(self, machine: Cut, place: _Place) -> None:
+        self.place = place
+        self._symmetric = all(is_zero(part) for part in machine.mechanism.wrench[0, :3].tolist())
+        self._factors = eliminated(place.rates.tolist(), self._symmetric)
+        self.step: Row = self._factors.solve((-place.terms.left[0]).tolist())
+
+    @property
+    def stable(self) -> Scalar:
+        """Whether the tangent stiffness is positive definite by a margin."""
+        if self._symmetric:
+            return definite(self._factors, self.place.rates)
+        rows = 0.5 * (self.place.rates + self.place.rates.T)
+        return definite(eliminated(rows.tolist()), rows)
+
+    def displacement(self) -> tuple[Row, Scalar]:
+        """Rotation vector and displacement of the tool point after the step, and whether the turn is small enough."""
+        step = of_scalars(self.step)
+        moved = np.einsum("nck,nk->nc", self.place.terms.rates, step)[0]
+        rotation, shift = self.place.platform.rotation[0], self.place.platform.translation[0]
+        sines = [0.5 * (rotation[i, j] - rotation[j, i]) for i, j in ((2, 1), (0, 2), (1, 0))]
+        square, ratio = total([s * s for s in sines]), 0.0
+        for coefficient in reversed(ARC_SINE):
+            ratio = ratio * square + coefficient
+        turned = [sine * ratio + part for sine, part in zip(sines, moved[:3], strict=True)]
+        return [*turned, *(shift + moved[3:] + np.cross(moved[:3], shift))], square < LARGEST_TURN**2
+
+    def compliance(self) -> list[Row]:
+        """C at the loaded tool point [6][6], 0 where it is round-off."""
+        back = np.eye(6, dtype=object)[None]
+        back[:, 3:, :3] = -skew_of(self.place.platform.translation)
+        rows = (back @ self.place.terms.rates)[0].tolist()
+        if self._symmetric:
+            left = [self._factors.forward(row) for row in rows]
+            right = [[a * b for a, b in zip(row, self._factors.shrink, strict=True)] for row in left]
+        else:
+            left, right = rows, [self._factors.solve(row) for row in rows]
+        whole = [[total([a * b for a, b in zip(row, column, strict=True)]) for column in right] for row in left]
+        return [[_resisted(0.5 * (whole[i][j] + whole[j][i])) for j in range(6)] for i in range(6)]
+
+    def factor(self) -> tuple[Scalar, Scalar]:
+        """By which the load may grow until the state gives way, and whether springs alone hold the machine."""
+        elastic, rates = self.place.elastic, self.place.rates
+        half = eliminated((0.5 * (elastic + elastic.T)).tolist())
+        turning = elastic - 0.5 * (rates + rates.T)
+        once = [half.forward(row) for row in turning.tolist()]
+        twice = [half.forward(row) for row in np.array(once, dtype=object).T.tolist()]
+        roots = [sqrt(abs(shrink)) for shrink in half.shrink]
+        size = range(len(roots))
+        greatest = greatest_eigenvalue([[roots[i] * twice[i][j] * roots[j] for j in size] for i in size])
+        grows = greatest > 0.0
+        return where(grows, 1.0 / where(grows, greatest, 1.0), math.inf), definite(half, elastic)
+
+
+def _resisted(compliance: Scalar) -> Scalar:
+    return where(abs(compliance) < UNRESISTED, 0.0, compliance)
+
+
+def definite(factors: Eliminated, rows: Array) -> Scalar:
+    """Whether a symmetric matrix is surely positive definite, by the pivots of its elimination."""
+    good: Scalar = True
+    for k, pivot in enumerate(factors.pivots):
+        good = good & (pivot > SURE * abs(rows[k, k]))
+    return good
+
+
+def _inverse_diagonal(rows: list[Row], rank: int) -> tuple[Row, Scalar]:
+    """The diagonal of the inverse of a symmetric matrix, infinite if its rank is less, and whether it is sure."""
+    if rank < len(rows):
+        return [math.inf] * len(rows), True
+    factors = eliminated(rows)
+    units = np.eye(len(rows)).tolist()
+    solved = [factors.forward(unit) for unit in units]
+    diagonal = [total([a * a * b for a, b in zip(row, factors.shrink, strict=True)]) for row in solved]
+    return diagonal, definite(factors, np.array(rows, dtype=object))

@@ -1,0 +1,124 @@
+"""Loaded states of many poses: programs in the coordinates of one leg against the solver for any machine."""
+
+import numpy as np
+import pytest
+
+from kinetostat import analyze
+from kinetostat.engine.batch import evaluate
+from kinetostat.engine.loaded import NUMPY_FROM, Way, loaded_fill
+from kinetostat.engine.points import Table
+from kinetostat.equilibrium.reduced import cut_machine
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.loading import bundled
+from machines import load_without_limits
+from refusals import refused
+
+CUT = {
+    *("hexapod", "hexapod-cubic", "planar-3rpr", "tricept", "zhang-gosselin-4dof"),
+    *("passive-leg-3dof-pu", "passive-leg-3dof-pu-driven", "passive-leg-4dof-driven"),
+    *("passive-leg-5dof", "passive-leg-5dof-driven"),
+}
+"""Bundled machines whose loops are cut at rods."""
+
+
+def moved_by_about(name, amount, *settings):
+    """A machine under a force, a moment and a weight that move it by about some m and rad."""
+    planar = name.startswith("planar")
+    soft = np.diag(analyze(load_without_limits(name, [*settings])).C)[1 if planar else 3 :].max()
+    size = float(amount / soft)
+    loads = [f"load.force={[0.3 * size, 0.5 * size, 0.0 if planar else -0.5 * size]}", f"tool.mass={size / 50}"]
+    centre, moment = ([0.01, 0.02, 0.0], [0.0, 0.0, 0.02 * size]) if planar else ([0.01, 0.02, 0.03], [0.01 * size] * 3)
+    pull = [0.0, -9.0, 0.0] if planar else [1.0, 0.0, -9.0]
+    loads += [f"load.moment={moment}", f"tool.centre_of_mass={centre}", f"load.gravity={pull}"]
+    return load_without_limits(name, [*loads, *settings])
+
+
+def quantities_of(machine, *others):
+    parts = [("rx", "ry", "rz", "x", "y", "z")[i] for i in machine.family.components]
+    kinds = ("displacement", "tangent_free_stiffness", "tangent_stiffness")
+    return [f"{kind}_{part}" for kind in kinds for part in parts] + list(others)
+
+
+def both_ways(machine, columns, quantities, way=Way.NUMPY):
+    count = len(next(iter(columns.values())))
+    answers = []
+    for each in (way, Way.ANY_MACHINE):
+        results, status = np.empty((len(quantities), count)), np.empty(count, dtype=np.int8)
+        loaded_fill(machine, list(columns), quantities, each)(columns, results, status)
+        answers.append((results, status))
+    return answers
+
+
+def compare(machine, columns, quantities, way=Way.NUMPY, agreed=1e-9):
+    (fast, status), (slow, expected) = both_ways(machine, columns, quantities, way)
+    assert status.tolist() == expected.tolist()
+    size = np.abs(slow)
+    parts = len(machine.family.components)
+    parts = parts if quantities[:parts] == quantities_of(machine)[:parts] else 0
+    size[:parts] = size[:parts].max(axis=0, initial=0.0)  # of a displacement, small components count beside the largest
+    same = (fast == slow) | (np.isnan(fast) & np.isnan(slow))
+    with np.errstate(invalid="ignore"):
+        assert (same | (np.abs(fast - slow) <= agreed * size)).all()
+    return status
+
+
+def poses_near(machine, count, share=0.01):
+    pose = machine.tables["pose"]
+    paths = [f"pose.{name}" for name in type(pose).__dataclass_fields__][:3]
+    drawn = np.random.default_rng(1).uniform(-share, share, (3, count))
+    return {path: getattr(pose, path[5:]) + row for path, row in zip(paths, drawn, strict=True)}
+
+
+def test_which_machines_are_cut_at_rods():
+    assert {name for name in bundled() if cut_machine(load_without_limits(name)) is not None} == CUT
+
+
+@pytest.mark.parametrize("name", sorted(CUT))
+def test_loaded_states_of_a_program_are_those_of_the_solver(name):
+    machine = moved_by_about(name, 2e-3)
+    status = compare(machine, poses_near(machine, 6), quantities_of(machine, "load_factor", "slack_springs"))
+    assert (status == Status.OK).all()
+
+
+def test_machine_code_gives_them_too_and_leaves_far_ones_to_the_solver():
+    machine = moved_by_about("zhang-gosselin-4dof", 1e-3)
+    force = machine.tables["load"].force[2]
+    columns = poses_near(machine, 4) | {"load.force.2": force * np.array([1.0, 0.0, 200.0, 30.0])}
+    columns["pose.z"][0] = 9.0
+    status = compare(machine, columns, ["displacement_z", "tangent_stiffness_z"], Way.NATIVE)
+    assert status.tolist() == [Status.OUT_OF_REACH, Status.OK, Status.OK, Status.OK]
+
+
+def test_links_weigh_as_they_do_in_the_solver():
+    densities = ["linear_density.legs=0.3 kg/m", "linear_density.passive_links=[0.01, 0.02]"]
+    machine = load_without_limits("zhang-gosselin-4dof", [*densities, "load.gravity=[0, 0, -0.1]"])
+    compare(machine, poses_near(machine, 6), quantities_of(machine))
+    bare = load_without_limits("zhang-gosselin-4dof", ["tool.mass=1e-9", "load.gravity=[0, 0, -0.1]"])
+    moved = [both_ways(each, poses_near(each, 2), ["displacement_x"])[0][0][0] for each in (machine, bare)]
+    assert (np.abs(moved[0]) > 1e3 * np.abs(moved[1])).all()
+
+
+def test_rigid_links_and_springs_in_a_row():
+    rigid = moved_by_about("zhang-gosselin-4dof", 1e-3, "stiffness.passive_links=rigid", "stiffness.leg_axial=2e4")
+    compare(rigid, poses_near(rigid, 6), quantities_of(rigid), agreed=1e-8)
+
+
+def test_machines_with_other_loops_are_left_to_the_solver():
+    machine = moved_by_about("planar-3rrr", 1e-3)
+    compare(machine, poses_near(machine, 3), quantities_of(machine), agreed=0.0)
+
+
+def test_many_points_go_through_programs(monkeypatch):
+    from kinetostat.engine import loaded
+
+    machine = moved_by_about("hexapod", 1e-3)
+    monkeypatch.setattr(loaded, "_solve_in_parts", lambda *_: pytest.fail("the slow solver was asked"))
+    count = NUMPY_FROM
+    values = evaluate(machine, Table(poses_near(machine, count)), ["displacement_z"])
+    assert (values.status == Status.OK).all()
+
+
+def test_gravity_without_any_mass_is_refused_by_programs_too():
+    machine = load_without_limits("hexapod", ["load.gravity=[0, 0, -9.81]"])
+    with refused(r"load.gravity pulls at masses, but none is known"):
+        evaluate(machine, Table({"pose.x": np.zeros(NUMPY_FROM)}), ["displacement_z"])
