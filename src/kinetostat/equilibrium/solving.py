@@ -64,7 +64,7 @@ def at_rest(mechanism: Mechanism, start: State | None = None) -> Solution:
         start: a state nearby; the free state if None.
     """
     state = start or free_state(mechanism)
-    reached = _newton(mechanism, state)
+    reached = newton(mechanism, state)
     for steps in LOAD_STEPS[1:]:
         rows = np.flatnonzero(~reached.settled)
         if not len(rows):
@@ -72,7 +72,7 @@ def at_rest(mechanism: Mechanism, start: State | None = None) -> Solution:
         part = mechanism.taken(rows)
         state_of_part = replace(free_state(part), amounts=state.amounts[rows])
         for number in range(1, steps + 1):
-            solution = _newton(with_share(part, number / steps), state_of_part)
+            solution = newton(with_share(part, number / steps), state_of_part)
             state_of_part = solution.balance.state
             if not solution.settled.any():
                 break
@@ -109,7 +109,13 @@ def _put(mechanism: Mechanism, reached: Solution, rows: Rows, part: Solution) ->
     return Solution(balance(mechanism, state), put(reached.settled, part.settled))
 
 
-def _newton(mechanism: Mechanism, state: State) -> Solution:
+def newton(mechanism: Mechanism, state: State) -> Solution:
+    """Find the states of rest near given ones, without steps of the load.
+
+    Args:
+        mechanism: with its load.
+        state: to begin with.
+    """
     equations = balance(mechanism, state)
     settled = np.zeros(len(mechanism.length), dtype=bool)
     last = np.full(len(mechanism.length), np.inf)

@@ -15,6 +15,7 @@ from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.balance import Balance, balance, free_state
 from kinetostat.equilibrium.buckling import Strut, struts
+from kinetostat.equilibrium.limit import LEAP, limit_of
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import loaded_mechanism
@@ -22,7 +23,6 @@ from kinetostat.equilibrium.shape import loaded_links
 from kinetostat.equilibrium.solving import Rest, at_rest, solve, with_share
 from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, inverse, stability
 from kinetostat.kinematics.closure import solve_joints
-from kinetostat.kinematics.singularity import describe
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.deflected import DeflectedLink
 from kinetostat.kinetostatics.response import Response, respond
@@ -30,6 +30,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.mass import located_members
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.load_limit import ADVICE, how_it_gives_way, moving_legs
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.refusal import why_not
 from kinetostat.studies.rounding import clean_matrix, clean_screw
@@ -78,7 +79,7 @@ class LoadedState(Immutable):
             what the loads do by turning; None where it is not finite.
         compliance: inverse of the tangent stiffness.
         factor: by which the loads may grow in proportion until the machine is unstable; infinite if no growth does it,
-            None where springs alone hold nothing.
+            None where springs alone hold nothing. Without a state of rest, the share of them up to which it stands.
         mode: small motion of the tool point when it becomes unstable, of any size, rad and m.
         mode_legs: the legs that move most then.
         struts: what presses each strut whose E I is known, and Euler's load at which it bends away.
@@ -132,7 +133,7 @@ def under_load(machine: Machine) -> LoadedState:
         return LoadedState(machine, Rest.NO_REST, _not_held(machine), names)
     solution = at_rest(mechanism)
     if not solution.settled[0]:
-        return LoadedState(machine, Rest.NO_REST, _without_rest(machine), names)
+        return _without_rest(machine, mechanism)
     members = located_members(machine, response.configuration, None if joints is None else joints.coordinates)
     pressed = struts(response.configuration.legs, members, response.reference, solution.balance)
     return _state(machine, response, solution.balance, tuple(pressed))
@@ -188,13 +189,13 @@ def _state(machine: Machine, response: Response, equations: Balance, pressed: tu
     judged = stability(equations)
     states = _springs(equations)
     slack = tuple(dict.fromkeys(state.leg for state in states if state.slack))
-    moving = [leg.name for leg, size in zip(mechanism.legs, judged.legs, strict=True) if size > 0.5 * max(judged.legs)]
+    moving = moving_legs(equations, judged)
     return LoadedState(
         machine,
         Rest.OK if judged.stable else Rest.UNSTABLE,
         " ".join(
             [
-                _message(judged, slack, judged.mode * units),
+                _message(judged, slack, mechanism, equations.state.platform.amounts()[0]),
                 *_buckled(machine, pressed),
                 *_passed_limit(machine, response),
             ]
@@ -271,13 +272,17 @@ def _cleaned(stiffness: Array) -> list[list[float]] | None:
     return clean_matrix(np.where(negligible, 0.0, stiffness).tolist())
 
 
-def _message(judged: Stability, slack: tuple[str, ...], mode: Array) -> str:
+def _message(judged: Stability, slack: tuple[str, ...], mechanism: Mechanism, moved: Array) -> str:
     sentences = []
     if not judged.stable:
+        stands = how_it_gives_way(limit_of(mechanism))
         sentences.append(
-            "The machine is not stable under this load: the least disturbance moves it away. Reduce the load, or "
-            f"stiffen what moves: {describe(mode.tolist(), ('rad', 'm')) or 'its legs'}."
+            f"The machine is not stable under this load: the least disturbance moves it away. {stands} {ADVICE}"
         )
+    elif np.abs(moved).max() > LEAP:
+        limit = limit_of(mechanism)
+        if limit is not None and limit.share < 1.0:
+            sentences.append(f"The machine has snapped over to another state on the way. {how_it_gives_way(limit)}")
     if slack:
         sentences.append(f"Slack, so that they carry nothing: {', '.join(slack)}.")
     return " ".join(sentences) or "At rest and stable."
@@ -310,10 +315,16 @@ def _not_held(machine: Machine) -> str:
     )
 
 
-def _without_rest(machine: Machine) -> str:
-    return (
-        f"{machine.name} comes to no rest under this load, even if it grows in 64 steps: either the load passes a "
-        "limit of stability, or what carries it goes slack. Reduce the load, or preload what only pulls."
+def _without_rest(machine: Machine, mechanism: Mechanism) -> LoadedState:
+    """A machine that comes to no rest, with the state in which it stood last while its loads grew."""
+    names, parts, limit = machine.family.component_names, list(machine.family.components), limit_of(mechanism)
+    message = f"{machine.name} comes to no rest under this load. {how_it_gives_way(limit)} {ADVICE}"
+    if limit is None:
+        return LoadedState(machine, Rest.NO_REST, message, names)
+    mode = (limit.judged.mode * mechanism.twist_units[0])[parts]
+    legs = moving_legs(limit.balance, limit.judged) if mode.any() else []
+    return LoadedState(
+        machine, Rest.NO_REST, message, names, factor=limit.share, mode=tuple(mode.tolist()), mode_legs=tuple(legs)
     )
 
 

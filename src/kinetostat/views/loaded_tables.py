@@ -8,6 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from kinetostat.display import DASH, Display, number
+from kinetostat.equilibrium.solving import Rest
 from kinetostat.studies.command import Command
 from kinetostat.studies.requirements import Verdict
 from kinetostat.studies.setting import pose_of
@@ -53,6 +54,8 @@ def stability_of(state: LoadedState) -> str:
         return "The springs alone hold nothing here: weight and tension do."
     if math.isinf(state.factor):
         return "No growth of this load makes the machine unstable."
+    if state.rest is Rest.UNSTABLE:
+        return f"The machine is unstable beyond {number(state.factor)} times this load."
     return f"The load may grow to {number(state.factor)} times its size until the machine becomes unstable."
 
 
