@@ -302,3 +302,35 @@ def test_a_study_without_feasible_design_has_no_report(tmp_path, capsys):
     assert main(["report", str(file), "-o", str(tmp_path / "r.html")]) == 1
     assert "No feasible design was found" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
+
+
+LESS = [*QUICK, "--without", "maps"]
+
+
+def test_a_machine_meant_under_load_has_a_section_of_it(tmp_path, capsys):
+    words = [*LESS, "--set", "load.force=[0, 150, -400]"]
+    page = Page(reported(tmp_path / "r.html", "hexapod", *words, "--loaded"))
+    state = told("analyze", "hexapod", "--loaded", *words[-2:])
+    assert page.results["under_load"] == state
+    assert f"Under load, ok: {state['message']}" in page.text
+    moved = page.table("Displacement of the tool point")
+    assert [number(cell) for cell in moved[1][1:]] == pytest.approx([1e6 * u for u in state["displacement"]], rel=1e-3)
+    springs = page.table("Load and deformation of every spring")[1:]
+    assert [number(row[1].split()[0]) for row in springs] == pytest.approx(
+        [spring["load"] for spring in state["springs"]], rel=1e-3
+    )
+    heads, *rows = page.table("Stiffness that further loads meet")
+    assert heads[1:] == ["1/C under load", "1/C free state", "K under load", "of springs", "K free state"]
+    assert number(rows[5][3]) == pytest.approx(state["tangent_stiffness"][5][5] * 1e-6, rel=1e-3)
+    said_by_file = reported(tmp_path / "s.html", "hexapod", *words, "--set", "load.state=loaded")
+    assert Page(said_by_file).results == page.results
+    assert "Under load, ok:" not in Page(reported(tmp_path / "t.html", "hexapod", *words)).text
+    pdf = PdfReader(io.BytesIO(reported(tmp_path / "r.pdf", "hexapod", *words, "--loaded")))
+    assert "Under load, ok:" in " ".join(" ".join(page.extract_text().split()) for page in pdf.pages)
+
+
+def test_loads_without_rest_are_said_in_the_report(tmp_path):
+    words = ["--set", "load.force=[0, 0, -2e6]", "--set", "limits.actuator_force=none", "--loaded"]
+    page = Page(reported(tmp_path / "r.html", "hexapod", *LESS, *words))
+    assert "Under load, no rest: 6-UPS hexapod (stewart-simscape) comes to no rest" in page.text
+    assert not any(caption.startswith("Load and deformation of every") for caption in page.tables)

@@ -2,6 +2,7 @@
 
 import argparse
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -74,6 +75,10 @@ def _add_report_command(commands: "Commands") -> None:
         help=f"omit a part that takes time: {', '.join(WITHOUT)}; repeatable",
     )  # fmt: skip
     command.add_argument(
+        "--loaded", action="store_true",
+        help='also show the machine at rest under its loads (default where [load] says state = "loaded")',
+    )  # fmt: skip
+    command.add_argument(
         "--engine",
         help="independent engine for the validation: exudyn or pynite (default: the first that is installed)",
     )
@@ -99,7 +104,7 @@ def _report(options: argparse.Namespace) -> int:
     from kinetostat.views.tables import print_written, terminal
 
     path = report_path(options.output)
-    wanted = Wanted(options.ranges, options.without, options.engine, options.author, options.date)
+    wanted = Wanted(options.ranges, options.without, options.engine, options.author, options.date, options.loaded)
     subject = subject_of(options.subject, options.settings)
     result = _search(subject.problem, subject.folder) if subject.problem else None
     if result is not None and not result.solved:
@@ -107,6 +112,7 @@ def _report(options: argparse.Namespace) -> int:
     result = result.in_units(options.units) if result and options.units else result
     machine = subject.machine if result is None else result.machine
     machine = machine.in_units(options.units) if options.units else machine
+    machine = replace(machine, loaded=True) if options.loaded else machine
     with progress_bar("computing") as progress:
         answers = gather(machine, wanted.ranges, wanted.without, result, progress)
         if answers.analysis.status is Status.OK:

@@ -7,28 +7,32 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from kinetostat.display import Scale
+from kinetostat.display import Scale, number
 from kinetostat.engine.points import Array
 from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.under_load import LoadedState, load_curve
 from kinetostat.views.drawing import flat, loop, views_of
 from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.loaded_tables import leg_loads
 from kinetostat.views.scene.analysis_overlays import exaggerated, exaggeration_of, motions_of
 from kinetostat.views.scene.proportions import proportions_of
 
 UNLOADED, LOADED, SLACK = "#9a9a9a", COLOURS[0], COLOURS[1]
+BAR = 0.24
+"""Inches of a bar."""
 BENDS = 12
 """Pieces of which a bent link is drawn."""
 MOST_SPRINGS = 12
 """Springs of which a curve is drawn, those with the greatest loads: more cannot be told apart."""
 
 
-def load_figure(state: LoadedState) -> Figure:
+def load_figure(state: LoadedState, title: str = "{}: under growing load") -> Figure:
     """Draw displacement and spring loads over the share of the load, with the linear answer as thin lines.
 
     Args:
         state: of the machine under its whole load.
+        title: over the figure, with braces for the name of the machine.
     """
     machine, curve = state.machine, load_curve(state.machine)
     display, share = machine.display, 100.0 * curve.shares
@@ -53,17 +57,18 @@ def load_figure(state: LoadedState) -> Figure:
             largest = sorted(loads, key=lambda name: -abs(loads[name]).max())[:MOST_SPRINGS]
             _curves(panel, share, {name: loads[name] for name in loads if name in largest}, scale.label("load"))
         panels[-1].set_xlabel("share of the loads (%)")
-        set_title(figure, f"{machine.name}: under growing load")
+        set_title(figure, title.format(machine.name))
         note_setting(figure, setting_of(machine, []), "thin lines: to first order" if state.linear else "")
         fix_layout(figure)
     return figure
 
 
-def shape_figure(state: LoadedState) -> Figure:
+def shape_figure(state: LoadedState, title: str = "{}: under load") -> Figure:
     """Draw the loaded machine over the unloaded one, in front, side and plan; slack legs are dashed.
 
     Args:
         state: of a machine that is at rest.
+        title: over the figure, with braces for the name of the machine.
     """
     machine, configuration, moved = state.machine, respond(state.machine).configuration, motions_of(state)
     factor = exaggeration_of(state, moved, proportions_of(machine, configuration).diagonal)
@@ -93,7 +98,38 @@ def shape_figure(state: LoadedState) -> Figure:
             loc="outside lower center", ncols=len(styles), title_fontsize=6.5,
             title=f"{setting_of(machine, [])}\n{drawn_larger(factor)}",
         )  # fmt: skip
-        set_title(figure, f"{machine.name}: under load")
+        set_title(figure, title.format(machine.name))
+        fix_layout(figure)
+    return figure
+
+
+def bars_figure(state: LoadedState) -> Figure:
+    """Draw a bar for the load of each leg: to the right where it pulls, to the left where it pushes, none if slack."""
+    shown, display = leg_loads(state), state.machine.display
+    kinds = [
+        (unit, turns) for unit, turns in (("N", False), ("N·m", True)) if any(s.turning is turns for _, s in shown)
+    ]
+    groups = [[(name, spring) for name, spring in shown if spring.turning is turns] for _, turns in kinds]
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(6.6, 0.6 * len(groups) + BAR * len(shown)), layout="constrained")
+        heights = [len(group) + 1 for group in groups]
+        panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=heights).flat
+        for panel, (unit, _), group in zip(panels, kinds, groups, strict=True):
+            scale, places = display.scale(unit), range(len(group))
+            loads = [spring.load * scale.factor for _, spring in group]
+            panel.barh(places, loads, height=0.6, color=[COLOURS[0] if load > 0.0 else COLOURS[1] for load in loads])
+            for place, load, (_, spring) in zip(places, loads, group, strict=True):
+                text = "slack" if spring.slack else number(load, digits=display.digits)
+                panel.annotate(
+                    text, (load, place), xytext=(-4 if load < 0.0 else 4, 0), textcoords="offset points",
+                    ha="right" if load < 0.0 else "left", va="center",
+                )  # fmt: skip
+            panel.set_yticks(places, [name for name, _ in group])
+            panel.axvline(0.0, color="#444444", linewidth=0.8)
+            panel.set_xlabel(scale.label("load, positive where it pulls"))
+            panel.margins(x=0.15)
+            panel.set_axisbelow(True)
+            panel.invert_yaxis()
         fix_layout(figure)
     return figure
 
@@ -104,9 +140,9 @@ def drawn_larger(factor: float) -> str:
 
 
 def _curves(panel: Axes, share: Array, curves: dict[str, Array], label: str) -> None:
-    for number, (name, values) in enumerate(curves.items()):
-        dash = DASHES[number % len(DASHES)]
-        panel.plot(share, values, color=COLOURS[number % len(COLOURS)], linestyle=dash, label=name)
+    for place, (name, values) in enumerate(curves.items()):
+        dash = DASHES[place % len(DASHES)]
+        panel.plot(share, values, color=COLOURS[place % len(COLOURS)], linestyle=dash, label=name)
     panel.axvline(100.0, color="#999999", linewidth=0.8)
     panel.set_ylabel(label)
     panel.margins(x=0.0)

@@ -1,19 +1,21 @@
 """A machine under load as tables on a terminal: the answer first, then springs and stiffness. Nothing is computed."""
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from kinetostat.algebra.scalar import reciprocal
 from kinetostat.display import DASH, Display, number
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.studies.command import Command
 from kinetostat.studies.requirements import Verdict
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.under_load import LoadedState, SpringState
-from kinetostat.views.analysis_tables import matrix_table
+from kinetostat.views.analysis_tables import entry_unit, matrix_table
 from kinetostat.views.assembly_tables import precise
 from kinetostat.views.requirement_lines import print_requirements
 from kinetostat.views.tables import numeric_table, print_doubts
@@ -33,10 +35,10 @@ def print_loaded(console: Console, state: LoadedState, requirements: Sequence[Ve
     print_doubts(console, machine)
     if not state.displacement:
         return
-    console.print(_displacements(state, display))
-    console.print(_springs(state, display))
+    console.print(displacement_table(state, display))
+    console.print(spring_table(state, display))
     if state.struts:
-        console.print(_struts(state, display))
+        console.print(strut_table(state, display))
     about = f"Components {' '.join(state.components)} at the loaded {machine.reference}, base axes."
     console.print(about, style="dim", highlight=False)
     for title, kind, rows in (
@@ -59,7 +61,7 @@ def stability_of(state: LoadedState) -> str:
     return f"The load may grow to {number(state.factor)} times its size until the machine becomes unstable."
 
 
-def _displacements(state: LoadedState, display: Display) -> Table:
+def displacement_table(state: LoadedState, display: Display) -> Table:
     """How far the load moves the tool, and what linear equations say."""
     units = ["rad" if name.startswith("r") else "m" for name in state.components]
     scales = dict.fromkeys(display.deflection(unit).unit for unit in units)
@@ -71,12 +73,47 @@ def _displacements(state: LoadedState, display: Display) -> Table:
     return table
 
 
+def leg_loads(state: LoadedState) -> list[tuple[str, SpringState]]:
+    """Name what carries each leg: its actuator by the name of the leg, or by its own where a leg has several."""
+    shown = [spring for spring in state.springs if spring.actuated] or list(state.springs)
+    count = Counter(spring.leg for spring in shown)
+    return [(spring.leg if count[spring.leg] == 1 else spring.name, spring) for spring in shown]
+
+
+def tangent_table(state: LoadedState, free: Sequence[float] = (), stiff: Sequence[float] = ()) -> Table | None:
+    """The stiffness to further loads in each direction, beside that of the machine without loads.
+
+    Args:
+        state: at rest; None is returned where its stiffness is not finite.
+        free: diagonal of 1/C without loads, SI; left out if empty.
+        stiff: diagonal of K without loads, SI.
+    """
+    if state.tangent is None or state.compliance is None:
+        return None
+    display, names = state.machine.display, state.components
+    columns = {
+        "1/C under load": [reciprocal(state.compliance[i][i]) for i in range(len(names))],
+        "1/C free state": list(free),
+        "K under load": [state.tangent[i][i] for i in range(len(names))],
+        "of springs": [] if state.elastic is None else [state.elastic[i][i] for i in range(len(names))],
+        "K free state": list(stiff),
+    }
+    columns = {head: values for head, values in columns.items() if values}
+    table = numeric_table("Stiffness to further loads", "", list(columns))
+    for i, name in enumerate(names):
+        unit = entry_unit("stiffness", name, name)
+        cells = (display.number(values[i], unit, "rigid") for values in columns.values())
+        table.add_row(display.scale(unit).label(name), *cells)
+    return table
+
+
 def word_of(spring: SpringState) -> str:
     """Say whether a spring carries."""
     return "slack" if spring.slack else "carries"
 
 
-def _springs(state: LoadedState, display: Display) -> Table:
+def spring_table(state: LoadedState, display: Display) -> Table:
+    """Load, deformation and state of every spring."""
     table = numeric_table("Springs", "spring", ["load", "deformation", "state"])
     for spring in state.springs:
         load = display.show(spring.load, "N·m" if spring.turning else "N")
@@ -85,7 +122,7 @@ def _springs(state: LoadedState, display: Display) -> Table:
     return table
 
 
-def _struts(state: LoadedState, display: Display) -> Table:
+def strut_table(state: LoadedState, display: Display) -> Table:
     """What presses each strut, and at which load it would bend away."""
     table = numeric_table("Struts: columns between two hinges", "strut", ["compression", "Euler's load", "reserve"])
     for strut in state.struts:

@@ -23,6 +23,7 @@ from kinetostat.studies.guidelines.guidelines import Guidelines, guidelines
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.requirements import Verdict, requirements
 from kinetostat.studies.sensitivity import Sensitivity, sensitivity
+from kinetostat.studies.under_load import LoadedState, under_load
 
 PROBES = 48
 """Steps to each side in which it is tried how far a coordinate goes."""
@@ -58,6 +59,7 @@ class Answers:
         result: of the study that the machine is the best design of.
         refused: why there is no answer, by the name of the part.
         requirements: of the machine's file, judged.
+        loaded: the machine at rest under its loads, if it is meant so (`machine.loaded`).
     """
 
     machine: Machine
@@ -68,6 +70,7 @@ class Answers:
     result: Result | None = None
     refused: dict[str, str] = field(default_factory=dict)
     requirements: tuple[Verdict, ...] = ()
+    loaded: LoadedState | None = None
 
 
 def gather(
@@ -87,7 +90,7 @@ def gather(
         progress: receives how far the work on a report is: five of `STEPS`.
 
     Raises:
-        InputError: a bad range, too many, or an unknown part.
+        InputError: a bad range, too many, an unknown part, or loads that `under_load` refuses.
     """
     for part in without:
         choice(part, PARTS, "the part of a report to leave out")
@@ -100,7 +103,7 @@ def gather(
     refused: dict[str, str] = {}
     if not over:
         refused["maps"] = "No coordinate of the pose can change by itself here, so that there is nothing to map."
-    judged = requirements(machine)
+    judged, state = requirements(machine), under_load(machine) if machine.loaded else None
     progress(1, STEPS)
     maps = evaluate_grid(machine, over, list(_diagonal(machine))) if over and "maps" not in without else None
     progress(2, STEPS)
@@ -108,7 +111,7 @@ def gather(
     progress(3, STEPS)
     advice = _advice(machine, over) if "guidelines" not in without else None
     progress(5, STEPS)
-    return Answers(machine, analysis, maps, advice, ranked, result, refused, judged)
+    return Answers(machine, analysis, maps, advice, ranked, result, refused, judged, state)
 
 
 def _advice(machine: Machine, over: Sequence[str]) -> Guidelines:

@@ -3,12 +3,10 @@
 The tables are HTML made of an `Analysis`; nothing is computed but the rounding of its numbers.
 """
 
-from collections import Counter
 from collections.abc import Sequence
 
 from nicegui import ui
 
-from kinetostat.algebra.scalar import reciprocal
 from kinetostat.display import DASH, Display
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.under_load import LoadedState
@@ -18,7 +16,8 @@ from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import bars, engineering, entry, heading, paragraph, table
 from kinetostat.views.analysis_tables import entry_unit, matrix_units
-from kinetostat.views.loaded_tables import stability_of, word_of
+from kinetostat.views.loaded_tables import leg_loads, spring_table, stability_of, tangent_table
+from kinetostat.views.report.typesetting import printed
 
 KINDS = {"C": "compliance", "K": "stiffness"}
 PRINCIPAL_UNITS = {"translation": "N/m", "rotation": "N·m/rad"}
@@ -198,10 +197,7 @@ def loaded_text(state: LoadedState) -> str:
         [name, display.show_deflection(now, unit), display.show_deflection(first, unit)]
         for name, unit, now, first in zip(state.components, units, state.displacement, linear, strict=True)
     ]
-    springs = [
-        [spring.name, *_loaded(spring.load, spring.deformation, spring.turning, display), word_of(spring)]
-        for spring in state.springs
-    ]
+    springs = printed(spring_table(state, display), "")
     return (
         paragraph(f"{state.message} {stability_of(state)}", "lead")
         + heading("Which legs carry")
@@ -210,20 +206,16 @@ def loaded_text(state: LoadedState) -> str:
         + table("displacement", ["", "under load", "to first order"], moved)
         + _tangents(state)
         + heading("Springs")
-        + table("springs", ["", "load", "deformation", ""], springs)
+        + table("springs", springs.heads, springs.rows)
     )
 
 
 def tension_bars(state: LoadedState) -> str:
     """A bar for each leg as long as the load of its actuator: blue where it pulls, orange where it pushes."""
-    shown = [spring for spring in state.springs if spring.actuated] or list(state.springs)
-    largest = {
-        turning: max((abs(s.load) for s in shown if s.turning is turning), default=0.0) for turning in (True, False)
-    }
-    named = Counter(spring.leg for spring in shown)
+    shown = leg_loads(state)
+    largest = {turning: max((abs(s.load) for _, s in shown if s.turning is turning), default=0.0) for turning in (0, 1)}
     rows, legs = [], {}
-    for spring in shown:
-        name = spring.leg if named[spring.leg] == 1 else spring.name
+    for name, spring in shown:
         load = "slack" if spring.slack else state.machine.display.show(spring.load, "N·m" if spring.turning else "N")
         rows.append((name, spring.load / (largest[spring.turning] or 1.0), load))
         legs[name] = spring.leg
@@ -232,16 +224,11 @@ def tension_bars(state: LoadedState) -> str:
 
 def _tangents(state: LoadedState) -> str:
     """The stiffness that a tool feels now, and that of the springs alone with all other motions held."""
-    if state.compliance is None or state.tangent is None:
+    stiffness = tangent_table(state)
+    if stiffness is None:
         return ""
-    display, rows = state.machine.display, []
-    for i, name in enumerate(state.components):
-        unit = entry_unit("stiffness", name, name)
-        free = reciprocal(state.compliance[i][i])
-        elastic = None if state.elastic is None else state.elastic[i][i]
-        numbers = (display.number(value, unit, "rigid") for value in (free, state.tangent[i][i], elastic))
-        rows.append([display.scale(unit).label(name), *numbers])
-    return heading("Stiffness to further loads") + table("stiffness", ["", "1/C", "K", "K of springs"], rows)
+    rows = printed(stiffness, "")
+    return heading("Stiffness to further loads") + table("stiffness", rows.heads, rows.rows)
 
 
 def _loaded(load: float, motion: float, turning: bool, display: Display) -> list[str]:

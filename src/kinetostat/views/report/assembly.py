@@ -19,6 +19,7 @@ from kinetostat.views.report.stiffness import load_section, stiffness_section, w
 from kinetostat.views.report.study import study_section
 from kinetostat.views.report.summary import summary_section
 from kinetostat.views.report.typesetting import typeset
+from kinetostat.views.report.under_load import loaded_section
 
 
 def report_of(
@@ -48,6 +49,7 @@ def report_of(
         data_section(analysis),
         stiffness_section(analysis),
         load_section(analysis, pictures),
+        *([loaded_section(answers.loaded, analysis)] if answers.loaded else []),
         workspace_section(answers),
         guideline_section(answers),
         sensitivity_section(answers.sensitivity),

@@ -19,6 +19,7 @@ from kinetostat.views.report.content import Block, Figure, Paragraph, Points, Se
 from kinetostat.views.report.provenance import verdict
 from kinetostat.views.report.study import gains
 from kinetostat.views.report.typesetting import typeset
+from kinetostat.views.report.under_load import verdict_of
 from kinetostat.views.requirement_lines import headline, requirement_lines
 
 MOST_NAMED = 2
@@ -31,6 +32,7 @@ def summary_section(answers: Answers, validation: Validation | str, portrait: Fi
     """Write the summary, with the requirements and a picture of the machine."""
     points = tuple((typeset(text), "") for text in _findings(answers, validation))
     answer = [Paragraph(typeset(text), f"{label}:") for label, text in first_lines(answers.analysis)]
+    answer += [verdict_of(answers.loaded)] if answers.loaded else []
     return Section("Summary", (*answer, *_requirements(answers), portrait, Points(points), _directions(answers)))
 
 

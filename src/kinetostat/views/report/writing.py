@@ -15,6 +15,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
+from kinetostat.studies import under_load
 from kinetostat.studies.analysis import as_json
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.result_data import message
@@ -39,6 +40,7 @@ class Wanted:
         without: parts to leave out because they take time, of `studies.report.answers.PARTS`.
         engine: for the validation; None for the first that is installed.
         author, date: for the title block; None for none.
+        loaded: whether the machine is to be shown under its loads, whatever its file says.
     """
 
     ranges: Sequence[str] = ()
@@ -46,13 +48,15 @@ class Wanted:
     engine: str | None = None
     author: str | None = None
     date: str | None = None
+    loaded: bool = False
 
     def options(self) -> list[str]:
         """Words of the command line that give the same options."""
         single = (("--engine", self.engine), ("--author", self.author), ("--date", self.date))
         pairs = [("--over", self.ranges), ("--without", self.without)]
         pairs += [(name, [value]) for name, value in single if value]
-        return [word for name, values in pairs for value in values for word in (name, value)]
+        words = [word for name, values in pairs for value in values for word in (name, value)]
+        return ["--loaded", *words] if self.loaded else words
 
 
 @checked
@@ -131,7 +135,8 @@ def write_report(
         InputError: an unknown engine, or a path that cannot be written.
     """
     command = shlex.join(["kinetostat", "report", *subject, *wanted.options(), "-o", path.name])
-    results = json.dumps(as_json(answers.analysis), ensure_ascii=False, allow_nan=False, indent=1)
+    loaded = {} if answers.loaded is None else {"under_load": under_load.as_json(answers.loaded)}
+    results = json.dumps(as_json(answers.analysis) | loaded, ensure_ascii=False, allow_nan=False, indent=1)
     origin = Origin(command, inputs, as_file(answers.machine), results)
     about = {name: text for name, text in (("Author", wanted.author), ("Date", wanted.date)) if text}
     page = path.suffix == ".html"
