@@ -7,6 +7,7 @@ from matplotlib.collections import QuadMesh
 from kinetostat import analyze, build, command, evaluate, evaluate_grid, plot, under_load
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.kinematics.status import Status
+from kinetostat.studies.command import command
 from kinetostat.studies.under_load import load_curve
 from refusals import refused
 
@@ -299,3 +300,33 @@ def test_counts_have_a_colour_each_in_maps_and_small_displacements_are_in_microm
     assert [type(part) for part in counts.collections] == [QuadMesh]
     assert [text.get_text() for text in counts.collections[0].colorbar.ax.get_yticklabels()] == ["0", "2"]
     assert moved.get_title() == "$u_{\\mathrm{y}}$ (µm)"
+
+
+STAGE = """
+schema = 1
+name   = "Stage on flexures"
+family = "legs"
+space  = "planar"
+[platform]
+point = [0, 0, 0]
+[pose]
+x   = "2 mm"
+y   = 0
+yaw = 0
+[[legs]]
+name = "flexure"
+joints = [{ name = "slide", type = "prismatic", joins = ["base", "platform"], point = [0, 0, 0], axis = [1, 0, 0], stiffness = STIFFNESS }]
+[[legs]]
+name = "drive"
+joints = [{ name = "slide", type = "prismatic", joins = ["base", "platform"], point = [0, 0, 0], axis = [1, 0, 0], stiffness = "3 N/um", actuated = true }]
+"""  # noqa: E501
+
+
+@pytest.mark.parametrize("stiffness", ['"1 N/um"', '["left 2 N/um", "right 2 N/um"]'])
+def test_a_flexure_pulls_back_to_its_home_pose_and_commands_drive_against_it(stiffness):
+    """1 N/um x (2 mm + u) + 3 N/um x u = 0; with a command a, 1 N/um x 2 mm = 3 N/um x (a - 2 mm)."""
+    machine = build(STAGE.replace("STIFFNESS", stiffness))
+    assert under_load(machine).displacement[1] == pytest.approx(-0.5e-3, rel=1e-12)
+    assert command(machine).coordinates[0] == pytest.approx([2e-3 + 2e-3 / 3.0], rel=1e-12)
+    home = build(STAGE.replace("STIFFNESS", stiffness), settings=["pose.x=0"])
+    assert not np.any(under_load(home).displacement)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.vector import Vector
@@ -74,6 +75,11 @@ class Chain:
     def size(self) -> int:
         """How many coordinates it has."""
         return len(self.springs)
+
+    @property
+    def hinged(self) -> npt.NDArray[np.bool_]:
+        """Which coordinates are flexure hinges, which pull back to the home pose [coordinates]."""
+        return np.array([spring is not None and not is_zero(spring.returns) for spring in self.springs], dtype=bool)
 
     def follows(self, which: tuple[int, ...], count: int) -> Array:
         """1 where a motion follows a coordinate, or a given amount [motions x count]; 0 elsewhere.
@@ -174,6 +180,7 @@ class _Row:
     units: Units
     amounts: Given
     links: list[tuple[Member, Station, Station]]
+    travels: Sequence[Array]
     twists: list[Array] = field(default_factory=list)
     coordinate: list[int] = field(default_factory=list)
     given: list[int] = field(default_factory=list)
@@ -190,7 +197,7 @@ class _Row:
             for joint in element.freedoms:
                 self._move(self.units.twist(joint), self._coordinate(None))
         for spring in element.springs:
-            self._spring(spring)
+            self._spring(spring, number)
         before = len(self.twists)
         if not isinstance(element, Parallelogram):
             self.grow(number)
@@ -236,7 +243,7 @@ class _Row:
         self.grow(number)
         self._move(-self.units.twist(far, rate), coordinate)
 
-    def _spring(self, spring: Spring) -> None:
+    def _spring(self, spring: Spring, number: int) -> None:
         twist = self.units.twist(spring.joint)
         if is_zero(spring.stiffness):
             self._move(twist, self._coordinate(None))
@@ -244,10 +251,14 @@ class _Row:
         if spring.actuated:
             self._move(twist, -1, self.amounts.actuator(spring))
         if not (isinstance(spring.stiffness, float) and np.isinf(spring.stiffness)):
-            self._move(twist, self._coordinate(spring))
+            coordinate = self._coordinate(spring)
+            self._move(twist, coordinate)
+            if self.travels and not is_zero(spring.returns):
+                returned = self.units.load(spring, spring.returns) * self.travels[number - 1]
+                self.preload[coordinate] = self.preload[coordinate] + returned
 
 
-def chain_of(leg: Leg, units: Units, amounts: Given, members: Sequence[Member]) -> Chain:
+def chain_of(leg: Leg, units: Units, amounts: Given, members: Sequence[Member], travels: Sequence[Array] = ()) -> Chain:
     """Read a leg as a row of motions.
 
     Args:
@@ -255,13 +266,15 @@ def chain_of(leg: Leg, units: Units, amounts: Given, members: Sequence[Member]) 
         units: in which it is counted.
         amounts: given ones of the legs before; those of this leg are added.
         members: links that belong to it.
+        travels: for each element, how far what moves there or last before it is from the home pose, rad or m [n]; empty
+            where no flexure hinge asks for it.
     """
     links: list[tuple[Member, Station, Station]] = []
     for link in members:
         ends = () if link.ends is None else link.ends()
         if len(ends) == 2:  # a driven joint at the base is a spring, which gives the link behind it no first end
             links.append((link, *ends))
-    row = _Row(units, amounts, links)
+    row = _Row(units, amounts, links, travels)
     row.grow(0)
     row.carried.append((0, len(row.twists)))
     for number, element in enumerate(leg.chain, 1):

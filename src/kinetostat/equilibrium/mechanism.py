@@ -20,7 +20,7 @@ from kinetostat.equilibrium.chains import Chain, Given, Masses, Units, chain_of
 from kinetostat.equilibrium.motion import Array, along, of_scalars
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.leg import Spring
+from kinetostat.machine.leg import Spring, Turn
 from kinetostat.machine.machine import Load, Machine
 from kinetostat.machine.mass import located_members
 
@@ -113,10 +113,11 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
     members = located_members(machine, configuration, None if joints is None else joints.coordinates)
     driven = [s for leg in configuration.legs for s in leg.springs if s.actuated and not is_zero(s.stiffness)]
     amounts = Given(len(driven))
+    travels = {} if joints is None or count is None else _travels(machine, joints, count)
     legs = []
     for leg in configuration.legs:
         here = [m for m in members if m.leg == leg.name or (not m.leg and leg.number is None)]
-        legs.append(chain_of(leg, units, amounts, here))
+        legs.append(chain_of(leg, units, amounts, here, travels.get(leg.name, ())))
     platform = configuration.platform
     tool = machine.tables["tool"]
     centres = [
@@ -149,6 +150,23 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
         force,
         bool(weights) or any(leg.masses.carried for leg in legs),
     )
+
+
+def _travels(machine: Machine, joints: Joints, count: int) -> dict[str, list[Array]]:
+    """For each leg and element, how far what moves there or last before it is from the home pose, rad or m [n]."""
+    remaining = iter(joints.coordinates)
+    travels = {}
+    for leg, steps in zip(machine.configure(joints.coordinates).legs, machine.chains().legs, strict=True):
+        row, last = [], np.zeros(count)
+        for step in steps:
+            if step.moves:
+                amount = next(remaining)
+                parts = (amount.sine, amount.cosine) if isinstance(amount, Turn) else (amount, 1.0)
+                both = of_scalars(parts, count)
+                last = np.arctan2(both[:, 0], both[:, 1]) if isinstance(amount, Turn) else both[:, 0]
+            row.append(last)
+        travels[leg.name] = row
+    return travels
 
 
 def _gravity(load: Load, count: int | None) -> Array:

@@ -78,7 +78,7 @@ def cut(mechanism: Mechanism) -> Cut | None:
     """Cut the loops of a mechanism; None if legs that are no rods close some, or its form does not allow it."""
     chains = [leg for leg in mechanism.legs if leg.rod is None]
     carrier = chains[0] if chains else _free_motions(mechanism)
-    if len(chains) > 1 or carrier.sign.any() or carrier.idle.any():
+    if len(chains) > 1 or carrier.sign.any() or carrier.idle.any() or any(leg.hinged.any() for leg in mechanism.legs):
         return None
     rods, points, masses = [], [mechanism.platform.point], [mechanism.platform.mass]
     for leg in mechanism.legs:

@@ -22,20 +22,21 @@ def tensioned(mechanism: Mechanism, least: Array, most: Array) -> tuple[Mechanis
     """Choose the preloads of all springs so that the machine is at rest at its pose.
 
     Args:
-        mechanism: with its loads; its own preloads are left out.
+        mechanism: with its loads; its own preloads are left out, but for flexure hinges, which carry what they do.
         least, most: bounds of what its one-sided springs pull (or push), in its units of force [n].
 
     Returns:
         The mechanism with these preloads, and where there are any within the bounds [n]; elsewhere they are zero.
     """
-    bare = replace(mechanism, legs=tuple(replace(leg, preload=0.0 * leg.preload) for leg in mechanism.legs))
+    bare = replace(mechanism, legs=tuple(replace(leg, preload=leg.preload * leg.hinged) for leg in mechanism.legs))
     equations = balance(bare, free_state(bare))
     chosen = [_chosen(equations, i, float(least[i]), float(most[i])) for i in range(len(least))]
     known = np.array([loads is not None for loads in chosen])
     size = sum(leg.size for leg in mechanism.legs)
     table = np.array([np.zeros(size) if loads is None else loads for loads in chosen])
     ends = np.cumsum([leg.size for leg in mechanism.legs])[:-1]
-    legs = [replace(leg, preload=part) for leg, part in zip(bare.legs, np.split(table, ends, axis=1), strict=True)]
+    parts = zip(bare.legs, np.split(table, ends, axis=1), strict=True)
+    legs = [replace(leg, preload=leg.preload + part) for leg, part in parts]
     return replace(bare, legs=tuple(legs)), known
 
 
@@ -49,7 +50,7 @@ def _chosen(equations: Balance, pose: int, least: float, most: float) -> Array |
     for number, (leg, terms) in enumerate(zip(legs, equations.legs, strict=True)):
         rows = np.zeros((leg.size, size * len(legs)))
         rows[:, size * number : size * (number + 1)] = (ways.T @ terms.rates[pose]).T
-        passive = np.array([spring is None for spring in leg.springs], dtype=bool)
+        passive = np.array([spring is None for spring in leg.springs], dtype=bool) | leg.hinged
         conditions.append(rows[passive])
         given.append(terms.left[pose][passive])
         felt.append(np.where(passive[:, None], 0.0, rows))

@@ -137,7 +137,9 @@ class Spring:
         part: the joint or link that it stands for, together with others of the same part; its own name if empty.
         actuated: whether it is an actuator.
         hinge: whether it is a flexure hinge: a joint that resists, where others are free.
-        preload: what it carries where it is not deformed, N or N·m, positive where it pulls its ends together.
+        preload: what it carries where it is not deformed, N or N·m, positive where it pulls its ends together; of a
+            flexure hinge at the home pose.
+        returns: how much more a flexure hinge, or the row of springs that it is, carries per travel from there, SI.
         acts: "pulls" or "pushes" if it carries loads of one sign only, as a cable does; otherwise empty.
     """
 
@@ -148,6 +150,7 @@ class Spring:
     actuated: bool = False
     hinge: bool = False
     preload: Scalar = 0.0
+    returns: Scalar = 0.0
     acts: str = ""
 
     @property

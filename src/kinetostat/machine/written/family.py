@@ -5,13 +5,13 @@ Which coordinates close the chains at a pose is found in `kinematics.closure`. P
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache, partial, reduce
 from typing import Any, cast
 
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.cross_section import least_bending_of, linear_density_of, rigidity_of
-from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Station, Turn
+from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Station, Turn, series
 from kinetostat.machine.link import Beam, any_up, lumped_springs, matrix_springs, seat_springs
 from kinetostat.machine.links import growth_of
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
@@ -131,6 +131,9 @@ def _moving(leg: LegPlan, joint: JointPlan, data: Any, plan: Plan, tables: Mappi
     if joint.series:
         parts = tables[f"{leg.table(joint.name)}.stiffness"]
         row = [*springs_in_a_row(row[0], [(key, getattr(parts, key)) for key in joint.series], joint.name)]
+    if not joint.actuated:
+        whole = reduce(series, [each.stiffness for each in row])
+        row = [replace(each, returns=whole) for each in row]
     rods = [rod_of(leg.name, joint, row[0], data, plan, tables)] if joint.rod else []
     return [*steps[:place], *(Step(part, i == 0) for i, part in enumerate([*row, *rods])), *steps[place + 1 :]]
 
