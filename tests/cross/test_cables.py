@@ -7,7 +7,6 @@ from matplotlib.collections import QuadMesh
 from kinetostat import analyze, build, command, evaluate, evaluate_grid, plot, under_load
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.kinematics.status import Status
-from kinetostat.studies.command import command
 from kinetostat.studies.under_load import load_curve
 from refusals import refused
 

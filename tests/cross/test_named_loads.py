@@ -1,11 +1,14 @@
-"""Loads at named points of the platform: the same machine as with one wrench, with a weight, or with none of them."""
+"""Loads at named points of the platform and masses of links, each against the same load said in another way."""
 
+import math
 import pickle
 
 import numpy as np
 import pytest
 
+from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.leg import Turn
 from kinetostat.machine.loading import as_toml, build, bundled, load, machine_schema
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.errors import InputError
@@ -84,3 +87,82 @@ def test_the_schema_of_files_has_them():
     loads = [table for table in machine_schema()["$defs"].values() if "gravity" in table.get("properties", {})]
     assert all({"point", "force", "moment"} == set(table["additionalProperties"]["properties"]) for table in loads)
     assert loads
+
+
+ARMS = """
+schema = 1
+name   = "Two arms on hinges with motors"
+family = "legs"
+space  = "planar"
+[platform]
+point = [0, "300 mm", 0]
+[pose]
+x   = "20 mm"
+y   = "310 mm"
+[sections.bar]
+shape    = "round"
+diameter = "30 mm"
+material = "steel"
+[[legs]]
+name = "arm"
+joints = [
+  { name = "motor", type = "revolute", joins = ["base", "upper"], point = ["-200 mm", 0, 0], axis = [0, 0, 1], actuated = true, stiffness = "5e7 N*m/rad" },
+  { name = "elbow", type = "revolute", joins = ["upper", "lower"], point = ["-300 mm", "200 mm", 0], axis = [0, 0, 1] },
+  { name = "wrist", type = "revolute", joins = ["lower", "platform"], point = [0, "300 mm", 0], axis = [0, 0, 1] },
+]
+links.upper = { model = "rigid", UPPER }
+[[legs]]
+name = "other arm"
+joints = [
+  { name = "motor", type = "revolute", joins = ["base", "upper"], point = ["200 mm", 0, 0], axis = [0, 0, 1], actuated = true, stiffness = "5e7 N*m/rad" },
+  { name = "elbow", type = "revolute", joins = ["upper", "platform"], point = ["300 mm", "200 mm", 0], axis = [0, 0, 1] },
+]
+[load]
+gravity = [0, "-9.81 m/s**2", 0]
+"""  # noqa: E501
+LENGTH = math.hypot(0.1, 0.2)
+
+
+def arms(upper):
+    return build(ARMS.replace("UPPER", upper))
+
+
+def test_a_link_with_its_mass_in_the_middle_is_a_uniform_one():
+    mass = 7850.0 * math.pi * 0.03**2 / 4.0 * LENGTH
+    uniform = arms('section = "bar"')
+    given = arms(f"mass = {mass!r}")
+    centred = arms(f'mass = {mass!r}, centre_of_mass = ["-250 mm", "100 mm", 0]')
+    expected = under_load(uniform).displacement
+    assert np.abs(expected).max() > 1e-9
+    for machine in (given, centred, build(as_toml(centred))):
+        assert under_load(machine).displacement == pytest.approx(expected, rel=1e-9)
+        assert analyze(machine).moving_mass == pytest.approx(analyze(uniform).moving_mass, rel=1e-12)
+    heavier = centred.with_values({"legs.arm.upper.mass": 2.0 * mass})
+    assert under_load(heavier).displacement == pytest.approx([2.0 * c for c in expected], rel=1e-4)
+
+
+def test_a_centre_of_mass_travels_with_its_link():
+    """The link hangs on its own motor alone, which carries its weight times the lever arm at the pose."""
+    centre = np.array([-0.36, 0.13])
+    machine = arms(f"mass = 4, centre_of_mass = {[*centre.tolist(), 0.0]}")
+    turn = solve_joints(machine).coordinates[0]
+    sine, cosine = (turn.sine, turn.cosine) if isinstance(turn, Turn) else (math.sin(turn), math.cos(turn))
+    assert abs(sine) > 0.03
+    lever = (centre[0] + 0.2) * cosine - centre[1] * sine
+    motors = {spring.leg: spring.load for spring in under_load(machine).springs}
+    assert abs(motors["arm"]) == pytest.approx(abs(4.0 * 9.81 * lever), rel=1e-5)
+    assert motors["other arm"] == pytest.approx(0.0, abs=1e-5 * abs(motors["arm"]))
+
+
+@pytest.mark.parametrize(
+    ("upper", "message"),
+    [
+        ("centre_of_mass = [0, 0, 0]", 'link "upper" has centre_of_mass, but no mass'),
+        ("mass = -1", "cannot be negative"),
+        ("mas = 1", "mas is not known; a link has model, section, up, compliance, mass and centre_of_mass"),
+        ("mass = 1, centre_of_mass = [0, 0]", "it has 2 entries; give 3"),
+    ],
+)
+def test_masses_of_links_are_checked(upper, message):
+    with pytest.raises(InputError, match=message):
+        arms(upper)

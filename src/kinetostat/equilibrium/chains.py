@@ -213,13 +213,15 @@ class _Row:
 
     def masses(self) -> list[tuple[int, Vector, Scalar]]:
         """The masses of the links: the potential of a straight uniform one is that of half its mass at either end."""
-        halves = []
+        masses = []
         for link, (first, start), (last, end) in self.links:
-            half = 0.5 * link.length * link.linear_density
-            if not is_zero(half):
-                begins = self.carried[first][first < last]  # a rigid link begins before it grows
-                halves += [(begins, start, half), (self.carried[last][1], end, half)]
-        return halves
+            begins = self.carried[first][first < last]  # a rigid link begins before it grows
+            if link.centre is not None:
+                masses.append((begins, link.centre()[1], link.mass))
+            elif not is_zero(link.mass):
+                half = 0.5 * link.mass
+                masses += [(begins, start, half), (self.carried[last][1], end, half)]
+        return masses
 
     def _move(self, twist: Array, coordinate: int, given: int = -1) -> None:
         self.twists.append(twist)

@@ -107,19 +107,21 @@ class Member:
         leg: that it belongs to, or empty.
         name: unique within the machine.
         length: from joint to joint, m.
-        linear_density: kg/m; 0 where nothing says it.
+        mass: kg; 0 where nothing says it.
         bending: least E I, N·m²; 0 where nothing says it.
         growth: by which it makes its leg longer because it is warmer than when the machine was built, m.
         ends: gives both ends of its axis at the pose; None where they are not known.
+        centre: gives its centre of mass at the pose; None for a uniform link.
     """
 
     leg: str
     name: str
     length: Scalar
-    linear_density: Scalar
+    mass: Scalar
     bending: Scalar = 0.0
     growth: Scalar = 0.0
     ends: Callable[[], tuple[Station, ...]] | None = None
+    centre: Callable[[], Station] | None = None
 
 
 @table

@@ -65,7 +65,7 @@ def located_members(
 
 
 def _weighed(link: Member) -> Scalar | None:
-    return None if is_zero(link.linear_density) else link.linear_density * link.length
+    return None if is_zero(link.mass) else link.mass
 
 
 def _members(machine: Machine, configuration: Configuration) -> list[Member]:
@@ -80,5 +80,5 @@ def _members(machine: Machine, configuration: Configuration) -> list[Member]:
             density, bending, expansion, rise = given if kind.count is None else (entries[i] for entries in given)
             beside = sum(other == leg for other, *_ in placed) if leg else 1  # pairs of bars lengthen their leg once
             growth = growth_of(expansion, rise, kind.name) * length * (1.0 / beside)
-            members.append(Member(leg, name, length, density, bending, growth, ends))
+            members.append(Member(leg, name, length, density * length, bending, growth, ends))
     return members

@@ -29,6 +29,7 @@ from kinetostat.machine.written.plan import (
     Plan,
 )
 from kinetostat.machine.written.struts import AXIAL, check_strut
+from kinetostat.machine.written.tables import WEIGHT
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import LARGEST_OTHER, SOFTEST
@@ -230,7 +231,10 @@ def _leg(name: str, leg: dict[str, Any], where: str, shapes: Mapping[str, str]) 
     bodies = {plan.joins[1] for plan in plans[:-1]}
     for key in links:
         choice(key, bodies, f"{where}: links name")
-    flexible = {key: _link(key, leg.pop(key), f'{where}, link "{key}"', shapes) for key in links}
+    flexible = {key: _link(key, links[key], f'{where}, link "{key}"', shapes) for key in links}
+    for key in links:  # what is left of a link are its numbers
+        if not leg[key]:
+            del leg[key]
     return LegPlan(name, plans, flexible)
 
 
@@ -364,9 +368,15 @@ def _link(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str]
         raise InputError(
             f'{where}: model = "matrix" needs compliance, and no other model may have it; add it or leave it out.'
         )
-    for key in part:
-        raise InputError(f"{where}: {key} is not known; a link has model, section, up and compliance.")
-    return LinkPlan(name, model, section, (float(up[0]), float(up[1]), float(up[2])) if up else None, compliance)
+    weighed, centred = ("mass" in part, "centre_of_mass" in part)
+    for key in part.keys() - WEIGHT.keys():
+        raise InputError(
+            f"{where}: {key} is not known; a link has model, section, up, compliance, {' and '.join(WEIGHT)}."
+        )
+    if centred and not weighed:
+        raise InputError(f"{where} has centre_of_mass, but no mass; give its mass, or leave centre_of_mass out.")
+    direction = (float(up[0]), float(up[1]), float(up[2])) if up else None
+    return LinkPlan(name, model, section, direction, compliance, weighed, centred)
 
 
 def _matrix(value: object, where: str) -> Matrix:

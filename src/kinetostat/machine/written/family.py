@@ -3,7 +3,7 @@
 Which coordinates close the chains at a pose is found in `kinematics.closure`. Points and axes are in the base frame.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial, reduce
 from typing import Any, cast
@@ -166,40 +166,66 @@ def members(plan: Plan, joints: Sequence[Scalar | Turn] | None = None, **tables:
     links, left = [], None if joints is None else iter(joints)
     for leg in plan.legs:
         points = [Vector(*joint_numbers(leg, joint, tables).point) for joint in leg.joints]
-        placed = [None] * len(points) if left is None else _link_ends(plan, leg, tables, points, left)
+        placed = [None] * len(points) if left is None else _carriers(plan, leg, tables, left)
         moves = False
-        for joint, start, end, ends in zip(leg.joints, points, points[1:], placed, strict=False):
+        for joint, start, end, carrier in zip(leg.joints, points, points[1:], placed, strict=False):
             moves = moves or joint.kind != "fixed"
             if moves:
-                section = _section(leg, joint.joins[1])
-                data = tables[f"sections.{section}"] if section else None
-                name, length = f"{leg.name} {joint.joins[1]}", (end - start).norm()
-                links.append(Member(leg.name, name, length, *_of_section(plan, section, data, length), ends))
+                links.append(_member(plan, leg, joint.joins[1], (start, end), carrier, tables))
     return links
 
 
-def _of_section(plan: Plan, section: str, data: Any, length: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """Linear density, least E I and growth of a link of this length with a cross-section, SI; zeros without one."""
-    if not section:
-        return 0.0, 0.0, 0.0
-    shape = plan.shapes[section]
-    growth = growth_of(data.expansion, data.temperature_rise, f'the links of section "{section}"') * length
-    return linear_density_of(shape, data), least_bending_of(shape, data), growth
+Carrier = tuple[Displacement, int, int]
+"""How a link is displaced from the home pose, and how many elements of its leg carry its beginning and its end."""
 
 
-def _link_ends(
-    plan: Plan, leg: LegPlan, tables: Mapping[str, Any], points: Sequence[Vector], joints: Iterator[Scalar | Turn]
-) -> list[Callable[[], tuple[Station, ...]]]:
-    """Where both ends of each link of a leg are, from its joints' points at the home pose and their coordinates."""
+def _carriers(
+    plan: Plan, leg: LegPlan, tables: Mapping[str, Any], joints: Iterator[Scalar | Turn]
+) -> list[Carrier | None]:
+    """Where the links of a leg are at the coordinates of its joints."""
     motion, carried = Displacement(IDENTITY, ZERO), 0
-    ends: list[Callable[[], tuple[Station, ...]]] = []
-    following = [*points[1:], points[-1]]
-    for (moving, flexible), start, end in zip(_parts_at_home(plan, leg, tables), points, following, strict=True):
+    carriers: list[Carrier | None] = []
+    for moving, flexible in _parts_at_home(plan, leg, tables):
         motion = place([replace(s, element=s.element.displaced(motion)) for s in moving], joints)[1] @ motion
         carried += len(moving) + len(flexible)
-        stations = (carried - len(flexible), motion.apply(start)), (carried, motion.apply(end))
-        ends.append(partial(tuple[Station, ...], stations))
-    return ends
+        carriers.append((motion, carried - len(flexible), carried))
+    return carriers
+
+
+def _member(
+    plan: Plan, leg: LegPlan, body: str, ends: tuple[Vector, Vector], carrier: Carrier | None, tables: Mapping[str, Any]
+) -> Member:
+    """A link with what it weighs and how it grows.
+
+    Args:
+        plan, leg, body: the machine, its leg, and the name of the link's body.
+        ends: of its axis at the home pose, base frame, m.
+        carrier: where it is, if that is known.
+        tables: numbers of the machine.
+    """
+    length, section = (ends[1] - ends[0]).norm(), _section(leg, body)
+    mass, bending, growth = (0.0, 0.0, 0.0)
+    if section:
+        shape, data = plan.shapes[section], tables[f"sections.{section}"]
+        mass, bending = linear_density_of(shape, data) * length, least_bending_of(shape, data)
+        growth = growth_of(data.expansion, data.temperature_rise, f'the links of section "{section}"') * length
+    link, centre = leg.links.get(body), None
+    if link is not None and link.weighed:
+        given = tables[leg.table(body)]
+        mass, centre = given.mass, direction_in(leg, given.centre_of_mass) if link.centred else None
+    whole = None if carrier is None else partial(_stations, carrier, ends)
+    at = None if carrier is None or centre is None else partial(_station, carrier, centre)
+    return Member(leg.name, f"{leg.name} {body}", length, mass, bending, growth, whole, at)
+
+
+def _stations(carrier: Carrier, ends: tuple[Vector, Vector]) -> tuple[Station, ...]:
+    motion, first, last = carrier
+    return (first, motion.apply(ends[0])), (last, motion.apply(ends[1]))
+
+
+def _station(carrier: Carrier, point: Vector) -> Station:
+    motion, first, _ = carrier
+    return first, motion.apply(point)
 
 
 def _section(leg: LegPlan, body: str) -> str:

@@ -18,6 +18,13 @@ POSE_KINDS = {"x": "length", "y": "length", "z": "length", "roll": "angle", "pit
 ROD = Field(Quantity("axial rigidity", "EA of a strut's rod, whose stiffness is EA/L at the pose", positive=True))
 
 
+WEIGHT = {
+    "mass": Field(Quantity("mass", "of the link, in the place of what its cross-section weighs")),
+    "centre_of_mass": Field(Quantity("length", "of that mass, base frame at the home pose", count=3, apart=True)),
+}
+"""What a link may say about its mass."""
+
+
 def tables_of(plan: Plan) -> dict[str, type]:
     """The tables of the plan's machine files, by dotted name."""
     point = Quantity("length", "platform point P at the home pose, base frame", count=3, apart=True)
@@ -29,6 +36,10 @@ def tables_of(plan: Plan) -> dict[str, type]:
             tables[leg.table(joint.name)] = made_table("JointTable", _joint_fields(joint))
             if joint.series:
                 tables[f"{leg.table(joint.name)}.stiffness"] = made_table("Series", _series_fields(joint))
+        for link in leg.links.values():
+            given = [name for name, there in zip(WEIGHT, (link.weighed, link.centred), strict=True) if there]
+            if given:
+                tables[leg.table(link.name)] = made_table("Link", {name: WEIGHT[name] for name in given})
     pose = {name: Field(Quantity(POSE_KINDS[name], f"{name} of the platform")) for name in plan.pose}
     return {**tables, "pose": made_table("Pose", pose)}
 
@@ -140,6 +151,7 @@ def _leg() -> dict[str, Any]:
         "section": {"type": "string"},
         "up": DIRECTION,
         "compliance": COMPLIANCE,
+        **{name: _field(field) for name, field in WEIGHT.items()},
     }
     joints = {"type": "array", "minItems": 1, "items": _table({**joint, **fields}, ["name", "type", "joins"])}
     links = {"type": "object", "additionalProperties": _table(link, ["model"])}
