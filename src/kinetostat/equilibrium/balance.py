@@ -132,13 +132,13 @@ def leg_terms(
     work = np.einsum("nfc,nc->nf", screws, wrench)
     return LegTerms(
         placed.motions[-1],
-        np.einsum("nfc,fk->nck", screws, follows),
-        np.einsum("nfc,fk->nck", screws, drives),
+        np.swapaxes(screws, 1, 2) @ follows,
+        np.swapaxes(screws, 1, 2) @ drives,
         loads,
         stiffness,
         loads + (weight - work) @ follows,
-        np.einsum("fk,nfg,gl->nkl", follows, change, follows),
-        np.einsum("fk,nfg,gl->nkl", follows, change, drives),
+        follows.T @ change @ follows,
+        follows.T @ change @ drives,
     )
 
 

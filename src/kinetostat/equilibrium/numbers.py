@@ -11,7 +11,7 @@ import numpy.typing as npt
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.solving import at_rest
-from kinetostat.equilibrium.tangent import compliance, inverse, stability
+from kinetostat.equilibrium.tangent import compliance, inverse, stabilities
 from kinetostat.equilibrium.tensions import tensioned
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints, solve_joints
@@ -114,8 +114,8 @@ def loaded_numbers(
     solution = at_rest(mechanism)
     settled = np.flatnonzero(solution.settled & balanced)
     equations = solution.at(settled)
-    judged = [stability(equations, i) for i in range(len(settled))]
-    stable = np.array([each.stable for each in judged], dtype=bool)
+    judged = stabilities(equations)
+    stable = judged.stable
     status[rows], rested = Status.NO_REST, rows[settled[stable]]
     status[rested] = Status.OK
     moved = equations.state.platform.amounts() * equations.mechanism.twist_units
@@ -130,7 +130,7 @@ def loaded_numbers(
         "compliance": np.diagonal(soft, axis1=1, axis2=2),
         "stiffness": stiffness,
         "slack": slack,
-        "factor": np.array([each.factor for each in judged]),
+        "factor": judged.factor,
     }
     for name, values in numbers.items():
         result[name][rested] = values[stable]

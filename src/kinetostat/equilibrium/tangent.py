@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.motion import Array, skew_of
@@ -84,35 +85,76 @@ class Stability:
     legs: Array
 
 
-def stability(equations: Balance, pose: int = 0) -> Stability:
-    """Judge the state of rest at one of the poses."""
+@dataclass(frozen=True)
+class Stabilities:
+    """The same of n states of rest: arrays with the poses first."""
+
+    stable: npt.NDArray[np.bool_]
+    factor: Array
+    mode: Array
+    legs: Array
+
+
+def stability(equations: Balance) -> Stability:
+    """Judge the state of rest at a single pose."""
+    every = stabilities(equations)
+    return Stability(bool(every.stable[0]), float(every.factor[0]), every.mode[0], every.legs[0])
+
+
+def stabilities(equations: Balance) -> Stabilities:
+    """Judge states of rest; what is not finite is not stable."""
+    ways, starts = equations.mechanism.ways, _starts(equations)
+    elastic, geometric, conditions = _motions(equations, starts)
+    count, size = len(elastic), ways.shape[1]
+    sound = np.isfinite(elastic + geometric).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
+    stable, factors, modes = sound.copy(), np.where(sound, np.inf, np.nan), np.zeros((count, starts[-1]))
+    values, rows_of_all = np.zeros((count, min(conditions.shape[1:]))), np.zeros((count, starts[-1], starts[-1]))
+    _, values[sound], rows_of_all[sound] = np.linalg.svd(conditions[sound])
+    ranks = (values > UNRESISTED * values[:, :1]).sum(axis=1)
+    for rank in np.unique(ranks[sound]):
+        here = np.flatnonzero(sound & (ranks == rank))
+        allowed = np.swapaxes(rows_of_all[here, rank:], 1, 2)
+        if not allowed.size:
+            continue  # nothing can move at all
+        stiff, turning = (_within(part[here], allowed) for part in (elastic, geometric))
+        stable[here] = np.linalg.eigvalsh(stiff + turning)[:, 0] > 0.0
+        least, springs = np.linalg.eigh(stiff)
+        holds = least[:, 0] > UNRESISTED * least[:, -1]
+        half = springs / np.sqrt(np.where(holds[:, None], least, 1.0))[:, None]
+        shares, turns = np.linalg.eigh(-np.swapaxes(half, 1, 2) @ turning @ half)
+        grows = holds & (shares[:, -1] > 0.0)
+        factors[here] = np.where(grows, 1.0 / np.where(grows, shares[:, -1], 1.0), np.where(holds, np.inf, np.nan))
+        moved = (allowed @ half @ turns[:, :, -1:])[:, :, 0]
+        modes[here] = np.where(grows[:, None], moved / np.abs(moved).max(axis=1, keepdims=True), 0.0)
+    legs = [np.abs(modes[:, a:b]).max(axis=1, initial=0.0) for a, b in pairwise(starts)]
+    return Stabilities(
+        stable, factors, modes[:, :size] @ ways.T, np.stack(legs, axis=1) if legs else np.zeros((count, 0))
+    )
+
+
+def _starts(equations: Balance) -> npt.NDArray[np.int64]:
+    """Where the coordinates of each leg begin after the ways of the platform, and where the last ones end."""
+    sizes = [leg.size for leg in equations.mechanism.legs]
+    return equations.mechanism.ways.shape[1] + np.cumsum([0, *sizes])
+
+
+def _motions(equations: Balance, starts: npt.NDArray[np.int64]) -> tuple[Array, Array, Array]:
+    """Springs, and what loads and wrenches add, over the twist of the platform and all coordinates; what these obey."""
     mechanism, ways = equations.mechanism, equations.mechanism.ways
-    size, sizes = ways.shape[1], [leg.size for leg in mechanism.legs]
-    starts = np.concatenate([[size], size + np.cumsum(sizes)]).astype(int)
-    elastic, geometric = np.zeros((2, starts[-1], starts[-1]))
-    conditions = np.zeros((size * len(sizes), starts[-1]))
-    geometric[:size, :size] = -ways.T @ equations.load_change[pose] @ ways
+    count, size, end = len(equations.left), ways.shape[1], int(starts[-1])
+    elastic, geometric = np.zeros((2, count, end, end))
+    conditions = np.zeros((count, size * len(mechanism.legs), end))
+    geometric[:, :size, :size] = -ways.T @ equations.load_change @ ways
     for k, (leg, terms) in enumerate(zip(mechanism.legs, equations.legs, strict=True)):
         moving, rows = slice(starts[k], starts[k + 1]), slice(size * k, size * (k + 1))
-        elastic[moving, moving] = np.diag(terms.carrying[pose]) + leg.idle[pose] @ leg.idle[pose].T
-        geometric[moving, moving] = terms.geometric[pose]
-        conditions[rows, moving] = ways.T @ terms.rates[pose]
-        conditions[rows, :size] = -np.eye(size)
-    _, values, rows_of_all = np.linalg.svd(conditions)
-    rank = int((values > UNRESISTED * values[0]).sum()) if len(values) else 0
-    allowed = rows_of_all[rank:].T
-    if not allowed.size:
-        return Stability(True, np.inf, np.zeros(6), np.zeros(len(sizes)))  # nothing can move at all
-    stiff, turning = (allowed.T @ (m + m.T) @ allowed * 0.5 for m in (elastic, geometric))
-    stable = bool(np.linalg.eigvalsh(stiff + turning)[0] > 0.0)
-    least, ways_of_springs = np.linalg.eigh(stiff)
-    if least[0] <= UNRESISTED * least[-1]:
-        return Stability(stable, np.nan, np.zeros(6), np.zeros(len(sizes)))
-    half = ways_of_springs / np.sqrt(least)
-    shares, modes = np.linalg.eigh(-half.T @ turning @ half)
-    if shares[-1] <= 0.0:
-        return Stability(stable, np.inf, np.zeros(6), np.zeros(len(sizes)))
-    mode = allowed @ half @ modes[:, -1]
-    mode = mode / np.abs(mode).max()
-    legs = [np.abs(mode[a:b]).max(initial=0.0) for a, b in pairwise(starts)]
-    return Stability(stable, float(1.0 / shares[-1]), ways @ mode[:size], np.array(legs))
+        springs = terms.carrying[:, :, None] * np.eye(leg.size)
+        elastic[:, moving, moving] = springs + leg.idle @ np.swapaxes(leg.idle, 1, 2)
+        geometric[:, moving, moving] = terms.geometric
+        conditions[:, rows, moving] = ways.T @ terms.rates
+        conditions[:, rows, :size] = -np.eye(size)
+    return elastic, geometric, conditions
+
+
+def _within(matrix: Array, allowed: Array) -> Array:
+    """The symmetric part of a matrix over the motions that are allowed, the columns [n x k x k]."""
+    return np.asarray(0.5 * np.swapaxes(allowed, 1, 2) @ (matrix + np.swapaxes(matrix, 1, 2)) @ allowed)

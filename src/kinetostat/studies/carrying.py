@@ -16,7 +16,7 @@ from kinetostat.engine.loaded import Way
 from kinetostat.engine.points import Array
 from kinetostat.equilibrium.numbers import FREE, loaded_mechanism
 from kinetostat.equilibrium.solving import at_rest
-from kinetostat.equilibrium.tangent import stability
+from kinetostat.equilibrium.tangent import stabilities
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
@@ -112,7 +112,7 @@ def _slab(machine: Machine, columns: dict[str, Array], legs: int) -> tuple[Any, 
     solution = at_rest(mechanism)
     settled = np.flatnonzero(solution.settled & balanced)
     equations = solution.at(settled)
-    stable = np.array([stability(equations, i).stable for i in range(len(settled))], dtype=bool)
+    stable = stabilities(equations).stable
     status[rows], rested = Status.NO_REST, rows[settled[stable]]
     status[rested] = Status.OK
     pairs = zip(equations.mechanism.legs, equations.legs, strict=True)

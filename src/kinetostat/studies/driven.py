@@ -13,7 +13,7 @@ from kinetostat.engine.batch import Progress, silent
 from kinetostat.equilibrium.commanding import commanded
 from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import loaded_mechanism
-from kinetostat.equilibrium.tangent import stability
+from kinetostat.equilibrium.tangent import stabilities
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.forward import leg_names
@@ -147,13 +147,13 @@ def _at(posed: Machine, machine: Machine, columns: Mapping[str, Array], count: i
     units = senses * np.where([actuator.slides for actuator in actuators], length[:, None], 1.0)
     answer = commanded(mechanism)
     equations = answer.solution.balance
-    stable = [bool(rests) and stability(equations, i).stable for i, rests in enumerate(answer.solution.settled)]
+    stable = answer.solution.settled & stabilities(equations).stable
     before, left = (np.linalg.norm(twists[:, 3:], axis=1) * length for twists in (answer.before, answer.off))
     left = np.where(left > ROUND_OFF_OF_ENTRY * length, left, 0.0)
     turned = np.linalg.norm(answer.off[:, :3], axis=1)
     rates = answer.rates[:, 3:] * (length[:, None] / units)[:, None]
     whole = Driven(tuple(actuators), stands + equations.state.amounts * units, stands, before, left, turned, rates)
-    return whole.where(np.array(stable, dtype=bool))
+    return whole.where(stable)
 
 
 def _actuators(
