@@ -106,7 +106,18 @@ def test_no_work_is_done_round_a_closed_path(conservative):
 @pytest.mark.parametrize("name", ["hexapod", "delta", "hexapod-rus", "planar-3rrr", "orthoglide", "tricept"])
 def test_a_family_and_itself_leg_by_leg_come_to_one_state(name):
     planar = name.startswith("planar")
-    machine = load_without_limits(name, [f"load.force={[20, 30, 0] if planar else [20, 30, -50]}", "tool.mass=5 kg"])
+    high = 0.0 if planar else 0.02
+    settings = [
+        f"load.force={[20, 30, 0] if planar else [20, 30, -50]}",
+        "tool.mass=5 kg",
+        "tool.payload=3 kg",
+        f"tool.centre_of_mass={[0.01, -0.02, high]}",
+        f"load.gravity={[4, 3, 0] if planar else [1, 2, -9]}",
+        "load.gravity_angle=20 deg",
+        f"load.gravity_axis={[0, 0, 1]}",
+        f"load.hook={{point = {[0.03, 0.01, high]}, force = {[5, -3, 0]}}}",
+    ]
+    machine = load_without_limits(name, settings)
     state, legs = under_load(machine), build(document_of(machine), "legs")
     # A link's springs stand in another order there, and turns do not commute: the square of the angle.
     square = float(np.max(np.abs(state.displacement)) ** 2)

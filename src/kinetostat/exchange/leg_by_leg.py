@@ -13,17 +13,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.vector import Vector
+from kinetostat.algebra.vector import Rotation, Vector
 from kinetostat.kinematics.mobility import task_coordinates
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.loading import load
-from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.machine import Configuration, Load, Machine
 from kinetostat.machine.written.plan import BASE, NAME, PLATFORM, SPATIAL_POSE
 from kinetostat.spec.document import Document, toml_key
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.fields import quantities
 from kinetostat.spec.validation import SCHEMA_VERSION
 from kinetostat.studies.rounding import clean_screw
 
@@ -55,18 +56,36 @@ def document_of(machine: Machine) -> Document:
     document |= {"space": "planar"} if machine.family.planar else {}
     document |= {"platform": {"point": _numbers(point)}, "pose": _pose(configuration, point)}
     document["legs"] = [_Chain(leg, point).document() for leg in configuration.legs]
-    tool = machine.tables["tool"]
-    if any(tool.offset) or tool.mass:
-        document["tool"] = {"offset": _numbers(turn.apply(Vector(*tool.offset))), "mass": tool.mass}
-    load_given = machine.tables["load"]
-    if any(load_given.moment) or any(load_given.force):
-        document["load"] = {"moment": list(load_given.moment), "force": list(load_given.force)}
+    tool, load_given = _tool(machine, turn), _load(machine, turn)
+    document |= {"tool": tool} if tool else {}
+    document |= {"load": load_given} if load_given else {}
     upright = _numbers(turn.z) == [0.0, 0.0, 1.0]
     table = machine.tables["limits"]
     limits = {limit.name: getattr(table, limit.name) for limit in limits_set(table)}
     if not upright:  # the platform's z axis is that of the base at the home pose of a file leg by leg
         limits.pop("platform_joint_angle", None)
     return document | ({"limits": limits} if limits else {})
+
+
+def _tool(machine: Machine, turn: Rotation) -> dict[str, Any]:
+    """The table [tool]; platform axes are those of the base at the home pose of a file leg by leg."""
+    table = machine.tables["tool"]
+    given = {name: getattr(table, name) for name in quantities(type(table))}
+    turned = {name: _numbers(turn.apply(Vector(*value))) for name, value in given.items() if isinstance(value, tuple)}
+    return {name: value for name, value in (given | turned).items() if np.any(value)}
+
+
+def _load(machine: Machine, turn: Rotation) -> dict[str, Any]:
+    """The table [load], with the loads that have names."""
+    table, usual = machine.tables["load"], Load()
+    given = {name: getattr(table, name) for name in quantities(Load) if getattr(table, name) != getattr(usual, name)}
+    given = {name: list(value) if isinstance(value, tuple) else value for name, value in given.items()}
+    given |= {"state": machine.state} if machine.loaded else {}
+    for name in machine.family.loads:
+        entry = machine.tables[f"load.{name}"]
+        point = _numbers(turn.apply(Vector(*entry.point)))
+        given[name] = {"point": point, "moment": list(entry.moment), "force": list(entry.force)}
+    return given
 
 
 def _pose(configuration: Configuration, point: Vector) -> dict[str, float]:
@@ -109,7 +128,9 @@ class _Chain:
                 self.joints[-1]["stiffness"] = [f"{self._name(s.name)} {_stiffness(s)}" for s in series]
             elif isinstance(element, Spring) and (element.actuated or element.hinge):
                 series = [element]
-                about = {"actuated": True} if element.actuated else {}
+                about: dict[str, Any] = {"actuated": True} if element.actuated else {}
+                about |= {"preload": float(element.preload)} if element.preload else {}
+                about |= {"acts": element.acts} if element.acts else {}
                 self._add({**self._freedom(element.joint), **about, "stiffness": _stiffness(element)}, element.of)
             elif isinstance(element, Parallelogram):
                 self._add(_parallelogram(element), element.name)

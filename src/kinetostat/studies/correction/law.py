@@ -99,7 +99,7 @@ def _without_round_off(law: Law) -> Law:
     """The law without terms that only round-off has; all functions are 1 at most."""
     sizes = np.abs(law.coefficients)
     coefficients = np.where(sizes > EXACT_LAW * sizes.max(axis=0), law.coefficients, 0.0)
-    felt = coefficients.any(axis=1)
+    felt = np.asarray(coefficients.any(axis=1))
     felt[0] |= not felt.any()
     terms = tuple(term for term, kept in zip(law.terms, felt, strict=True) if kept)
     return replace(law, terms=terms, coefficients=coefficients[felt])
