@@ -26,7 +26,8 @@ def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> t
         origin: its tool point there, m.
     """
     mechanism, state = equations.mechanism, equations.state
-    length, links = float(mechanism.length[0]), []
+    length = float(mechanism.length[0])
+    links: list[DeflectedLink] = []
     given = np.concatenate([state.amounts, mechanism.growth], axis=1)
     for leg, chain, coordinates in zip(legs, mechanism.legs, state.coordinates, strict=True):
         bodies = list(_bodies(leg, chain, coordinates, given))

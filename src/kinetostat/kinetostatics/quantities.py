@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Literal, TypeAlias
 
-from kinetostat.algebra.scalar import Scalar, reciprocal
+from kinetostat.algebra.scalar import Scalar, reciprocal, where
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.symmetric import POSITIONS
 from kinetostat.kinetostatics.extremes import (
@@ -25,6 +25,7 @@ from kinetostat.kinetostatics.extremes import (
 )
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import LIMITS
+from kinetostat.tolerances import UNMOVED_TOOL
 
 Better: TypeAlias = Literal["more", "less"] | None
 
@@ -128,6 +129,12 @@ def _under_load(response: Response, what: str, row: int | None = None) -> Scalar
     return values if row is None else values[row]
 
 
+def _moved(response: Response, row: int) -> Scalar:
+    """A displacement under load, without what round-off leaves where nothing moves."""
+    amount = _under_load(response, "displacement", row)
+    return where(amount * amount < UNMOVED_TOOL * UNMOVED_TOOL, 0.0, amount)
+
+
 def _tangent_free(response: Response, row: int) -> Scalar:
     return reciprocal(_under_load(response, "compliance", row))
 
@@ -136,7 +143,7 @@ def _of_loaded_state() -> list[MapQuantity]:
     entries = []
     for i, name in enumerate(COMPONENTS):
         shown, unit = rf"\mathrm{{{name}}}", "rad" if i in ROTATIONS else "m"
-        moved = partial(_under_load, what="displacement", row=i)
+        moved = partial(_moved, row=i)
         tangent, free = partial(_under_load, what="stiffness", row=i), partial(_tangent_free, row=i)
         stiff = _stiffness_unit(i, i)
         entries += [

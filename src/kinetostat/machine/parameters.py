@@ -84,6 +84,19 @@ class Parameter:
         return dimension(self.path)
 
 
+AXES = ("x", "y", "z")
+VECTORS = (
+    "offset", "moment", "force", "gravity", "gravity_axis", "centre_of_mass", "payload_centre", "point", "axis",
+    "first_axis", "second_axis", "far",
+)  # fmt: skip
+"""Fields whose entries are along x, y, z."""
+
+
+def entry_name(field: str, entry: int) -> str:
+    """Return the name of an entry, counted from 0: x, y or z of a vector, else its number from 1."""
+    return AXES[entry] if field in VECTORS else str(entry + 1)
+
+
 POSE = "pose."
 
 

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import Parameter, parameters, values
+from kinetostat.machine.parameters import VECTORS, Parameter, parameters, values
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.studio.wording import VECTORS, label, table_of
+from kinetostat.studio.wording import label, table_of
 
 PANELS = ("Pose", "Geometry", "Stiffness", "Load")
 STEPS = 1000

@@ -8,18 +8,12 @@ from collections.abc import Mapping, Sequence
 from html import escape
 
 from kinetostat.display import ENGINEERING, Display
-from kinetostat.machine.parameters import Parameter
+from kinetostat.machine.parameters import Parameter, entry_name
 from kinetostat.spec.fields import Quantity
 from kinetostat.units import KINDS
 
 DIGITS = 6
 """Significant digits of a value that may be typed over."""
-AXES = ("x", "y", "z")
-VECTORS = (
-    "offset", "moment", "force", "gravity", "gravity_axis", "centre_of_mass", "payload_centre", "point", "axis",
-    "first_axis", "second_axis", "far",
-)  # fmt: skip
-"""Fields whose entries are along x, y, z."""
 MINUS = "\u2212"
 LEAST_GAIN = 1e-3
 """Logarithm of the gain that fills a whole bar when no gain is greater, so that tiny ones look tiny."""
@@ -54,8 +48,7 @@ def label(parameter: Parameter) -> str:
     if not name.isdecimal():
         return name.replace("_", " ")
     field = parameter.path.split(".")[-2]
-    entry = AXES[int(name)] if field in VECTORS else str(int(name) + 1)
-    return f"{field.replace('_', ' ')} {entry}"
+    return f"{field.replace('_', ' ')} {entry_name(field, int(name))}"
 
 
 def table_of(parameter: Parameter) -> str:

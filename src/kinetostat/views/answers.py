@@ -105,7 +105,7 @@ def _sensitivity_figures(sensitivity: Sensitivity) -> Drawings:
 
 def _loaded_figures(state: LoadedState) -> Drawings:
     """Return the curve over the growing load, and the shape; a machine without rest has neither."""
-    drawn = {"growing load": partial(load_figure, state), "shape": partial(shape_figure, state)}
+    drawn: Drawings = {"growing load": partial(load_figure, state), "shape": partial(shape_figure, state)}
     return drawn if state.displacement else {}
 
 

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 
 from kinetostat.display import Scale, number, with_unit
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
+from kinetostat.machine.parameters import VECTORS, entry_name
 from kinetostat.studies.grid.grid import failures, field_of
 from kinetostat.studies.storage import replacing
 from kinetostat.views.grid_tables import display_of
@@ -199,7 +200,10 @@ def axis_values(dataset: xr.Dataset, name: str) -> tuple[Array, str]:
 def _plain(path: str) -> str:
     """A path as an axis label: "pose.x" to "x", "stiffness.passive_links" to "stiffness: passive links"."""
     section, _, field = path.partition(".")
-    words = field.replace("_", " ").replace(".", " ")
+    parts = field.split(".")
+    if parts[-1].isdecimal() and parts[-2:-1] and parts[-2] in VECTORS:
+        parts[-1] = entry_name(parts[-2], int(parts[-1]))
+    words = " ".join(parts).replace("_", " ")
     return words if section == "pose" else f"{section}: {words}"
 
 
@@ -259,7 +263,7 @@ def _count_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: Sca
     return []
 
 
-def fill_regions(panel: Axes, x: Array, y: Array, places: Array, known: Any, colours: Any) -> QuadMesh:
+def fill_regions(panel: Axes, x: Array, y: Array, places: Any, known: Any, colours: Any) -> QuadMesh:
     """Fill a panel pose by pose, without any value between two poses.
 
     Args:

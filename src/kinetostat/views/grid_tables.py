@@ -17,6 +17,7 @@ from kinetostat.studies.grid.grid import failures, field_of
 from kinetostat.studies.grid.stored_grid import Extremes, StoredGrid
 from kinetostat.studies.workspace.verdicts import INSIDE, phrase
 from kinetostat.studies.workspace.workspace import Workspace
+from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 from kinetostat.views.tables import numeric_table
 
 LONGEST = 60
@@ -99,7 +100,9 @@ def _print_extremes(
     size = " × ".join(f"{dim} ({count})" for dim, count in sizes.items())
     table = numeric_table(f"{machine}: {size}", "quantity", ["unit", "least", "mean", "largest"])
     for name, extreme in extremes.items():
-        statistics = (extreme.least, extreme.mean, extreme.largest)
+        size = max(abs(extreme.least), abs(extreme.largest))
+        mean = 0.0 if abs(extreme.mean) < ROUND_OFF_OF_ENTRY * size else extreme.mean
+        statistics = (extreme.least, mean, extreme.largest)
         scale = display.fitting(QUANTITIES[name].unit, statistics)
         table.add_row(name, _head(scale), *(number(value * scale.factor) for value in statistics))
     console.print(table)

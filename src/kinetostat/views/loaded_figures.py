@@ -1,6 +1,7 @@
 """Pictures of a machine under load: its shape over the unloaded one, and the curve while the load grows."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -91,7 +92,7 @@ def shape_figure(state: LoadedState, title: str = "{}: under load") -> Figure:
 
     with mpl.rc_context(STYLE):
         figure = views_of(configuration, draw)
-        styles = [("without loads", UNLOADED, "-"), ("at rest under load", LOADED, "-")]
+        styles: list[tuple[str, str, Any]] = [("without loads", UNLOADED, "-"), ("at rest under load", LOADED, "-")]
         styles += [("slack", SLACK, "--")] if state.slack_legs else []
         figure.legend(
             handles=[Line2D([], [], color=colour, linestyle=dash, label=text) for text, colour, dash in styles],
