@@ -74,7 +74,7 @@ class Engine:
                 number = next(i for i, leg in enumerate(configuration.legs) if leg.number is None)
             for carried, point in link.ends():
                 body = self._body(configuration.legs[number], self.model.chains[number], carried, point)
-                self._pull(body, point, 0.5 * float(link.length) * float(link.linear_density) * gravity)
+                self._pull(body, point, 0.5 * float(link.mass) * gravity)
 
     def _body(self, leg, bodies, carried, point):
         """The body that carries a point after so many elements of a leg; a strut's ends are its neighbours'."""
