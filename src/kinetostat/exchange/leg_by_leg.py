@@ -20,7 +20,7 @@ from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.loading import load
-from kinetostat.machine.machine import Configuration, Load, Machine
+from kinetostat.machine.machine import Configuration, Load, Machine, Tool
 from kinetostat.machine.written.plan import BASE, NAME, PLATFORM, SPATIAL_POSE
 from kinetostat.spec.document import Document, toml_key
 from kinetostat.spec.errors import InputError
@@ -70,7 +70,7 @@ def document_of(machine: Machine) -> Document:
 def _tool(machine: Machine, turn: Rotation) -> dict[str, Any]:
     """The table [tool]; platform axes are those of the base at the home pose of a file leg by leg."""
     table = machine.tables["tool"]
-    given = {name: getattr(table, name) for name in quantities(type(table))}
+    given = {name: getattr(table, name) for name in quantities(Tool)}
     turned = {name: _numbers(turn.apply(Vector(*value))) for name, value in given.items() if isinstance(value, tuple)}
     return {name: value for name, value in (given | turned).items() if np.any(value)}
 

@@ -83,7 +83,7 @@ def shortest_law(
     best: tuple[Law, float] | None = None
     for terms in _candidates(paths, [len(axis) for axis in axes], int(known.sum())):
         functions = _functions(terms, [axis[known] for axis in points], middles, halves)
-        coefficients = np.linalg.lstsq(functions, corrections[known], rcond=None)[0]
+        coefficients: Array = np.linalg.lstsq(functions, corrections[known], rcond=None)[0].astype(float)
         law = _without_round_off(Law(tuple(paths), middles, halves, terms, coefficients))
         here = error(law)
         if best is None or here < best[1]:
