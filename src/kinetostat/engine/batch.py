@@ -82,7 +82,7 @@ def evaluate(
         way = way_of(machine, points.paths, points.size, repeated)
         slab, most, method = way.slab, threads or available_cores(), partial(loaded_fill, way=way)
     elif repeated or points.size >= NATIVE_FROM:
-        slab, most, method = NATIVE_SLAB, threads or available_cores(), _program_fill
+        slab, most, method = NATIVE_SLAB, threads or available_cores(), program_fill
     else:
         slab, most, method = NUMPY_SLAB, 1, _numpy_fill
     fill = by_free_springs(machine, points.paths, quantities, method)
@@ -161,7 +161,14 @@ def _numpy_fill(machine: Machine, _paths: Sequence[str], quantities: Sequence[st
     return fill
 
 
-def _program_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str]) -> Fill:
+def program_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str]) -> Fill:
+    """Return the fill in machine code of quantities of unloaded machines.
+
+    Args:
+        machine: gives all parameters that do not vary.
+        paths: leaf paths of those that do.
+        quantities: names from `QUANTITIES`.
+    """
     return slab_kernel(machine, paths, quantities).run
 
 

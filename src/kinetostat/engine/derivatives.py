@@ -20,9 +20,11 @@ from kinetostat.engine.form import Form, Kind, Weights, angles, equations_of, fo
 from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.interpreter import Interpreted
 from kinetostat.engine.kernel import Fill, closes_inside, falling_back, program_columns
+from kinetostat.engine.loaded import States
 from kinetostat.engine.points import Points
 from kinetostat.engine.trace import Array, Codes, Runnable
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.tolerances import IDLE_COORDINATES, OPENING, ROUND_OFF_DERIVATIVE, SAME_DERIVATIVE
@@ -170,6 +172,7 @@ class _Routes:
         self._known_slopes, self._differentiated = known, tuple(path for path in paths if path not in known)
         self._form, self._fixed = form_of(machine, varying, self._differentiated)
         self._angles = angles(machine)
+        self._loaded = any(QUANTITIES[name].loaded for objective in weights for name, _ in objective)
 
     def direct(self, closed: bool = False) -> Fill:
         """Return the fill by a single program, in which the family places the joints or `closed` forms give them."""
@@ -177,6 +180,7 @@ class _Routes:
 
         def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
             given = program_columns(columns, self._form.varying, self._angles)
+            given += self._state(given, len(status), closed)
             if self._known_slopes:
                 self._spread(*program.slopes(self._fixed, given, status), results)
             else:
@@ -189,8 +193,15 @@ class _Routes:
         given = program_columns(columns, self._form.varying, self._angles)
         given += joint_columns(self._machine, columns, len(status))
         rates = self._program(()).slopes(self._fixed, given, np.empty_like(status))[1]
+        given += self._state(given, len(status), closed=False)
         objectives, partial = self._program(self._weights).slopes(self._fixed, given, status)
         self._spread(objectives, _following(partial, rates, len(self._differentiated)), results)
+
+    def _state(self, given: Sequence[Array], count: int, closed: bool) -> list[Array]:
+        """Coordinates of the states of rest, if any objective is about the machine under load."""
+        if not self._loaded:
+            return []
+        return [*States(self._machine, self._form, closed, self._native).settled(self._fixed, given, count)]
 
     def _spread(self, objectives: Array, slopes: Array, results: Array) -> None:
         """Put objectives and slopes in their rows, with the known slopes by rigid and free springs among them."""

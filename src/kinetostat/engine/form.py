@@ -165,16 +165,18 @@ def objectives_of(
     given = traced(kind, form)
     joints, columns = _joints(given, closed)
     response = respond(given.machine, joints)
+    coordinates: tuple[Traced, ...] = ()
     wanted = {QUANTITIES[name].loaded for weights in objectives for name, _ in weights} - {""}
     if wanted:
         equations = reduced_machine(given.machine, response, joints)
         coordinates = _inputs(given.graph, equations.size)
-        columns = (*columns, *coordinates)
-        loaded, status = equations.numbers([*coordinates], wanted, response.place_status)
+        # At a state of rest a step has no size, but the derivatives of the state: it follows the parameters.
+        there = equations.step([*coordinates])[0] if paths else [*coordinates]
+        loaded, status = equations.numbers(there, wanted, response.place_status)
         response = replace(response, loaded=loaded, status=status)
     accepted = response.status < Status.OK + 0.5
     results = [_number(where(accepted, _weighted(response, weights), math.nan)) for weights in objectives]
-    return _formula(given, columns, results, _number(response.status), paths)
+    return _formula(given, columns, results, _number(response.status), paths, coordinates)
 
 
 def step_of(kind: Kind, form: Form, closed: bool, first: bool = False) -> Body:
@@ -216,9 +218,14 @@ def equations_of(kind: Kind, form: Form, paths: Sequence[str]) -> Formula:
 
 
 def _formula(
-    given: Inputs, joints: Sequence[Traced], results: Sequence[Operand], code: Operand, paths: Sequence[str]
+    given: Inputs,
+    joints: Sequence[Traced],
+    results: Sequence[Operand],
+    code: Operand,
+    paths: Sequence[str],
+    coordinates: Sequence[Traced] = (),
 ) -> Formula:
-    body = Body(given.fixed, [*given.columns.values(), *joints], results, code)
+    body = Body(given.fixed, [*given.columns.values(), *joints, *coordinates], results, code)
     return Formula(body, (*(given.parameters[path] for path in paths), *joints[:-1]))
 
 

@@ -81,11 +81,22 @@ def loaded_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str
     cut = None if way is Way.ANY_MACHINE else _cut(machine, tuple(paths))
     if cut is None:
         return solved
-    directly = falling_back(States(machine, paths, way is Way.NATIVE).fill(quantities), lambda: solved)
+    form, fixed = form_of(machine, paths)
+    closed, native = closes_inside(machine), way is Way.NATIVE
+    states, turning = States(machine, form, closed, native), angles(machine)
+    program = _program(Kind(machine), form, tuple(quantities), closed, native)
+
+    def directly(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        given = program_columns(columns, form.varying, turning)
+        if machine.family.chains is not None and not closed:
+            given += joint_columns(machine, columns, len(status))
+        program.run(fixed, [*given, *states.settled(fixed, given, len(status))], results, status)
+
+    every = falling_back(directly, lambda: solved)
 
     def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         check_loads(with_values(machine, columns), len(status), cut.mechanism.weighs)
-        directly(columns, results, status)
+        every(columns, results, status)
 
     return fill
 
@@ -107,40 +118,34 @@ def _solve_in_parts(
 
 
 class States:
-    """The programs of a machine, with its fixed parameters."""
+    """Programs that find states of rest of machines of one kind and form."""
 
-    def __init__(self, machine: Machine, paths: Sequence[str], native: bool) -> None:
-        """Trace the first steps; arguments as for `loaded_fill`, and whether to compile."""
-        self._machine, self._native, self._closed = machine, native, closes_inside(machine)
-        self._form, self._fixed = form_of(machine, paths)
-        self._angles, self._making = angles(machine), Lock()
+    def __init__(self, machine: Machine, form: Form, closed: bool, native: bool) -> None:
+        """Trace the first steps.
+
+        Args:
+            machine: whose loops can be cut.
+            form: how its parameters enter.
+            closed: whether joints are closed inside the programs.
+            native: whether to compile.
+        """
+        self._key, self._making = (Kind(machine), form, closed, native), Lock()
         self._first, self._size = self._step(first=True)
 
     def _step(self, first: bool) -> tuple[Runnable, int]:
-        with self._making:  # threads that need a program at the same time wait for one of them to make it
-            return _step(Kind(self._machine), self._form, self._closed, self._native, first)
+        with self._making:  # threads that need a program at the same time wait until it is there
+            return _step(*self._key, first)
 
-    def fill(self, quantities: Sequence[str]) -> Fill:
-        """Return the fill of quantities; NOT_CONVERGED where this way does not end surely in a stable state."""
-        program = _program(Kind(self._machine), self._form, tuple(quantities), self._closed, self._native)
-
-        def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-            given = program_columns(columns, self._form.varying, self._angles)
-            if self._machine.family.chains is not None and not self._closed:
-                given += joint_columns(self._machine, columns, len(status))
-            program.run(self._fixed, [*given, *self.settled(given, len(status))], results, status)
-
-        return fill
-
-    def settled(self, given: Sequence[Array], count: int) -> Array:
+    def settled(self, fixed: Array, given: Sequence[Array], count: int) -> Array:
         """Coordinates of the states of rest [coordinates x points], NaN where there is none nearby.
 
         Args:
-            given: columns of the parameters, and of joints if they are not closed inside the program.
+            fixed: values of the parameters that are the same at all points.
+            given: columns of the others, and of joints if they are not closed inside the programs.
             count: of points.
         """
         result, codes = np.empty((self._size + 1, count)), np.empty(count, dtype=np.int8)
-        self._first.run(self._fixed, given, result, codes)
+        self._first.run(fixed, given, result, codes)
         for _ in range(MOST_STEPS):
             rows = np.flatnonzero(result[-1] > NEARLY**2)
             if not len(rows):
@@ -150,7 +155,7 @@ class States:
             at = [*given, *result[:-1]]
             at = at if most else [np.ascontiguousarray(part[rows]) for part in at]
             stepped = np.empty((self._size + 1, len(at[0])))
-            step.run(self._fixed, at, stepped, codes[: len(at[0])])
+            step.run(fixed, at, stepped, codes[: len(at[0])])
             result[:, rows] = stepped[:, rows] if most else stepped
         return result[:-1]
 

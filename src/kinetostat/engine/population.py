@@ -2,14 +2,23 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
-from kinetostat.engine.batch import NATIVE_SLAB, Codes, available_cores, by_free_springs, in_slabs
+from kinetostat.engine.batch import (
+    NATIVE_SLAB,
+    Codes,
+    Method,
+    available_cores,
+    by_free_springs,
+    in_slabs,
+    program_fill,
+)
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.kernel import slab_kernel
+from kinetostat.engine.loaded import loaded_fill, way_of
 from kinetostat.engine.points import Array
+from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 
 
@@ -75,13 +84,17 @@ class Evaluator:
             paths: leaf paths of those that do: of designs, then of poses.
             quantities: names from `kinetostatics.quantities.QUANTITIES`.
         """
-        self._names = tuple(quantities)
-        self._fill = by_free_springs(machine, paths, self._names, lambda *form: slab_kernel(*form).run)
+        self._names, self._slab = tuple(quantities), NATIVE_SLAB
+        method: Method = program_fill
+        if any(QUANTITIES[name].loaded for name in self._names):
+            way = way_of(machine, paths, NATIVE_SLAB, repeated=True)
+            self._slab, method = way.slab, partial(loaded_fill, way=way)
+        self._fill = by_free_springs(machine, paths, self._names, method)
 
     def __call__(self, population: Population) -> Answers:
         """Evaluate a population; its size alone decides how it is cut, so that equal ones give equal bits."""
-        threads = available_cores() if population.size > NATIVE_SLAB else 1
-        results, status = in_slabs(population, self._fill, len(self._names), NATIVE_SLAB, threads)
+        threads = available_cores() if population.size > self._slab else 1
+        results, status = in_slabs(population, self._fill, len(self._names), self._slab, threads)
         return _answers(population, self._names, results, status)
 
 

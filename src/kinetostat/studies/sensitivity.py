@@ -35,6 +35,12 @@ WITHOUT_INFLUENCE = (
     "load.", "limits.", "tool.centre_of_mass", "tool.payload", "bending_rigidity.", "expansion.", "temperature_rise.",
 )  # fmt: skip
 """How the fields begin on which no index depends: loads, limits, weights, buckling and growth."""
+NOT_EVEN_LOADED = ("limits.", "bending_rigidity.", "load.min_tension", "load.max_tension")
+"""Those on which nothing about the loaded machine depends; chosen tensions have no derivatives."""
+FAR_AWAY = (
+    "Newton's method does not lead from the unloaded pose to a stable state of rest nearby, so that there are no "
+    "derivatives here. Look at the loaded state (analyze --loaded), and reduce the loads."
+)
 MOST_NAMED = 12
 """Greatest number of parameters without influence that are named."""
 
@@ -175,7 +181,7 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     names = tuple(resolve_quantities(quantities, machine.family.component_names))
     if not names:
         raise InputError("quantities names none; give at least one quantity or group.")
-    refuse_loaded(names, "sensitivities")
+    refuse_loaded(machine, names)
     refuse_absent(machine, names)
     candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(p, names)]
     here = values(machine)
@@ -185,7 +191,7 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     answer = evaluate_gradient(machine, Table({column: np.array([here[column]])}), names, by)
     status = Status(int(answer.status[0]))
     if status is not Status.OK:
-        return Sensitivity(machine, status, analyze(machine).message)
+        return Sensitivity(machine, status, FAR_AWAY if status is Status.NOT_CONVERGED else analyze(machine).message)
     response = respond(machine)
     length = float(response.configuration.length)
     indices = tuple(
@@ -205,7 +211,7 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
 def _without_round_off(name: str, value: float, response: Response) -> float:
     """An index, set to zero where it is an entry of C or K that is only round-off: of a rigid or a free direction."""
     about = QUANTITIES[name].components
-    if not about or not math.isfinite(value):
+    if not about or not math.isfinite(value) or QUANTITIES[name].loaded:
         return value
     matrix = response.compliance if name.startswith("compliance") else response.stiffness
     shrink = 1.0 / float(response.configuration.length)
@@ -219,6 +225,8 @@ def _without_round_off(name: str, value: float, response: Response) -> float:
 
 
 def _decides(parameter: Parameter, names: Sequence[str]) -> bool:
+    if any(QUANTITIES[name].loaded for name in names):
+        return not parameter.path.startswith(NOT_EVEN_LOADED)
     if KINDS[parameter.quantity.kind].heavy and "mass" not in names:
         return False
     return not parameter.path.startswith(WITHOUT_INFLUENCE)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.equilibrium.reduced import cut_machine
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.kinetostatics.response import respond
@@ -56,22 +57,31 @@ def _exists(name: str, components: Sequence[str]) -> bool:
     return all(part in components for part in QUANTITIES[name].components)
 
 
-def refuse_loaded(names: Sequence[str], what: str) -> None:
-    """Refuse quantities of the machine under load where only unloaded machines are computed.
+def without_derivatives(machine: Machine, names: Sequence[str], varied: Sequence[str] = ()) -> str | None:
+    """The first quantity about the loaded machine whose derivatives are not known; None if there is none.
 
     Args:
+        machine: with its loads.
         names: of quantities.
-        what: is computed, in the plural.
+        varied: leaf paths of parameters that vary.
+    """
+    loaded = [name for name in names if name in QUANTITIES and QUANTITIES[name].loaded]
+    return loaded[0] if loaded and cut_machine(machine, varied) is None else None
+
+
+def refuse_loaded(machine: Machine, names: Sequence[str], varied: Sequence[str] = ()) -> None:
+    """Refuse derivatives of the loaded machine where they are not known; arguments as for `without_derivatives`.
 
     Raises:
         InputError: names the first such quantity.
     """
-    for name in names:
-        if name in QUANTITIES and QUANTITIES[name].loaded:
-            raise InputError(
-                f'"{name}" is about the machine under load, but {what} are those of the unloaded machine; choose '
-                "another quantity, or look at this one in a sweep or a map."
-            )
+    name = without_derivatives(machine, names, varied)
+    if name is not None:
+        raise InputError(
+            f'"{name}" of {machine.name} has no derivatives: those of a loaded machine are known where at most a '
+            "single leg is more than a rod between two joints and no tensions are to be chosen; look at it in a sweep "
+            "or a map, or search without derivatives, optimizer.method = genetic."
+        )
 
 
 def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Parameter] = ()) -> None:

@@ -10,7 +10,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.renamed import current_name
 from kinetostat.spec.study import TermTable
-from kinetostat.studies.grid.quantities import refuse_absent, refuse_loaded
+from kinetostat.studies.grid.quantities import refuse_absent
 from kinetostat.studies.indices import three_numbers
 from kinetostat.studies.optimisation.poses import PoseSet
 from kinetostat.studies.optimisation.terms import PoseTerm, StrokeTerm, Term, VolumeTerm, parse_aggregate
@@ -34,9 +34,7 @@ def known_terms(machine: Machine) -> list[str]:
     """Names of all terms that a machine of this kind may be asked for."""
     there = machine.family.component_names
     of_poses = [
-        name
-        for name, q in QUANTITIES.items()
-        if all(part in there for part in q.components) and name != "aspect" and not q.loaded
+        name for name, q in QUANTITIES.items() if all(part in there for part in q.components) and name != "aspect"
     ]
     return [*SUMS, *ALONG, STROKE, VOLUME, *of_poses]
 
@@ -94,7 +92,6 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
 def _known(machine: Machine, name: str, where: str) -> str:
     """The name, if it is one of the catalogue; otherwise what was meant, or all but the single entries of C and K."""
     known, name = known_terms(machine), current_name(name, "quantity")
-    refuse_loaded([name], "objectives and constraints")
     entries = [entry for entry in known if entry in QUANTITIES and QUANTITIES[entry].components]
     if name in known or difflib.get_close_matches(name, known, 1):
         return choice(name, known, where)

@@ -18,6 +18,7 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import current_name
 from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, read_study
 from kinetostat.studies.bundled import bundled_studies, study_of
+from kinetostat.studies.grid.quantities import refuse_loaded, without_derivatives
 from kinetostat.studies.optimisation.catalogue import known_terms, read_term, usual_goal
 from kinetostat.studies.optimisation.poses import PoseSet, read_poses
 from kinetostat.studies.optimisation.terms import Aggregate, Term, parse_aggregate
@@ -120,6 +121,7 @@ class Problem(Immutable):
     def differentiable(self) -> bool:
         """Whether there are derivatives, and few enough of them to be kept."""
         smooth = all(item.term.differentiable for item in self.objectives)
+        smooth = smooth and without_derivatives(self.machine, self.names, self.paths) is None
         return smooth and bool((self.space.catalogue == 0).any()) and self.points <= MOST_DIFFERENTIATED
 
     @property
@@ -267,6 +269,7 @@ def _check(problem: Problem) -> None:
                 f"{MOST_DIFFERENTIATED:,}; lower the counts of [poses], or take optimizer.method = genetic."
             )
         stepped = [term.label for term in problem.terms if not term.differentiable]
+        refuse_loaded(problem.machine, problem.names, problem.paths)
         if stepped:
             raise InputError(f"{stepped[0]} changes in steps and has no gradient; take optimizer.method = genetic.")
         if problem.method == "gradient" and not (problem.space.catalogue == 0).any():
