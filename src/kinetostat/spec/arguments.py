@@ -41,6 +41,8 @@ WORDS = {
     "direction": "three numbers, e.g. (0, 0, 1)",
     "quantities": 'names of quantities as texts, e.g. ["compliance_z"]',
     "ranges": 'ranges as texts, e.g. ["x=-1 cm:1 cm:11"]',
+    "over": 'ranges as texts, e.g. ["x=-1 cm:1 cm:11"]',
+    "tolerance": 'a length, e.g. "1 um"',
     "conditions": 'conditions as texts, e.g. ["stiffness_z > 1 N/um"]',
     "seed": "a whole number from 0",
     "progress": "a function of the steps done and of all steps",
