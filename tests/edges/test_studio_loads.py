@@ -91,7 +91,8 @@ def test_a_load_without_rest_is_said_and_the_last_figures_stay():
         await page.send("control pose.x", "write", "50 cm")
         assert page.one("status").text == "under load: no rest"
         assert "No tensions of 50 N or more hold this load" in page.one("message").text
-        assert "still show the last good pose" in page.one("message").text
+        assert "The picture shows the machine without its loads" in page.one("message").text
+        assert page.shown("MachineView", "overlay") == []
         assert page.one("headline").content == figures
 
     on_page(steps)

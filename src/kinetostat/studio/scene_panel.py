@@ -10,6 +10,7 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from kinetostat.equilibrium.solving import Rest
+from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.answers import Picture, Report
@@ -32,6 +33,7 @@ GHOST = "Keep the present machine as a ghost behind later changes; click again t
 EXAGGERATION = "factor by which the deflected shape is drawn larger than it is: a number, or auto"
 UNDER_LOAD = "the machine at rest under its weight, preloads and load; gravity is set under Load on the left"
 KEPT = "The picture and the figures still show the last good pose."
+UNLOADED = "The picture shows the machine without its loads, and the figures still show the last state of rest."
 VIEWS = {"iso": "view from the corner", "front": "front view", "side": "side view", "top": "view from above"}
 
 
@@ -119,8 +121,11 @@ class ScenePanel:
         """
         status, message = _verdict(report)
         sound = report.loaded is None or report.loaded.rest is Rest.OK
-        self._tell(report.answered, status, message, sound)
+        placed = report.analysis.status is Status.OK
+        self._tell(report.answered, status, message, sound, UNLOADED if placed else KEPT)
         if not report.answered:
+            if placed:
+                self.view.run_method("overlay", [], [])
             return
         self.view.run_method("overlay", report.solids, [])
         self.key.set_content(scene_key(report))
@@ -133,10 +138,10 @@ class ScenePanel:
         """Say that the machine could not be drawn or analysed because of a mistake of the program."""
         self._tell(False, "no answer", as_sentence(error))
 
-    def _tell(self, answered: bool, status: str, message: str, sound: bool = True) -> None:
+    def _tell(self, answered: bool, status: str, message: str, sound: bool = True, kept: str = KEPT) -> None:
         self.line.classes(replace="pose-line" if answered and sound else "pose-line refused")
         self.status.set_text(status)
-        self.message.set_text(message if answered else f"{message} {KEPT}")
+        self.message.set_text(message if answered else f"{message} {kept}")
 
 
 def _verdict(report: Report) -> tuple[str, str]:
