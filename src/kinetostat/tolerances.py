@@ -92,10 +92,6 @@ all legs keeps seven digits."""
 UNRESISTED = 1e-12
 """Share of the largest singular value or stiffness below which a motion meets no condition, or no spring."""
 
-PARALLEL_ROD = 1e-9
-"""Sine of the angle between a leg's slides and the line of its end joints up to which it is a rod: joints found by
-iteration leave 1e-14."""
-
 COMMANDED = 1e-14
 """Change of an actuator, rad or in units of the machine's length, below which a correction is round-off."""
 EXACT_LAW = 1e-9

@@ -41,6 +41,57 @@ MEASURE = re.compile(r"([-+]?[0-9][0-9.]*(?:[eE][-+]?[0-9]+)?)( .+)")
 """A number and its unit, with the space between."""
 
 
+LOADS = """
+[tool]
+mass = "3 kg"
+centre_of_mass = [0, "10 mm", "20 mm"]
+payload = "1 kg"
+[load]
+state = "loaded"
+force = ["20 N", 0, "-100 N"]
+gravity = [0, 0, "-9.81 m/s**2"]
+gravity_angle = "20 deg"
+[load.spindle]
+point = ["30 mm", 0, "-40 mm"]
+force = [0, "10 N", 0]
+"""
+CABLES = """
+schema = 1
+name = "cables"
+family = "legs"
+space = "planar"
+platform.point = [0, 0, 0]
+pose = { x = "50 mm", y = 0, yaw = "5 deg" }
+sections.bar = { shape = "round", diameter = "20 mm", material = "steel", temperature_rise = "9 K" }
+load = { gravity = [0, "-9.81 m/s**2", 0], max_tension = "9 kN" }
+tool = { mass = "8 kg" }
+[[legs]]
+name = "upper"
+type = "cable"
+copies = 2
+mirrored = true
+from = ["-1 m", "2 m", 0]
+to = ["-1 m", "20 cm", 0]
+stiffness = "200 N/mm"
+preload = "100 N"
+[[legs]]
+name = "lower"
+type = "cable"
+from = ["1 m", "-2 m", 0]
+to = ["1 m", "-20 cm", 0]
+stiffness = "200 N/mm"
+[[legs]]
+name = "strut"
+joints = [
+  { name = "foot", type = "revolute", joins = ["base", "link"], point = ["-1 m", "-2 m", 0], axis = [0, 0, 1], stiffness = "90 N*m/rad", preload = "2 N*m" },
+  { name = "slide", type = "prismatic", joins = ["link", "rod"], point = ["-1 m", "-1 m", 0], axis = "head", stiffness = "50 N/mm", actuated = true, acts = "pushes" },
+  { name = "head", type = "revolute", joins = ["rod", "platform"], point = ["-1 m", "-20 cm", 0], axis = [0, 0, 1] },
+]
+links.link = { model = "rigid", section = "bar", mass = "2 kg", centre_of_mass = ["-1 m", "-1.5 m", 0] }
+"""  # noqa: E501
+"""What may load a machine, for bundled ones that say nothing about it, and a machine of cables."""
+
+
 class Bare(str):
     """Text that stands in a TOML file without quotes."""
 
@@ -97,8 +148,12 @@ def known_keys() -> list[str]:
 
 @cache
 def good_texts(kind: str) -> list[str]:
-    """Texts of all bundled machines or studies."""
-    return [*(bundled() if kind == "machine" else bundled_studies()).values()]
+    """Texts of all bundled machines or studies, of machines under load as well."""
+    if kind == "study":
+        return [*bundled_studies().values()]
+    free = [*bundled().values()]
+    under_load = [toml({**tomllib.loads(text), **tomllib.loads(LOADS)}) for text in free]
+    return [*free, *under_load, CABLES]
 
 
 @cache

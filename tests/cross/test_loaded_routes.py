@@ -8,9 +8,8 @@ from kinetostat.engine.batch import evaluate
 from kinetostat.engine.loaded import NUMPY_FROM, Way, loaded_fill
 from kinetostat.engine.points import Table
 from kinetostat.equilibrium.reduced import cut_machine
-from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.loading import build, bundled
+from kinetostat.machine.loading import bundled
 from machines import load_without_limits
 from refusals import refused
 
@@ -90,12 +89,6 @@ def test_machine_code_gives_them_too_and_leaves_far_ones_to_the_solver():
     assert status.tolist() == [Status.OUT_OF_REACH, Status.OK, Status.OK, Status.OK]
 
 
-def test_a_machine_written_leg_by_leg_is_cut_at_its_rods():
-    machine = build(document_of(moved_by_about("hexapod", 1e-3)), "legs")
-    assert cut_machine(machine) is not None
-    compare(machine, poses_near(machine, 4, 0.003), ["displacement_z", "tangent_stiffness_z"], agreed=1e-8)
-
-
 def test_links_weigh_as_they_do_in_the_solver():
     densities = ["linear_density.legs=0.3 kg/m", "linear_density.passive_links=[0.01, 0.02]"]
     machine = load_without_limits("zhang-gosselin-4dof", [*densities, "load.gravity=[0, 0, -0.1]"])
@@ -129,36 +122,3 @@ def test_gravity_without_any_mass_is_refused_by_programs_too():
     machine = load_without_limits("hexapod", ["load.gravity=[0, 0, -9.81]"])
     with refused(r"load.gravity pulls at masses, but none is known"):
         evaluate(machine, Table({"pose.x": np.zeros(NUMPY_FROM)}), ["displacement_z"])
-
-
-CABLES = """
-schema = 1
-name = "four cables"
-family = "legs"
-space = "planar"
-[platform]
-point = [0, 0, 0]
-[pose]
-x = 0
-y = 0
-yaw = 0
-[load]
-force = [0, 1, 0]
-"""
-
-
-def test_cables_go_slack_in_programs_as_in_the_solver():
-    legs = "".join(
-        f'[[legs]]\nname = "{side} {height}"\ntype = "cable"\nfrom = [{side}, {2 * height}, 0]\n'
-        f"to = [{0.9 * side}, {0.2 * height}, 0]\nstiffness = 2e5\npreload = 100\n"
-        for side in (-1, 1)
-        for height in (-1, 1)
-    )
-    machine = build(CABLES + legs)
-    assert cut_machine(machine) is not None
-    columns = {"load.force.1": np.array([-700.0, -300.0, 0.0, 600.0]), "pose.x": np.array([0.0, 0.01, -0.02, 0.0])}
-    names = [*quantities_of(machine), "slack_springs"]
-    compare(machine, columns, names)
-    (numbers, status), _ = both_ways(machine, columns, names)
-    assert (status == Status.OK).all()
-    assert numbers[-1].tolist() == [2.0, 0.0, 0.0, 2.0]

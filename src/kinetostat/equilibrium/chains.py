@@ -17,7 +17,7 @@ from kinetostat.equilibrium.motion import Array, of_scalars
 from kinetostat.machine.leg import Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Member
-from kinetostat.tolerances import DEPENDENT, PARALLEL_ROD
+from kinetostat.tolerances import DEPENDENT
 
 SIGNS = {"": 0.0, "pulls": 1.0, "pushes": -1.0}
 """Sign of the loads that a spring carries if it carries those of one sign only, by what its file says."""
@@ -93,13 +93,12 @@ class Chain:
 
 @dataclass(frozen=True)
 class Units:
-    """What lengths and forces are counted in, and where from; and how many freedoms a body has, 6 or 3 in a plane."""
+    """What lengths and forces are counted in, and where from."""
 
     origin: Vector
     length: Array
     force: Array
     count: int | None
-    ways: int
 
     @property
     def nothing(self) -> Array:
@@ -303,41 +302,20 @@ def chain_of(leg: Leg, units: Units, amounts: Given, members: Sequence[Member], 
 
 def _rod(leg: Leg, units: Units, weights: Sequence[Vector]) -> tuple[Array, Array] | None:
     """Both ends of a leg that is a rod between two joints with one centre each, and its springs along it."""
-    turning = [number for number, element in enumerate(leg.chain) if element.freedoms]
+    if len(leg.lines) != 1:
+        return None
+    (line,), turning = leg.lines, [number for number, element in enumerate(leg.chain) if element.freedoms]
     slides = [number for number, element in enumerate(leg.chain) if element.springs]
-    if not slides or slides != list(range(slides[0], slides[-1] + 1)) or set(slides) & set(turning):
+    ends = [leg.chain[n].freedoms[0].point for n in (0, -1) if leg.chain[n].freedoms]
+    if len(ends) != 2 or slides != list(range(slides[0], slides[-1] + 1)) or set(slides) & set(turning):
         return None
-    near = [joint for n in turning if n < slides[0] for joint in leg.chain[n].freedoms]
-    far = [joint for n in turning if n > slides[0] for joint in leg.chain[n].freedoms]
-    if not (near and far and _about_one_point(leg, near) and _about_one_point(leg, far)):
+    points = [ends[number > slides[0]] for number in turning]
+    centred = all(j.point is p for n, p in zip(turning, points, strict=True) for j in leg.chain[n].freedoms)
+    straight = all(spring.joint.point is None and spring.joint.axis is line.direction for spring in leg.springs)
+    if not (centred and straight and all(any(point is end for end in ends) for point in weights)):
         return None
-    start, end = near[0].point, far[0].point
-    if start is None or end is None:
-        return None
-    straight = all(spring.joint.point is None for spring in leg.springs) and _along_rod(leg, units, end - start)
-    if not (straight and all(point.is_at(start) or point.is_at(end) for point in weights)):
-        return None
-    return units.points([start])[:, 0], units.points([end])[:, 0]
-
-
-def _about_one_point(leg: Leg, joints: Sequence[Joint]) -> bool:
-    """Whether joints that begin or end a leg turn about one point, by their form."""
-    if all(joint.point is joints[0].point for joint in joints):
-        return joints[0].point is not None
-    first = 0 if leg.passive[0] is joints[0] else len(leg.passive) - len(joints)
-    return tuple(range(first, first + len(joints))) in leg.centred
-
-
-def _along_rod(leg: Leg, units: Units, span: Vector) -> bool:
-    """Whether a leg carries a force between its ends alone; of traced legs without lines that is known beforehand."""
-    if leg.lines:
-        return len(leg.lines) == 1 and all(spring.joint.axis is leg.lines[0].direction for spring in leg.springs)
-    if len(leg.passive) - len(leg.idle) != units.ways - 1:
-        return False
-    if units.count is None:
-        return True
-    aside = [spring.joint.axis.cross(span).norm() for spring in leg.springs]
-    return bool((of_scalars(aside, units.count) <= PARALLEL_ROD * of_scalars([span.norm()], units.count)).all())
+    near, far = (units.points([end])[:, 0] for end in ends if end is not None)
+    return near, far
 
 
 def _idle(twists: Sequence[Array], coordinate: Sequence[int], springs: Sequence[Spring | None], count: int) -> Array:

@@ -8,16 +8,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinetostat.equilibrium.balance import Balance, State, free_state
+from kinetostat.equilibrium.balance import Balance, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.motion import logarithm
+from kinetostat.equilibrium.motion import Array, logarithm
 from kinetostat.equilibrium.solving import newton, with_share
-from kinetostat.equilibrium.tangent import Stability, stability
+from kinetostat.equilibrium.tangent import Stability, stabilities, stability
+from kinetostat.tolerances import AT_REST
 
-STEPS, HALVINGS = 24, 14
-"""Of the loads, and of the step in which the state is lost: the share is known to 3e-6."""
+RATIO, CANDIDATES = 2.0, 14
+"""Steps of the loads that are tried together: all that is left of them, and each time by this ratio less."""
+FINE = 1e-3
+"""Share of what it stands by which the last step is allowed to be wrong."""
+MOST_ITERATIONS = 8
+"""Of Newton's method in a step: where it needs more, the step is too long."""
+BENT = 0.5
+"""Share of its motion by which a step may miss what the tangent foresees: where it misses more, the state has snapped
+over, or the step is too long."""
+LONGEST = 0.3
+"""Motion of the platform in a step, rad or in units of the machine's length."""
 LEAP = 0.1
-"""Motion of the platform between two steps, rad or in units of the machine's length, that counts as a leap."""
+"""Motion in the same units from which a state that is found at once may be another one than growing loads lead to."""
 
 
 @dataclass(frozen=True)
@@ -44,30 +54,37 @@ def limit_of(mechanism: Mechanism) -> Limit | None:
     Returns:
         Where it stands last, share 1 if it stands under all of them; None if it stands under no share.
     """
-    last: Limit | None = None
-    for number in range(STEPS + 1):
-        there = _stands(mechanism, number / STEPS, last)
-        if there is None and last is not None:
-            return _halved(mechanism, last, number / STEPS)
+    last = _standing(mechanism, np.zeros(1), None)
+    while last is not None and last.share < 1.0:
+        shares = last.share + (1.0 - last.share) * RATIO ** -np.arange(CANDIDATES - 1.0, -1.0, -1.0)
+        there = _standing(mechanism, np.append(shares[:-1], 1.0), last)
+        if there is None:
+            break
+        nearly = there.share - last.share < FINE * there.share
         last = there
+        if nearly:
+            break
     return last
 
 
-def _halved(mechanism: Mechanism, last: Limit, lost: float) -> Limit:
-    for _ in range(HALVINGS):
-        share = 0.5 * (last.share + lost)
-        there = _stands(mechanism, share, last)
-        last, lost = (last, share) if there is None else (there, lost)
-    return last
+def _standing(mechanism: Mechanism, shares: Array, last: Limit | None) -> Limit | None:
+    """The state under the greatest of some shares up to which all are stable and near the last one.
 
-
-def _stands(mechanism: Mechanism, share: float, last: Limit | None) -> Limit | None:
-    """The state at a share of the loads, near the last one; None if there is none that is stable."""
-    start: State = free_state(mechanism) if last is None else last.balance.state
-    solution = newton(with_share(mechanism, share, preload=1.0), start)
-    if not solution.settled[0]:
+    Args:
+        mechanism: with all of its loads.
+        shares: of the loads, from the least to the greatest.
+        last: the state from which each of them is sought; the free state if None.
+    """
+    rows = np.zeros(len(shares), dtype=np.int64)
+    start = (free_state(mechanism) if last is None else last.balance.state).taken(rows)
+    loaded = with_share(mechanism.taken(rows), shares, preload=1.0)
+    first, solution = (newton(loaded, start, iterations) for iterations in (1, MOST_ITERATIONS))
+    foreseen, moved = (logarithm(s.balance.state.platform @ start.platform.inverse()) for s in (first, solution))
+    size, wrong = np.abs(moved).max(axis=1), np.abs(moved - foreseen).max(axis=1)
+    near = (size <= LONGEST) & (wrong <= BENT * size + AT_REST) | (last is None)
+    stands = solution.settled & near & stabilities(solution.balance).stable
+    count = int(np.cumprod(stands).sum())
+    if not count:
         return None
-    moved = logarithm(solution.balance.state.platform @ start.platform.inverse())
-    judged = stability(solution.balance)
-    leapt = last is not None and float(np.abs(moved).max()) > LEAP
-    return None if leapt or not judged.stable else Limit(share, solution.balance, judged)
+    equations = solution.at(np.array([count - 1]))
+    return Limit(float(shares[count - 1]), equations, stability(equations))

@@ -109,7 +109,7 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
     known = [_linear(spring, configuration.length) for leg in configuration.legs for spring in leg.springs]
     typical = _typical(of_scalars(known, count))
     force = typical * length
-    units = Units(origin, length, force, count, 6 if configuration.plane is None else 3)
+    units = Units(origin, length, force, count)
     members = located_members(machine, configuration, None if joints is None else joints.coordinates)
     driven = [s for leg in configuration.legs for s in leg.springs if s.actuated and not is_zero(s.stiffness)]
     amounts = Given(len(driven))

@@ -28,7 +28,7 @@ from kinetostat.equilibrium.solving import LONGEST_STEP
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
-from kinetostat.machine.machine import Machine, springs
+from kinetostat.machine.machine import Machine
 from kinetostat.tolerances import AT_REST, UNRESISTED
 
 TENSIONS = ("load.min_tension", "load.max_tension")
@@ -249,10 +249,7 @@ def cut_machine(machine: Machine, varying: Collection[str] = ()) -> Cut | None:
         return None
     joints = solve_joints(machine) if machine.family.chains else None
     with np.errstate(all="ignore"):
-        response = respond(machine, joints)
-        if any(not is_zero(spring.returns) for spring in springs(response.configuration)):
-            return None  # what such a hinge carries at the free state depends on its home pose
-        return cut(mechanism_of(machine, response, joints))
+        return cut(mechanism_of(machine, respond(machine, joints), joints))
 
 
 def reduced_machine(machine: Machine, response: Response, joints: Joints | None) -> "Reduced":

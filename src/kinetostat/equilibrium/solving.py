@@ -80,11 +80,21 @@ def at_rest(mechanism: Mechanism, start: State | None = None) -> Solution:
     return reached
 
 
-def with_share(mechanism: Mechanism, share: float, preload: float | None = None) -> Mechanism:
-    """The mechanism with a share of its loads, and with one of its preloads: the same unless another one is given."""
+def with_share(mechanism: Mechanism, share: float | Array, preload: float | None = None) -> Mechanism:
+    """The mechanism with a share of its loads, or with one at each pose [n], and with one of its preloads.
+
+    Args:
+        mechanism: with all of its loads.
+        share: of its loads.
+        preload: share of its preloads; that of the loads if None.
+    """
+
+    def part(values: Array, of: float | Array) -> Array:
+        return np.asarray((values.T * of).T)
+
     tension = share if preload is None else preload
-    legs = tuple(replace(leg, preload=leg.preload * tension) for leg in mechanism.legs)
-    loads = {name: getattr(mechanism, name) * share for name in ("wrench", "forces", "gravity", "growth")}
+    legs = tuple(replace(leg, preload=part(leg.preload, tension)) for leg in mechanism.legs)
+    loads = {name: part(getattr(mechanism, name), share) for name in ("wrench", "forces", "gravity", "growth")}
     return replace(mechanism, legs=legs, **loads)
 
 
@@ -109,17 +119,18 @@ def _put(mechanism: Mechanism, reached: Solution, rows: Rows, part: Solution) ->
     return Solution(balance(mechanism, state), put(reached.settled, part.settled))
 
 
-def newton(mechanism: Mechanism, state: State) -> Solution:
+def newton(mechanism: Mechanism, state: State, iterations: int = MOST_ITERATIONS) -> Solution:
     """Find the states of rest near given ones, without steps of the load.
 
     Args:
         mechanism: with its load.
         state: to begin with.
+        iterations: at most.
     """
     equations = balance(mechanism, state)
     settled = np.zeros(len(mechanism.length), dtype=bool)
     last = np.full(len(mechanism.length), np.inf)
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(iterations):
         step = solve(equations, -equations.left[:, :, None])[:, :, 0]
         motion = equations.motion_of(step)
         # Steps that no longer shrink are round-off, once they are as small as that. The first one may only find what

@@ -29,7 +29,7 @@ class LinkKind:
     """Links of a family that are alike.
 
     Attributes:
-        name: their field in the table [linear_density].
+        name: their field in the tables about links.
         rigidities: fields of [stiffness] in which their cross-section may be written.
         lengths: of each of them, and where it is.
         count: how many entries those fields have; None where one is for all links.

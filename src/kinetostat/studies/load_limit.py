@@ -1,6 +1,5 @@
 """In sentences: up to which share of its loads a machine stands, and how it gives way there. Nothing is solved here."""
 
-from kinetostat.display import number
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.limit import Limit
 from kinetostat.equilibrium.tangent import Stability
@@ -34,4 +33,4 @@ def how_it_gives_way(limit: Limit | None) -> str:
     known = limit.judged.mode.any()
     by = f", and then gives way by a motion like {mode} at the tool, most of all in {', '.join(legs)}" if known else ""
     what = f" Slack there: {', '.join(slack)}." if slack else ""
-    return f"It stands up to {number(limit.share)} times this load{by}.{what}"
+    return f"It stands up to {limit.share:.3g} times this load{by}.{what}"
