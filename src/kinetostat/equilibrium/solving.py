@@ -94,7 +94,9 @@ def with_share(mechanism: Mechanism, share: float | Array, preload: float | None
 
     tension = share if preload is None else preload
     legs = tuple(replace(leg, preload=part(leg.preload, tension)) for leg in mechanism.legs)
-    loads = {name: part(getattr(mechanism, name), share) for name in ("wrench", "forces", "gravity", "growth")}
+    loads: dict[str, Any] = {
+        name: part(getattr(mechanism, name), share) for name in ("wrench", "forces", "gravity", "growth")
+    }
     return replace(mechanism, legs=legs, **loads)
 
 

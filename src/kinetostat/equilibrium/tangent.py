@@ -107,7 +107,8 @@ def stabilities(equations: Balance) -> Stabilities:
     elastic, geometric, conditions = _motions(equations, starts)
     count, size = len(elastic), ways.shape[1]
     sound = np.isfinite(elastic + geometric).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
-    stable, factors, modes = sound.copy(), np.where(sound, np.inf, np.nan), np.zeros((count, starts[-1]))
+    stable: npt.NDArray[np.bool_] = np.array(sound)
+    factors, modes = np.where(sound, np.inf, np.nan), np.zeros((count, starts[-1]))
     values, rows_of_all = np.zeros((count, min(conditions.shape[1:]))), np.zeros((count, starts[-1], starts[-1]))
     _, values[sound], rows_of_all[sound] = np.linalg.svd(conditions[sound])
     ranks = (values > UNRESISTED * values[:, :1]).sum(axis=1)
