@@ -22,7 +22,7 @@ from kinetostat.machine.loading import load
 from kinetostat.studies.diagnosis.hardware import processor
 
 LOADED = (*(f"displacement_{c}" for c in COMPONENTS), *(f"tangent_free_stiffness_{c}" for c in COMPONENTS))
-POSES, TURNS = 100_000, 7
+POSES, TURNS = 100_000, 16
 RUNS = (("4-dof", "1 g"), ("4-dof", "5 g"), ("4-dof", "20 g"), ("hexapod", "5 kg"), ("hexapod", "500 kg"))
 
 

@@ -147,16 +147,19 @@ class States:
         result, codes = np.empty((self._size + 1, count)), np.empty(count, dtype=np.int8)
         self._first.run(fixed, given, result, codes)
         for _ in range(MOST_STEPS):
-            rows = np.flatnonzero(result[-1] > NEARLY**2)
+            moving = result[-1] > NEARLY**2
+            rows = np.flatnonzero(moving)
             if not len(rows):
                 break
             step, _ = self._step(first=False)
             most = 2 * len(rows) > count  # then picking them out would take longer than computing the others as well
-            at = [*given, *result[:-1]]
-            at = at if most else [np.ascontiguousarray(part[rows]) for part in at]
+            at = [*given, *result[:-1]] if most else [part[rows] for part in (*given, *result[:-1])]
             stepped = np.empty((self._size + 1, len(at[0])))
             step.run(fixed, at, stepped, codes[: len(at[0])])
-            result[:, rows] = stepped[:, rows] if most else stepped
+            if most:
+                np.copyto(result, stepped, where=moving)
+            else:
+                result[:, rows] = stepped
         return result[:-1]
 
 
