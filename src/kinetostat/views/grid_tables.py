@@ -100,8 +100,8 @@ def _print_extremes(
     size = " × ".join(f"{dim} ({count})" for dim, count in sizes.items())
     table = numeric_table(f"{machine}: {size}", "quantity", ["unit", "least", "mean", "largest"])
     for name, extreme in extremes.items():
-        size = max(abs(extreme.least), abs(extreme.largest))
-        mean = 0.0 if abs(extreme.mean) < ROUND_OFF_OF_ENTRY * size else extreme.mean
+        greatest = max(abs(extreme.least), abs(extreme.largest))
+        mean = 0.0 if abs(extreme.mean) < ROUND_OFF_OF_ENTRY * greatest else extreme.mean
         statistics = (extreme.least, mean, extreme.largest)
         scale = display.fitting(QUANTITIES[name].unit, statistics)
         table.add_row(name, _head(scale), *(number(value * scale.factor) for value in statistics))
