@@ -68,3 +68,13 @@ def test_its_derivatives_are_the_dyad_of_its_vector(diagonal):
     for row, (i, j) in zip(found[1:], places, strict=True):
         expected = vectors[:, i] * vectors[:, j] * (1.0 if i == j else 2.0)
         np.testing.assert_allclose(row, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("size", [4, 6, 8])
+def test_larger_matrices_converge_as_well(size):
+    decades = 10.0 ** np.random.default_rng(size).uniform(-4.0, 4.0, (500, size))
+    signs = np.random.default_rng(1).choice([-1.0, 1.0], (500, size))
+    stack = matrices(decades * signs)
+    expected = np.linalg.eigvalsh(stack)[:, -1]
+    largest = np.abs(decades).max(axis=1)
+    assert (np.abs(greatest(stack) - expected) <= 1e-13 * largest).all()
