@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from kinetostat.equilibrium.chains import Chain
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.motion import Array, Motions, along, brackets, exponential, logarithm, skew_of, still
+from kinetostat.equilibrium.motion import Array, Motions, along, brackets, cross, exponential, logarithm, skew_of, still
 
 
 @dataclass(frozen=True)
@@ -150,10 +150,10 @@ def _weight(leg: Chain, placed: Sequence[Motions], screws: Array, gravity: Array
     for i, carried in enumerate(leg.masses.carried):
         force = gravity * leg.masses.mass[:, i, None]
         at = placed[carried].point(leg.masses.point[:, i])
-        moving = np.cross(screws[:, :carried, :3], at[:, None]) + screws[:, :carried, 3:]
+        moving = cross(screws[:, :carried, :3], at[:, None]) + screws[:, :carried, 3:]
         gradient[:, :carried] -= np.einsum("nc,nfc->nf", force, moving)
         # Of two motions, the one nearer to the base turns the path on which the other one moves the mass.
-        turned = np.cross(screws[:, :carried, None, :3], moving[:, None])
+        turned = cross(screws[:, :carried, None, :3], moving[:, None])
         both = np.triu(np.einsum("nc,njkc->njk", force, turned))
         rates[:, :carried, :carried] -= both + np.swapaxes(np.triu(both, 1), 1, 2)
     return gradient, rates
@@ -173,7 +173,7 @@ def platform_load(mechanism: Mechanism, platform: Motions) -> tuple[Array, Array
     change = np.zeros((count, 6, 6))
     for point, force in zip(points, forces, strict=True):
         at, across = platform.point(point), skew_of(force)
-        wrench = wrench + np.concatenate([np.cross(at, force), force], axis=1)
+        wrench = wrench + np.concatenate([cross(at, force), force], axis=1)
         turning = np.concatenate([across @ skew_of(at), -across], axis=2)
         change = change + np.concatenate([turning, 0.0 * turning], axis=1)
     return wrench, change

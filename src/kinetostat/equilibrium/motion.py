@@ -19,6 +19,8 @@ from kinetostat.kinematics.closing import stacked
 
 Array = npt.NDArray[np.float64]
 
+NEXT, AFTER = [1, 2, 0], [2, 0, 1]
+"""The axes that come next in turn, and after these."""
 SMALL_ANGLE = 0.05
 """Angle, rad, below which quotients like (t - sin t) / t^3 are taken from their series: the fourth term is 1e-16."""
 
@@ -47,7 +49,7 @@ class Motions:
         """Where screws fixed in the bodies [n x 6] go (the adjoint map)."""
         turning = np.einsum("nij,nj->ni", self.rotation, twists[:, :3])
         moving = np.einsum("nij,nj->ni", self.rotation, twists[:, 3:])
-        return np.concatenate([turning, moving + np.cross(self.translation, turning)], axis=1)
+        return np.concatenate([turning, moving + cross(self.translation, turning)], axis=1)
 
     def amounts(self) -> Array:
         """Rotation vectors and translations [n x 6]: how far bodies are turned, and where their origins are."""
@@ -141,6 +143,11 @@ def _quotients(angle: Array) -> tuple[Array, Array, Array]:
     return first, 0.5 * half * half, third
 
 
+def cross(a: Array, b: Array) -> Array:
+    """The vector product over the last axis, in less than half of the time that NumPy's takes for a few of them."""
+    return np.asarray(a[..., NEXT] * b[..., AFTER] - a[..., AFTER] * b[..., NEXT])
+
+
 def skew_of(vectors: Array) -> Array:
     """The matrices [n x 3 x 3] that multiply by vectors [n x 3]: skew_of(a) b = a x b."""
     result = np.zeros((len(vectors), 3, 3), dtype=vectors.dtype)
@@ -152,6 +159,6 @@ def skew_of(vectors: Array) -> Array:
 def brackets(twists: Array) -> Array:
     """The change [n x m x m x 6] of each screw [n x m x 6], second index, by a unit motion along each, first index."""
     first, second = twists[:, :, None], twists[:, None, :]
-    turning = np.cross(first[..., :3], second[..., :3])
-    moving = np.cross(first[..., :3], second[..., 3:]) + np.cross(first[..., 3:], second[..., :3])
+    turning = cross(first[..., :3], second[..., :3])
+    moving = cross(first[..., :3], second[..., 3:]) + cross(first[..., 3:], second[..., :3])
     return np.concatenate([turning, moving], axis=-1)

@@ -22,7 +22,7 @@ from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.equilibrium.balance import LegTerms, leg_terms, placed_leg, platform_load
 from kinetostat.equilibrium.chains import Chain, Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
-from kinetostat.equilibrium.motion import Array, Motions, of_scalars, skew_of
+from kinetostat.equilibrium.motion import Array, Motions, cross, of_scalars, skew_of
 from kinetostat.equilibrium.numbers import FREE
 from kinetostat.equilibrium.solving import LONGEST_STEP
 from kinetostat.kinematics.closure import Joints, solve_joints
@@ -360,7 +360,7 @@ class _Tangent:
         for coefficient in reversed(ARC_SINE):
             ratio = ratio * square + coefficient
         turned = [sine * ratio + part for sine, part in zip(sines, moved[:3], strict=True)]
-        return [*turned, *(shift + moved[3:] + np.cross(moved[:3], shift))], square < LARGEST_TURN**2
+        return [*turned, *(shift + moved[3:] + cross(moved[:3], shift))], square < LARGEST_TURN**2
 
     def compliance(self) -> list[Row]:
         """C at the loaded tool point [6][6], 0 where it is round-off."""
