@@ -15,7 +15,18 @@ import numpy.typing as npt
 
 from kinetostat.equilibrium.chains import Chain
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.motion import Array, Motions, along, brackets, cross, exponential, logarithm, skew_of, still
+from kinetostat.equilibrium.motion import (
+    Array,
+    Motions,
+    brackets,
+    cross,
+    each_along,
+    each_twist,
+    exponential,
+    logarithm,
+    skew_of,
+    still,
+)
 
 
 @dataclass(frozen=True)
@@ -95,12 +106,14 @@ class Placed:
 
 def placed_leg(leg: Chain, coordinates: Array, amounts: Array) -> Placed:
     """Move a leg by its coordinates [n x coordinates] and by all given amounts [n x amounts]."""
-    placed, columns = [still(len(coordinates))], []
-    for number, (by, driven) in enumerate(zip(leg.coordinate, leg.given, strict=True)):
-        twist = leg.twists[:, number]
-        columns.append(placed[-1].twist(twist))
-        placed.append(placed[-1] @ along(twist, amounts[:, driven] if by < 0 else coordinates[:, by]))
-    return Placed(tuple(placed), np.stack(columns, axis=1) if columns else np.zeros((len(coordinates), 0, 6)))
+    placed = [still(len(coordinates))]
+    if not leg.coordinate:
+        return Placed(tuple(placed), leg.twists)
+    pairs = zip(leg.coordinate, leg.given, strict=True)
+    moved = [amounts[:, driven] if by < 0 else coordinates[:, by] for by, driven in pairs]
+    for step in each_along(leg.twists, np.stack(moved, axis=1)):
+        placed.append(placed[-1] @ step)
+    return Placed(tuple(placed), each_twist(placed[:-1], leg.twists))
 
 
 def leg_terms(

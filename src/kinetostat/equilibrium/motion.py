@@ -97,6 +97,26 @@ def along(twists: Array, amounts: Array) -> Motions:
     return Motions(np.stack(columns, axis=1)[None], of_scalars(shift.components()))
 
 
+def each_along(twists: Array, amounts: Array) -> list[Motions]:
+    """The displacements by screw motions in a row [n x m x 6], each by its amount [n x m]: m of them."""
+    count, motions = amounts.shape
+    if twists.dtype == object or amounts.dtype == object:
+        return [along(twists[:, k], amounts[:, k]) for k in range(motions)]
+    every = exponential((twists * amounts[:, :, None]).reshape(-1, 6))
+    rotation, translation = every.rotation.reshape(count, motions, 3, 3), every.translation.reshape(count, motions, 3)
+    return [Motions(rotation[:, k], translation[:, k]) for k in range(motions)]
+
+
+def each_twist(motions: Sequence[Motions], twists: Array) -> Array:
+    """Where screws fixed in m bodies [n x m x 6] go, each with its own [n x m x 6]."""
+    if twists.dtype == object or any(motion.rotation.dtype == object for motion in motions):
+        return np.stack([motion.twist(twists[:, k]) for k, motion in enumerate(motions)], axis=1)
+    rotation = np.stack([motion.rotation for motion in motions], axis=1)
+    turning, moving = ((rotation @ part[..., None])[..., 0] for part in (twists[..., :3], twists[..., 3:]))
+    lever = np.stack([motion.translation for motion in motions], axis=1)
+    return np.concatenate([turning, moving + cross(lever, turning)], axis=2)
+
+
 def of_scalars(scalars: Sequence[Scalar], count: int | None = None) -> Array:
     """Scalars as columns [n x scalars]; without a count as objects, whatever they are [1 x scalars]."""
     if count is not None:
