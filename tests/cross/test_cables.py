@@ -134,6 +134,31 @@ def test_tensions_of_a_spatial_machine_balance_its_weight_and_no_smaller_ones_do
         moved = tensions + 1e-3 * direction
         if (moved >= 40.0 - 1e-9).all():
             assert np.linalg.norm(moved) > np.linalg.norm(tensions) - 1e-9
+    elastic, geometric = of_cables(corners - eyes, eyes - [0.0, 0.0, 2.0], tensions, 2e5)
+    geometric = geometric - turned(weight, np.array([0.02, 0.0, 0.0]))
+    assert np.array(state.elastic) == pytest.approx(elastic, rel=1e-9, abs=1e-4)
+    assert np.array(state.tangent) == pytest.approx(elastic + geometric, rel=1e-9, abs=1e-4)
+
+
+def turned(force, arm):
+    """Second derivative, by a turn of the arm to its end, of the work of a force that keeps its direction [6 x 6]."""
+    result = np.zeros((6, 6))
+    result[:3, :3] = 0.5 * (np.outer(force, arm) + np.outer(arm, force)) - force @ arm * np.eye(3)
+    return result
+
+
+def of_cables(spans, arms, tensions, stiffness):
+    """K from the lengths of cables alone: V = k (L - L0)^2 / 2, where L changes to second order with a small motion."""
+    elastic, geometric = np.zeros((2, 6, 6))
+    for span, arm, tension in zip(spans, arms, tensions, strict=True):
+        length = np.linalg.norm(span)
+        along = span / length
+        gradient = -np.concatenate([np.cross(arm, along), along])
+        moving = np.hstack([-np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]]), np.eye(3)])
+        across = moving.T @ (np.eye(3) - np.outer(along, along)) @ moving / length
+        elastic += stiffness * np.outer(gradient, gradient)
+        geometric += tension * (across - turned(along, arm))
+    return elastic, geometric
 
 
 @pytest.mark.parametrize(

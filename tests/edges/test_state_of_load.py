@@ -55,6 +55,7 @@ def test_a_file_wants_what_the_option_wants(capsys):
 def test_without_a_quantity_a_loaded_machine_shows_how_far_it_moves(capsys, command):
     name, *ranges = command
     words = [name, "hexapod", *PUSHED, *ranges]
+    assert answer(capsys, *words, "--loaded")[1]["variables"] == answer(capsys, *words, *LOADED)[1]["variables"]
     assert set(answer(capsys, *words, *LOADED)[1]["variables"]) == {
         f"displacement_{c}" for c in ["rx", "ry", "rz", "x", "y", "z"]
     }
@@ -70,6 +71,7 @@ def test_the_workspace_of_a_loaded_machine_is_where_it_comes_to_rest(capsys, tmp
     nodes = answer(capsys, *words)[1]["nodes"]
     assert (nodes["inside"], nodes["no rest under load"]) == (3, 12)
     assert answer(capsys, *words, "--set", "load.state=free")[1]["nodes"]["no rest under load"] == 0
+    assert answer(capsys, *words, "--set", "load.state=free", "--loaded")[1]["nodes"] == nodes
 
 
 def test_requirements_are_judged_and_decide_the_exit_code(capsys, tmp_path):

@@ -106,6 +106,11 @@ def takes_machine(command: Parser, what: str = MACHINE) -> None:
     takes_units(command)
 
 
+def takes_loaded(command: Parser, what: str) -> None:
+    """Give a command about many poses `--loaded`, which says what [load] state says."""
+    command.add_argument("--loaded", dest="loaded_state", action="store_true", help=what)
+
+
 def takes_units(command: Parser) -> None:
     """Give a command `--units`."""
     command.add_argument(
@@ -197,7 +202,8 @@ def load_machine(options: argparse.Namespace, more: "Sequence[str]" = ()) -> "Ma
 
         if options.machine in bundled_studies():
             raise InputError(f'"{options.machine}" {STUDY}')
-    machine = load(options.machine, [*options.settings, *more])
+    state = ["load.state=loaded"] if getattr(options, "loaded_state", False) else []
+    machine = load(options.machine, [*options.settings, *state, *more])
     return machine.in_units(options.units) if options.units else machine
 
 

@@ -11,6 +11,7 @@ from kinetostat.commands.common import (
     progress_bar,
     quantities_of,
     takes_json,
+    takes_loaded,
     takes_machine,
     takes_quantities,
 )
@@ -34,6 +35,7 @@ def add_path_command(commands: "Commands") -> None:
         help="a CSV file: a line of fields with their units, such as x [mm], z [mm], and below it a line for each pose",
     )  # fmt: skip
     takes_quantities(path, "free_stiffness")
+    takes_loaded(path, 'as state = "loaded" in [load]: displacement under load, if no quantity is named')
     path.add_argument(
         "-o", "--output", metavar="FILE", type=Path, action="append", default=[],
         help="write a table (.csv, .json, .nc) or a picture along the path (.png, .svg, .pdf); repeatable",
