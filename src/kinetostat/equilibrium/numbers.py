@@ -4,14 +4,16 @@ Source: theory section 12.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.solving import at_rest
-from kinetostat.equilibrium.tangent import compliance, inverse, stabilities
+from kinetostat.equilibrium.tangent import Stabilities, compliance, inverse, stabilities
 from kinetostat.equilibrium.tensions import tensioned
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints, solve_joints
@@ -82,6 +84,41 @@ def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:
         )
 
 
+@dataclass(frozen=True)
+class States:
+    """The states of rest at n points.
+
+    Attributes:
+        status: `Status` codes [n].
+        rows: of the points at which the machine is at rest and stable.
+        equations: at all states of rest, stable or not; None if no point has a place.
+        judged: their stability; `rows` are those that are stable, in their order.
+    """
+
+    status: npt.NDArray[np.int64]
+    rows: npt.NDArray[np.int64]
+    equations: Balance | None = None
+    judged: Stabilities | None = None
+
+
+def states_of_rest(machine: Machine, columns: Mapping[str, Array], count: int) -> States:
+    """Find the states of rest at n points; arguments and errors as for `loaded_numbers`."""
+    status = np.broadcast_to(respond(with_values(machine, columns)).status, (count,)).astype(np.int64)
+    rows = np.flatnonzero(np.isin(status, FREE))
+    if not len(rows):
+        return States(status, rows)
+    posed = with_values(machine, {path: np.asarray(values)[rows] for path, values in columns.items()})
+    joints = solve_joints(posed) if posed.family.chains else None
+    mechanism, balanced = loaded_mechanism(posed, respond(posed, joints), joints, len(rows))
+    solution = at_rest(mechanism)
+    settled = np.flatnonzero(solution.settled & balanced)
+    equations = solution.at(settled)
+    judged = stabilities(equations)
+    status[rows], rested = Status.NO_REST, rows[settled[judged.stable]]
+    status[rested] = Status.OK
+    return States(status, rested, equations, judged)
+
+
 def loaded_numbers(
     machine: Machine, columns: Mapping[str, Array], count: int
 ) -> tuple[dict[str, Array], npt.NDArray[np.int64]]:
@@ -104,24 +141,14 @@ def loaded_numbers(
         **{name: np.full((count, 6), np.nan) for name in ("displacement", "compliance", "stiffness")},
         **{name: np.full(count, np.nan) for name in ("slack", "factor")},
     }
-    status = np.broadcast_to(respond(with_values(machine, columns)).status, (count,)).astype(np.int64)
-    rows = np.flatnonzero(np.isin(status, FREE))
-    if not len(rows):
-        return result, status
-    posed = with_values(machine, {path: np.asarray(values)[rows] for path, values in columns.items()})
-    joints = solve_joints(posed) if posed.family.chains else None
-    mechanism, balanced = loaded_mechanism(posed, respond(posed, joints), joints, len(rows))
-    solution = at_rest(mechanism)
-    settled = np.flatnonzero(solution.settled & balanced)
-    equations = solution.at(settled)
-    judged = stabilities(equations)
-    stable = judged.stable
-    status[rows], rested = Status.NO_REST, rows[settled[stable]]
-    status[rested] = Status.OK
+    states = states_of_rest(machine, columns, count)
+    equations, judged = states.equations, states.judged
+    if equations is None or judged is None:
+        return result, states.status
     moved = equations.state.platform.amounts() * equations.mechanism.twist_units
     soft = compliance(equations) * equations.mechanism.compliance_units
     parts = np.array(machine.family.components)
-    stiffness = np.full((len(settled), 6), np.nan)
+    stiffness = np.full((len(equations.left), 6), np.nan)
     stiffness[:, parts] = np.diagonal(inverse(soft[:, parts[:, None], parts]), axis1=1, axis2=2)
     pairs = zip(equations.mechanism.legs, equations.legs, strict=True)
     slack = np.sum([((leg.sign != 0.0) & (terms.carrying == 0.0)).sum(axis=1) for leg, terms in pairs], axis=0)
@@ -133,5 +160,5 @@ def loaded_numbers(
         "factor": judged.factor,
     }
     for name, values in numbers.items():
-        result[name][rested] = values[stable]
-    return result, status
+        result[name][states.rows] = values[judged.stable]
+    return result, states.status

@@ -149,20 +149,16 @@ class Tool:
     ] = (0.0, 0.0, 0.0)
 
 
+Moment = Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3, apart=True)]
+Force = Annotated[tuple[float, float, float], Quantity("force", "force along x, y, z", count=3, apart=True)]
+
+
 @table
 class Load:
     """Table [load], in any machine file: a wrench on the platform at the tool point, and gravity; base axes."""
 
-    moment: Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3, apart=True)] = (
-        0.0,
-        0.0,
-        0.0,
-    )
-    force: Annotated[tuple[float, float, float], Quantity("force", "force along x, y, z", count=3, apart=True)] = (
-        0.0,
-        0.0,
-        0.0,
-    )
+    moment: Moment = (0.0, 0.0, 0.0)
+    force: Force = (0.0, 0.0, 0.0)
     gravity: Annotated[
         tuple[float, float, float],
         Quantity("acceleration", "along x, y, z: pulls at all masses of a loaded machine", count=3, apart=True),
@@ -185,16 +181,8 @@ class NamedLoad:
         tuple[float, float, float],
         Quantity("length", "where it acts: from P, in platform axes: x, y, z", count=3, apart=True),
     ] = (0.0, 0.0, 0.0)
-    moment: Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3, apart=True)] = (
-        0.0,
-        0.0,
-        0.0,
-    )
-    force: Annotated[tuple[float, float, float], Quantity("force", "force along x, y, z", count=3, apart=True)] = (
-        0.0,
-        0.0,
-        0.0,
-    )
+    moment: Moment = (0.0, 0.0, 0.0)
+    force: Force = (0.0, 0.0, 0.0)
 
 
 STATES = {"free": False, "loaded": True}

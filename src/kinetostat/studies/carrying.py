@@ -14,14 +14,10 @@ import xarray as xr
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.loaded import Way
 from kinetostat.engine.points import Array
-from kinetostat.equilibrium.numbers import FREE, loaded_mechanism
-from kinetostat.equilibrium.solving import at_rest
-from kinetostat.equilibrium.tangent import stabilities
-from kinetostat.kinematics.closure import solve_joints
+from kinetostat.equilibrium.numbers import states_of_rest
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine, springs
-from kinetostat.machine.parameters import with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
@@ -102,23 +98,12 @@ def _slab(machine: Machine, columns: dict[str, Array], legs: int) -> tuple[Any, 
     """Which legs carry at some points [points x legs], and `Status` codes [points]."""
     count = len(next(iter(columns.values())))
     carries = np.zeros((count, legs), dtype=bool)
-    status = np.broadcast_to(respond(with_values(machine, columns)).status, (count,)).astype(np.int8)
-    rows = np.flatnonzero(np.isin(status, FREE))
-    if not len(rows):
-        return carries, status
-    posed = with_values(machine, {path: np.asarray(values)[rows] for path, values in columns.items()})
-    joints = solve_joints(posed) if posed.family.chains else None
-    mechanism, balanced = loaded_mechanism(posed, respond(posed, joints), joints, len(rows))
-    solution = at_rest(mechanism)
-    settled = np.flatnonzero(solution.settled & balanced)
-    equations = solution.at(settled)
-    stable = stabilities(equations).stable
-    status[rows], rested = Status.NO_REST, rows[settled[stable]]
-    status[rested] = Status.OK
-    pairs = zip(equations.mechanism.legs, equations.legs, strict=True)
-    slack = [((leg.sign != 0.0) & (terms.carrying == 0.0)).any(axis=1)[stable] for leg, terms in pairs]
-    carries[rested] = ~np.stack(slack, axis=1)
-    return carries, status
+    states = states_of_rest(machine, columns, count)
+    if states.equations is not None and states.judged is not None:
+        pairs = zip(states.equations.mechanism.legs, states.equations.legs, strict=True)
+        slack = [((leg.sign != 0.0) & (terms.carrying == 0.0)).any(axis=1) for leg, terms in pairs]
+        carries[states.rows] = ~np.stack(slack, axis=1)[states.judged.stable]
+    return carries, states.status.astype(np.int8)
 
 
 def as_json(carrying: Carrying) -> dict[str, Any]:
