@@ -4,6 +4,7 @@ import ast
 import re
 from pathlib import Path
 
+import pytest
 from source import modules, wrong_in
 from test_docstrings import public
 from test_docstrings_tell import FORMULAS, functions, signature
@@ -81,3 +82,11 @@ def test_points_and_screws_have_a_frame():
         return [name for name, doc in placed if not FRAME.search(doc)]
 
     assert not wrong_in(unplaced, [module for module in modules() if set(module.split(".")[1:2]) & ROOMS])
+
+
+def test_the_site_can_typeset_every_formula_of_the_theory():
+    convert = pytest.importorskip("latex2mathml.converter").convert
+    formulas = re.findall(r"\$\$(.+?)\$\$|\$([^$\n]+)\$", THEORY, re.DOTALL)
+    assert len(formulas) > 300
+    for display, inline in formulas:
+        assert convert(display or inline)
