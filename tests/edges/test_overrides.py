@@ -1,11 +1,12 @@
 """`--set path=value`: the forms that are taken, and the words for those that are not. Also the good forms of files."""
 
+import copy
 import math
 
 import pytest
 from machine_files import GOOD, HUGE_NUMBER, NAME, refusal
 
-from kinetostat.machine.loading import build, load
+from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec import document
 from refusals import refused
@@ -42,6 +43,18 @@ TAKEN = [
 def test_an_override_changes_what_it_names_and_nothing_else(settings, changes):
     expected = values(load(NAME)) | changes
     assert values(load(NAME, settings)) == pytest.approx(expected, rel=1e-15)
+
+
+def test_an_entry_of_a_list_that_the_file_leaves_out_is_set_beside_the_others():
+    tables = document.parse(bundled()["delta"], "delta")
+    before = copy.deepcopy(tables)
+    machine = build(tables, "delta", ["load.gravity.2=-9.81", "tool.offset.1=5 mm", "load.drag.force.0=3 N"])
+    assert machine.tables["load"].gravity == (0.0, 0.0, -9.81)
+    assert machine.tables["tool"].offset == (0.0, 0.005, 0.0)
+    assert machine.tables["load.drag"].force == (3.0, 0.0, 0.0)
+    assert tables == before
+    with refused("load.gravty is not known; did you mean gravity"):
+        build(tables, "delta", ["load.gravty.2=1"])
 
 
 def test_text_may_hold_an_equals_sign():

@@ -1,5 +1,6 @@
 """Files to machines: the bundled ones by name, any other by path, with overrides."""
 
+import copy
 import difflib
 import json
 import math
@@ -19,7 +20,7 @@ from kinetostat.machine import pickling as _pickling  # noqa: F401  # machines t
 from kinetostat.machine.catalogue import families, family_named
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.limits import Parts, check_limits
-from kinetostat.machine.machine import STATES, Family, Machine, NamedLoad, Written
+from kinetostat.machine.machine import COMMON, STATES, Family, Machine, NamedLoad, Written
 from kinetostat.machine.named_loads import family_with_loads
 from kinetostat.machine.orientation import ANGLES, form_of, make_room, orientation_schema, with_angles
 from kinetostat.machine.parameters import POSE, check_contrast, find, with_values
@@ -171,9 +172,27 @@ def _overridden(
     document: Document, settings: Sequence[str], counts: Mapping[str, int], coordinates: Sequence[str], origin: str
 ) -> Document:
     """The document with overrides, and with its orientation, however it is written, in the angles of the pose."""
-    ready = {**document, "pose": dict(document["pose"])} if isinstance(document.get("pose"), dict) else document
+    tables = [key for key in ("pose", *COMMON) if isinstance(document.get(key), dict)]
+    ready = {**document, **{key: copy.deepcopy(document[key]) for key in tables}}
     make_room(ready, settings, coordinates, origin)
+    for setting in settings:
+        _write_out(ready, setting.partition("=")[0].strip())
     return with_angles(documents.override(ready, settings, counts), coordinates, origin)
+
+
+def _write_out(document: Document, path: str) -> None:
+    """Write out a list that a common table leaves to its default, if an override names an entry: `load.gravity.2`."""
+    field, _, entry = path.rpartition(".")
+    name, _, key = field.rpartition(".")
+    known = COMMON.get(name, NamedLoad if name.startswith("load.") else None)
+    quantity = None if known is None else quantities(known).get(key)
+    if quantity is None or quantity.count is None or not entry.isdecimal():
+        return
+    table: Any = document
+    for part in name.split("."):
+        table = table.setdefault(part, {}) if isinstance(table, dict) else None
+    if isinstance(table, dict):
+        table.setdefault(key, list(getattr(known, key)))
 
 
 def _unloaded(legs: Sequence[Leg]) -> list[tuple[Spring, Scalar]]:

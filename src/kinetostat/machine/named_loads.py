@@ -25,7 +25,8 @@ def family_with_loads(family: Family, document: Document, origin: str) -> Family
     """
     load = document.get("load")
     entries = load.items() if isinstance(load, dict) else ()
-    names = tuple(key for key, value in entries if isinstance(value, dict) and key not in quantities(Load))
+    tables = {key: value for key, value in entries if isinstance(value, dict) and key not in quantities(Load)}
+    names = tuple(key for key, value in tables.items() if not all(entry.isdecimal() for entry in value))
     if len(names) > MOST_LOADS:
         raise InputError(f'"{origin}": [load] has {len(names)} named loads; at most {MOST_LOADS} are allowed.')
     for name in names:
