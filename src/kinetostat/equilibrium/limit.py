@@ -4,7 +4,7 @@ Preloads are there from the beginning. The state is followed in steps, each from
 other one is nearby, where it is not stable, or where the next one is a leap away: the mechanism has snapped over.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from kinetostat.tolerances import AT_REST
 
 RATIO, CANDIDATES = 2.0, 14
 """Steps of the loads that are tried together: all that is left of them, and each time by this ratio less."""
+MOST_STEPS = 14
+"""Of the loads: a machine that moves very far before it is lost is not followed to the end, which takes seconds."""
 FINE = 1e-3
 """Share of what it stands by which the last step is allowed to be wrong."""
 MOST_ITERATIONS = 8
@@ -38,11 +40,13 @@ class Limit:
         share: of the loads there.
         balance: the equations there.
         judged: how it gives way.
+        least: whether the machine was not followed to its end: it stands by this share or more.
     """
 
     share: float
     balance: Balance
     judged: Stability
+    least: bool = False
 
 
 def limit_of(mechanism: Mechanism) -> Limit | None:
@@ -55,16 +59,18 @@ def limit_of(mechanism: Mechanism) -> Limit | None:
         Where it stands last, share 1 if it stands under all of them; None if it stands under no share.
     """
     last = _standing(mechanism, np.zeros(1), None)
-    while last is not None and last.share < 1.0:
+    for _ in range(MOST_STEPS):
+        if last is None or last.share == 1.0:
+            return last
         shares = last.share + (1.0 - last.share) * RATIO ** -np.arange(CANDIDATES - 1.0, -1.0, -1.0)
         there = _standing(mechanism, np.append(shares[:-1], 1.0), last)
         if there is None:
-            break
+            return last
         nearly = there.share - last.share < FINE * there.share
         last = there
         if nearly:
-            break
-    return last
+            return last
+    return None if last is None else replace(last, least=True)
 
 
 def _standing(mechanism: Mechanism, shares: Array, last: Limit | None) -> Limit | None:

@@ -33,4 +33,5 @@ def how_it_gives_way(limit: Limit | None) -> str:
     known = limit.judged.mode.any()
     by = f", and then gives way by a motion like {mode} at the tool, most of all in {', '.join(legs)}" if known else ""
     what = f" Slack there: {', '.join(slack)}." if slack else ""
-    return f"It stands up to {limit.share:.3g} times this load{by}.{what}"
+    least = "at least " if limit.least else ""
+    return f"It stands up to {least}{limit.share:.3g} times this load{by}.{what}"

@@ -281,7 +281,7 @@ def _message(judged: Stability, slack: tuple[str, ...], mechanism: Mechanism, mo
         )
     elif np.abs(moved).max() > LEAP:
         limit = limit_of(mechanism)
-        if limit is not None and limit.share < 1.0:
+        if limit is not None and limit.share < 1.0 and not limit.least:
             sentences.append(f"The machine has snapped over to another state on the way. {how_it_gives_way(limit)}")
     if slack:
         sentences.append(f"Slack, so that they carry nothing: {', '.join(slack)}.")
