@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from kinetostat import evaluate_grid
 from kinetostat.machine.loading import build, load
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
@@ -137,6 +138,9 @@ def test_commands_take_growth_back():
 def test_a_link_that_is_warm_without_an_expansion_is_refused():
     with pytest.raises(InputError, match="temperature_rise of legs is given, but nothing says how its material grows"):
         under_load(load("hexapod", ["temperature_rise.legs=3 K"]))
+    with pytest.raises(InputError, match="nothing says how its material grows"):
+        evaluate_grid(load("hexapod"), ["temperature_rise.legs=0 K:3 K:3"], ["displacement_z"])
+    assert evaluate_grid(load("hexapod"), ["temperature_rise.legs=0 K:3 K:3"], ["stiffness_z"]).stiffness_z.size == 3
 
 
 def test_a_column_between_two_hinges_bends_away_at_the_load_of_euler():

@@ -19,6 +19,7 @@ from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.links import growth_of
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.errors import InputError
@@ -68,7 +69,8 @@ def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:
         weighs: whether any of its masses is known.
 
     Raises:
-        InputError: there is gravity but nothing says a mass, or it turns about no axis.
+        InputError: there is gravity but nothing says a mass, or it turns about no axis; links are warmer, but nothing
+            says how they grow.
     """
     load = machine.tables["load"]
     if not weighs and np.any(stacked(load.gravity, count)):
@@ -76,6 +78,11 @@ def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:
             f"{machine.name}: load.gravity pulls at masses, but none is known; give the platform's as [tool] mass, or "
             "links a cross-section with a density."
         )
+    for kind in machine.family.links:
+        tables = (getattr(machine.tables[table], kind.name) for table in ("expansion", "temperature_rise"))
+        expansions, rises = (entries if isinstance(entries, tuple) else (entries,) for entries in tables)
+        for expansion, rise in zip(expansions, rises, strict=True):
+            growth_of(expansion, float(np.abs(stacked([rise], count)).max(initial=0.0)), kind.name)
     turned = np.any(stacked([load.gravity_angle], count))
     if turned and not stacked(load.gravity_axis, count).any(axis=1).all():
         raise InputError(

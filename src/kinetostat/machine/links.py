@@ -73,9 +73,9 @@ def growth_of(expansion: Scalar, rise: Scalar, links: str) -> Scalar:
         links: names it in the message.
 
     Raises:
-        InputError: it is warmer, and nothing says how its material grows.
+        InputError: a number says that it is warmer, and nothing says how its material grows.
     """
-    if is_zero(expansion) and not is_zero(rise):
+    if is_zero(expansion) and isinstance(rise, float) and rise:
         raise InputError(
             f"The temperature_rise of {links} is given, but nothing says how its material grows: give its expansion, "
             f'e.g. "{KINDS["thermal expansion"].example}", or a cross-section with a material.'
