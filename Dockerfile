@@ -2,14 +2,14 @@
 
 FROM python:3.13-slim-bookworm AS build
 WORKDIR /source
-COPY pyproject.toml README.md LICENSE ./
+COPY pyproject.toml README.md LICENSE pins.txt ./
 COPY src src
-RUN pip wheel --no-cache-dir --no-deps --wheel-dir /wheels .
-RUN python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['tool']['uv']['constraint-dependencies'], sep='\n')" > /wheels/constraints.txt
+RUN pip wheel --no-cache-dir --no-deps --wheel-dir /wheels . && mv pins.txt /wheels
 
 FROM python:3.13-slim-bookworm
 RUN --mount=type=bind,from=build,source=/wheels,target=/wheels \
-    pip install --no-cache-dir --constraint /wheels/constraints.txt "$(echo /wheels/kinetostat-*.whl)[studio]"
+    pip install --no-cache-dir --require-hashes --requirement /wheels/pins.txt && \
+    pip install --no-cache-dir --no-deps /wheels/kinetostat-*.whl
 RUN useradd --create-home --uid 10001 kinetostat && install --directory --owner kinetostat /data
 USER kinetostat
 WORKDIR /data

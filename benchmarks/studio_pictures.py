@@ -67,6 +67,23 @@ def paper_machine(new_tab: Any) -> None:
         keep(page, "studio-out-of-reach", ".middle")
 
 
+def vibration(new_tab: Any) -> None:
+    """The first mode of a hexapod, at the end of its swing, and the map of its frequency."""
+    with served("hexapod") as address:
+        page = new_tab()
+        page.tab.emulate_media(reduced_motion="reduce")
+        page.open(f"{address}?machine=hexapod&tool.mass=12+kg&linear_density.legs=4+kg%2Fm")
+        page.tab.get_by_text("compliance ellipsoids").click()
+        page.tab.get_by_text("most compliant directions").click()
+        front(page, "Vibration")
+        page.tab.wait_for_function("document.querySelector('.machine-view').dataset.swings")
+        page.tab.get_by_role("tab", name="Mass", exact=True).click()
+        before = page.text(".server-time")
+        page.choose("map of", "frequency 1")
+        page.until_changed(".server-time", before)
+        keep(page, "studio-vibration")
+
+
 def tripteron(new_tab: Any) -> None:
     """Beams that bend, in the dark."""
     with served("tripteron") as address:
@@ -109,6 +126,7 @@ def main() -> None:
     """Make all pictures."""
     with browser() as new_tab:
         paper_machine(new_tab)
+        vibration(new_tab)
         tripteron(new_tab)
         design(new_tab)
         gallery(new_tab)

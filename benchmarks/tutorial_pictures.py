@@ -4,8 +4,10 @@ Run `python benchmarks/tutorial_pictures.py`; writes docs/images/.
 """
 
 import sys
+from contextlib import chdir
 from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from PIL import Image
 
@@ -48,6 +50,16 @@ def keep_map(name: str, degrees: int, *quantities: str) -> None:
     write(name, Image.open(drawn).convert("RGB"))
 
 
+def keep_fit(name: str) -> None:
+    """Write a small PNG of the residuals of the fit that the tutorial on calibration makes."""
+    page, space, drawn = ROOT / "docs" / "tutorials" / "calibrate.md", {}, BytesIO()
+    with TemporaryDirectory() as folder, chdir(folder):
+        programs = [block.text for block in blocks(page) if block.kind == "python"]
+        exec("\n".join(programs[: programs.index(next(p for p in programs if "whole = fit(" in p)) + 1]), space)
+    plot(space["whole"], "residuals").savefig(drawn, dpi=130)
+    write(name, Image.open(drawn).convert("RGB"))
+
+
 def write(name: str, image: Image.Image) -> None:
     """Write a small PNG into docs/images."""
     path = ROOT / "docs" / "images" / f"{name}.png"
@@ -62,4 +74,5 @@ if __name__ == "__main__":
     keep("tricept", load("tricept"))
     keep_map("tricept-map", 40, "free_stiffness_z", "stiffness_z", "singularity_margin")
     keep_map("tricept-stiffness", 25, "free_stiffness_z")
+    keep_fit("calibrate-residuals")
     keep("better-design", load(PAPER), optimize(load_problem("zhang-gosselin-2002", ["optimizer.seed=3"])).machine)

@@ -8,22 +8,31 @@ time; `--hypothesis-profile=explore` looks long for new counter-examples, and fo
 import os
 import sysconfig
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before anything loads NumPy
+
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
 MARKERS = {
     "documents": ("test_documents", "test_recipes"),
     "notebooks": ("test_notebooks",),
-    "browser": ("test_studio_browser", "test_studio_reach", "test_report_browser"),
+    "browser": ("test_studio_browser", "test_studio_reach", "test_studio_swing", "test_report_browser"),
     "workers": ("test_workers", "test_hash_seeds", "test_large_sweeps", "test_studio_runs", "test_studio_search"),
-    "studio": ("test_studio_design", "test_studio_files", "test_studio_loads", "test_studio_page"),
-    "engines": ("test_validation", "test_mujoco", "test_loaded_engines"),
+    "studio": (
+        "test_studio_design",
+        "test_studio_files",
+        "test_studio_loads",
+        "test_studio_page",
+        "test_studio_vibration",
+    ),
+    "engines": ("test_validation", "test_mujoco", "test_loaded_engines", "test_vibration_engines"),
     "attack": ("test_attack",),
     "packaging": ("test_packaging",),
     "numbers": (
         "test_derivatives",
         "test_derivatives_leg_by_leg",
         "test_engine",
+        "test_identified_truth",
         "test_limited_poses",
         "test_optimisers",
         "test_scalars",

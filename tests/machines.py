@@ -13,9 +13,10 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 
+from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
-from kinetostat.machine.loading import build, bundled
+from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.spec import document
@@ -219,3 +220,42 @@ def regular_machines(case: Case, stiffness: st.SearchStrategy[float] = MODERATE)
 def regular(case: Case, stiffness: st.SearchStrategy[float] = MODERATE) -> st.SearchStrategy[Response]:
     """What they answer."""
     return regular_machines(case, stiffness).map(respond)
+
+
+def written(name: str, point: Sequence[float], pose: Mapping[str, float], planar: bool = True) -> str:
+    """The beginning of a machine file leg by leg: name, platform point and pose, SI. Its legs are added as text."""
+    space = 'space = "planar"\n' if planar else ""
+    coordinates = "".join(f"{key} = {value}\n" for key, value in pose.items())
+    head = f'schema = 1\nname = "{name}"\nfamily = "legs"\n{space}'
+    return f"{head}[platform]\npoint = {[*point]}\n[pose]\n{coordinates}"
+
+
+def cable(name: str, base: Sequence[float], eye: Sequence[float], preload: float = 0.0) -> str:
+    """A leg that only pulls, from a point of the base to one of the platform, m; with `STRETCH` and a preload, N."""
+    ends = f"from = {[*base]}\nto = {[*eye]}\n"
+    return f'[[legs]]\nname = "{name}"\ntype = "cable"\n{ends}stiffness = {STRETCH}\npreload = {preload}\n'
+
+
+STRETCH = 2e5
+"""Stiffness of these cables, N/m."""
+
+
+def column(force: float) -> Machine:
+    """A column of 2 m on a hinge of 5 kN·m/rad, which a force (N) presses: it stands up to 2500 N."""
+    hinge = (
+        '{ name = "hinge", type = "revolute", joins = ["base", "platform"], point = [0, 0, 0], axis = [1, 0, 0], '
+        "actuated = true, stiffness = 5e3 }"
+    )
+    text = written("column", (0, 0, 2), {"roll": 0}, planar=False)
+    return build(f'{text}[[legs]]\nname = "column"\njoints = [{hinge}]\n[load]\nforce = [0, 0, {-force}]\n')
+
+
+def with_bodies(name, settings):
+    """A bundled machine leg by leg, each of its links a rigid body with a mass, a centre and an inertia of its own."""
+    document = document_of(load(name, settings))
+    for number, leg in enumerate(document["legs"]):
+        for body in sorted({body for joint in leg["joints"] for body in joint["joins"]} - {"base", "platform"}):
+            given = leg.setdefault("links", {}).setdefault(body, {"model": "rigid"})
+            given |= {"mass": 3.0, "centre_of_mass": [0.1 * number, 0.05, 0.02]}
+            given |= {"inertia": [0.3, 0.4, 0.5, 0.02, -0.03, 0.04]}
+    return build(document, "bodies")

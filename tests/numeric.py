@@ -11,8 +11,9 @@ from kinetostat.algebra.screw import Screw, Twist, Wrench
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.common_tables import Load, Tool
 from kinetostat.machine.limits import Limits
-from kinetostat.machine.machine import Configuration, Family, Load, Machine, Tool
+from kinetostat.machine.machine import Configuration, Family, Machine
 
 Array = npt.NDArray[np.float64]
 

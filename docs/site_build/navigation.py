@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-TUTORIALS = ("paper-machine", "own-machine", "real-hexapod", "read-a-map", "optimise", "jupyter")
+TUTORIALS = ("paper-machine", "own-machine", "real-hexapod", "read-a-map", "optimise", "calibrate", "jupyter")
 PAGES = {
     "Start": ["start", "overview", "install"],
     "Tutorials": [*(f"tutorials/{name}" for name in TUTORIALS), "exercises"],
@@ -13,6 +13,9 @@ PAGES = {
         "workspace",
         "poses",
         "loads",
+        "vibration",
+        "budget",
+        "calibration",
         "design",
         "report",
         "export",

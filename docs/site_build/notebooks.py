@@ -11,7 +11,7 @@ from typing import Any
 
 ROOT = Path(__file__).parents[2]
 TUTORIALS = ROOT / "docs" / "tutorials"
-NOTEBOOKS = ("paper-machine", "read-a-map", "optimise")
+NOTEBOOKS = ("paper-machine", "read-a-map", "optimise", "calibrate")
 FENCE = re.compile(r"^```(\w*)([^\n]*)\n(.*?)^```$\n?", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\((?!https?:|#)((?:\.\./)*)([^)]+)\)")
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}

@@ -4,6 +4,9 @@ import os
 import signal
 import sys
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Matrices of machines are small: threads of the linear algebra wait for each other longer than they compute, and forty
+# times as long where the processor has other work. Batches are spread over threads by the engine.
 CODE = 130
 """Exit code of a command that Ctrl-C has stopped."""
 

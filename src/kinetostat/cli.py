@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from kinetostat.commands.budget import add_budget_command
 from kinetostat.commands.common import (
     BAD_INPUT,
     DONE,
@@ -18,14 +19,17 @@ from kinetostat.commands.common import (
     Help,
     Parser,
     add_command,
+    direction,
     give,
     judged,
     load_machine,
     no_answer,
     print_json,
+    said_when_slow,
     stopped,
     takes_figures,
     takes_json,
+    takes_loaded,
     takes_machine,
     verdicts_of,
 )
@@ -33,8 +37,10 @@ from kinetostat.commands.compare import add_compare_commands
 from kinetostat.commands.doctor import add_doctor_command
 from kinetostat.commands.forward import add_forward_command
 from kinetostat.commands.grid import add_grid_commands
+from kinetostat.commands.identify import add_identify_command
 from kinetostat.commands.influence import add_influence_commands
 from kinetostat.commands.loaded import add_command_command, analyze_loaded
+from kinetostat.commands.modes import add_modes_command
 from kinetostat.commands.optimize import add_optimize_commands
 from kinetostat.commands.path import add_path_command
 from kinetostat.commands.report import add_report_commands
@@ -45,6 +51,9 @@ from kinetostat.spec.installation import as_typed
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of the system where standard output is a file on a full or failing disk; other files say it by themselves."""
 
+LOOKING = "computing; if the pose is out of reach, the nearest one is looked for"
+"""What is said where an analysis takes long."""
+
 EXAMPLES = """examples:
   kinetostat list
   kinetostat analyze zhang-gosselin-4dof
@@ -54,6 +63,7 @@ EXAMPLES = """examples:
   kinetostat sweep   zhang-gosselin-4dof --vary "stiffness.passive_links=1e3:1e10:8:log"
   kinetostat map     zhang-gosselin-4dof --over "x=-2 cm:2 cm:41" --over "z=66 cm:70 cm:41" -o maps
   kinetostat optimize zhang-gosselin-2002 -o better
+  kinetostat identify hexapod measured.csv --frame -o identified
   kinetostat validate tripteron
   kinetostat report tripteron -o report.html
   kinetostat reproduce
@@ -184,36 +194,29 @@ def _parser() -> Parser:
         help="axes of the results (default: base)",
     )
     analyze.add_argument(
-        "--along", metavar="X,Y,Z", action="append", default=[], type=_direction,
+        "--along", metavar="X,Y,Z", action="append", default=[], type=direction,
         help="also give the stiffness along (force) and about (moment) this direction; repeatable",
     )  # fmt: skip
     analyze.add_argument("--full", action="store_true", help="also show eigenscrews and every single spring")
-    analyze.add_argument(
-        "--loaded", action="store_true",
-        help="at rest under gravity, preload and [load], with exact geometry: displacement, springs, tangent stiffness "
-        '(default where [load] says state = "loaded")',
-    )  # fmt: skip
+    takes_loaded(
+        analyze, "at rest under gravity, preload and [load], with exact geometry: displacement, springs, stiffness"
+    )
     takes_figures(analyze, "figures of the loaded machine: its shape, and the curve while the load grows")
     takes_json(analyze)
     add_forward_command(commands)
+    add_identify_command(commands)
     add_command_command(commands)
     add_path_command(commands)
     add_grid_commands(commands)
     add_influence_commands(commands)
+    add_modes_command(commands)
+    add_budget_command(commands)
     add_compare_commands(commands)
     add_optimize_commands(commands)
     add_report_commands(commands)
     add_studio_command(commands)
     add_doctor_command(commands)
     return parser
-
-
-def _direction(text: str) -> tuple[float, ...]:
-    try:
-        x, y, z = (float(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text} is not a direction; give three numbers, e.g. 0,0,1") from None
-    return x, y, z
 
 
 def _version_or_help(options: argparse.Namespace) -> int:
@@ -276,7 +279,8 @@ def _check(options: argparse.Namespace) -> int:
     if is_study(options.machine):
         return _check_study(options)
     machine = load_machine(options)
-    analysis = analyze(machine)
+    with said_when_slow(LOOKING):
+        analysis = analyze(machine)
     print_machine(terminal(), machine, f"The file has no mistake. {analysis.message}")
     code = judged(machine)
     return no_answer(analysis.message) if analysis.status is not Status.OK else code
@@ -307,12 +311,13 @@ def _analyze(options: argparse.Namespace) -> int:
     from kinetostat.views.analysis_tables import print_analysis
 
     machine = load_machine(options)
-    if options.loaded or machine.loaded:
+    if machine.loaded:
         return analyze_loaded(options, machine)
     if options.output:
         raise InputError("analyze draws figures of the machine under load only; add --loaded, or leave -o out.")
     verdicts = verdicts_of(machine)
-    analysis = analyze(machine, options.axes)
+    with said_when_slow(LOOKING):
+        analysis = analyze(machine, options.axes)
     answered = analysis.status is Status.OK
     along = [analysis.along(direction) for direction in options.along] if answered else []
     code = give(

@@ -33,11 +33,11 @@ UNIT_OF = {
     "N·m": "N·m",
     "kg": "kg",
     "kg/m": "kg/m",
-    "kg/m**3": "kg/m**3",
+    "kg/m**3": "kg/m³",
     "Pa": "GPa",
-    "N·m**2": "N·m**2",
-    "m**2": "cm**2",
-    "m**4": "cm**4",
+    "N·m**2": "N·m²",
+    "m**2": "cm²",
+    "m**4": "cm⁴",
 }
 """The engineering unit of each SI unit. In N, N·m, µm and µrad every entry of K is a millionth of that in SI, so that K
 stays symmetric and K C = 1 also as printed."""
@@ -45,6 +45,7 @@ SMALL_MOTIONS = {"m": 1e3, "rad": 1e3}
 """Values of these units that are all below so many µm and µrad are read in µm and µrad."""
 DUAL = {"N/m": "m/N", "N·m/rad": "rad/(N·m)", "N/rad": "rad/N"}
 """Stiffnesses and the compliances whose units follow from theirs."""
+POWERS = {"2": "²", "3": "³", "4": "⁴"}
 EXAMPLE = "mm, deg, N/um, N*m/urad"
 
 
@@ -57,7 +58,12 @@ class Scale:
 
     def label(self, what: str) -> str:
         """Return the label of an axis or a column: what it shows, and its unit in brackets."""
-        return f"{what} ({self.unit})" if self.unit not in ("", "1") else what
+        return f"{what} ({self.unit})" if self.head else what
+
+    @property
+    def head(self) -> str:
+        """The unit alone, for the head of a column: nothing where there is none."""
+        return "" if self.unit == "1" else self.unit
 
 
 @dataclass(frozen=True)
@@ -74,7 +80,7 @@ class Display:
 
     def scale(self, unit: str) -> Scale:
         """Return the scale of an SI unit; a unit that has no other way to be read stays as it is."""
-        return _scales(self.units).get(unit, Scale(1.0, unit))
+        return _scales(self.units).get(unit) or Scale(1.0, _spelled(unit))
 
     def deflection(self, unit: str) -> Scale:
         """Return the scale of a small motion in m or rad: that of the compliances, µm and µrad unless chosen."""
@@ -189,7 +195,7 @@ def _scales(units: str) -> dict[str, Scale]:
     """
     words = [word.strip() for word in units.split(",") if word.strip()]
     whole = SI in (word.lower() for word in words)
-    chosen = {si: si if whole else unit for si, unit in UNIT_OF.items()}
+    chosen = {si: _spelled(si) if whole else unit for si, unit in UNIT_OF.items()}
     named = {}
     for word in words:
         if word.lower() not in (SI, "engineering"):
@@ -209,7 +215,8 @@ def _small(unit: str) -> Scale:
 
 
 def _spelled(unit: str) -> str:
-    """Return a unit as it is printed: "N m/urad" becomes "N·m/µrad"."""
+    """Return a unit as it is printed: "N m/urad" becomes "N·m/µrad", "cm**2" becomes "cm²"."""
+    unit = re.sub(r"\*\*([2-4])", lambda power: POWERS[power[1]], unit)
     unit = re.sub(r"(?<!\*)\*(?!\*)|(?<=\w)\s+(?=\w)", "·", unit.replace("μ", "µ"))
     return re.sub(r"\bu(?=(?:m|rad|N)\b)", "µ", unit.replace(" ", ""))
 

@@ -39,11 +39,9 @@ NEWTON_SETTLED = 1e-14
 LEAST_GAP_SETTLED = 1e-6
 """Slope of the squared gap, as a share of the gap, at which it has its least value: half of the digits
 are lost there."""
-NEAREST_SETTLED = 1e-7
-"""Slope of the squared distance from a pose, as a share of the distance, at which the nearest pose is reached: it is
-written in five digits."""
 NEAREST_GAIN = 1e-10
-"""Share of the distance by which a step must come nearer to be worth another: the place then changes by its root."""
+"""Share of its square by which a squared distance could still become less where the nearest pose is reached: it
+is written in five digits, and the step that would do so is still taken."""
 SURELY_APART = 1e-9
 """Share of the machine's length by which a leg must miss its platform, so that this shows it to be out of reach."""
 SAME_CENTRE = 1e-9
@@ -66,6 +64,9 @@ NO_COORDINATE = 1e-9
 """Coordinates of a pose below this, m or rad, are round-off of zero when they are offered to a reader."""
 PURE_TRANSLATION = 1e-9
 """Share of rotation below which a twist counts as a translation without rotation."""
+SEEN_BY_LEG = 1e-7
+"""Share of the largest singular value of a leg's freedoms, and of the effect of an error, below which it is round-off:
+at random places of a leg nothing is nearly dependent without being so by form."""
 DEPENDENT = 1e-6
 """Singular value of unit screws below which they are dependent: half of the digits are lost in a square root."""
 NEGLIGIBLE_COMPONENT = 1e-9
@@ -74,6 +75,14 @@ PARALLEL_AXES = 1e-12
 """Sine of the angle between axes up to which they are parallel as written in a file."""
 NO_LINK = 1e-9
 """Length of a link, m, below which it has no direction."""
+
+# Error budgets
+
+NO_REACTION = 1e-9
+"""Share of the load, moments over the machine's length, below which the reaction of a joint is round-off, so that the
+load does not say to which end it presses the free motion of the joint."""
+NO_FREEDOM = 1e-7
+"""Share of the largest singular value of the rates of all actuators below which they do not move the platform so."""
 
 # Equilibrium under load
 
@@ -154,6 +163,8 @@ UNBALANCED_LOAD = 1e-6
 """Share of a load that may remain where a singular system is solved by least squares; more means a free motion."""
 IDLE_MOTION = 1e-15
 """Relative stiffness below which a motion counts as idle: the round-off of the largest stiffness."""
+MASSLESS_MODE = 1e-9
+"""Square of a frequency ratio: a mode this much faster than the first one is a motion without mass, by round-off."""
 UNMOVED = 1e-9
 """Share of the largest motion below which a wrench moves nothing."""
 NEWTON_STATICS = 1e-9

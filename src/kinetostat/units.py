@@ -38,7 +38,12 @@ class Kind:
     @property
     def heavy(self) -> bool:
         """Whether it says how much matter there is: never negative."""
-        return self.name.endswith(("mass", "density"))
+        return self.name.endswith(("mass", "density", "moment of inertia"))
+
+    @property
+    def unsigned(self) -> bool:
+        """Whether it cannot be negative, though it may be 0."""
+        return self.heavy or self.name.endswith(("damping", "ratio", "rate", "duration", "pressure"))
 
 
 KINDS = {
@@ -63,11 +68,21 @@ KINDS = {
         Kind("density", "kg/m**3", "7850 kg/m**3"),
         Kind("linear density", "kg/m", "3.5 kg/m"),
         Kind("mass", "kg", "12 kg"),
+        Kind("moment of inertia", "kg·m**2", "2e-4 kg*m**2"),
+        Kind("inertia", "kg·m**2", "0.4 kg*m**2"),
+        Kind("ratio", "", "0.02"),
+        Kind("linear damping", "N·s/m", "500 N*s/m"),
+        Kind("torsional damping", "N·m·s/rad", "0.2 N*m*s/rad"),
+        Kind("rate", "rad/s", "3 rad/s"),
+        Kind("duration", "s", "1e-5 s"),
+        Kind("frequency", "Hz", "120 Hz"),
+        Kind("cutting pressure", "Pa", "2000 N/mm**2"),
         Kind("E I", "N·m**2", "5e4 N*m**2"),
         Kind("temperature difference", "K", "15 K"),
         Kind("thermal expansion", "m/(m·K)", "12 um/(m*K)"),
         Kind("acceleration", "m/s**2", "9.81 m/s**2"),
         Kind("direction", "", "1.0"),
+        Kind("ratio", "m/m", "20 um/m"),
     )
 }
 
@@ -91,9 +106,14 @@ USUAL = {
     "kg/m**3": {"kg/m**3": 1.0},
     "kg/m": {"kg/m": 1.0, "g/m": 1e-3},
     "kg": {"kg": 1.0, "g": 1e-3},
+    "kg*m**2": {"kg*m**2": 1.0},
+    "s": {"s": 1.0},
+    "rad/s": {"rad/s": 1.0},
+    "Hz": {"Hz": 1.0},
     "m/s**2": {"m/s**2": 1.0},
     "K": {"K": 1.0},
     "m/(m*K)": {"m/(m*K)": 1.0, "um/(m*K)": 1e-6},
+    "m/m": {"m/m": 1.0, "mm/m": 1e-3, "um/m": 1e-6, "%": 0.01, "ppm": 1e-6},
 }
 """SI values of the units that most files use, by SI unit. They are pint's to the last bit, which a test compares; pint
 itself takes longer to import than a thousand poses take to compute, and is only asked about all other units."""
@@ -112,10 +132,11 @@ PLAIN = (1e-4, 1e6)
 """Between these a number is written without an exponent."""
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
-_NAME = r"[A-Za-zµμ°]+(?:\s*(?:\*\*|\^)\s*[1-4])?"
+_NAME = r"(?:[A-Za-zµμ°]+|%)(?:\s*(?:\*\*|\^)\s*[1-4]|[²³⁴])?"
 _UNDER = rf"/\s*\({_NAME}(?:\s*[*·]\s*{_NAME})*\)"
 UNIT = re.compile(rf"{_NAME}(?:\s*[*/·]\s*{_NAME}|\s*{_UNDER})*")
 """How the text of a unit looks, e.g. "N/um"."""
+_PLAIN_SIGNS = str.maketrans({"·": "*", "µ": "u", "μ": "u", "²": "**2", "³": "**3", "⁴": "**4"})
 _LONGEST = 64
 
 
@@ -190,7 +211,7 @@ def _exactly(value: float, unit: str, wanted: Kind) -> str | None:
 
 def _ascii(unit: str) -> str:
     """Return a unit with signs that every keyboard has."""
-    return unit.replace("·", "*").replace("µ", "u").replace("μ", "u")
+    return unit.translate(_PLAIN_SIGNS)
 
 
 def as_read(value: float, unit: str) -> tuple[float, str]:

@@ -46,6 +46,28 @@ LOADS = """
 mass = "3 kg"
 centre_of_mass = [0, "10 mm", "20 mm"]
 payload = "1 kg"
+inertia = ["0.3 kg*m**2", "0.3 kg*m**2", "0.5 kg*m**2", 0, 0, "0.01 kg*m**2"]
+payload_centre = [0, 0, "50 mm"]
+payload_inertia = ["0.01 kg*m**2", "0.01 kg*m**2", "0.01 kg*m**2", 0, 0, 0]
+[drives]
+rotor_inertia = "2e-5 kg*m**2"
+lead = "10 mm"
+ratio = 30
+[cutting]
+pressure = "2000 N/mm**2"
+direction = [1, 0, 0.5]
+[damping]
+per_mass = "2 1/s"
+per_stiffness = "20 us"
+hinges = "0.1 N*m*s/rad"
+slides = "30 N*s/m"
+[tolerances]
+joints = ["0.05 mm", "sigma 0.02 deg"]
+zeros = ["0.02 mm", "0.01 deg"]
+gains = "20 um/m"
+clearances = "5 um"
+compliances = "10 %"
+"legs.*" = ["IT7", "0.1 deg"]
 [load]
 state = "loaded"
 force = ["20 N", 0, "-100 N"]
@@ -246,7 +268,7 @@ def spoilt(rng: Random, text: str) -> str:
 def _odd_numbers(rng: Random, text: str) -> str:
     """Keep every field and its unit, and change one to five numbers: to odd ones, to those of others, or by little."""
     document = tomllib.loads(text)
-    places = [(holder, name) for holder, name in _places(document) if _number_in(holder[name]) is not None]
+    places = [(holder, name) for holder, name in entries_of(document) if _number_in(holder[name]) is not None]
     numbers = [_number_in(holder[name]) for holder, name in places]
     for at in rng.sample(range(len(places)), min(len(places), rng.choice((1, 1, 1, 2, 5)))):
         holder, name = places[at]
@@ -267,7 +289,7 @@ def _number_in(entry: Any) -> float | None:
 def _spoilt_tables(rng: Random, text: str) -> str:
     document = tomllib.loads(text)
     for _ in range(rng.randint(1, 4)):
-        places = [*_places(document)]
+        places = [*entries_of(document)]
         holder, name = rng.choice(places)
         action = rng.random()
         if action < 0.6:
@@ -283,11 +305,12 @@ def _spoilt_tables(rng: Random, text: str) -> str:
     return toml(document)
 
 
-def _places(node: Any) -> Any:
+def entries_of(node: Any) -> Any:
+    """Every entry of tables and lists in each other: what holds it, and its name or number there."""
     for name, entry in node.items() if isinstance(node, dict) else enumerate(node):
         yield node, name
         if isinstance(entry, dict | list):
-            yield from _places(entry)
+            yield from entries_of(entry)
 
 
 def copied(node: Any) -> Any:

@@ -13,6 +13,10 @@ import time
 from pathlib import Path
 from random import Random
 
+from tables import MACHINE, good_table
+
+MEASURED = "measured.csv"
+"""Written beside the folder of a command, where it runs."""
 SEARCH = ["--set", "optimizer.population=8", "--set", "optimizer.generations=6"]
 COMMANDS = {
     "search of a family": ["optimize", "zhang-gosselin-2002", *SEARCH],
@@ -20,18 +24,25 @@ COMMANDS = {
     "front": ["pareto", "zhang-gosselin-front", *SEARCH],
     "map": ["map", "zhang-gosselin-4dof", "--over", "x=-40 cm:40 cm:300", "--over", "z=40 cm:140 cm:300",
             "--over", "theta5=-70 deg:-50 deg:60", "--quantity", "compliance_x"],
+    "budget": ["budget", "hexapod", "--tolerance", "joints=0.05 mm", "--samples", "500000"],
+    "identification": ["identify", MACHINE, MEASURED, "--fit", "zeros", "--fit", "gains"],
 }  # fmt: skip
-LASTING = ("designs.bin", "history.jsonl", "study.json", "map.nc", "best.toml")
+LASTING = (
+    "designs.bin", "history.jsonl", "study.json", "map.nc", "best.toml", "budget.json", "contributions.csv", "fit.json",
+    "machine.toml",
+)  # fmt: skip
 """Files of a folder whose bytes are the same however often the work was stopped."""
 
 
 def run(command: list[str], folder: Path, seed: int, wait: float | None = None) -> subprocess.CompletedProcess[str]:
     """Run a command into a folder; kill it -9 after `wait` seconds where that is given."""
     line = [sys.executable, "-c", "import sys; from kinetostat.cli import main; sys.exit(main())"]
+    (folder.parent / MEASURED).write_text(good_table())
     environment = {**os.environ, "PYTHONHASHSEED": str(seed), "MPLBACKEND": "agg"}
     with subprocess.Popen(
         [*line, *command, "-o", str(folder)],
-        env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        env=environment, cwd=folder.parent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
     ) as process:  # fmt: skip
         if wait is not None:
             try:
@@ -51,9 +62,10 @@ def undisturbed(name: str, folder: Path) -> tuple[Path, float]:
     return folder / "whole", time.monotonic() - start
 
 
-def bytes_of(folder: Path) -> dict[str, bytes]:
-    """Contents of the files that last."""
-    return {name: (folder / name).read_bytes() for name in LASTING if (folder / name).exists()}
+def lines_of(folder: Path) -> dict[str, list[bytes]]:
+    """Contents of the files that last; a chunk that was damaged and computed again has its line at the end."""
+    whole = {name: (folder / name).read_bytes() for name in LASTING if (folder / name).exists()}
+    return {name: sorted(data.split(b"\n")) if name == "history.jsonl" else [data] for name, data in whole.items()}
 
 
 def kill_and_resume(rng: Random, name: str, whole: Path, seconds: float) -> str | None:
@@ -72,7 +84,7 @@ def kill_and_resume(rng: Random, name: str, whole: Path, seconds: float) -> str 
         left = [path.name for path in folder.iterdir() if path.name.startswith(".") and path.suffix != ".lock"]
         if left:
             return f"{name}: litter is left: {left}"
-        return None if bytes_of(folder) == bytes_of(whole) else f"{name}, damaged: {damage}: another result"
+        return None if lines_of(folder) == lines_of(whole) else f"{name}, damaged: {damage}: another result"
 
 
 def harm(rng: Random, folder: Path) -> str:

@@ -2,16 +2,35 @@
 
 import argparse
 from functools import cache
+from pathlib import Path
 from random import Random
 
 from hostile import NUMBERS, UNITS, WORDS, file, known_keys
+from tables import good_table, table
 
 from kinetostat.cli import _parser
 from kinetostat.machine.loading import bundled
 
 LONG = {"studio", "reproduce", "optimize", "pareto", "validate", "doctor", "workspace", "report"}
 """Commands that serve, or work for seconds when all is well: they are attacked in the tests of each of them."""
+PARTS = ("joints", "zeros", "gains", "clearances", "compliances", "geometry", "shared", "legs.*", "*", "[", "frame")
+SIZES = (
+    "0.05 mm", "0.1 deg", "20 um/m", "10 %", "sigma 0.02 mm", "IT7", "IT99", "IT7 at 300 mm", "ISO 2768-m at 1e9 mm",
+    "0", "-1 mm", "1e-320 mm", "inf mm", "nan", "rigid", "1 kg", "", '["0.05 mm", "0.02 deg"]', "sigma", "IT", "1 m",
+)  # fmt: skip
+"""What tolerances, priors and bounds are about, and how large they are."""
+CSV_FILES = ("data", "poses")
+"""Arguments that are CSV files, of the machine of `tables`."""
 QUICK_MACHINES = ("zhang-gosselin-4dof", "hexapod", "planar-3rpr", "tricept", "delta", "tripteron")
+
+
+@cache
+def placed_files() -> tuple[str, ...]:
+    """Files of poses and measurements, put into the current folder."""
+    texts = {"good.csv": good_table(), **{f"spoilt-{n}.csv": table(Random(f"file {n}")) for n in range(9)}}
+    for name, text in texts.items():
+        Path(name).write_bytes(text.encode(errors="surrogatepass"))
+    return (*texts, *(["good.csv"] * len(texts)))
 
 
 @cache
@@ -42,6 +61,8 @@ def command_line(rng: Random) -> list[str]:
 def _positional(rng: Random, action: argparse.Action) -> str:
     if action.choices and rng.random() < 0.9:
         return rng.choice([*map(str, action.choices)])
+    if action.dest in CSV_FILES and rng.random() < 0.9:
+        return rng.choice(placed_files())
     if rng.random() < 0.85:
         return rng.choice(QUICK_MACHINES)
     return rng.choice((*WORDS, "no-such.toml", ".", "/", "/dev/null", "/etc/passwd", *bundled()))
@@ -57,6 +78,10 @@ def _argument(rng: Random, action: argparse.Action) -> str:
         return setting(rng)
     if "vary" in what or "over" in what:
         return f"{rng.choice(known_keys())}={_end(rng)}:{_end(rng)}:{rng.choice((1, 2, 3, 5, 0, -1, 'x', 1e9))}"
+    if action.dest in ("tolerances", "priors", "bounds"):
+        return f"{rng.choice(PARTS)}={rng.choice(SIZES)}"
+    if action.dest == "fit":
+        return rng.choice(PARTS)
     if "along" in what:
         return ",".join(str(rng.choice(NUMBERS)) for _ in range(rng.choice((3, 3, 3, 2, 4))))
     return str(rng.choice((*WORDS, *NUMBERS)))

@@ -1,4 +1,7 @@
-"""A small attack on every run; `python tests/attack --files 100000 --lines 10000` is the large one."""
+"""A small attack on every run; `python tests/attack --files 100000 --lines 10000` is the large one.
+
+Here only what hangs is found: how long a case may take is judged by the large one, on a machine that does nothing else.
+"""
 
 import subprocess
 import sys
@@ -6,6 +9,6 @@ from pathlib import Path
 
 
 def test_hostile_files_and_command_lines_are_well_answered():
-    command = [sys.executable, str(Path(__file__).parent), "--files", "600", "--lines", "150", "--seed", "1"]
+    command = [sys.executable, str(Path(__file__).parent), "--files", "600", "--lines", "150", "--longest", "120"]
     attack = subprocess.run(command, capture_output=True, text=True)
     assert attack.returncode == 0, attack.stdout + attack.stderr

@@ -8,31 +8,16 @@ from kinetostat import analyze, build, command, evaluate, evaluate_grid, plot, u
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.under_load import load_curve
+from machines import STRETCH, cable, column, written
 from refusals import refused
 
-CABLES = """
-schema = 1
-name = "cables"
-family = "legs"
-space = "planar"
-[platform]
-point = [0, 0, 0]
-[pose]
-x = 0
-y = 0
-yaw = 0
-"""
+CABLES = written("cables", (0, 0, 0), {"x": 0, "y": 0, "yaw": 0})
 ANCHORS = {"a": ((-2.0, 1.5), (-0.2, 0.1)), "b": ((2.0, 1.5), (0.2, -0.1)), "c": ((0.3, -1.6), (0.05, -0.1))}
-STRETCH = 2e5
 
 
 def cables(ends, preload, *more):
-    legs = "".join(
-        f'[[legs]]\nname = "{name}"\ntype = "cable"\nfrom = {[*base, 0.0]}\nto = {[*eye, 0.0]}\n'
-        f"stiffness = {STRETCH}\npreload = {preload[name]}\n"
-        for name, (base, eye) in ends.items()
-    )
-    return build("\n".join([CABLES, *more, legs]))
+    legs = [cable(name, (*base, 0.0), (*eye, 0.0), preload[name]) for name, (base, eye) in ends.items()]
+    return build("\n".join([CABLES, *more, *legs]))
 
 
 def stretched(ends, tensions):
@@ -95,9 +80,6 @@ def test_cables_go_slack_at_the_load_of_their_derivation(share, slack):
     assert state.displacement[2] == pytest.approx(-sag, rel=1e-9)
 
 
-HINGE = "actuated = true, stiffness = 5e3"
-
-
 @pytest.mark.parametrize(("least", "most"), [(50.0, None), (120.0, 500.0)])
 def test_tensions_are_the_least_within_their_bounds(least, most):
     """Two cables up and two down under 500 N: each lower one pulls as little as it may, each upper one 250 N more."""
@@ -114,14 +96,10 @@ def test_tensions_of_a_spatial_machine_balance_its_weight_and_no_smaller_ones_do
     corners = np.array([[x, y, z] for x in (-3.0, 3.0) for y in (-2.0, 2.0) for z in (0.0, 4.0)])
     eyes = np.array([[x, y, z] for x in (-0.2, 0.2) for y in (0.3, -0.3) for z in (2.3, 1.8)])
     eyes[:, 2] += 0.05 * rng.normal(size=8)
-    legs = "".join(
-        f'[[legs]]\nname = "c{i}"\ntype = "cable"\nfrom = {a}\nto = {b}\nstiffness = 2e5\n'
-        for i, (a, b) in enumerate(zip(corners.tolist(), eyes.tolist(), strict=True))
-    )
-    head = 'schema = 1\nname = "room"\nfamily = "legs"\n[platform]\npoint = [0, 0, 2]\n[pose]\n'
-    pose = "x = 0\ny = 0\nz = 2\nroll = 0\npitch = 0\nyaw = 0\n"
+    legs = "".join(cable(f"c{i}", *ends) for i, ends in enumerate(zip(corners.tolist(), eyes.tolist(), strict=True)))
+    head = written("room", (0, 0, 2), {"x": 0, "y": 0, "z": 2, "roll": 0, "pitch": 0, "yaw": 0}, planar=False)
     load = "[tool]\nmass = 20\ncentre_of_mass = [0.02, 0, 0]\n[load]\ngravity = [0, 0, -9.81]\nmin_tension = 40\n"
-    state = under_load(build(head + pose + load + legs))
+    state = under_load(build(head + load + legs))
     assert state.rest is Rest.OK
     tensions = np.array([s.load for s in state.springs])
     along = (corners - eyes) / np.linalg.norm(corners - eyes, axis=1)[:, None]
@@ -190,49 +168,18 @@ def test_a_planar_machine_that_only_tension_holds_says_how_it_moves_without():
     assert state.elastic[1] == [0.0, 0.0, 0.0]
 
 
-COLUMN = """
-schema = 1
-name = "column"
-family = "legs"
-[platform]
-point = [0, 0, 2]
-[pose]
-roll = 0
-[[legs]]
-name = "column"
-joints = [
-  { name = "hinge", type = "revolute", joins = ["base", "platform"], point = [0, 0, 0], axis = [1, 0, 0], %s },
-]
-[load]
-force = [0, 0, %s]
-"""
-
-
 def test_a_column_on_a_spring_falls_at_the_load_of_its_derivation():
     """Of height h on a hinge of stiffness k, it stands up to k / h."""
-    standing = under_load(build(COLUMN % (HINGE, -1000)))
+    standing = under_load(column(1000))
     assert standing.rest is Rest.OK
     assert standing.factor == pytest.approx(2.5, rel=1e-9)
     assert standing.mode[4] == pytest.approx(-2.0 * standing.mode[0], rel=1e-9), "it tilts about the hinge"
-    fallen = under_load(build(COLUMN % (HINGE, -2600)))
+    fallen = under_load(column(2600))
     assert fallen.rest is Rest.UNSTABLE
     assert "not stable" in fallen.message
     assert "stands up to 0.962 times this load" in fallen.message
     assert "gives way by a motion like rx +1 rad, y -2 m at the tool, most of all in column" in fallen.message
-    assert np.isinf(under_load(build(COLUMN % (HINGE, 1000))).factor)
-
-
-TOGGLE = """
-schema = 1
-name = "toggle"
-family = "legs"
-space = "planar"
-[platform]
-point = [0, 0.3, 0]
-[pose]
-x = 0
-y = 0.3
-"""
+    assert np.isinf(under_load(column(-1000)).factor)
 
 
 def toggle(force, height=0.3):
@@ -240,13 +187,14 @@ def toggle(force, height=0.3):
     legs = "".join(
         f'[[legs]]\nname = "{name}"\njoints = [\n'
         f'{{ name = "foot", type = "revolute", joins = ["base", "b1"], point = [{x}, 0, 0], axis = [0, 0, 1] }},\n'
-        f'{{ name = "strut", type = "prismatic", joins = ["b1", "b2"], point = [{x}, 0, 0], axis = [{-x}, 0.3, 0], '
-        "actuated = true, stiffness = 1e6 },\n"
-        '{ name = "top", type = "revolute", joins = ["b2", "platform"], point = [0, 0.3, 0], axis = [0, 0, 1]'
+        f'{{ name = "strut", type = "prismatic", joins = ["b1", "b2"], point = [{x}, 0, 0], axis = [{-x}, {height}, 0]'
+        ", actuated = true, stiffness = 1e6 },\n"
+        f'{{ name = "top", type = "revolute", joins = ["b2", "platform"], point = [0, {height}, 0], axis = [0, 0, 1]'
         f"{held} }},\n]\n"
         for name, x, held in (("left", -1, ""), ("right", 1, ", actuated = true, stiffness = 1e3"))
     )
-    return build(f"{TOGGLE}{legs}[load]\nforce = [0, {-force}, 0]\n".replace("0.3", str(height)))
+    head = written("toggle", (0, height, 0), {"x": 0, "y": height})
+    return build(f"{head}{legs}[load]\nforce = [0, {-force}, 0]\n")
 
 
 def greatest_load(height):
@@ -312,7 +260,7 @@ def test_a_curve_over_the_load_ends_in_the_state_and_shows_where_cables_go_slack
 
 
 def test_what_falls_has_no_rest_in_tables_and_commands():
-    fallen = build(COLUMN % (HINGE, -2600))
+    fallen = column(2600)
     table = evaluate(fallen, {"roll": [0.0]}, ["displacement_y", "load_factor"])
     assert table.status.values.tolist() == [Status.NO_REST]
     assert np.isnan(table["load_factor"].values).all()

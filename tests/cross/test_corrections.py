@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from kinetostat import build, command, correction_table, save
+from kinetostat import command, correction_table, save
 from kinetostat.cli import main
 from kinetostat.equilibrium.balance import free_state
 from kinetostat.equilibrium.numbers import loaded_mechanism
@@ -17,7 +17,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.actuators import senses_of
 from kinetostat.machine.parameters import with_values
 from kinetostat.views.notebook import html_of
-from machines import load_without_limits
+from machines import column, load_without_limits
 from refusals import refused
 
 WEIGHT = ["tool.mass=20 kg", "load.gravity=[0, 0, -9.81]"]
@@ -118,27 +118,9 @@ def test_tables_that_cannot_be_made_are_refused(over, tolerance, pattern):
         correction_table(load_without_limits("delta", ["load.force=[0, 0, -30]"]), over, tolerance)
 
 
-COLUMN = """
-schema = 1
-name = "falling column"
-family = "legs"
-[platform]
-point = [0, 0, 2]
-[pose]
-roll = 0
-[[legs]]
-name = "column"
-joints = [
-  { name = "hinge", type = "revolute", joins = ["base", "platform"], point = [0, 0, 0], axis = [1, 0, 0], %s },
-]
-[load]
-force = [0, 0, -2600]
-"""
-
-
 def test_a_table_of_a_machine_that_falls_is_refused():
     with refused("comes to rest at no point of this table"):
-        correction_table(build(COLUMN % "actuated = true, stiffness = 5e3"), "roll=0 deg:0.01 deg:2")
+        correction_table(column(2600), "roll=0 deg:0.01 deg:2")
 
 
 def test_the_command_writes_the_table_and_prints_its_law(tmp_path, capsys):

@@ -12,7 +12,8 @@ from kinetostat.studies.analysis import analyze
 from kinetostat.studies.assembly import forward
 from kinetostat.studies.command import command
 from kinetostat.studies.under_load import Rest, under_load
-from machines import load_without_limits
+from kinetostat.views.loaded_tables import stability_of
+from machines import load_without_limits, written
 
 GROWTH = 12e-6 * 40.0
 """Of steel that is 40 K warmer."""
@@ -72,16 +73,6 @@ def test_links_that_are_warmer_are_links_that_are_longer(name, kind, field):
 
 
 LEGS = """
-schema = 1
-name   = "Three legs in a plane"
-family = "legs"
-space  = "planar"
-[platform]
-point = [0, "600 mm", 0]
-[pose]
-x   = 0
-y   = "600 mm"
-yaw = 0
 [sections.rod]
 shape            = "round"
 diameter         = "20 mm"
@@ -118,7 +109,7 @@ joints = [
 
 def test_sections_of_machines_leg_by_leg_say_how_their_links_grow():
     """A machine of three legs between known points: where circles about the feet meet, to first order by hand."""
-    state = under_load(build(LEGS))
+    state = under_load(build(written("three legs in a plane", (0, 0.6, 0), {"x": 0, "y": 0.6, "yaw": 0}) + LEGS))
     left, right, across = 23e-6 * 10.0 * 0.6, 12e-6 * 25.0 * 0.6, 0.0
     # The heads rise by the growth of the upright legs; the diagonal keeps its length, which fixes the motion along x.
     right_x = (across * math.hypot(0.4, 0.6) - 0.6 * right) / 0.4
@@ -156,8 +147,14 @@ def test_a_column_between_two_hinges_bends_away_at_the_load_of_euler():
         assert strut.euler_load == pytest.approx(by_hand / actuator.coordinate**2, rel=1e-12)
     worst = min(strut.factor for strut in state.struts)
     heavier = under_load(load("hexapod", [*settings[:1], f"load.force=[0, 0, {-20e3 * worst * 1.01}]"]))
-    assert "bends away: it is pressed with" in heavier.message
-    assert "bends away" not in state.message
+    assert heavier.rest is Rest.UNSTABLE
+    assert heavier.message.startswith("Strut leg ")
+    assert "bends away (and 5 more): it is pressed with" in heavier.message
+    assert "bends away at about 0.98" in stability_of(heavier)
+    assert state.rest is Rest.OK
+    assert state.message.startswith("At rest and stable.")
+    assert f"bends away at about {worst:.3g} times this load" in stability_of(state)
+    assert heavier.factor > 1.0, "the springs alone would stand"
     assert all(
         strut.factor == math.inf for strut in under_load(load("hexapod", [settings[0], "load.force=[0,0,1e4]"])).struts
     )
@@ -182,17 +179,8 @@ def chained(count, force):
     row.append(f'{{ name = "head", type = "revolute", {head} }}')
     links = "\n".join(f'"part {i}" = {{ model = "beam", section = "bar" }}' for i in range(1, count + 1))
     return build(
-        f"""
-schema = 1
-name = "Column"
-family = "legs"
-space = "planar"
-[platform]
-point = [0, 1, 0]
-[pose]
-x = 0
-y = 1
-yaw = 0
+        written("row of beams", (0, 1, 0), {"x": 0, "y": 1, "yaw": 0})
+        + f"""
 [sections.bar]
 shape = "round"
 diameter = "10 mm"

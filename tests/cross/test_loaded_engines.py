@@ -3,24 +3,27 @@
 Exudyn solves its own nonlinear statics of rigid bodies and springs, MuJoCo runs until the machine hangs still.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from kinetostat import build, under_load
 from kinetostat.algebra.vector import Vector
-from kinetostat.equilibrium.solving import Rest
+from kinetostat.equilibrium.mechanism import mechanism_of
+from kinetostat.equilibrium.solving import Rest, at_rest
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.mass import located_members
 from kinetostat.validation import exudyn_machine
-from kinetostat.validation.pieces import pieces
-from machines import load_without_limits
+from kinetostat.validation.comparison import KNOWN
+from kinetostat.validation.exudyn_modes import modal_frequencies, weigh
+from kinetostat.validation.pieces import bodies_before
+from kinetostat.vibration.modes import frequencies
+from machines import STRETCH, cable, load_without_limits, written
 
 pytest.importorskip("exudyn")
+EXUDYN = KNOWN[0]
 
 DENSITIES = {
     "hexapod": {"legs": 3000.0},
@@ -53,7 +56,7 @@ class Engine:
         configuration, reference = self.response.configuration, self.response.reference
         model, _ = exudyn_machine.build(configuration, reference)
         model.system.Assemble()
-        unit = float(np.max(np.abs(model.system.ComputeLinearizedSystem(exudyn_machine._settings(model))[1])))
+        unit = float(np.max(np.abs(model.system.ComputeLinearizedSystem(exudyn_machine.settings_of(model))[1])))
         self.model, self.platform = exudyn_machine.build(configuration, reference, unit, preloaded=True)
         kinds = (self.model.items.Torque, self.model.items.Force)
         marker = self.model.marker(self.platform, self.platform.at, np.eye(3))
@@ -74,18 +77,8 @@ class Engine:
                 number = next(i for i, leg in enumerate(configuration.legs) if leg.number is None)
             halves = [(*end, 0.5) for end in link.ends()] if link.centre is None else [(*link.centre(), 1.0)]
             for carried, point, share in halves:
-                body = self._body(configuration.legs[number], self.model.chains[number], carried, point)
-                self._pull(body, point, share * float(link.mass) * gravity)
-
-    def _body(self, leg, bodies, carried, point):
-        """The body that carries a point after so many elements of a leg; a strut's ends are its neighbours'."""
-        plane = self.response.configuration.plane
-        whole, part = pieces(leg, plane), pieces(replace(leg, chain=leg.chain[:carried]), plane)
-        same = next((i for i, (a, b) in enumerate(zip(whole, part, strict=False)) if a != b), len(part))
-        if same == len(part):
-            return bodies[same]
-        near, far = (float((end - point).norm()) for end in (whole[same].start, whole[same].end))
-        return bodies[same] if near < far else bodies[same + 1]
+                place = bodies_before(configuration.legs[number], (carried, point), configuration.plane)
+                self._pull(self.model.chains[number][place], point, share * float(link.mass) * gravity)
 
     def _pull(self, body, point, force):
         if body.node is None or not np.any(force):
@@ -194,6 +187,37 @@ def test_the_tangent_is_that_of_exudyn(name):
     assert 0.5 * (theirs + theirs.T) == pytest.approx(ours, abs=1e-6 * np.abs(ours).max())
 
 
+PULLS = {
+    "force": ["load.force=[4000, 6000, -10000]"],
+    "weight": ["load.gravity=[300, -200, -900]"],
+    "preloads": [],
+}
+
+
+@pytest.mark.parametrize("what", PULLS)
+def test_frequencies_about_the_loaded_state_are_those_of_exudyn(what):
+    """Of struts as bars and loads without a lever: the engine linearises neither levers nor constraints that turn."""
+    machine = load_without_limits("hexapod", ["tool.mass=20", "tool.inertia=[0.05, 0.06, 0.07, 0, 0, 0]", *PULLS[what]])
+    if what == "preloads":
+        document = document_of(machine)
+        driven = [joint for leg in document["legs"] for joint in leg["joints"] if joint.get("actuated")]
+        for number, joint in enumerate(driven):
+            joint["preload"] = 3000.0 - 900.0 * number
+        machine = build(document, "legs")
+    free = EXUDYN.frequencies(machine)
+    joints = solve_joints(machine) if machine.family.chains else None
+    loaded = frequencies(at_rest(mechanism_of(machine, respond(machine, joints), joints)).balance)[0]
+    engine = Engine(machine)
+    weigh(engine.model, engine.platform, machine, engine.response, engine.joints)
+    engine.model.system.Assemble()
+    engine.start = engine.model.system.systemData.GetODE2Coordinates()
+    engine.displacement(wrench_of(machine))
+    data, begin = engine.model.system.systemData, engine.model.engine.ConfigurationType.Initial
+    data.SetODE2Coordinates(data.GetODE2Coordinates(), begin)
+    assert loaded == pytest.approx(modal_frequencies(engine.model), rel=1e-9)
+    assert loaded != pytest.approx(free, rel=1e-5), "the load does matter"
+
+
 @pytest.mark.parametrize("name", ["delta", "orthoglide", "tripteron"])
 def test_other_models_of_parallelograms_and_beams_differ_by_the_square_of_the_load(name):
     """The engine has two bars in a parallelogram, and a beam's springs at its end; here both are at the middle."""
@@ -209,18 +233,6 @@ def test_other_models_of_parallelograms_and_beams_differ_by_the_square_of_the_lo
 
 
 ROOM = """
-schema = 1
-name = "room"
-family = "legs"
-[platform]
-point = [0, 0, 2]
-[pose]
-x = 0
-y = 0
-z = 2
-roll = 0
-pitch = 0
-yaw = 0
 [tool]
 mass = 60
 centre_of_mass = [0.02, 0.01, 0.05]
@@ -228,18 +240,17 @@ centre_of_mass = [0.02, 0.01, 0.05]
 force = [150, -40, 0]
 gravity = [0, 0, -9.81]
 """
-STRETCH, PRELOAD = 2e5, 60.0
+PRELOAD = 60.0
 CORNERS = np.array([[x, y, z] for x in (-3.0, 3.0) for y in (-2.0, 2.0) for z in (0.0, 4.0)])
 EYES = np.array([[x, y, z] for x in (-0.2, 0.25) for y in (-0.3, 0.35) for z in (2.3, 1.8)])
 
 
 def test_cables_that_go_slack_are_those_of_exudyn():
     """Eight cables in a room, in the engine as forces of its own between points of two bodies, which never push."""
-    legs = "".join(
-        f'[[legs]]\nname = "c{i}"\ntype = "cable"\nfrom = {a}\nto = {b}\nstiffness = {STRETCH}\npreload = {PRELOAD}\n'
-        for i, (a, b) in enumerate(zip(CORNERS.tolist(), EYES.tolist(), strict=True))
-    )
-    machine = build(ROOM + legs)
+    ends = zip(CORNERS.tolist(), EYES.tolist(), strict=True)
+    legs = "".join(cable(f"c{i}", corner, eye, PRELOAD) for i, (corner, eye) in enumerate(ends))
+    head = written("room", (0, 0, 2), {"x": 0, "y": 0, "z": 2, "roll": 0, "pitch": 0, "yaw": 0}, planar=False)
+    machine = build(head + ROOM + legs)
     state = under_load(machine)
     assert state.rest is Rest.OK
     assert 1 <= len(state.slack_legs) <= 4
@@ -270,7 +281,7 @@ def test_cables_that_go_slack_are_those_of_exudyn():
     weight = [0.0, 0.0, -60 * 9.81 / STRETCH]
     model.system.AddLoad(model.items.Force(markerNumber=heavy, loadVector=weight))
     model.system.Assemble()
-    settings = exudyn_machine._settings(model)
+    settings = exudyn_machine.settings_of(model)
     settings.staticSolver.numberOfLoadSteps = 10
     force, torque = wrench_of(machine)[3:], wrench_of(machine)[:3]
     for load, part in zip(loads, (torque, force), strict=True):

@@ -14,7 +14,7 @@ from kinetostat.machine.parameters import with_values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.under_load import under_load
-from machines import load_without_limits
+from machines import load_without_limits, written
 
 SPINDLE = """
 [load.spindle]
@@ -90,15 +90,6 @@ def test_the_schema_of_files_has_them():
 
 
 ARMS = """
-schema = 1
-name   = "Two arms on hinges with motors"
-family = "legs"
-space  = "planar"
-[platform]
-point = [0, "300 mm", 0]
-[pose]
-x   = "20 mm"
-y   = "310 mm"
 [sections.bar]
 shape    = "round"
 diameter = "30 mm"
@@ -124,7 +115,7 @@ LENGTH = math.hypot(0.1, 0.2)
 
 
 def arms(upper):
-    return build(ARMS.replace("UPPER", upper))
+    return build(written("two arms", (0, 0.3, 0), {"x": 0.02, "y": 0.31}) + ARMS.replace("UPPER", upper))
 
 
 def test_a_link_with_its_mass_in_the_middle_is_a_uniform_one():
@@ -159,7 +150,10 @@ def test_a_centre_of_mass_travels_with_its_link():
     [
         ("centre_of_mass = [0, 0, 0]", 'link "upper" has centre_of_mass, but no mass'),
         ("mass = -1", "cannot be negative"),
-        ("mas = 1", "mas is not known; a link has model, section, up, compliance, mass and centre_of_mass"),
+        ("mas = 1", "mas is not known; a link has model, section, up, compliance, mass, centre_of_mass and inertia"),
+        ("mass = 1, inertia = [1, 1, 1, 0, 0, 0]", "has inertia, but no centre_of_mass"),
+        ("mass = 1, centre_of_mass = [0, 0, 0], inertia = [1, 1, 3, 0, 0, 0]", r"legs\.arm\.upper\.inertia .* no body"),
+        ("mass = 0, centre_of_mass = [0, 0, 0], inertia = [1, 1, 1, 0, 0, 0]", r"but legs\.arm\.upper\.mass is 0"),
         ("mass = 1, centre_of_mass = [0, 0]", "it has 2 entries; give 3"),
     ],
 )

@@ -4,16 +4,19 @@ import numpy as np
 import pytest
 
 from kinetostat.exchange.leg_by_leg import document_of
+from kinetostat.kinematics import closure
+from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import solve_joints
-from kinetostat.kinematics.leg_gaps import Problems
+from kinetostat.kinematics.leg_gaps import Problems, free_coordinates, goal_of, problems_of
+from kinetostat.kinematics.leg_span import too_far_or_near
 from kinetostat.kinematics.nearest import nearest_pose
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import build
-from kinetostat.machine.parameters import with_values
+from kinetostat.machine.parameters import values, with_values
 from kinetostat.spec import document
 from kinetostat.studies.workspace.workspace import workspace
-from machines import load_without_limits
+from machines import load_without_limits, written
 
 CRANKS = """
 schema = 1
@@ -37,6 +40,22 @@ roll = 0
 pitch = 0
 yaw = 0
 """
+FIVE_BAR = """
+[[legs]]
+name = "left"
+joints = [
+  { name = "motor", type = "revolute", joins = ["base", "crank"], point = [-0.1, 0, 0], axis = [0, 0, 1] },
+  { name = "elbow", type = "revolute", joins = ["crank", "platform"], point = [-0.16, 0.14, 0], axis = [0, 0, 1] },
+]
+[[legs]]
+name = "right"
+joints = [
+  { name = "motor", type = "revolute", joins = ["base", "crank"], point = [0.1, 0, 0], axis = [0, 0, 1] },
+  { name = "elbow", type = "revolute", joins = ["crank", "rod"], point = [0.16, 0.14, 0], axis = [0, 0, 1] },
+  { name = "wrist", type = "revolute", joins = ["rod", "platform"], point = [0, 0.25, 0], axis = [0, 0, 1] },
+]
+"""
+"""Its platform is one of its bars; yaw follows from the legs."""
 REACHED = (Status.OK, Status.SINGULAR, Status.JOINT_LIMIT)
 
 
@@ -80,6 +99,27 @@ def test_poses_beyond_flat_parallelograms_are_shown_to_be_out_of_reach():
     assert (status[~inside] == Status.OUT_OF_REACH).mean() > 0.9
 
 
+@pytest.mark.parametrize("name", ["delta", "hexapod-rus", "orthoglide", "planar-3rrr", "five-bar"])
+def test_the_lengths_of_links_show_no_pose_out_of_reach_that_is_not(name, monkeypatch):
+    """Solutions are followed to all poses, beyond the bound too; it is passed at most of those that are not reached."""
+    five_bar = build(written("five-bar", (0, 0.25, 0), {"x": 0.02, "y": 0.24}) + FIVE_BAR)
+    machine = five_bar if name == "five-bar" else build(document_of(load_without_limits(name)), name)
+    here, rng = values(machine), np.random.default_rng(2)
+    fields = [path for path in here if path in ("pose.x", "pose.y", "pose.z")]
+    columns = {path: here[path] + rng.uniform(-0.5, 0.5, 60) for path in fields}
+    with monkeypatch.context() as patched:
+        patched.setattr(closure, "too_far_or_near", lambda problems, _: np.zeros(len(problems.poses), dtype=bool))
+        status = np.asarray(solve_joints(with_values(machine, columns)).status)
+    chains = with_values(machine, columns).chains()
+    given = stacked(chains.pose.values(), 60)
+    beyond = np.zeros(60, dtype=bool)
+    for problems in problems_of(chains, 60, free_coordinates(chains)):
+        goal = goal_of(problems, given)
+        beyond[problems.poses[too_far_or_near(problems, goal)]] = True
+    assert not (beyond & (status == Status.OK)).any()
+    assert beyond.sum() > 0.7 * (status != Status.OK).sum() > 5
+
+
 @pytest.mark.parametrize("name", ["hexapod-hardware", "tripteron"])
 def test_a_pose_has_the_same_answer_alone_and_in_a_batch(name):
     machine = load_without_limits(name)
@@ -112,13 +152,24 @@ def test_the_nearest_pose_is_on_the_border_and_no_sampled_one_is_nearer():
     assert apart < distances[inside].min() + 1e-3
 
 
-def test_the_nearest_pose_takes_few_evaluations_of_the_legs(monkeypatch):
-    """Each takes some 2 ms: a message is to be there in 0.3 s."""
+@pytest.mark.parametrize(("name", "far"), [("tripteron", "pose.z"), ("passive-leg-4dof-rus", "pose.x")])
+def test_the_nearest_pose_is_that_of_every_pose_on_the_way_to_it(name, far):
+    """Where the search ends too early, it ends elsewhere from nearby."""
+    machine = build(document_of(load_without_limits(name)), "legs")
+    wanted = {path: values(machine)[path] for path in values(machine) if path.startswith("pose.")}
+    wanted[far] += 6.0 * respond(machine).configuration.length
+    near = nearest_pose(with_values(machine, wanted))
+    beside = {path: 0.9 * near[path.removeprefix("pose.")] + 0.1 * goal for path, goal in wanted.items()}
+    assert nearest_pose(with_values(machine, beside)) == pytest.approx(near, abs=2e-6)
+
+
+@pytest.mark.parametrize(("name", "most"), [("tripteron", 40), ("passive-leg-4dof-rus", 40), ("hexapod-rus", 60)])
+def test_the_nearest_pose_takes_few_evaluations_of_the_legs(monkeypatch, name, most):
+    """Each takes some 2 to 10 ms: a message is to be there in 0.3 s."""
     calls, gaps = [], Problems.gaps
     monkeypatch.setattr(Problems, "gaps", lambda *arguments: calls.append(1) or gaps(*arguments))
-    for far in ({"pose.x": 3.0}, {"pose.x": 3.0, "pose.y": -2.0}):
-        nearest_pose(with_values(load_without_limits("tripteron"), far))
-    assert len(calls) < 130
+    nearest_pose(with_values(build(document_of(load_without_limits(name)), "legs"), {"pose.x": 3.0}))
+    assert len(calls) < most
 
 
 @pytest.mark.parametrize("z", [0.37, 0.49])

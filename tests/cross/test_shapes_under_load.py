@@ -7,12 +7,14 @@ import pytest
 from matplotlib.collections import QuadMesh
 from test_cables import HANGING, cables
 
-from kinetostat import carrying_legs, load, plot, save, under_load
+from kinetostat import build, carrying_legs, load, plot, save, under_load
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE
 from kinetostat.kinetostatics.deflected import deflected_links
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import as_toml
+from kinetostat.views.scene.analysis_overlays import loaded_overlays
+from kinetostat.views.scene.proportions import proportions_of
 from refusals import refused
 
 DOWN = "[load]\nforce = [0, -500, 0]\n"
@@ -44,6 +46,25 @@ def test_under_a_large_load_the_ends_of_all_legs_stay_on_the_platform():
         expected = np.array([[cosine, -sine], [sine, cosine]]) @ at + (x, y) - at
         assert link.start_motion.translational.norm() == pytest.approx(0.0, abs=1e-12)
         assert link.end_motion.translational.components()[:2] == pytest.approx(expected, abs=1e-9)
+
+
+def test_warm_links_reach_the_platform_where_they_have_grown():
+    """Links that grow alike lift the platform; the motions of their ends are those of their joints there."""
+    machine = load("hexapod", ["expansion.legs=12 um/(m*K)", "temperature_rise.legs=40 K"])
+    state = under_load(machine)
+    assert np.abs(state.displacement[:5]).max() < 1e-9
+    assert state.displacement[5] > 1e-5
+    last = {link.leg: link for link in state.links}
+    for link in last.values():
+        assert link.end_motion.translational.components() == pytest.approx(state.displacement[3:], abs=1e-12)
+
+
+def test_a_load_at_a_named_point_is_drawn_too():
+    machine = load("hexapod")
+    pushed = build(as_toml(machine) + '\n[load.spindle]\npoint = [0, 0, 0]\nforce = ["500 N", 0, 0]\n')
+    solids, factor = loaded_overlays(under_load(pushed), proportions_of(pushed, pushed.configure()))
+    assert {solid.layer for solid in solids} == {"load", "deflection"}
+    assert factor > 100
 
 
 def words_of(figure):

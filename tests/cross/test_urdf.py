@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from kinetostat import modes
 from kinetostat.exchange.formats import choose
 from kinetostat.exchange.urdf_export import texts_of
 from kinetostat.exchange.urdf_file import parse
@@ -16,6 +17,7 @@ from kinetostat.machine.loading import build, bundled, load
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.document import parse as parse_toml
 from kinetostat.studies.analysis import analyze
+from machines import with_bodies
 from refusals import refused
 
 SAME = 1e-9
@@ -57,7 +59,7 @@ FIVE_BAR = """<?xml version="1.0"?>
 def read_text(text, tmp_path):
     path = tmp_path / "machine.urdf"
     path.write_text(text, encoding="utf-8")
-    return read_machine(path)
+    return read_machine(path)[0]
 
 
 def refusal(text):
@@ -115,6 +117,65 @@ def test_links_of_every_model_and_bearings_that_give_survive(tmp_path):
     settings += ["legs.z.wrist.compliance=[0, 0, 0, 2e-9, 2e-9, 4e-9]"]
     found = analyze(load("tripteron", settings))
     assert_same(found, analyze(read_text(texts_of(found)[0], tmp_path)))
+
+
+@pytest.mark.parametrize("name", ["planar-3rrr", "tripteron", "hexapod"])
+def test_bodies_keep_their_masses_and_inertias(name, tmp_path):
+    settings = ["tool.mass=5", "tool.inertia=[0.06, 0.06, 0.07, 0.01, 0, 0]", "tool.payload=2"]
+    machine = with_bodies(name, [*settings, "tool.payload_centre=[0.01, 0.02, 0]"])
+    text, _ = texts_of(analyze(machine))
+    wanted = [mode.frequency for mode in modes(machine).modes[:6]]
+    assert [mode.frequency for mode in modes(read_text(text, tmp_path)).modes[:6]] == pytest.approx(wanted, rel=1e-9)
+    light = [mode.frequency for mode in modes(load(name, settings)).modes[:6]]
+    assert wanted != pytest.approx(light, rel=0.1), "links are heavy here"
+
+
+def test_a_link_that_telescopes_is_left_out_and_the_file_says_so():
+    text, _ = texts_of(analyze(load("hexapod", ["tool.mass=5", "linear_density.legs=2"])))
+    assert "telescope" in text
+    assert text.count("<inertial>") == 1
+
+
+def test_inertias_of_a_file_of_somebody_else(tmp_path):
+    """Links that are fixed together are one body; what hangs beside the legs is named; the base stands still."""
+    inertial = (
+        '<inertial><origin xyz="0.1 0.2 0.3" rpy="0 0 1.2"/><mass value="{}"/>'
+        '<inertia ixx="0.02" iyy="0.05" izz="0.06" ixy="0.004" ixz="0" iyz="0"/></inertial>'
+    )
+    extra = """<joint name="bolts" type="fixed"><parent link="left crank"/><child link="motor"/></joint>
+      <joint name="pin" type="revolute"><parent link="left crank"/><child link="flag"/></joint></robot>"""
+    text = FIVE_BAR.replace("</robot>", extra)
+    for name, mass in (("floor", 90), ("left crank", 2), ("hand", 4), ("left rod", 6)):
+        text = text.replace(f'<link name="{name}"/>', f'<link name="{name}">{inertial.format(mass)}</link>')
+    text = text.replace("</robot>", '<link name="motor"><inertial><mass value="2"/></inertial></link></robot>')
+    text = text.replace("</robot>", '<link name="flag"><inertial><mass value="1"/></inertial></link></robot>')
+    machine = read_text(text, tmp_path)
+    crank, tool = machine.tables["legs.leg 1.body 1"], machine.tables["tool"]
+    assert crank.mass == 4.0
+    assert crank.centre_of_mass == pytest.approx([-0.1 + 0.05, 0.1, 0.15])
+    cosine, sine = math.cos(1.2), math.sin(1.2)
+    turn = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+    arm = np.array([0.05, 0.1, 0.15])
+    steiner = 4.0 * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    whole = turn @ np.array([[0.02, 0.004, 0], [0.004, 0.05, 0], [0, 0, 0.06]]) @ turn.T + steiner
+    entries = [whole[0, 0], whole[1, 1], whole[2, 2], whole[0, 1], whole[0, 2], whole[1, 2]]
+    assert crank.inertia == pytest.approx(entries, rel=1e-12)
+    assert tool.mass == 10.0, "the left rod is fixed to the hand"
+    assert machine_text(tmp_path / "machine.urdf").splitlines()[2].endswith('not counted: "flag".')
+    assert "which no body has" in refusal(text.replace('ixx="0.02"', 'ixx="2"'))
+
+
+def test_hinges_with_something_heavy_between_them_stay_apart(tmp_path):
+    text, _ = texts_of(analyze(load("hexapod")))
+    cross = '<link name="leg_1_body_1"'
+    heavy = f'{cross}><inertial><mass value="0.1"/></inertial></link><link name="spare"'
+    assert cross in text
+    kinds = [[joint["type"] for joint in leg["joints"]] for leg in document_of(parse(text.encode(), "h"))["legs"]]
+    apart = text.replace(cross, heavy, 1).replace('<link name="spare"', "<unused", 1)
+    document = document_of(parse(apart.encode(), "h"))
+    assert [joint["type"] for joint in document["legs"][0]["joints"]] != kinds[0]
+    assert document["legs"][0]["links"]["body 1"]["mass"] == 0.1
+    assert "links" not in document["legs"][1]
 
 
 def test_an_actuator_without_stiffness_stays_one(tmp_path):
@@ -188,6 +249,11 @@ REFUSED = [
     (('<parent link="floor"/> <child link="right crank"/>', '<child link="right crank"/>'), ("", ""), "parent link"),
     (('name="left elbow"', 'id="left elbow"'), ("", ""), "no name"),
     (("</robot>", ""), ("", ""), "it is not XML"),
+    (
+        ('type="revolute">\n    <predecessor', 'type="fixed">\n    <predecessor'),
+        ('successor link="right rod"><origin xyz="-0.16 0.11 0"/>', 'successor link="floor"><origin xyz="0 0.25 0"/>'),
+        'fixes the platform to "floor"',
+    ),
 ]
 
 

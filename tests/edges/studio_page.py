@@ -48,6 +48,12 @@ class Page:
         while tasks := [t for t in background_tasks.running_tasks if _of_the_studio(t.get_name())]:
             await asyncio.wait(tasks)
 
+    async def until(self, condition: Callable[[], bool]) -> None:
+        """Until something holds that the end of a computation brings about, whatever else is being computed."""
+        while not condition():
+            tasks = [t for t in background_tasks.running_tasks if _of_the_studio(t.get_name())]
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+
     async def send(self, mark: str, event: str, args: Any = None) -> None:
         """An event of an element, as a browser sends it, and all that follows from it."""
         element = self.one(mark)

@@ -1,14 +1,17 @@
 """The commands as a new user types them: exit codes, messages, output."""
 
+import io
 import json
 import re
 import signal
 import subprocess
 import sys
+import threading
 
 import pytest
 
 from kinetostat.cli import main
+from kinetostat.commands import common
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER, STOPPED
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.loading import bundled, load
@@ -126,7 +129,8 @@ def test_help_names_every_quantity(command, capsys):
     with pytest.raises(SystemExit):
         main([command, "--help"])
     shown = " ".join(capsys.readouterr().out.split())
-    single = {name for name, quantity in QUANTITIES.items() if not quantity.components}
+    grouped = {name for members in GROUPS.values() for name in members}
+    single = {name for name, quantity in QUANTITIES.items() if not quantity.components} - grouped
     assert all(re.search(rf"\b{name}\b", shown) for name in {*GROUPS, *single})
     assert "repeatable" in shown
 
@@ -232,13 +236,36 @@ def test_the_package_runs_as_the_command(capsys):
     assert ran.stdout == capsys.readouterr().out
 
 
-def test_one_pose_needs_no_compiler_and_no_datasets():
+@pytest.mark.parametrize("command", ["analyze", "guidelines"])
+def test_one_pose_needs_no_compiler_and_no_datasets(command):
     script = (
         "import sys, kinetostat.cli\n"
-        f"kinetostat.cli.main(['analyze', '{MACHINE}'])\n"
+        f"kinetostat.cli.main(['{command}', '{MACHINE}'])\n"
         "print('LOADED', sorted({name.split('.')[0] for name in sys.modules}))\n"
     )
     output = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
     loaded = output.split("LOADED")[1]
-    for heavy in ("jax", "matplotlib", "xarray"):
+    for heavy in ("jax", "matplotlib", "xarray", "llvmlite"):
         assert f"'{heavy}'" not in loaded
+
+
+def test_what_takes_long_is_said_on_a_terminal(monkeypatch):
+    class Terminal(io.StringIO):
+        """Standard error on a terminal that tells when something has been written."""
+
+        written = threading.Event()
+
+        def isatty(self):
+            return True
+
+        def write(self, text):
+            size = super().write(text)
+            self.written.set()
+            return size
+
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setattr(common, "PATIENCE", 0.0)
+    with common.said_when_slow("looking"):
+        assert terminal.written.wait(60)
+    assert terminal.getvalue() == f"looking ...{common.CLEAR_LINE}"

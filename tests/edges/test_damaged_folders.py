@@ -64,6 +64,13 @@ def cut(path, place):
     path.write_bytes(path.read_bytes()[: int(place * path.stat().st_size)])
 
 
+def lengthened(path, place):
+    """Add a line that says nothing, at a share of the lines."""
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines.insert(int(place * len(lines)), b"nothing\n")
+    path.write_bytes(b"".join(lines))
+
+
 DAMAGES = [
     ("grid", "map.nc", flipped, 0.0001),
     ("grid", "map.nc", flipped, 0.2),
@@ -73,6 +80,9 @@ DAMAGES = [
     ("grid", "map.nc", cut, 0.01),
     ("grid", "history.jsonl", flipped, 0.3),
     ("grid", "history.jsonl", flipped, 0.98),
+    ("grid", "history.jsonl", lengthened, 1.0),
+    ("search", "history.jsonl", lengthened, 0.4),
+    ("search", "history.jsonl", lengthened, 1.0),
     ("search", "designs.bin", flipped, 0.1),
     ("search", "designs.bin", flipped, 0.5),
     ("search", "designs.bin", cut, 0.7),

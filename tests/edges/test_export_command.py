@@ -23,7 +23,7 @@ FORMS = [pytest.param(one, marks=needs_cad if one.name == "step" else (), id=one
 @pytest.mark.parametrize("one", FORMS)
 def test_every_format_is_written(one, tmp_path, capsys):
     path = tmp_path / f"out{one.suffix}"
-    assert main(["export", MACHINE, "--to", one.name, "-o", str(path)]) == DONE
+    assert main(["export", MACHINE, "--set", "tool.mass=5 kg", "--to", one.name, "-o", str(path)]) == DONE
     assert str(path) in capsys.readouterr().out.replace("\n", "")
     assert path.stat().st_size > 100
     assert not [other for other in tmp_path.iterdir() if other.name.startswith(".")]
@@ -78,7 +78,7 @@ def test_step_says_which_library_of_the_system_it_lacks(tmp_path, monkeypatch, c
     ("arguments", "code", "told"),
     [
         ([MACHINE], BAD_INPUT, "name it with --to"),
-        ([MACHINE, "--to", "iges"], BAD_INPUT, "choose from mjcf, urdf"),
+        ([MACHINE, "--to", "iges"], BAD_INPUT, "choose from mjcf, mjcf-vibration, urdf"),
         ([MACHINE, "-o", "a.docx"], BAD_INPUT, "one of these suffixes"),
         (["nope", "--to", "csv"], BAD_INPUT, "neither a file nor a bundled machine"),
         ([MACHINE, "--to", "csv", "--set", "pose.z=3 m"], NO_ANSWER, "span 3 m"),

@@ -80,7 +80,7 @@ BAD_FILES = [
         "angle in percent",
         '"-60 deg"',
         '"30 percent"',
-        ["pose.theta5", '"percent" is unknown', 'e.g. "30 deg"'],
+        ["pose.theta5", '"percent" is not a unit of angle', 'e.g. "30 deg"'],
     ),
     ("scaled unit", '"22 cm"', '"66 cm/3"', ["geometry.base_radius", '"66 cm/3"', *LENGTH]),
     ("no quotes", '"22 cm"', "22 cm", ["not valid TOML", "line 5", "need quotes"]),

@@ -105,6 +105,20 @@ def test_the_image_rests_on_a_pinned_slim_python():
     assert f"Programming Language :: Python :: 3.{minor[1]}" in PROJECT["classifiers"]
 
 
+def test_what_the_image_installs_is_pinned_by_hash():
+    """The hashes are those of the versions pinned for everybody; what core and studio ask for is among them."""
+    text = (ROOT / "pins.txt").read_text("utf-8")
+    entries = re.split(r"\n(?=\w)", re.sub(r"^#.*\n", "", text, flags=re.MULTILINE))
+    pinned = dict(re.match(r"([\w.-]+)==([^ ;]+)", entry).groups() for entry in entries)
+    constraints = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["uv"]["constraint-dependencies"]
+    assert pinned.items() <= dict(line.partition(";")[0].strip().split("==") for line in constraints).items()
+    assert all(re.search(r"--hash=sha256:[0-9a-f]{64}", entry) for entry in entries)
+    assert "://" not in text
+    direct = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["studio"]]
+    assert {re.match(r"[\w-]+", line)[0].lower() for line in direct} <= {*pinned}
+    assert "--require-hashes" in arguments("RUN")[1]
+
+
 def test_the_image_runs_without_rights():
     order = [instruction for instruction, _ in stages()[-1]]
     (user,) = arguments("USER")

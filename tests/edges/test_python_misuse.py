@@ -15,18 +15,24 @@ from kinetostat import (
     Machine,
     Status,
     analyze,
+    budget,
     build,
     bundled,
+    carrying_legs,
     changed,
+    command,
     compare,
+    correction_table,
     evaluate,
     evaluate_grid,
     export,
     forward,
     guidelines,
+    identify,
     load,
     load_problem,
     machine_picture,
+    modes,
     optimize,
     plot,
     register,
@@ -35,7 +41,9 @@ from kinetostat import (
     requirements,
     save,
     sensitivity,
+    under_load,
     validate,
+    validate_measured,
     workspace,
 )
 from kinetostat.spec.arguments import words_of
@@ -43,6 +51,12 @@ from refusals import refused
 
 H = load("hexapod")
 A = analyze(H)
+HEAVY = load("hexapod", ['tool.mass="12 kg"', "tool.inertia=[0.3, 0.3, 0.5, 0, 0, 0]"])
+JOINTS = {"joints": "0.05 mm"}
+MEASURED = "f.csv"
+TABLE = "x [mm],y [mm],z [mm],measured.x [mm],measured.y [mm],measured.z [mm]\n" + "".join(
+    f"{x},{y},{130 + x},{x + 0.01},{y},{130 + x}\n" for x in (-4, 0, 5) for y in (-3, 2)
+)
 OVER = ["x=-1 cm:1 cm:3", "y=-1 cm:1 cm:3"]
 SIZE = (64, 64)
 HEAD = {"schema": 1, "name": "a", "family": "hexapod"}
@@ -51,6 +65,16 @@ HEAD = {"schema": 1, "name": "a", "family": "hexapod"}
 @cache
 def problem():
     return load_problem("zhang-gosselin-2002", ["optimizer.population=8", "optimizer.generations=2"])
+
+
+@cache
+def ringing():
+    return modes(HEAVY)
+
+
+@cache
+def off():
+    return budget(H, tolerances=JOINTS, samples=64)
 
 
 class Odd:
@@ -191,13 +215,113 @@ MISUSES = [
     ("path", lambda: export(H, 3)),
     ("to", lambda: export(H, "a.xml", ["mjcf"])),
     ("status 99", lambda: Status(99)),
+    ("machine", lambda: modes("hexapod")),
+    ("machine", lambda: modes(A)),
+    ("machine", lambda: modes()),
+    ("loaded", lambda: modes(HEAVY, loaded=True)),
+    ("machine", lambda: budget("hexapod")),
+    ("poses", lambda: budget(H, 3)),
+    ("poses", lambda: budget(H, {"x": [Odd()]})),
+    ("poses", lambda: budget(H, "absent.csv")),
+    ("ranges", lambda: budget(H, ranges=3)),
+    ("count", lambda: budget(H, None, "x=0:1:3 m")),
+    ("tolerances", lambda: budget(H, tolerances=["joints"])),
+    ("tolerances", lambda: budget(H, tolerances="joints=1 mm")),
+    ("joints", lambda: budget(H, tolerances={"joints": Odd()})),
+    ("joints", lambda: budget(H, tolerances={"joints": None})),
+    ("joints", lambda: budget(H, tolerances={"joints": float("nan")})),
+    ("key of tolerances", lambda: budget(H, tolerances={3: "1 mm"})),
+    ("along", lambda: budget(H, along="z", tolerances=JOINTS)),
+    ("along", lambda: budget(H, along=(0, 0, 0), tolerances=JOINTS)),
+    ("along", lambda: budget(H, along=(1,), tolerances=JOINTS)),
+    ("along", lambda: budget(H, along=(np.inf, 0, 0), tolerances=JOINTS)),
+    ("samples", lambda: budget(H, samples=-1, tolerances=JOINTS)),
+    ("samples", lambda: budget(H, samples=1e3, tolerances=JOINTS)),
+    ("samples", lambda: budget(H, samples=10**12, tolerances=JOINTS)),
+    ("exact", lambda: budget(H, exact=10**12, tolerances=JOINTS)),
+    ("exact", lambda: budget(H, exact="many", tolerances=JOINTS)),
+    ("allocate", lambda: budget(H, allocate="5 kg", tolerances=JOINTS)),
+    ("allocate", lambda: budget(H, allocate=-1.0, tolerances=JOINTS)),
+    ("allocate", lambda: budget(H, allocate=[1], tolerances=JOINTS)),
+    ("allocate", lambda: budget(H, allocate=float("nan"), tolerances=JOINTS)),
+    ("by", lambda: budget(H, by="mean", tolerances=JOINTS)),
+    ("seed", lambda: budget(H, seed=-1, tolerances=JOINTS)),
+    ("progress", lambda: budget(H, progress=3)),
+    ("statistic", lambda: off().size("mad", "x")),
+    ("measure", lambda: off().size("rms", "q")),
+    ("key", lambda: off().shares_by("colour")),
+    ("measure", lambda: off().shares_by("line", "q")),
+    ("statistic", lambda: off().size(None, "x")),
+    ("statistic", lambda: off().size("__class__", "x")),
+    ("data", lambda: identify(H)),
+    ("data", lambda: identify(H, None)),
+    ("data", lambda: identify(H, 3)),
+    ("data", lambda: identify(H, {"x": [1]})),
+    ("f.csv", lambda: identify(H, "f.csv")),
+    ("CSV", lambda: identify(H, ".")),
+    ("machine", lambda: identify("hexapod", MEASURED)),
+    ("fit", lambda: identify(H, MEASURED, None)),
+    ("fit", lambda: identify(H, MEASURED, [3])),
+    ("zero", lambda: identify(H, MEASURED, "zero")),
+    ("fit", lambda: identify(H, MEASURED, [])),
+    ("frame", lambda: identify(H, MEASURED, ["zeros"], frame="yes")),
+    ("target", lambda: identify(H, MEASURED, ["zeros"], target=3)),
+    ("sigma", lambda: identify(H, MEASURED, ["zeros"], sigma=5e-6)),
+    ("sigma", lambda: identify(H, MEASURED, ["zeros"], sigma="5 kg")),
+    ("sigma_angle", lambda: identify(H, MEASURED, ["zeros"], sigma_angle=None)),
+    ("priors", lambda: identify(H, MEASURED, ["zeros"], priors=["zeros=1 mm"])),
+    (r"priors\['zeros'\]", lambda: identify(H, MEASURED, ["zeros"], priors={"zeros": 1e-3})),
+    ("bounds", lambda: identify(H, MEASURED, ["zeros"], bounds="zeros=1")),
+    ("bounds", lambda: identify(H, MEASURED, ["zeros"], bounds={3: "1 mm"})),
+    ("robust", lambda: identify(H, MEASURED, ["zeros"], robust="no")),
+    ("more", lambda: identify(H, MEASURED, ["zeros"], more=-1)),
+    ("more", lambda: identify(H, MEASURED, ["zeros"], more=1.5)),
+    ("more", lambda: identify(H, MEASURED, ["zeros"], more=10**9)),
+    ("tell", lambda: identify(H, MEASURED, ["zeros"], tell=3)),
+    ("too many", lambda: identify(H, MEASURED, ["zeros"], True)),
+    ("direction", lambda: ringing().along(None, [1.0])),
+    ("direction", lambda: ringing().along((0, 0, 0), [1.0])),
+    ("direction", lambda: ringing().softest("z")),
+    ("frequencies", lambda: ringing().receptance(None)),
+    ("frequencies", lambda: ringing().receptance(["a"])),
+    ("frequencies", lambda: ringing().along((0, 0, 1), 5.0)),
+    ("fit", lambda: identify(H, MEASURED, [])),
+    ("machine", lambda: under_load("hexapod")),
+    ("machine", lambda: command("hexapod")),
+    ("poses", lambda: command(H, 3)),
+    ("machine", lambda: carrying_legs(None, OVER)),
+    ("ranges", lambda: carrying_legs(H, None)),
+    ("ranges", lambda: carrying_legs(H, [3])),
+    ("over", lambda: correction_table(H, None)),
+    ("over", lambda: correction_table(H, [3])),
+    ("over", lambda: correction_table(H, {"x": 1})),
+    ("tolerance", lambda: correction_table(H, "x=-1 cm:1 cm:3", tolerance=[1])),
+    ("tolerance", lambda: correction_table(H, "x=-1 cm:1 cm:3", tolerance="1 kg")),
+    ("tolerance", lambda: correction_table(H, "x=-1 cm:1 cm:3", tolerance=-1.0)),
+    ("data", lambda: validate_measured(H, None)),
+    ("machine", lambda: validate_measured("hexapod", MEASURED)),
+    ("fit", lambda: validate_measured(H, MEASURED, fit=3)),
+    ("sigma", lambda: validate_measured(H, MEASURED, sigma=3)),
+    ("sigma", lambda: validate_measured(H, MEASURED, sigma="3 kg")),
+    ("inputs", lambda: export(HEAVY, "a.mat", inputs=3)),
+    ("inputs", lambda: export(HEAVY, "a.mat", inputs=["nose"])),
+    ("outputs", lambda: export(HEAVY, "a.mat", outputs=[3])),
+    ("outputs", lambda: export(HEAVY, "a.mat", outputs=[])),
+    ("inputs", lambda: export(HEAVY, "a.xml", inputs=["force.x"])),
+    ("inputs", lambda: export(HEAVY, "a.mat", inputs=[])),
+    ("which", lambda: plot(ringing(), "nose")),
+    ("which", lambda: plot(ringing(), 3)),
+    ("which", lambda: plot(off(), "nose")),
+    ("suffix", lambda: save(ringing(), "a.png")),
+    ("suffix", lambda: save(off(), "a.toml")),
+    ("path", lambda: save(off(), 3)),
 ]
 
 
 @pytest.mark.parametrize(("name", "misuse"), MISUSES, ids=[str(number) for number in range(len(MISUSES))])
 def test_a_misuse_is_refused_by_the_name_of_the_argument(name, misuse, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "f.csv").touch()
+    (tmp_path / "f.csv").write_text(TABLE)
     with refused(rf"(^|\W){name}\W") as caught:
         misuse()
     assert str(caught.value).isprintable()

@@ -27,6 +27,7 @@ TITLES = (
     "Add a limit",
     "Add an index",
     "Add an export format",
+    "Add a damper or a mass",
 )
 
 

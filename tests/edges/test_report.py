@@ -9,11 +9,13 @@ from machine_files import GOOD
 from pypdf import PdfReader
 from report_pages import MACHINE, QUICK, Page, no_pictures, number, reported, small_pictures
 
+from kinetostat import report
 from kinetostat.cli import main
 from kinetostat.commands.common import STOPPED
 from kinetostat.commands.report import WITHOUT
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values
+from kinetostat.spec.errors import InputError
 from kinetostat.spec.installation import adding
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.report import answers
@@ -22,6 +24,7 @@ from kinetostat.views.report import pdf, pictures
 from kinetostat.views.report.assembly import report_of
 from kinetostat.views.report.html_page import html_page
 from kinetostat.views.report.provenance import Origin
+from pages import ROOT
 from studies import SMALL
 
 LOAD = ["--set", 'load.force=["0 N","0 N","-500 N"]']
@@ -334,3 +337,61 @@ def test_loads_without_rest_are_said_in_the_report(tmp_path):
     page = Page(reported(tmp_path / "r.html", "hexapod", *LESS, *words))
     assert "Under load, no rest: 6-UPS hexapod (stewart-simscape) comes to no rest" in page.text
     assert not any(caption.startswith("Load and deformation of every") for caption in page.tables)
+
+
+def test_a_machine_with_a_heavy_platform_has_a_section_of_its_vibrations(tmp_path):
+    words = [*LESS, "--set", "tool.mass=12 kg", "--set", "tool.inertia=[0.3, 0.3, 0.5, 0, 0, 0]"]
+    page = Page(reported(tmp_path / "r.html", "hexapod", *words))
+    known = told("modes", "hexapod", *words[-4:])
+    assert page.results["vibration"] == known
+    assert f"Vibration: {known['message']}" in page.text
+    _, *rows = page.table("Natural frequencies")
+    assert [number(row[1]) for row in rows] == pytest.approx([m["frequency"] for m in known["modes"]], rel=5e-4)
+    assert "Vibration:" not in Page(reported(tmp_path / "s.html", "hexapod", *LESS)).text
+
+
+def test_a_machine_with_tolerances_has_a_section_of_its_error(tmp_path):
+    words = [*LESS, "--set", "tolerances.joints=0.05 mm"]
+    page = Page(reported(tmp_path / "r.html", "hexapod", *words))
+    built = told("budget", "hexapod", *words[-2:])
+    assert page.results["budget"] == built
+    assert f"As built: {built['message']}" in page.text
+    _, *rows = page.table("Error of the tool at the platform point P")
+    assert number(rows[-1][4]) == pytest.approx(1e6 * built["errors"]["usual"]["position"], rel=5e-3)
+    assert [row[0] for row in page.table("Contributions of the lines")[1:]] == ["joints"]
+    assert "As built:" not in Page(reported(tmp_path / "s.html", "hexapod", *LESS)).text
+
+
+def test_a_fit_has_a_section_with_its_numbers_and_pictures(tmp_path):
+    folder = tmp_path / "fit"
+    folder.mkdir()
+    unknown = {"path": "legs.leg 1.actuator.zero", "group": "zeros", "unit": "m", "words": "zero of leg 1"}
+    record = {
+        "machine": load("hexapod").name, "family": "hexapod", "data": "m.csv", "poses": 20, "values": 60, "rank": 1,
+        "unknowns": [
+            unknown | {"value": 1.234e-4, "half_interval_95": 2e-6},
+            unknown | {"path": "legs.leg 2.actuator.compliance", "group": "compliances", "unit": "1", "value": 0.125,
+                       "half_interval_95": None},
+        ],
+        "covariance": [[1e-12, 0.0], [0.0, 0.0]], "scatter": 3.2, "sigma_known": True,
+        "before": {"length": 4e-4}, "after": {"length": 5e-6}, "left_out": {"length": 6e-6},
+        "outliers": [{"line": 17, "value": "x", "sigmas": -35.0}],
+        "unseen": [{"words": "A <common> shift.", "tool": 1e-3, "inside": 0.0}],
+    }  # fmt: skip
+    (folder / "fit.json").write_text(json.dumps(record))
+    residual = next((ROOT / "docs" / "images").glob("*.png"))
+    (folder / "residuals.png").write_bytes(residual.read_bytes())
+    (folder / "poses.png").write_text("not a picture")
+    page = Page(reported(tmp_path / "r.html", "hexapod", *LESS, "--fit", str(folder)))
+    for words in ("60 values at 20 poses (m.csv)", "3.2 times as large", "123.4 µm", "12.5 %", "not seen", "400 µm",
+                  "A <common> shift.", "17"):  # fmt: skip
+        assert words in page.text
+    assert "What is left of every measured value" in page.text
+    assert "The tool points at which" not in page.text
+    with pytest.raises(InputError, match="is the fit of 6-UPS hexapod"):
+        report(load("delta"), tmp_path / "s.html", fit=folder)
+    (folder / "fit.json").write_text('{"machine": 3}')
+    with pytest.raises(InputError, match="is not the record of a fit"):
+        report(load("hexapod"), tmp_path / "s.html", fit=folder)
+    with pytest.raises(InputError, match="cannot be read"):
+        report(load("hexapod"), tmp_path / "s.html", fit=tmp_path / "nowhere.json")

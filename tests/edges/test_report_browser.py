@@ -18,7 +18,8 @@ def page(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         small_pictures(patch)
         file = tmp_path_factory.mktemp("report") / "r.html"
-        reported(file, MACHINE, *QUICK, "--without", "maps", "--set", 'load.force=["0 N","0 N","-500 N"]')
+        given = ("--set", 'load.force=["0 N","0 N","-500 N"]', "--set", "tool.mass=40 kg")
+        reported(file, MACHINE, *QUICK, "--without", "maps", *given)
     with browser() as new_tab:
         page = new_tab(width=640, height=640)
         page.tab.goto(file.as_uri())
@@ -44,6 +45,20 @@ def test_the_machine_is_there_and_follows_its_buttons(page):
     assert above != before
     page.tab.get_by_label("deflected shape").uncheck()
     assert shot(page) != above
+
+
+def test_a_mode_of_vibration_swings_until_it_is_paused(page):
+    view, modes = page.tab.locator(".machine-view"), page.tab.get_by_role("combobox")
+    assert modes.locator("option").first.inner_text() == "none"
+    modes.select_option(index=1)
+    page.tab.wait_for_function("document.querySelector('.machine-view').dataset.share < 0.5")
+    page.tab.get_by_role("button", name="pause").click()
+    assert view.get_attribute("data-swings") == "false"
+    page.tab.get_by_role("button", name="play").click()
+    assert view.get_attribute("data-swings") == "true"
+    modes.select_option(label="none")
+    assert view.get_attribute("data-swings") == ""
+    assert page.tab.get_by_role("button", name="pause").count() == 0
 
 
 def test_it_is_dark_where_people_like_it_dark_and_light_on_paper(page):

@@ -10,29 +10,21 @@ from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, NO_ANSWER
 from kinetostat.machine.loading import as_toml, machine_schema
 from kinetostat.machine.saving import as_file
+from machines import cable, written
 from refusals import refused
 
 PUSHED = ["--set", 'load.force=[0, 0, "-400 N"]']
 LOADED = ["--set", "load.state=loaded"]
-CABLES = """
-schema = 1
-name = "four upright cables"
-family = "legs"
-space = "planar"
-[platform]
-point = [0, 0, 0]
-[pose]
-x = 0
-y = 0
-yaw = 0
-[load]
+LOAD = """[load]
 state = "loaded"    # the comment stays
 force = [0, -500, 0]
 min_tension = 50
-""" + "".join(
-    f'[[legs]]\nname = "{name}"\ntype = "cable"\nstiffness = 2e5\n'
-    f"from = [{x}, {2 * up}, 0]\nto = [{x}, {0.2 * up}, 0]\n"
-    for name, x, up in (("a", -1, 1), ("b", 1, 1), ("c", -1, -1), ("d", 1, -1))
+"""
+ENDS = {"a": (-1, 1), "b": (1, 1), "c": (-1, -1), "d": (1, -1)}
+CABLES = (
+    written("four upright cables", (0, 0, 0), {"x": 0, "y": 0, "yaw": 0})
+    + LOAD
+    + "".join(cable(name, (x, 2 * up, 0), (x, 0.2 * up, 0)) for name, (x, up) in ENDS.items())
 )
 
 

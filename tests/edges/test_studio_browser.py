@@ -181,6 +181,26 @@ def test_a_machine_chosen_from_the_list_is_drawn(page):
     assert page.text(".pose-status") == "ok"
 
 
+def test_a_pose_out_of_reach_leg_by_leg_says_first_that_the_nearest_is_looked_for(page):
+    page.choose("machine", "tripteron")
+    page.tab.wait_for_function("document.title.startsWith('Tripteron')")
+    page.tab.evaluate("""() => {
+        const line = document.querySelector('.pose-message');
+        window.messages = [];
+        const note = () => window.messages.push(line.innerText);
+        new MutationObserver(note).observe(line, { childList: true, characterData: true, subtree: true });
+    }""")
+    box = page.tab.locator(".quantity-text").nth(0)
+    box.fill("3 m")
+    box.press("Enter")
+    page.tab.wait_for_function("window.messages.at(-1)?.includes('the nearest admissible pose is x')")
+    messages = page.tab.evaluate("window.messages")
+    assert any("is being looked for" in message for message in messages[:-1])
+    page.tab.keyboard.press("Escape")
+    page.tab.get_by_role("button", name="Undo (Ctrl+Z)").click()
+    page.until_changed(".pose-status", "out of reach")
+
+
 def test_under_another_name_there_is_no_page(address):
     """A site whose name is made to point to this computer gets nothing from it."""
     assert httpx.get(address).status_code == 200

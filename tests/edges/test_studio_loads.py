@@ -27,7 +27,7 @@ def test_the_switch_shows_the_machine_at_rest_and_offers_what_loads_it():
         overlay = page.shown("MachineView", "overlay")
         assert overlay != free
         assert {solid["layer"] for solid in overlay} == {"load", "deflection"}
-        assert page.one("control load.gravity.2")._props["text"] == "0 m/s**2"
+        assert page.one("control load.gravity.2")._props["text"] == "0 m/s²"
         await page.choose("loaded", False)
         assert page.one("status").text == "ok"
         assert page.shown("MachineView", "overlay") == free

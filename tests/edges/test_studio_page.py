@@ -1,19 +1,27 @@
 """Sliders, fields, maps and panels of the studio, driven without a browser: numbers as `analyze` has them, history."""
 
+import asyncio
 import json
 import math
+from threading import Event
 
 import pytest
 from studio_page import on_page
 
 from kinetostat.cli import main
+from kinetostat.kinematics.nearest import nearest_pose
 from kinetostat.machine.loading import bundled, load
+from kinetostat.studies import refusal
 from kinetostat.studies.analysis import analyze
-from kinetostat.studio import answers
+from kinetostat.studio import answers, lanes
+from kinetostat.studio import page as page_of_a_tab
 from kinetostat.studio.panels.tables import matrix_text
+from kinetostat.studio.scene_panel import ScenePanel
 from machines import KINDS
 
 MACHINE = "zhang-gosselin-4dof"
+RESCUE = 20
+"""Seconds after which a computation that waits for the page goes on, so that a test fails instead of hanging."""
 
 
 def analysed(capsys, *settings):
@@ -91,6 +99,59 @@ def test_what_is_no_value_is_refused_at_its_place():
         assert row["text"] == "220 mm"
         await page.send("control geometry.base_radius", "write", "23 cm")
         assert page.one("control geometry.base_radius")._props["problem"] == ""
+
+    on_page(steps)
+
+
+def test_a_pose_out_of_reach_says_at_once_that_the_nearest_is_looked_for(monkeypatch):
+    """The nearest pose is not there before all else has been answered."""
+    answered = Event()
+
+    def patient(machine):
+        answered.wait(RESCUE)
+        return nearest_pose(machine)
+
+    monkeypatch.setattr(refusal, "nearest_pose", patient)
+
+    async def steps(page):
+        try:
+            figures = page.one("headline").content
+            refused = asyncio.create_task(page.send("control pose.x", "write", "3 m"))
+            await asyncio.sleep(0)
+            await page.until(lambda: page.one("status").text == "out of reach")
+            assert "is being looked for" in page.one("message").text
+            page.one("map-quantity").value = "compliance_rx"
+            shown = len(page.calls)
+            await page.until(lambda: any(what == "MapView" for what, _, _ in page.calls[shown:]))
+            assert "is being looked for" in page.one("message").text
+        finally:
+            answered.set()
+        await refused
+        assert "the nearest admissible pose is x " in page.one("message").text
+        assert page.one("headline").content == figures
+
+    on_page(steps, "tripteron")
+
+
+def test_a_pose_that_takes_its_time_says_so(monkeypatch):
+    seen = Event()
+
+    def patient(request):
+        seen.wait(RESCUE)
+        return answers.picture(request)
+
+    def wait(panel, said=ScenePanel.wait):
+        said(panel)
+        assert panel.message.text.endswith("...")
+        seen.set()
+
+    monkeypatch.setattr(lanes, "PATIENCE", 0.0)
+    monkeypatch.setattr(page_of_a_tab, "picture", patient)
+    monkeypatch.setattr(ScenePanel, "wait", wait)
+
+    async def steps(page):
+        assert seen.is_set()
+        assert "..." not in page.one("message").text
 
     on_page(steps)
 

@@ -23,15 +23,20 @@ MACHINE = "delta"
 
 @contextlib.contextmanager
 def files_of_at_most(size):
-    """Writing behind byte `size` of any file fails, as on a full disk."""
+    """Writing behind byte `size` of any file fails, as on a full disk.
+
+    Python keeps what it compiles meanwhile to itself: a file of it that is cut would be read by the next process.
+    """
     import resource
 
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before, compiled = resource.getrlimit(resource.RLIMIT_FSIZE), sys.dont_write_bytecode
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    sys.dont_write_bytecode = True
     try:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        sys.dont_write_bytecode = compiled
 
 
 def tree(folder):
@@ -45,25 +50,48 @@ def test_an_export_to_a_full_disk_is_one_sentence_and_leaves_nothing(suffix, tmp
     assert tree(tmp_path) == []
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        ["sweep", MACHINE, "--vary", "x=-1 cm:1 cm:5"],
-        ["map", MACHINE, "--over", "x=-1 cm:1 cm:2", "--over", "y=-1 cm:1 cm:2"],
-        ["workspace", MACHINE, "--over", "x=-1 cm:1 cm:3", "--over", "y=-1 cm:1 cm:3"],
-        ["optimize", "STUDY"],
-        ["report", MACHINE, *(word for part in WITHOUT for word in ("--without", part))],
-    ],
-    ids=lambda words: words[0],
-)
-def test_a_command_on_a_full_disk_is_one_sentence(command, tmp_path, capsys):
+HEAVY = ["--set", "tool.mass=2 kg", "--set", "tool.inertia=[0.01, 0.01, 0.02, 0, 0, 0]"]
+WRITING = {
+    "sweep": [MACHINE, "--vary", "x=-1 cm:1 cm:5"],
+    "map": [MACHINE, "--over", "x=-1 cm:1 cm:2", "--over", "y=-1 cm:1 cm:2"],
+    "workspace": [MACHINE, "--over", "x=-1 cm:1 cm:3", "--over", "y=-1 cm:1 cm:3"],
+    "optimize": ["study.toml"],
+    "report": [MACHINE, *(word for part in WITHOUT for word in ("--without", part))],
+    "analyze": [MACHINE, *HEAVY, "--loaded"],
+    "command": [MACHINE, "poses.csv", *HEAVY],
+    "path": [MACHINE, "poses.csv"],
+    "modes": [MACHINE, *HEAVY],
+    "budget": [MACHINE, "--tolerance", "joints=0.05 mm", "--samples", "64"],
+    "identify": [MACHINE, "measured.csv", "--fit", "zeros"],
+    "export": [MACHINE, *HEAVY, "--to", "state-space"],
+    "compare": [MACHINE, MACHINE],
+}
+"""Commands that write, with what they need besides -o; `given` has the files."""
+SINGLE = {"report": "out.html", "command": "out.csv", "path": "out.nc", "export": "out.mat"}
+"""What is written by those that write a file, not a folder."""
+
+
+@pytest.fixture
+def given(tmp_path, monkeypatch):
+    """A current folder with a study, poses and measurements."""
+    monkeypatch.chdir(tmp_path)
+    home = load(MACHINE).tables["pose"].z * 1e3
+    poses = [(x, y, home + z) for x in (-9, 4) for y in (-5, 8) for z in (-7, 6)]
+    rows = [f"{x},{y},{z},{x + 0.01},{y},{z - 0.02}" for x, y, z in poses]
     (tmp_path / "study.toml").write_text(SMALL)
-    words = [str(tmp_path / "study.toml") if word == "STUDY" else word for word in command]
-    with files_of_at_most(600):
-        assert main([*words, "-o", str(tmp_path / ("out.html" if command[0] == "report" else "out"))]) == BAD_INPUT
+    (tmp_path / "poses.csv").write_text("\n".join(["x [mm],y [mm],z [mm]", *(f"{x},{y},{z}" for x, y, z in poses)]))
+    heads = "x [mm],y [mm],z [mm],measured.x [mm],measured.y [mm],measured.z [mm]"
+    (tmp_path / "measured.csv").write_text("\n".join([heads, *rows]))
+    return tmp_path
+
+
+@pytest.mark.parametrize("command", WRITING)
+def test_a_command_on_a_full_disk_is_one_sentence(command, given, capsys):
+    with files_of_at_most(300):
+        assert main([command, *WRITING[command], "-o", str(given / SINGLE.get(command, "out"))]) == BAD_INPUT
     captured = capsys.readouterr()
     assert captured.err.count("cannot be written: it would exceed the largest size") == 1
-    assert not [name for name in tree(tmp_path) if PREFIX in name]
+    assert not [name for name in tree(given) if PREFIX in name]
 
 
 def test_a_large_grid_on_a_full_disk_is_one_sentence(tmp_path, monkeypatch, capsys):
@@ -125,6 +153,16 @@ def test_only_plain_files_are_replaced(kind, words, tmp_path, capsys):
     assert words in capsys.readouterr().err
     assert (path.lstat().st_ino, path.lstat().st_mode) == (before.st_ino, before.st_mode)
     assert tree(tmp_path) == ["file.csv"]
+
+
+@pytest.mark.parametrize("kind", ["fifo", "link to a device", "link to itself"])
+@pytest.mark.parametrize("command", WRITING)
+def test_a_command_writes_into_folders_and_plain_files_only(command, kind, given, capsys):
+    path = occupied(given, kind)
+    before = path.lstat()
+    assert main([command, *WRITING[command], "-o", str(path)]) == BAD_INPUT
+    assert capsys.readouterr().err.count("\n") == 1
+    assert (path.lstat().st_ino, path.lstat().st_mode) == (before.st_ino, before.st_mode)
 
 
 @pytest.mark.parametrize("there", [True, False])

@@ -46,7 +46,7 @@ def test_a_number_has_four_digits_and_no_empty_zeros(value, text):
         (70e9, "Pa", "70 GPa"),
         (0.26, "1", "0.26"),
         (0.26, "", "0.26"),
-        (1.5, "m**3", "1.5 m**3"),
+        (1.5, "m**3", "1.5 m³"),
     ],
 )
 def test_a_result_is_shown_in_engineering_units(value, unit, text):

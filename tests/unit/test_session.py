@@ -1,10 +1,12 @@
 """A designer's session apart from any page: changes, their history, files."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from kinetostat.machine.loading import load
+from kinetostat.machine.parameters import parameters
 from machines import every_machine
 from refusals import refused
 
@@ -127,8 +129,10 @@ def test_a_session_goes_on_from_its_memory(session):
 
 @every_machine
 def test_every_number_has_a_control_and_text_that_can_be_typed(case):
-    session = Session(Memory(case.machine))
-    assert {path for path in case.ranges if not path.startswith("tool.")} <= set(session.controls)
+    session = Session(Memory(replace(case.machine, loaded=True)))
+    moved = {leaf for control in session.controls.values() for leaf in control.parameter.leaves}
+    assert moved == {leaf for parameter in parameters(case.machine.family) for leaf in parameter.leaves}
+    assert {path for path, control in session.controls.items() if len(control.parameter.leaves) == 1} == moved
     held = session.values()
     for path, control in session.controls.items():
         assert control.panel in PANELS
@@ -146,6 +150,24 @@ def test_sliders_contain_the_value_and_go_both_ways(case):
             continue
         assert control.value_at(control.position_of(held[path])) == pytest.approx(held[path], rel=0.02, abs=0.02)
         assert control.value_at(0) < control.value_at(STEPS // 2) < control.value_at(STEPS)
+
+
+def test_what_weighs_nothing_yet_has_a_slider_from_nothing_on():
+    """A body has no moment of inertia about one axis alone, so that the first slider moves all three."""
+    session = Session(Memory(load("hexapod")))
+    for path in ("tool.mass", "linear_density.legs", "drives.rotor_inertia", "drives.lead", "damping.ratio"):
+        control = session.controls[path]
+        assert (control.panel, control.value_at(0)) == ("Mass", 0.0)
+        session.slide(path, STEPS // 2)
+        assert session.value(path) == pytest.approx(0.5 * control.high)
+        assert control.high > 0.0
+    with refused("which no body has"):
+        session.slide("tool.inertia.0", STEPS)
+    session.settle()
+    session.write("tool.inertia", "0.3 kg*m**2")
+    session.write("tool.inertia.2", "0.5 kg*m**2")
+    assert session.machine.tables["tool"].inertia == (0.3, 0.3, 0.5, 0.0, 0.0, 0.0)
+    assert session.controls["tool.inertia.3"].value_at(0) < 0.0
 
 
 def test_the_last_position_of_a_stiffness_is_rigid(session):

@@ -59,6 +59,13 @@ def cos(a: Scalar) -> Scalar:
     return math.cos(a) if isinstance(a, float) else a.__array_namespace__().cos(a)
 
 
+def steady(a: Scalar) -> Scalar:
+    """The number itself, which derivatives of traced formulas take for a constant."""
+    traced = getattr(a, "__array_namespace__", None)
+    constant = getattr(traced(), "steady", None) if traced else None
+    return constant(a) if constant else a
+
+
 def where(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
     """`a` where the condition holds, `b` elsewhere."""
     if not hasattr(condition, "__array_namespace__"):

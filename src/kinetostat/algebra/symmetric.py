@@ -1,4 +1,4 @@
-"""Symmetric matrices: K and C by their 21 upper entries, and the greatest eigenvalue of small ones, without branches.
+"""Symmetric matrices: K and C by their 21 upper entries, and the eigenvalues of small ones, without branches.
 
 Factorisations are in `solve`. K and C are in the axes and at the point of the screws whose dyads add up to them.
 
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from kinetostat.algebra.scalar import Scalar, sqrt, total, weighted, where
+from kinetostat.algebra.scalar import Scalar, sqrt, steady, total, weighted, where
 from kinetostat.algebra.screw import Screw
 
 SIZE = 6
@@ -62,24 +62,55 @@ SWEEPS_OF_LARGER = 7
 
 
 def greatest_eigenvalue(rows: Sequence[Sequence[Scalar]]) -> Scalar:
-    """Return the greatest eigenvalue of a symmetric matrix [n x n].
-
-    Accurate to some units of round-off, also where eigenvalues are equal. NaN where an entry is infinite. Derivatives
-    are those of the eigenvalue that is chosen.
-    """
-    size = len(rows)
-    at = {(i, j): rows[i][j] for i in range(size) for j in range(i, size)}
-    for _ in range({1: 0, 2: 1, 3: SWEEPS}.get(size, SWEEPS_OF_LARGER)):
-        for p, q in combinations(range(size), 2):
-            _rotate(at, p, q, [i for i in range(size) if i not in (p, q)])
-    greatest = at[0, 0]
-    for i in range(1, size):
-        greatest = where(at[i, i] > greatest, at[i, i], greatest)
+    """Return the greatest eigenvalue of a symmetric matrix [n x n]; see `eigenvalues`."""
+    values = eigenvalues(rows)
+    greatest = values[0]
+    for value in values[1:]:
+        greatest = where(value > greatest, value, greatest)
     return greatest
 
 
-def _rotate(at: dict[tuple[int, int], Scalar], p: int, q: int, others: Sequence[int]) -> None:
-    """Turn rows and columns p and q so that their common entry vanishes, by the smaller of the two angles."""
+def eigenvalues(rows: Sequence[Sequence[Scalar]], sloped: bool = False) -> list[Scalar]:
+    """Return the eigenvalues of a symmetric matrix [n x n], in no order.
+
+    Accurate to some units of round-off of the greatest, also where eigenvalues are equal. NaN where an entry is
+    infinite.
+
+    Args:
+        rows: of the matrix.
+        sloped: whether derivatives will be taken where eigenvalues may be equal. Each is then v^T A v with its
+            eigenvector v kept: its derivative is v^T dA v, so that the mean of equal ones has the derivative that it
+            should have. That of the rotations themselves is lost in the round-off of their angles.
+    """
+    size = len(rows)
+    at = {(i, j): rows[i][j] for i in range(size) for j in range(i, size)}
+    axes = [[1.0 if i == j else 0.0 for j in range(size)] for i in range(size)]
+    for _ in range({1: 0, 2: 1, 3: SWEEPS}.get(size, SWEEPS_OF_LARGER)):
+        for p, q in combinations(range(size), 2):
+            cosine, sine = _rotate(at, p, q, [i for i in range(size) if i not in (p, q)])
+            if sloped:
+                for axis in axes:
+                    axis[p], axis[q] = cosine * axis[p] - sine * axis[q], sine * axis[p] + cosine * axis[q]
+    if not sloped:
+        return [at[i, i] for i in range(size)]
+    vectors = [[steady(axis[k]) for axis in axes] for k in range(size)]
+    return [_form(rows, vector) for vector in vectors]
+
+
+def _form(rows: Sequence[Sequence[Scalar]], vector: Sequence[Scalar]) -> Scalar:
+    """v^T A v / v^T v; of A only the upper triangle is read."""
+    size = range(len(rows))
+    diagonal = total([rows[i][i] * (vector[i] * vector[i]) for i in size])
+    beside = total([rows[i][j] * (vector[i] * vector[j]) for i in size for j in range(i + 1, len(rows))])
+    return (diagonal + 2.0 * beside) / total([part * part for part in vector])
+
+
+def _rotate(at: dict[tuple[int, int], Scalar], p: int, q: int, others: Sequence[int]) -> tuple[Scalar, Scalar]:
+    """Turn rows and columns p and q so that their common entry vanishes, by the smaller of the two angles.
+
+    Returns:
+        Its cosine and sine.
+    """
     apart, coupling = at[q, q] - at[p, p], at[p, q]
     square = apart * apart + 4.0 * (coupling * coupling)
     turned = square > 0.0
@@ -87,10 +118,9 @@ def _rotate(at: dict[tuple[int, int], Scalar], p: int, q: int, others: Sequence[
     tangent = where(turned, where(apart < 0.0, -2.0, 2.0) * coupling / size, 0.0)
     # Where both diagonal entries are equal and nothing couples them, there is nothing to turn: the angle is 0.
     at[p, p], at[q, q], at[p, q] = at[p, p] - tangent * coupling, at[q, q] + tangent * coupling, 0.0
-    if not others:
-        return
     cosine = 1.0 / sqrt(1.0 + tangent * tangent)
     sine = tangent * cosine
     for other in others:
         first, second = (min(p, other), max(p, other)), (min(q, other), max(q, other))
         at[first], at[second] = cosine * at[first] - sine * at[second], sine * at[first] + cosine * at[second]
+    return cosine, sine

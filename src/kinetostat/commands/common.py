@@ -8,7 +8,9 @@ import json
 import re
 import sys
 import textwrap
+import threading
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -36,13 +38,21 @@ QUANTITIES = (
     "least_translational_stiffness, greatest_translational_stiffness, least_rotational_stiffness, "
     "greatest_rotational_stiffness, frobenius_condition (of K), singularity_margin (0: singular, 1: best), "
     "aspect (1 or -1; the sign changes at singularities), shortest_leg, longest_leg, actuator_force, "
-    "actuator_moment (the greatest under [load]), mass (of all moving parts); of the machine at rest under its loads: "
+    "actuator_moment (the greatest under [load]), mass (of all moving parts), frequency (the six lowest natural "
+    "frequencies) or frequency_1, least_real_receptance and stable_width (across [cutting]); of the machine at rest "
+    "under its loads: "
     'displacement (the default where [load] says state = "loaded"), tangent_stiffness, tangent_free_stiffness, '
-    "load_factor, slack_springs; repeatable"
+    "load_factor, slack_springs, loaded_frequency; repeatable"
 )
 """Help on the quantities of sweeps, maps and sensitivities."""
+DISPLACED = "the machine at rest under its loads: its displacement, if no quantity is named"
+"""Help on `--loaded` of commands that name quantities."""
 MACHINE = "a machine file, or the name of a bundled machine (see `kinetostat list`)"
 
+PATIENCE = 0.3
+"""Seconds for which an answer may take without a word."""
+CLEAR_LINE = "\r\x1b[K"
+"""Makes a terminal empty the line that it is in."""
 MEMORY = 600.0
 """Seconds of progress from which the remaining time is estimated: several chunks, even where each takes minutes."""
 
@@ -106,9 +116,11 @@ def takes_machine(command: Parser, what: str = MACHINE) -> None:
     takes_units(command)
 
 
-def takes_loaded(command: Parser, what: str) -> None:
-    """Give a command about many poses `--loaded`, which says what [load] state says."""
-    command.add_argument("--loaded", dest="loaded_state", action="store_true", help=what)
+def takes_loaded(command: Parser, meaning: str) -> None:
+    """Give a command `--loaded`, which wants what `state = "loaded"` in [load] wants."""
+    command.add_argument(
+        "--loaded", action="store_true", help=f'{meaning} (default where [load] says state = "loaded")'
+    )
 
 
 def takes_units(command: Parser) -> None:
@@ -182,6 +194,15 @@ def write_figures(options: argparse.Namespace, drawings: "Drawings") -> list[Pat
         return save(drawings, options.output, options.formats, update)
 
 
+def direction(text: str) -> tuple[float, ...]:
+    """Read a direction, three numbers with commas, as an option of the command line."""
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text} is not a direction; give three numbers, e.g. 0,0,1") from None
+    return x, y, z
+
+
 def takes_json(command: Parser) -> None:
     """Give a command `--json`."""
     command.add_argument("--json", action="store_true", help="print the result as JSON and nothing else")
@@ -202,8 +223,12 @@ def load_machine(options: argparse.Namespace, more: "Sequence[str]" = ()) -> "Ma
 
         if options.machine in bundled_studies():
             raise InputError(f'"{options.machine}" {STUDY}')
-    state = ["load.state=loaded"] if getattr(options, "loaded_state", False) else []
-    machine = load(options.machine, [*options.settings, *state, *more])
+    return as_wanted(options, load(options.machine, [*options.settings, *more]))
+
+
+def as_wanted(options: argparse.Namespace, machine: "Machine") -> "Machine":
+    """Return a machine with the units of `--units`, and under its loads where `--loaded` says so."""
+    machine = replace(machine, loaded=True) if getattr(options, "loaded", False) else machine
     return machine.in_units(options.units) if options.units else machine
 
 
@@ -286,6 +311,23 @@ def search_bar(what: str) -> "Iterator[Callable[[int, int, str], None]]":
         yield lambda done, total, words: bar.update(
             task, completed=done, total=total, description=f"{what} {words}".rstrip()
         )
+
+
+@contextmanager
+def said_when_slow(what: str) -> "Iterator[None]":
+    """Say on a terminal what is being done as soon as it takes longer than people wait without a word."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    words = sys.stderr
+    timer = threading.Timer(PATIENCE, lambda: print(f"{what} ...", end="", file=words, flush=True))
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
+        print(CLEAR_LINE, end="", file=words, flush=True)
 
 
 def verdicts_of(machine: "Machine") -> "tuple[Verdict, ...]":

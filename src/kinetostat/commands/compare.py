@@ -1,4 +1,4 @@
-"""The commands `compare` and `validate`: designs side by side, and a machine in an independent engine.
+"""The commands `compare` and `validate`: designs side by side, and a machine beside an engine or a measurement.
 
 No formula lives here.
 """
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from kinetostat.commands.common import Commands
+    from kinetostat.machine.machine import Machine
     from kinetostat.studies.comparison.designs import Comparison
 
 
@@ -49,7 +50,8 @@ def add_compare_commands(commands: "Commands") -> None:
     takes_figures(compare, "the figure and JSON")
     takes_json(compare)
     validate = add_command(
-        commands, "validate", _validate, "compare the machine with an independent engine",
+        commands, "validate", _validate,
+        "compare the machine with an independent engine, or with a measured stiffness",
         'kinetostat validate tripteron --pose x="0.4 m" y="0.6 m" --pose z="0.3 m"',
     )  # fmt: skip
     takes_machine(validate)
@@ -58,6 +60,25 @@ def add_compare_commands(commands: "Commands") -> None:
         help="coordinates of the pose to change from those of the file; repeat for several poses",
     )  # fmt: skip
     validate.add_argument("--engine", help="exudyn or pynite (default: the first that is installed)")
+    validate.add_argument(
+        "--measured", metavar="FILE", type=Path,
+        help="compare with a measured stiffness instead: a CSV file with the columns entry (stiffness_z, "
+        "compliance_rx_y, free_stiffness_x), value and sigma, or with deflections under loads as `identify` takes them",
+    )  # fmt: skip
+    validate.add_argument(
+        "--fit", metavar="FILE", type=Path, help="fit.json of `identify`, whose values and covariance then count"
+    )
+    validate.add_argument(
+        "--tolerance", metavar="WHAT=VALUE", action="append", default=[], dest="tolerances",
+        help="how sure numbers of the machine are, as a line of [tolerances], e.g. --tolerance \"compliances=sigma 10 "
+        "%%\"; repeatable",
+    )  # fmt: skip
+    validate.add_argument(
+        "--sigma", metavar="SIZE", default="",
+        help="standard deviation of what has none in the file: a share (3 %%), or of deflections a length",
+    )  # fmt: skip
+    validate.add_argument("--sigma-angle", metavar="ANGLE", default="", help="the same of deflections that are angles")
+    takes_figures(validate, "the figure and JSON of --measured")
     takes_json(validate)
 
 
@@ -92,11 +113,15 @@ def _validate(options: argparse.Namespace) -> int:
     from kinetostat.views.comparison_tables import print_validation
 
     poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]
-    machines = [load_machine(options, pose) for pose in poses]
+    lines = [f"tolerances.{line}" for line in options.tolerances]
+    machines = [load_machine(options, [*pose, *lines]) for pose in poses]
+    _check_words(options)
     for machine in machines:
         analysis = analyze(machine)
         if analysis.status is not Status.OK:
             return no_answer(analysis.message)
+    if options.measured:
+        return _validate_measured(options, machines[0])
     validations = [validate(machine, options.engine) for machine in machines]
 
     def show(console: "Console") -> None:
@@ -105,3 +130,39 @@ def _validate(options: argparse.Namespace) -> int:
 
     agreed = all(validation.difference <= AGREED for validation in validations)
     return give(options, agreed, lambda: [as_json(validation) for validation in validations], show)
+
+
+def _check_words(options: argparse.Namespace) -> None:
+    """Refuse options that belong to the other kind of validation."""
+    from kinetostat.spec.errors import InputError
+
+    of_measured = {
+        "--fit": options.fit, "--tolerance": options.tolerances, "--sigma": options.sigma,
+        "--sigma-angle": options.sigma_angle, "-o": options.output,
+    }  # fmt: skip
+    wrong = [name for name, given in of_measured.items() if given]
+    if wrong and not options.measured:
+        raise InputError(f"{wrong[0]} is about a measured stiffness; give its file with --measured, or leave it out.")
+    if options.measured and options.engine:
+        raise InputError("--engine and --measured are two kinds of validation; give one of them at a time.")
+    if options.measured and len(options.poses) > 1:
+        raise InputError("a stiffness was measured at one pose; give --pose once, or columns of the pose in the file.")
+
+
+def _validate_measured(options: argparse.Namespace, machine: "Machine") -> int:
+    """Compare a machine with a measured stiffness."""
+    from kinetostat.studies.measured.comparison import as_json, validate_measured
+    from kinetostat.studies.storage import write_json
+    from kinetostat.views.measured_tables import print_measured
+
+    answer = validate_measured(
+        machine, options.measured, fit=options.fit, sigma=options.sigma, sigma_angle=options.sigma_angle
+    )
+    written = []
+    if options.output:
+        from kinetostat.views.measured_figure import measured_figure
+
+        written = [options.output / "measured.json"]
+        write_json(written[0], as_json(answer))
+        written += write_figures(options, {"measured": lambda: measured_figure(answer)})
+    return give(options, answer.agrees, lambda: as_json(answer), lambda show: print_measured(show, answer), written)

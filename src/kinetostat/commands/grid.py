@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import (
+    DISPLACED,
     add_command,
     give,
     load_machine,
@@ -59,7 +60,7 @@ def add_grid_commands(commands: "Commands") -> None:
     for command in (sweep, mapping):
         takes_machine(command)
         takes_quantities(command, command.get_default("default_quantity"))
-        takes_loaded(command, 'as state = "loaded" in [load]: displacement under load, if no quantity is named')
+        takes_loaded(command, DISPLACED)
         takes_figures(command, "NetCDF and figures")
         command.add_argument(
             "--resume", action="store_true",
@@ -85,7 +86,7 @@ def _add_workspace_command(commands: "Commands") -> None:
         "--where", metavar="CONDITION", action="append", default=[], dest="conditions",
         help='a condition that a pose must meet, e.g. "free_stiffness_z > 20 N/um"; repeatable, all must be met',
     )  # fmt: skip
-    takes_loaded(command, 'as state = "loaded" in [load]: only poses at which the machine comes to rest')
+    takes_loaded(command, "only poses at which the machine comes to rest under its loads")
     command.add_argument("--seed", type=_seed, default=0, help="seed of the random points for the volume (default: 0)")
     takes_figures(command, "NetCDF and pictures")
     takes_json(command)

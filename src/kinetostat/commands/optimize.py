@@ -104,7 +104,8 @@ def _report(options: argparse.Namespace, result: "Result") -> int:
     result = result.in_units(options.units) if options.units else result
     if options.output:
         log = result.log
-        repaired = f"{log.repaired:,} of {len(log.steps):,} steps" if log.repaired else ""
+        repaired = "nothing but its history" if log.cleaned else ""
+        repaired = f"{log.repaired:,} of {len(log.steps):,} steps" if log.repaired else repaired
         note_damage(options.output, repaired, log.unchecked)
     written = write_result(result, options.output) if options.output else []
     if result.solved and options.output:

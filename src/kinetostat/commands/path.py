@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import (
+    DISPLACED,
     add_command,
     give,
     load_machine,
@@ -35,7 +36,7 @@ def add_path_command(commands: "Commands") -> None:
         help="a CSV file: a line of fields with their units, such as x [mm], z [mm], and below it a line for each pose",
     )  # fmt: skip
     takes_quantities(path, "free_stiffness")
-    takes_loaded(path, 'as state = "loaded" in [load]: displacement under load, if no quantity is named')
+    takes_loaded(path, DISPLACED)
     path.add_argument(
         "-o", "--output", metavar="FILE", type=Path, action="append", default=[],
         help="write a table (.csv, .json, .nc) or a picture along the path (.png, .svg, .pdf); repeatable",

@@ -2,7 +2,6 @@
 
 import argparse
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ from kinetostat.commands.common import (
     DONE,
     NO_ANSWER,
     add_command,
+    as_wanted,
     give,
     load_machine,
     no_answer,
@@ -17,6 +17,7 @@ from kinetostat.commands.common import (
     search_bar,
     takes_figures,
     takes_json,
+    takes_loaded,
     takes_machine,
     takes_ranges,
     takes_settings,
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from kinetostat.studies.optimisation.problem import Problem
     from kinetostat.studies.optimisation.result import Result
 
-FORMATS = "mjcf, urdf, glb, step, csv, netcdf, mat, nastran, abaqus or ansys"
+FORMATS = "mjcf, mjcf-vibration, urdf, glb, step, csv, netcdf, mat, modes, state-space, nastran, abaqus or ansys"
 WITHOUT = ("maps", "guidelines", "sensitivity", "validation")
 
 
@@ -56,6 +57,15 @@ def _add_export_command(commands: "Commands") -> None:
     command.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="the file (default: the name of the machine)"
     )
+    for kind, names in (("inputs", "forces fx,fy,fz,mx,my,mz"), ("outputs", "motions x,y,z,rx,ry,rz")):
+        command.add_argument(
+            f"--{kind}", metavar="NAMES", type=_names,
+            help=f"of a state space: {names} of the tool, or names of actuators (default: all of the tool)",
+        )  # fmt: skip
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",")]
 
 
 def _add_report_command(commands: "Commands") -> None:
@@ -74,14 +84,15 @@ def _add_report_command(commands: "Commands") -> None:
         "--without", metavar="PART", action="append", default=[], choices=WITHOUT,
         help=f"omit a part that takes time: {', '.join(WITHOUT)}; repeatable",
     )  # fmt: skip
-    command.add_argument(
-        "--loaded", action="store_true",
-        help='also show the machine at rest under its loads (default where [load] says state = "loaded")',
-    )  # fmt: skip
+    takes_loaded(command, "also show the machine at rest under its loads")
     command.add_argument(
         "--engine",
         help="independent engine for the validation: exudyn or pynite (default: the first that is installed)",
     )
+    command.add_argument(
+        "--fit", metavar="FOLDER", type=Path,
+        help="also show an identification of the machine: the folder of `identify -o`, or its fit.json",
+    )  # fmt: skip
     command.add_argument("--author", help="author in the title block")
     command.add_argument(
         "--date", help="date in the title block (default: none, so that equal input gives equal files)"
@@ -104,17 +115,17 @@ def _report(options: argparse.Namespace) -> int:
     from kinetostat.views.tables import print_written, terminal
 
     path = report_path(options.output)
-    wanted = Wanted(options.ranges, options.without, options.engine, options.author, options.date, options.loaded)
+    wanted = Wanted(
+        options.ranges, options.without, options.engine, options.author, options.date, options.loaded, options.fit
+    )
     subject = subject_of(options.subject, options.settings)
     result = _search(subject.problem, subject.folder) if subject.problem else None
     if result is not None and not result.solved:
         return no_answer(message(result))
     result = result.in_units(options.units) if result and options.units else result
-    machine = subject.machine if result is None else result.machine
-    machine = machine.in_units(options.units) if options.units else machine
-    machine = replace(machine, loaded=True) if options.loaded else machine
+    machine = as_wanted(options, subject.machine if result is None else result.machine)
     with progress_bar("computing") as progress:
-        answers = gather(machine, wanted.ranges, wanted.without, result, progress)
+        answers = gather(machine, wanted.ranges, wanted.without, result, progress, wanted.fit)
         if answers.analysis.status is Status.OK:
             named = [options.subject, *(word for text in options.settings for word in ("--set", text))]
             write_report(answers, wanted, named, subject.inputs, path, progress)
@@ -150,7 +161,8 @@ def _export(options: argparse.Namespace) -> int:
     if analysis.status is not Status.OK:
         return no_answer(analysis.message)
     stem = re.sub(r"[^\w.-]+", "-", Path(options.machine).stem if options.output is None else "").strip("-")
-    written = chosen.write(analysis, options.output or Path(f"{stem}{chosen.suffix}"))
+    path = options.output or Path(f"{stem}{chosen.suffix}")
+    written = chosen.write(analysis, path, inputs=options.inputs, outputs=options.outputs)
     print_written(terminal(), written)
     return DONE
 

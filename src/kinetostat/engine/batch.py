@@ -78,8 +78,8 @@ def evaluate(
             pays to compile for few points as well: a thousand poses take a millisecond from then on.
     """
     method: Method
-    if any(QUANTITIES[name].loaded for name in quantities):
-        way = way_of(machine, points.paths, points.size, repeated)
+    if any(QUANTITIES[name].stateful for name in quantities):
+        way = way_of(machine, points.paths, quantities, points.size, repeated)
         slab, most, method = way.slab, threads or available_cores(), partial(loaded_fill, way=way)
     elif repeated or points.size >= NATIVE_FROM:
         slab, most, method = NATIVE_SLAB, threads or available_cores(), program_fill

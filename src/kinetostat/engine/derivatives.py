@@ -28,6 +28,8 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.tolerances import IDLE_COORDINATES, OPENING, ROUND_OFF_DERIVATIVE, SAME_DERIVATIVE
+from kinetostat.vibration.reduced import reducible
+from kinetostat.vibration.slopes import EQUALS, mode_columns
 
 MACHINE_CODE_FROM = 20_000
 """Number of points from which on compiling pays: NumPy differentiates some ten thousand poses per second."""
@@ -81,12 +83,13 @@ def evaluate_gradient(
     """
     several = [objectives] if isinstance(objectives, str | Mapping) else list(objectives)
     weights = tuple(((entry, 1.0),) if isinstance(entry, str) else tuple(entry.items()) for entry in several)
-    native = repeated or points.size >= MACHINE_CODE_FROM
+    modes = _modes_to_know(machine, weights, (*points.paths, *paths))
+    native = (repeated or points.size >= MACHINE_CODE_FROM) and not modes
     slab = NATIVE_SLAB if native else SMALL_SLAB
     threads = available_cores() if native and points.size > slab else 1
 
     def method(part: Machine, varying: Sequence[str], _names: Sequence[str]) -> Fill:
-        return _fill(part, tuple(varying), weights, tuple(paths), native)
+        return _fill(part, tuple(varying), weights, tuple(paths), native, modes)
 
     fill = by_free_springs(machine, points.paths, (), method)
     count, rows = len(weights), len(weights) * (1 + len(paths))
@@ -97,14 +100,26 @@ def evaluate_gradient(
     return Gradients(values, slopes, status)
 
 
+def _modes_to_know(machine: Machine, weights: Sequence[Weights], paths: Sequence[str]) -> int:
+    """How many modes must be solved for before a program takes derivatives; 0 where it finds the frequencies itself."""
+    named = {name: QUANTITIES[name] for objective in weights for name, _ in objective}
+    wanted = [int(name.rpartition("_")[2]) for name, row in named.items() if row.modal and not row.loaded]
+    return max(wanted) + EQUALS if wanted and not reducible(machine, paths) else 0
+
+
 def _fill(
-    machine: Machine, varying: tuple[str, ...], weights: tuple[Weights, ...], paths: tuple[str, ...], native: bool
+    machine: Machine,
+    varying: tuple[str, ...],
+    weights: tuple[Weights, ...],
+    paths: tuple[str, ...],
+    native: bool,
+    modes: int,
 ) -> Fill:
     """Return the fill for slabs of points of one machine: rows of objectives, then of their derivatives by each path.
 
     Closed forms are faster than solving for the joints, but are used only where they still hold as parameters change.
     """
-    routes = _Routes(machine, varying, weights, paths, native)
+    routes = _Routes(machine, varying, weights, paths, native, modes)
     if machine.family.chains is None:
         return routes.direct()
     if native and _closed_forms_hold(Kind(machine), tuple(values(machine).items()), varying, weights, paths):
@@ -166,12 +181,14 @@ class _Routes:
         weights: tuple[Weights, ...],
         paths: tuple[str, ...],
         native: bool,
+        modes: int = 0,
     ) -> None:
         known = {path: slope for path, slope in _at_ends(machine).items() if path in paths and path not in varying}
         self._machine, self._weights, self._paths, self._native = machine, weights, paths, native
         self._known_slopes, self._differentiated = known, tuple(path for path in paths if path not in known)
         self._form, self._fixed = form_of(machine, varying, self._differentiated)
         self._angles = angles(machine)
+        self._modes = modes
         self._loaded = any(QUANTITIES[name].loaded for objective in weights for name, _ in objective)
 
     def direct(self, closed: bool = False) -> Fill:
@@ -180,7 +197,7 @@ class _Routes:
 
         def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
             given = program_columns(columns, self._form.varying, self._angles)
-            given += self._state(given, len(status), closed)
+            given += self._state(given, len(status), closed) + self._known_modes(columns, len(status))
             if self._known_slopes:
                 self._spread(*program.slopes(self._fixed, given, status), results)
             else:
@@ -193,7 +210,7 @@ class _Routes:
         given = program_columns(columns, self._form.varying, self._angles)
         given += joint_columns(self._machine, columns, len(status))
         rates = self._program(()).slopes(self._fixed, given, np.empty_like(status))[1]
-        given += self._state(given, len(status), closed=False)
+        given += self._state(given, len(status), closed=False) + self._known_modes(columns, len(status))
         objectives, partial = self._program(self._weights).slopes(self._fixed, given, status)
         self._spread(objectives, _following(partial, rates, len(self._differentiated)), results)
 
@@ -202,6 +219,10 @@ class _Routes:
         if not self._loaded:
             return []
         return [*States(self._machine, self._form, closed, self._native).settled(self._fixed, given, count)]
+
+    def _known_modes(self, columns: Mapping[str, Array], count: int) -> list[Array]:
+        """The modes that programs cannot find themselves, if any objective is about them."""
+        return mode_columns(with_values(self._machine, columns), count, self._modes) if self._modes else []
 
     def _spread(self, objectives: Array, slopes: Array, results: Array) -> None:
         """Put objectives and slopes in their rows, with the known slopes by rigid and free springs among them."""
@@ -214,7 +235,8 @@ class _Routes:
             )
 
     def _program(self, weights: tuple[Weights, ...], closed: bool = False) -> "_Program":
-        return _program(Kind(self._machine), self._form, weights, self._differentiated, self._native, closed)
+        form = (Kind(self._machine), self._form, weights, self._differentiated, self._native, closed)
+        return _program(*form, self._modes if weights else 0)
 
 
 def _at_ends(machine: Machine) -> dict[str, float]:
@@ -296,10 +318,16 @@ class _Program:
 
 @lru_cache(KEPT)
 def _program(
-    kind: Kind, form: Form, weights: tuple[Weights, ...], paths: tuple[str, ...], native: bool, closed: bool
+    kind: Kind,
+    form: Form,
+    weights: tuple[Weights, ...],
+    paths: tuple[str, ...],
+    native: bool,
+    closed: bool,
+    modes: int,
 ) -> _Program:
     """Return the program of the objectives and their derivatives, or without weights that of the closing equations."""
-    formula = objectives_of(kind, form, weights, paths, closed) if weights else equations_of(kind, form, paths)
+    formula = objectives_of(kind, form, weights, paths, closed, modes) if weights else equations_of(kind, form, paths)
     count, inputs = len(formula.body.results), len(formula.inputs)
     if not native:
         return _Program(Interpreted(formula.body, formula.inputs), count, inputs)

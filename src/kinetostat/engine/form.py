@@ -21,6 +21,8 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.vibration.reduced import free_frequencies, frequencies_at, in_order
+from kinetostat.vibration.slopes import vibrating
 
 ORDINARY = (1e-25, 1e25)
 """Bounds of ordinary parameters: what a handful of them make is neither zero nor infinite by a wide margin."""
@@ -149,7 +151,12 @@ class Formula:
 
 
 def objectives_of(
-    kind: Kind, form: Form, objectives: Sequence[Weights], paths: Sequence[str] = (), closed: bool = False
+    kind: Kind,
+    form: Form,
+    objectives: Sequence[Weights],
+    paths: Sequence[str] = (),
+    closed: bool = False,
+    modes: int = 0,
 ) -> Formula:
     """Trace weighted sums of quantities as functions of the parameters; NaN where the status is not OK.
 
@@ -161,6 +168,7 @@ def objectives_of(
         closed: whether joints are computed inside the program, in closed form. Otherwise their coordinates and a
             status are further columns, unless the family places the joints itself. If quantities are about the machine
             under load, coordinates of its state follow, see `step_of`.
+        modes: how many modes are known, as further columns (`vibration.slopes`); 0 to solve for frequencies inside.
     """
     given = traced(kind, form)
     joints, columns = _joints(given, closed)
@@ -173,7 +181,16 @@ def objectives_of(
         # At a state of rest a step has no size, but the derivatives of the state: it follows the parameters.
         there = equations.step([*coordinates])[0] if paths else [*coordinates]
         loaded, status = equations.numbers(there, wanted, response.place_status)
+        if "frequency" in wanted:
+            loaded["frequency"] = frequencies_at(equations.cut, there, bool(paths))
         response = replace(response, loaded=loaded, status=status)
+    if modes:
+        vibration = vibrating(given.machine, response, joints, modes)
+        known = _inputs(given.graph, vibration.columns)
+        coordinates = (*coordinates, *known)
+        response = replace(response, frequencies=in_order(vibration.squares(known)))
+    elif any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for weights in objectives for name, _ in weights):
+        response = replace(response, frequencies=free_frequencies(given.machine, response, joints, bool(paths)))
     accepted = response.status < Status.OK + 0.5
     results = [_number(where(accepted, _weighted(response, weights), math.nan)) for weights in objectives]
     return _formula(given, columns, results, _number(response.status), paths, coordinates)

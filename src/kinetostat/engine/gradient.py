@@ -79,7 +79,7 @@ def parents(node: Node) -> list[tuple[int, Traced]]:
     turn = node.graph.turns.get(node)
     if turn is not None:
         return [(0, turn[0])]
-    if isinstance(node, Condition):
+    if isinstance(node, Condition) or node.operation == "steady":
         return []
     return [(place, operand) for place, operand in enumerate(node.operands) if isinstance(operand, Traced)]
 

@@ -19,6 +19,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "neg": np.negative,
     "abs": np.absolute,
     "sqrt": np.sqrt,
+    "steady": np.positive,
     "lt": np.less,
     "le": np.less_equal,
     "and": np.logical_and,

@@ -21,9 +21,12 @@ from kinetostat.equilibrium.numbers import check_loads, loaded_numbers
 from kinetostat.equilibrium.reduced import cut_machine
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.kinetostatics.response import respond
+from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
+from kinetostat.vibration.modes import frequencies
+from kinetostat.vibration.receptance import cut_receptances
+from kinetostat.vibration.reduced import leaves_plane, platform_alone, pose_frequencies, reducible
 
 KEPT = 32
 """Programs kept in memory."""
@@ -34,14 +37,18 @@ NEARLY = 1e-7
 
 
 class Way(Enum):
-    """How loaded states are found, and how many points a slab has.
+    """How loaded states and vibrations are found, and how many points a slab has.
 
-    Equations of any machine fill the third cache level with some hundred poses. Programs by NumPy do five to ten
-    thousand poses/s after half a second of tracing, in machine code some hundred thousand after two seconds.
+    Equations of any machine fill the third cache level with some hundred poses; its modes take as long by LAPACK as the
+    formulas by Python, which more poses share. Programs by NumPy do five to ten
+    thousand poses/s after half a second of tracing, in machine code some hundred thousand after two seconds. Where the
+    platform alone is massive and nothing is loaded, columns of numbers do thirty thousand at once.
     """
 
     ANY_MACHINE = 256
+    MODES = 768
     NUMPY = 1024
+    COLUMNS = 4096
     NATIVE = 32768
 
     @property
@@ -52,24 +59,30 @@ class Way(Enum):
 
 NUMPY_FROM, NATIVE_FROM = 200, 10_000
 """Points from which programs pay, by NumPy and in machine code."""
+COLUMNS_TO = 30_000
+"""Points up to which the vibrations of a platform alone take less time than compiling."""
 
 
-def way_of(machine: Machine, paths: Sequence[str], count: int, repeated: bool) -> Way:
-    """Choose how to find the loaded states of a machine.
+def way_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], count: int, repeated: bool) -> Way:
+    """Choose how to find the loaded states of a machine, and its natural vibrations.
 
     Args:
         machine: with its loads; gives all parameters that do not vary.
         paths: leaf paths of those that vary.
+        quantities: names from `QUANTITIES`.
         count: of points.
         repeated: whether the same will be asked many times, so that compiling pays for few points too.
     """
-    if (count < NUMPY_FROM and not repeated) or _cut(machine, tuple(paths)) is None:
-        return Way.ANY_MACHINE
+    loaded = any(QUANTITIES[name].loaded or QUANTITIES[name].cut for name in quantities)
+    if not loaded and count < COLUMNS_TO and not repeated and platform_alone(machine, paths):
+        return Way.COLUMNS
+    if (count < NUMPY_FROM and not repeated) or not _over_scalars(machine, tuple(paths), quantities):
+        return Way.ANY_MACHINE if loaded else Way.MODES
     return Way.NATIVE if repeated or count >= NATIVE_FROM else Way.NUMPY
 
 
 def loaded_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str], way: Way) -> Fill:
-    """Return the fill of quantities of which some are about the machine under load.
+    """Return the fill of quantities of which some are about the machine under load, or about its vibrations.
 
     Args:
         machine: with its loads; gives all parameters that do not vary.
@@ -77,44 +90,63 @@ def loaded_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str
         quantities: names from `QUANTITIES`.
         way: how to find the states.
     """
-    solved = partial(_solve_in_parts, machine, tuple(quantities))
-    cut = None if way is Way.ANY_MACHINE else _cut(machine, tuple(paths))
-    if cut is None:
+    plain = way in (Way.ANY_MACHINE, Way.MODES, Way.COLUMNS)
+    solved = partial(_solve_in_parts, machine, tuple(quantities), (way if plain else Way.ANY_MACHINE).slab)
+    if plain or not _over_scalars(machine, tuple(paths), quantities):
         return solved
     form, fixed = form_of(machine, paths)
-    closed, native = closes_inside(machine), way is Way.NATIVE
-    states, turning = States(machine, form, closed, native), angles(machine)
+    closed, native, turning = closes_inside(machine), way is Way.NATIVE, angles(machine)
+    cut = _cut(machine, tuple(paths)) if any(QUANTITIES[name].loaded for name in quantities) else None
+    states = States(machine, form, closed, native) if cut else None
     program = _program(Kind(machine), form, tuple(quantities), closed, native)
 
     def directly(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         given = program_columns(columns, form.varying, turning)
         if machine.family.chains is not None and not closed:
             given += joint_columns(machine, columns, len(status))
-        program.run(fixed, [*given, *states.settled(fixed, given, len(status))], results, status)
+        at_rest = states.settled(fixed, given, len(status)) if states else ()
+        program.run(fixed, [*given, *at_rest], results, status)
 
     every = falling_back(directly, lambda: solved)
 
     def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-        check_loads(with_values(machine, columns), len(status), cut.mechanism.weighs)
+        if cut:
+            check_loads(with_values(machine, columns), len(status), cut.mechanism.weighs)
         every(columns, results, status)
 
     return fill
 
 
 def _solve_in_parts(
-    machine: Machine, quantities: Sequence[str], columns: Mapping[str, Array], results: Array, status: Codes
+    machine: Machine, quantities: Sequence[str], slab: int, columns: Mapping[str, Array], results: Array, status: Codes
 ) -> None:
-    """Fill by the solver for any machine, some hundred points at a time."""
-    for start in range(0, len(status), Way.ANY_MACHINE.slab):
-        part = slice(start, start + Way.ANY_MACHINE.slab)
+    """Fill by the solver for any machine, a slab of points at a time."""
+    for start in range(0, len(status), slab):
+        part = slice(start, start + slab)
         here = {path: values[part] for path, values in columns.items()}
         with np.errstate(all="ignore"):
-            loaded, status[part] = loaded_numbers(machine, here, len(status[part]))
-            response = respond(with_values(machine, here))
-            response = replace(response, loaded={name: values.T for name, values in loaded.items()})
+            response = _solved(machine, quantities, here, len(status[part]))
+            status[part] = response.status
             for row, name in zip(results[:, part], quantities, strict=True):
                 row[:] = QUANTITIES[name].value(response)
     results[:, status != Status.OK] = np.nan
+
+
+def _solved(machine: Machine, quantities: Sequence[str], columns: Mapping[str, Array], count: int) -> Response:
+    """The response at some points, with what quantities need of states of rest and of vibrations."""
+    wanted = [QUANTITIES[name] for name in quantities]
+    posed = with_values(machine, columns)
+    response = respond(posed)
+    if any(quantity.modal and not quantity.loaded and not quantity.cut for quantity in wanted):
+        response = replace(response, frequencies=list(pose_frequencies(posed, response, count).T))
+    if any(quantity.cut for quantity in wanted):
+        pressure = posed.tables["cutting"].pressure
+        response = replace(response, softest=cut_receptances(posed, response, count), cutting_pressure=pressure)
+    if any(quantity.loaded for quantity in wanted):
+        further = {"frequency": frequencies} if any(quantity.loaded == "frequency" for quantity in wanted) else None
+        loaded, status = loaded_numbers(machine, columns, count, further)
+        response = replace(response, loaded={name: values.T for name, values in loaded.items()}, status=status)
+    return response
 
 
 class States:
@@ -164,6 +196,20 @@ class States:
 
 
 _cut = lru_cache(KEPT)(cut_machine)
+_reducible = lru_cache(KEPT)(reducible)
+
+
+def _over_scalars(machine: Machine, paths: tuple[str, ...], quantities: Sequence[str]) -> bool:
+    """Whether programs can compute all that these quantities need."""
+    wanted = [QUANTITIES[name] for name in quantities]
+    if any(quantity.cut for quantity in wanted):
+        return False
+    machine_cut = _cut(machine, paths) if any(quantity.loaded for quantity in wanted) else None
+    at_rest = not any(quantity.loaded for quantity in wanted) or machine_cut is not None
+    if machine_cut is not None and any(quantity.loaded == "frequency" for quantity in wanted):
+        at_rest = not leaves_plane(machine, machine_cut)
+    rings = not any(q.modal and not q.loaded for q in wanted) or _reducible(machine, paths)
+    return at_rest and rings
 
 
 @lru_cache(KEPT)

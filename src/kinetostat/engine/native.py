@@ -177,6 +177,8 @@ def line(node: Node, names: Sequence[str], lanes: int) -> str:
             return f"%v{node.number} = {ARITHMETIC[node.operation]}{_relaxed(node)} {numbers} {', '.join(names)}"
         case "neg":
             return f"%v{node.number} = fneg {numbers} {names[0]}"
+        case "steady":
+            return f"%v{node.number} = bitcast {numbers} {names[0]} to {numbers}"
         case "abs" | "sqrt":
             return f"%v{node.number} = call {numbers} {_intrinsic(node.operation, lanes)}({numbers} {names[0]})"
         case "lt" | "le":

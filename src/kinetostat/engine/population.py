@@ -86,8 +86,8 @@ class Evaluator:
         """
         self._names, self._slab = tuple(quantities), NATIVE_SLAB
         method: Method = program_fill
-        if any(QUANTITIES[name].loaded for name in self._names):
-            way = way_of(machine, paths, NATIVE_SLAB, repeated=True)
+        if any(QUANTITIES[name].stateful for name in self._names):
+            way = way_of(machine, paths, self._names, NATIVE_SLAB, repeated=True)
             self._slab, method = way.slab, partial(loaded_fill, way=way)
         self._fill = by_free_springs(machine, paths, self._names, method)
 

@@ -28,7 +28,7 @@ class Node:
     """One value of a graph: an operation and its operands. Two equal values of one graph are the same object.
 
     Attributes:
-        operation: "input", "add", "sub", "mul", "div", "neg", "abs", "sqrt", "lt", "le", "and" or "where".
+        operation: "input", "add", "sub", "mul", "div", "neg", "abs", "sqrt", "steady", "lt", "le", "and" or "where".
         operands: nodes and floats; empty for an input.
         number: position in the graph; operands have smaller ones.
         fixed: whether it depends on inputs alone that are the same at all points.
@@ -125,6 +125,11 @@ class Namespace:
     def sqrt(a: Traced) -> Traced:
         """Square root, NaN for a negative argument."""
         return a.graph.number("sqrt", a)
+
+    @staticmethod
+    def steady(a: Traced) -> Traced:
+        """The number itself, which derivatives take for a constant."""
+        return a.graph.number("steady", a)
 
     @staticmethod
     def where(condition: Condition, a: Operand, b: Operand) -> Operand:

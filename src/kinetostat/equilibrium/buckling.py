@@ -45,6 +45,11 @@ class Strut:
         """By which its compression may grow until it bends away; infinite where it is pulled."""
         return self.euler_load / self.compression if self.compression > 0.0 else math.inf
 
+    @property
+    def bends_away(self) -> bool:
+        """Whether it is pressed with more than Euler's load."""
+        return self.factor < 1.0
+
 
 def struts(legs: Sequence[Leg], members: Sequence[Member], reference: Vector, equations: Balance) -> list[Strut]:
     """Find the struts whose E I is known, and what presses them at a state of rest.

@@ -6,7 +6,7 @@ Source: theory (35).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -24,18 +24,70 @@ SIGNS = {"": 0.0, "pulls": 1.0, "pushes": -1.0}
 
 
 @dataclass(frozen=True)
-class Masses:
-    """Point masses that move with a body.
+class Weight:
+    """A mass at a point.
 
     Attributes:
-        carried: how many of the leg's screw motions carry each [m]; not used of the platform.
-        point: where they are in the free state [n x m x 3].
-        mass: in units of force per m/s² [n x m].
+        name: of the part that it belongs to.
+        carried: how many of the leg's screw motions carry it; not used of the platform.
+        point: where it is in the free state, m.
+        mass: kg.
+        inertia: about the point, base axes: xx, yy, zz, xy, xz, yz, kg·m²; zero where it is empty.
+        bar: whether it is half of a uniform straight bar, whose other half stands beside it in a list.
     """
 
+    name: str
+    carried: int
+    point: Vector
+    mass: Scalar
+    inertia: Sequence[Scalar] = ()
+    bar: bool = False
+
+
+@dataclass(frozen=True)
+class Masses:
+    """Point masses that move with a body, and bars as two of them.
+
+    Both halves of a uniform bar at its ends have its weight, and its momentum; its kinetic energy is that of a third
+    of the bar at each end, and of a sixth that couples both.
+
+    Attributes:
+        names: of the parts that they belong to [m].
+        carried: how many of the leg's screw motions carry each [m]; not used of the platform.
+        pairs: which of them are both halves of a bar.
+        point: where they are in the free state [n x m x 3].
+        mass: in units of force per m/s² [n x m].
+        uncoupled: that part of each whose kinetic energy is its own [n x m].
+        inertia: about each point in the free state, in the same unit times the square of the machine's length
+            [n x m x 6]: xx, yy, zz, xy, xz, yz.
+    """
+
+    names: tuple[str, ...]
     carried: tuple[int, ...]
+    pairs: tuple[tuple[int, int], ...]
     point: Array
     mass: Array
+    uncoupled: Array
+    inertia: Array
+
+    def taken(self, rows: npt.NDArray[np.int64]) -> "Masses":
+        """The masses at some of n poses [rows]."""
+        return replace(self, **{name: getattr(self, name)[rows] for name in ("point", "mass", "uncoupled", "inertia")})
+
+    def of(self, numbers: Sequence[int]) -> "Masses":
+        """Some of the masses, of bars whose other halves are at rest."""
+        parts = {name: getattr(self, name)[:, numbers] for name in ("point", "mass", "uncoupled", "inertia")}
+        names, carried = (tuple(self.names[n] for n in numbers), tuple(self.carried[n] for n in numbers))
+        return Masses(names, carried, (), **parts)
+
+
+def together(masses: Sequence[Masses]) -> Masses:
+    """Several masses as those of a single body; none if there are none, of a single pose."""
+    if not masses:
+        return Masses((), (), (), np.zeros((1, 0, 3)), *(np.zeros((1, 0)),) * 2, np.zeros((1, 0, 6)))
+    names = tuple(name for part in masses for name in part.names)
+    parts = [np.concatenate([getattr(p, a) for p in masses], axis=1) for a in ("point", "mass", "uncoupled", "inertia")]
+    return Masses(names, (0,) * len(names), (), *parts)
 
 
 @dataclass(frozen=True)
@@ -55,8 +107,12 @@ class Chain:
         idle: a basis of motions of the passive coordinates that move nothing [n x coordinates x coordinates], with
             columns of zeros.
         masses: that it carries.
+        rotors: inertia that the drives add to each coordinate, in the unit of masses times length, squared for a turn
+            [n x coordinates].
+        dampers: viscous friction of each coordinate, in units of force per velocity [n x coordinates].
         rod: joint centres nearer to the base and to the platform in the free state [n x 3], of a leg that only carries
             a force between them and has its masses there; None of others.
+        ends: how many of its motions carry what so many of its elements carry, from none to all of them.
     """
 
     name: str
@@ -69,7 +125,10 @@ class Chain:
     sign: Array
     idle: Array
     masses: Masses
+    rotors: Array
+    dampers: Array
     rod: tuple[Array, Array] | None = None
+    ends: tuple[int, ...] = ()
 
     @property
     def size(self) -> int:
@@ -110,9 +169,9 @@ class Units:
         """Units of length in a metre [n x 1]; products with it keep what is zero by form."""
         return (1.0 / self.length)[:, None]
 
-    def twist(self, joint: Joint, rate: Scalar = 1.0) -> Array:
-        """Unit twist of a joint at the origin, times a rate [n x 6]; a slide by one unit of length."""
-        components = of_scalars(joint.twist(self.origin).components(), self.count) * of_scalars([rate], self.count)
+    def twist(self, joint: Joint, rate: float | Array = 1.0) -> Array:
+        """Unit twist of a joint at the origin, times a rate or rates [n], as [n x 6]; a slide by one unit of length."""
+        components = of_scalars(joint.twist(self.origin).components(), self.count) * np.reshape(rate, (-1, 1))
         if joint.point is not None:
             components[:, 3:] *= self.shrink
         return components
@@ -127,10 +186,28 @@ class Units:
         rows = [of_scalars(force.components(), self.count) * (1.0 / self.force)[:, None] for force in forces]
         return np.stack(rows, axis=1) if rows else np.zeros((len(self.length), 0, 3))
 
-    def masses(self, given: Sequence[tuple[int, Vector, Scalar]]) -> Masses:
-        """Masses in units of force per m/s²: how many motions carry each, where it is, kg."""
-        mass = of_scalars([m for _, _, m in given], self.count) * (1.0 / self.force)[:, None]
-        return Masses(tuple(n for n, _, _ in given), self.points([point for _, point, _ in given]), mass)
+    def masses(self, given: Sequence[Weight]) -> Masses:
+        """Masses in units of force per m/s²."""
+        lighter = (1.0 / self.force)[:, None]
+        mass = of_scalars([weight.mass for weight in given], self.count) * lighter
+        share = np.array([2.0 / 3.0 if weight.bar else 1.0 for weight in given])
+        bars = [number for number, weight in enumerate(given) if weight.bar]
+        tensors = [of_scalars(tuple(weight.inertia) or (0.0,) * 6, self.count) for weight in given]
+        tensors = [tensor * (lighter * self.shrink * self.shrink) for tensor in tensors]
+        return Masses(
+            tuple(weight.name for weight in given),
+            tuple(weight.carried for weight in given),
+            tuple(zip(bars[::2], bars[1::2], strict=True)),
+            self.points([weight.point for weight in given]),
+            mass,
+            mass * share,
+            np.stack(tensors, axis=1) if tensors else np.zeros((len(self.length), 0, 6)),
+        )
+
+    def inertia(self, number: Scalar, turns: bool) -> Array:
+        """An inertia or friction of a slide, kg or N·s/m, or of a turn, kg·m² or N·m·s/rad [n]."""
+        lighter = 1.0 / self.force
+        return of_scalars([number], self.count)[:, 0] * (lighter / (self.length * self.length) if turns else lighter)
 
     def stiffness(self, spring: Spring) -> Array:
         """Of a spring [n]."""
@@ -211,16 +288,22 @@ class _Row:
                 slide = Joint(span * reciprocal(span.norm()))
                 self._move(self.units.twist(slide), -1, self.amounts.link(link.growth))
 
-    def masses(self) -> list[tuple[int, Vector, Scalar]]:
+    def masses(self) -> list[Weight]:
         """The masses of the links: the potential of a straight uniform one is that of half its mass at either end."""
-        masses = []
+        masses: list[Weight] = []
         for link, (first, start), (last, end) in self.links:
             begins = self.carried[first][first < last]  # a rigid link begins before it grows
+            if is_zero(link.mass):
+                continue
             if link.centre is not None:
-                masses.append((begins, link.centre()[1], link.mass))
-            elif not is_zero(link.mass):
+                tensor = () if link.inertia is None else link.inertia()
+                masses.append(Weight(link.name, begins, link.centre()[1], link.mass, tensor))
+            else:
                 half = 0.5 * link.mass
-                masses += [(begins, start, half), (self.carried[last][1], end, half)]
+                masses += [
+                    Weight(link.name, begins, start, half, bar=True),
+                    Weight(link.name, self.carried[last][1], end, half, bar=True),
+                ]
         return masses
 
     def _move(self, twist: Array, coordinate: int, given: int = -1) -> None:
@@ -238,7 +321,7 @@ class _Row:
 
     def _parallelogram(self, bars: Parallelogram, number: int) -> None:
         """Turn about the near side and back about the far one; in between, the bars grow."""
-        rate = 1.0 / (bars.far - bars.near).norm() * self.units.length
+        rate = self.units.length * (1.0 / (bars.far - bars.near).norm())
         near, far = (Joint(bars.normal, point) for point in (bars.near, bars.far))
         coordinate = self._coordinate(None)
         self._move(self.units.twist(near, rate), coordinate)
@@ -296,7 +379,10 @@ def chain_of(leg: Leg, units: Units, amounts: Given, members: Sequence[Member], 
         np.array([SIGNS[spring.acts] if spring else 0.0 for spring in row.springs]),
         idle,
         units.masses(masses),
-        _rod(leg, units, [point for _, point, _ in masses]),
+        np.zeros((count, len(row.springs))),
+        np.zeros((count, len(row.springs))),
+        _rod(leg, units, [weight.point for weight in masses]),
+        tuple(whole for _, whole in row.carried),
     )
 
 

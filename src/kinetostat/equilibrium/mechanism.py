@@ -16,13 +16,15 @@ import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, total, where
 from kinetostat.algebra.vector import Vector
-from kinetostat.equilibrium.chains import Chain, Given, Masses, Units, chain_of
+from kinetostat.equilibrium.chains import Chain, Given, Masses, Units, Weight, chain_of
+from kinetostat.equilibrium.drives import with_drives
 from kinetostat.equilibrium.motion import Array, along, of_scalars
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.common_tables import Load
 from kinetostat.machine.leg import Spring, Turn
-from kinetostat.machine.machine import Load, Machine
-from kinetostat.machine.mass import located_members
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.mass import PAYLOAD, PLATFORM, located_members, turned_tensor
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class Mechanism:
         return replace(
             self,
             legs=tuple(_taken(leg, rows) for leg in self.legs),
-            platform=replace(self.platform, point=self.platform.point[rows], mass=self.platform.mass[rows]),
+            platform=self.platform.taken(rows),
             growth=self.growth[rows],
             wrench=self.wrench[rows],
             pushed=self.pushed[rows],
@@ -89,9 +91,8 @@ def _wrench_units(length: Array, force: Array) -> Array:
 
 
 def _taken(leg: Chain, rows: npt.NDArray[np.int64]) -> Chain:
-    masses = replace(leg.masses, point=leg.masses.point[rows], mass=leg.masses.mass[rows])
-    parts = {name: getattr(leg, name)[rows] for name in ("twists", "stiffness", "preload", "idle")}
-    return replace(leg, masses=masses, **parts)
+    parts = {name: getattr(leg, name)[rows] for name in ("twists", "stiffness", "preload", "idle", "rotors", "dampers")}
+    return replace(leg, masses=leg.masses.taken(rows), **parts)
 
 
 def mechanism_of(machine: Machine, response: Response, joints: Joints | None, count: int | None = 1) -> Mechanism:
@@ -117,15 +118,9 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
     legs = []
     for leg in configuration.legs:
         here = [m for m in members if m.leg == leg.name or (not m.leg and leg.number is None)]
-        legs.append(chain_of(leg, units, amounts, here, travels.get(leg.name, ())))
-    platform = configuration.platform
-    tool = machine.tables["tool"]
-    centres = [
-        platform.apply(Vector(*tool.centre_of_mass)),
-        response.reference + platform.rotation.apply(Vector(*tool.payload_centre)),
-    ]
-    pairs = zip(centres, (tool.mass, tool.payload), strict=True)
-    weights = [(0, point, mass) for point, mass in pairs if not is_zero(mass)]
+        chain = chain_of(leg, units, amounts, here, travels.get(leg.name, ()))
+        legs.append(with_drives(chain, units, machine.tables["drives"], machine.tables["damping"]))
+    platform, weights = configuration.platform, platform_weights(machine, response)
     load = machine.tables["load"]
     named = machine.named_loads
     moment = machine.load.rotational
@@ -150,6 +145,21 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
         force,
         bool(weights) or any(leg.masses.carried for leg in legs),
     )
+
+
+def platform_weights(machine: Machine, response: Response) -> list[Weight]:
+    """The masses of platform with tool and of the payload at the pose, base frame; those that are zero are left out."""
+    platform, tool = response.configuration.platform, machine.tables["tool"]
+    payload = response.reference + platform.rotation.apply(Vector(*tool.payload_centre))
+    parts = (
+        (PLATFORM, platform.apply(Vector(*tool.centre_of_mass)), tool.mass, tool.inertia),
+        (PAYLOAD, payload, tool.payload, tool.payload_inertia),
+    )
+    return [
+        Weight(name, 0, point, mass, turned_tensor(platform.rotation.apply, inertia))
+        for name, point, mass, inertia in parts
+        if not (is_zero(mass) and all(is_zero(entry) for entry in inertia))
+    ]
 
 
 def _travels(machine: Machine, joints: Joints, count: int) -> dict[str, list[Array]]:

@@ -3,7 +3,7 @@
 Source: theory section 12.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,6 +91,10 @@ def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:
         )
 
 
+Further = Callable[[Balance], Array]
+"""Another number of states of rest, or several of each [n] or [n x m]."""
+
+
 @dataclass(frozen=True)
 class States:
     """The states of rest at n points.
@@ -127,7 +131,7 @@ def states_of_rest(machine: Machine, columns: Mapping[str, Array], count: int) -
 
 
 def loaded_numbers(
-    machine: Machine, columns: Mapping[str, Array], count: int
+    machine: Machine, columns: Mapping[str, Array], count: int, further: Mapping[str, Further] | None = None
 ) -> tuple[dict[str, Array], npt.NDArray[np.int64]]:
     """Find the loaded states at n poses.
 
@@ -135,6 +139,7 @@ def loaded_numbers(
         machine: with its loads; gives all parameters that do not vary.
         columns: values of those that vary by leaf path, SI [n].
         count: n.
+        further: what else to compute of the states of rest, by name.
 
     Returns:
         For each name its values [n] or [n x 6], SI, at the loaded tool point in base axes: "displacement" (rotation
@@ -166,6 +171,8 @@ def loaded_numbers(
         "slack": slack,
         "factor": judged.factor,
     }
+    numbers |= {name: compute(equations) for name, compute in (further or {}).items()}
     for name, values in numbers.items():
-        result[name][states.rows] = values[judged.stable]
+        whole = result.setdefault(name, np.full((count, *values.shape[1:]), np.nan))
+        whole[states.rows] = values[judged.stable]
     return result, states.status

@@ -20,7 +20,7 @@ from kinetostat.algebra.solve import Eliminated, Row, eliminated
 from kinetostat.algebra.symmetric import POSITIONS, greatest_eigenvalue
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.equilibrium.balance import LegTerms, leg_terms, placed_leg, platform_load
-from kinetostat.equilibrium.chains import Chain, Masses
+from kinetostat.equilibrium.chains import Chain, together
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.motion import Array, Motions, cross, of_scalars, skew_of
 from kinetostat.equilibrium.numbers import FREE
@@ -50,6 +50,7 @@ class Rod:
         softness: sum of the compliances of its springs.
         given: by how much longer they would be free to be: what their preloads have stretched, less the rod's growth.
         sign: of the loads that it can carry, 0 for both.
+        rotor: inertia that its drive adds along it, as `Chain.rotors`.
     """
 
     near: Array
@@ -57,6 +58,7 @@ class Rod:
     softness: Scalar
     given: Scalar
     sign: float
+    rotor: Scalar = 0.0
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ def cut(mechanism: Mechanism) -> Cut | None:
     carrier = chains[0] if chains else _free_motions(mechanism)
     if len(chains) > 1 or carrier.sign.any() or carrier.idle.any() or any(leg.hinged.any() for leg in mechanism.legs):
         return None
-    rods, points, masses = [], [mechanism.platform.point], [mechanism.platform.mass]
+    rods, masses = [], [mechanism.platform]
     for leg in mechanism.legs:
         if leg.rod is None:
             continue
@@ -89,17 +91,17 @@ def cut(mechanism: Mechanism) -> Cut | None:
         if not springs:
             return None  # nothing of it deflects
         heavy = [i for i, carried in enumerate(leg.masses.carried) if carried > slides[0]]
-        points.append(leg.masses.point[:, heavy])
-        masses.append(leg.masses.mass[:, heavy])
+        masses.append(leg.masses.of(heavy))
         if all(leg.springs[number] is not None for number in springs):
             soft = [1.0 / leg.stiffness[0, number] for number in springs]
             given = [a * leg.preload[0, number] for a, number in zip(soft, springs, strict=True)]
             given += [-mechanism.growth[0, n] for n in (i - len(mechanism.actuators) for i in leg.given) if n >= 0]
             signs = [float(leg.sign[number]) for number in springs if leg.sign[number]]
-            rods.append(Rod(*leg.rod, total(soft), total(given), signs[0] if signs else 0.0))
-    count = sum(part.shape[1] for part in masses)
-    platform = Masses((0,) * count, np.concatenate(points, axis=1), np.concatenate(masses, axis=1))
-    return Cut(replace(mechanism, platform=platform), carrier, tuple(rods))
+            rotors = [rotor for rotor in leg.rotors[0].tolist() if not is_zero(rotor)]
+            if rotors and len(springs) > 1:
+                return None  # a rotor between two springs has a motion of its own
+            rods.append(Rod(*leg.rod, total(soft), total(given), signs[0] if signs else 0.0, total(rotors)))
+    return Cut(replace(mechanism, platform=together(masses)), carrier, tuple(rods))
 
 
 def _free_motions(mechanism: Mechanism) -> Chain:
@@ -107,7 +109,6 @@ def _free_motions(mechanism: Mechanism) -> Chain:
     ways = mechanism.ways.T[::-1].astype(object)
     size = len(ways)
     nothing = np.zeros((1, size))
-    masses = Masses((), np.zeros((1, 0, 3)), np.zeros((1, 0)))
     return Chain(
         "platform",
         ways[None],
@@ -118,7 +119,9 @@ def _free_motions(mechanism: Mechanism) -> Chain:
         nothing,
         nothing[0],
         np.zeros((1, size, size)),
-        masses,
+        together([]),
+        nothing,
+        nothing,
     )
 
 
@@ -197,7 +200,7 @@ def _sum(vectors: Sequence[Vector]) -> Vector:
 
 
 @dataclass(frozen=True)
-class _Place:
+class Place:
     """The equations at some coordinates of the carrier.
 
     Attributes:
@@ -215,7 +218,8 @@ class _Place:
     slack: Scalar
 
 
-def _place(machine: Cut, coordinates: Row) -> _Place:
+def place_of(machine: Cut, coordinates: Row) -> Place:
+    """Evaluate the equations of a machine whose loops are cut at some coordinates of its carrier."""
     mechanism, carrier = machine.mechanism, machine.carrier
     moved = of_scalars(coordinates)
     amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
@@ -230,7 +234,7 @@ def _place(machine: Cut, coordinates: Row) -> _Place:
     springs = terms.carrying[0][:, None] * np.eye(carrier.size)
     rates = springs + terms.geometric[0] + twists.T @ (fall - change)[0] @ twists
     elastic = springs + twists.T @ _stretched(pulls, [pull.elastic for pull in pulls]) @ twists
-    return _Place(platform, terms, rates, elastic, total([pull.slack for pull in pulls]))
+    return Place(platform, terms, rates, elastic, total([pull.slack for pull in pulls]))
 
 
 def _stretched(pulls: Sequence[_Pull], weights: Row) -> Array:
@@ -289,7 +293,7 @@ class Reduced:
 
     def step(self, coordinates: Row) -> tuple[Row, Scalar]:
         """The coordinates after a step of Newton's method, and the square of its size; NaN where it is too long."""
-        step = _Tangent(self.cut, _place(self.cut, coordinates)).step
+        step = Tangent(self.cut, place_of(self.cut, coordinates)).step
         square = _square(step)
         near = square < LONGEST_STEP**2
         return [where(near, a + b, math.nan) for a, b in zip(coordinates, step, strict=True)], square
@@ -306,7 +310,7 @@ class Reduced:
             The numbers by name, and the status of the pose: NOT_CONVERGED where this is not surely a stable state of
             rest.
         """
-        tangent, mechanism = _Tangent(self.cut, _place(self.cut, coordinates)), self.cut.mechanism
+        tangent, mechanism = Tangent(self.cut, place_of(self.cut, coordinates)), self.cut.mechanism
         displacement, good = tangent.displacement()
         good = (_square(tangent.step) < AT_REST**2) & tangent.stable & good
         compliance, units = tangent.compliance(), mechanism.compliance_units[0]
@@ -333,10 +337,10 @@ def _square(step: Row) -> Scalar:
     return total([part * part for part in step])
 
 
-class _Tangent:
+class Tangent:
     """How a machine resists at a place, and Newton's step from there."""
 
-    def __init__(self, machine: Cut, place: _Place) -> None:
+    def __init__(self, machine: Cut, place: Place) -> None:
         self.place = place
         self._symmetric = all(is_zero(part) for part in machine.mechanism.wrench[0, :3].tolist())
         self._factors = eliminated(place.rates.tolist(), self._symmetric)
@@ -379,18 +383,22 @@ class _Tangent:
         """By which the load may grow until the state gives way, and whether springs alone hold the machine."""
         elastic, rates = self.place.elastic, self.place.rates
         half = eliminated((0.5 * (elastic + elastic.T)).tolist())
-        turning = elastic - 0.5 * (rates + rates.T)
-        once = [half.forward(row) for row in turning.tolist()]
-        twice = [half.forward(row) for row in np.array(once, dtype=object).T.tolist()]
-        roots = [sqrt(abs(shrink)) for shrink in half.shrink]
-        size = range(len(roots))
-        greatest = greatest_eigenvalue([[roots[i] * twice[i][j] * roots[j] for j in size] for i in size])
+        greatest = greatest_eigenvalue(relative(half, elastic - 0.5 * (rates + rates.T)))
         grows = greatest > 0.0
         return where(grows, 1.0 / where(grows, greatest, 1.0), math.inf), definite(half, elastic)
 
 
 def _resisted(compliance: Scalar) -> Scalar:
     return where(abs(compliance) < UNRESISTED, 0.0, compliance)
+
+
+def relative(factors: Eliminated, matrix: Array) -> list[Row]:
+    """L^-1 A L^-T of a symmetric matrix A, with the factors of a positive definite one, L L^T."""
+    once = [factors.forward(row) for row in matrix.tolist()]
+    twice = [factors.forward(row) for row in np.array(once, dtype=object).T.tolist()]
+    roots = [sqrt(abs(shrink)) for shrink in factors.shrink]
+    size = range(len(roots))
+    return [[roots[i] * twice[i][j] * roots[j] for j in size] for i in size]
 
 
 def definite(factors: Eliminated, rows: Array) -> Scalar:

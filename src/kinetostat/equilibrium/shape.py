@@ -3,18 +3,17 @@
 Source: theory (35).
 """
 
-from collections.abc import Iterator
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
-from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.vector import Vector
-from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.chains import Chain
-from kinetostat.equilibrium.motion import Array, Motions, exponential, still
+from kinetostat.equilibrium.balance import Balance, placed_leg
+from kinetostat.equilibrium.motion import Motions
 from kinetostat.kinetostatics.deflected import DeflectedLink, leg_links
-from kinetostat.machine.leg import Element, Leg
+from kinetostat.machine.leg import Leg
 
 
 def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> tuple[DeflectedLink, ...]:
@@ -30,32 +29,14 @@ def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> t
     links: list[DeflectedLink] = []
     given = np.concatenate([state.amounts, mechanism.growth], axis=1)
     for leg, chain, coordinates in zip(legs, mechanism.legs, state.coordinates, strict=True):
-        bodies = list(_bodies(leg, chain, coordinates, given))
-
-        def moved(body: int, point: Vector, bodies: list[Motions] = bodies) -> Twist:
-            at = np.array([(point - origin).components()], dtype=float) / length
-            turned = Vector(*bodies[body].amounts()[0, :3].tolist())
-            return Twist(turned, Vector(*(length * (bodies[body].point(at) - at))[0].tolist()))
-
-        links += leg_links(leg, moved)
+        placed = placed_leg(chain, coordinates, given).motions
+        bodies = [placed[number] for number in chain.ends]
+        links += leg_links(leg, partial(_moved, bodies, origin, length))
     return tuple(links)
 
 
-def _bodies(leg: Leg, chain: Chain, coordinates: Array, given: Array) -> Iterator[Motions]:
-    """Displacements of the bodies before, between and after the elements of a leg."""
-    placed, number, known = still(1), 0, 0
-    yield placed
-    for element in leg.chain:
-        known += _size(element)
-        while number < len(chain.coordinate) and chain.coordinate[number] < known:
-            by = chain.coordinate[number]
-            amount = given[:, chain.given[number]] if by < 0 else coordinates[:, by]
-            placed = placed @ exponential(chain.twists[:, number] * amount[:, None])
-            number += 1
-        yield placed
-
-
-def _size(element: Element) -> int:
-    """How many coordinates an element has: none for a rigid spring."""
-    springs = [spring.stiffness for spring in element.springs]
-    return len(element.freedoms) + sum(is_zero(k) or not np.isinf(float(k)) for k in springs)
+def _moved(bodies: Sequence[Motions], origin: Vector, length: float, body: int, point: Vector) -> Twist:
+    """How a point (m) of one of the bodies moves, rad and m."""
+    at = np.array([(point - origin).components()], dtype=float) / length
+    turned = Vector(*bodies[body].amounts()[0, :3].tolist())
+    return Twist(turned, Vector(*(length * (bodies[body].point(at) - at))[0].tolist()))

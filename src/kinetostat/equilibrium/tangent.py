@@ -9,6 +9,7 @@ Source: theory (39) and (40). M. Zefran and V. Kumar, "A geometrical approach to
 matrix", J. Mechanical Design 124(1), 2002. Units are those of `mechanism`.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -103,21 +104,14 @@ def stability(equations: Balance) -> Stability:
 
 def stabilities(equations: Balance) -> Stabilities:
     """Judge states of rest; what is not finite is not stable."""
-    ways, starts = equations.mechanism.ways, _starts(equations)
-    elastic, geometric, conditions = _motions(equations, starts)
+    ways, starts = equations.mechanism.ways, starts_of(equations)
+    elastic, geometric, conditions = motions_of(equations)
     count, size = len(elastic), ways.shape[1]
     sound = np.isfinite(elastic + geometric).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
     stable: npt.NDArray[np.bool_] = np.array(sound)
     factors, modes = np.where(sound, np.inf, np.nan), np.zeros((count, starts[-1]))
-    values, rows_of_all = np.zeros((count, min(conditions.shape[1:]))), np.zeros((count, starts[-1], starts[-1]))
-    _, values[sound], rows_of_all[sound] = np.linalg.svd(conditions[sound])
-    ranks = (values > UNRESISTED * values[:, :1]).sum(axis=1)
-    for rank in np.unique(ranks[sound]):
-        here = np.flatnonzero(sound & (ranks == rank))
-        allowed = np.swapaxes(rows_of_all[here, rank:], 1, 2)
-        if not allowed.size:
-            continue  # nothing can move at all
-        stiff, turning = (_within(part[here], allowed) for part in (elastic, geometric))
+    for here, allowed in allowed_motions(conditions, np.flatnonzero(sound)):
+        stiff, turning = (within(part[here], allowed) for part in (elastic, geometric))
         stable[here] = np.linalg.eigvalsh(stiff + turning)[:, 0] > 0.0
         least, springs = np.linalg.eigh(stiff)
         holds = least[:, 0] > UNRESISTED * least[:, -1]
@@ -133,15 +127,33 @@ def stabilities(equations: Balance) -> Stabilities:
     )
 
 
-def _starts(equations: Balance) -> npt.NDArray[np.int64]:
+def allowed_motions(conditions: Array, rows: npt.NDArray[np.int64]) -> Iterator[tuple[npt.NDArray[np.int64], Array]]:
+    """Poses with as many motions that obey the conditions, and an orthonormal basis of these, as columns.
+
+    Poses at which nothing can move at all are left out.
+
+    Args:
+        conditions: that motions must make 0 [n x conditions x coordinates].
+        rows: of the poses at which they are finite.
+    """
+    _, values, bases = np.linalg.svd(conditions[rows])
+    ranks = (values > UNRESISTED * values[:, :1]).sum(axis=1)
+    for rank in np.unique(ranks):
+        here = ranks == rank
+        allowed = np.swapaxes(bases[here, rank:], 1, 2)
+        if allowed.size:
+            yield rows[here], allowed
+
+
+def starts_of(equations: Balance) -> npt.NDArray[np.int64]:
     """Where the coordinates of each leg begin after the ways of the platform, and where the last ones end."""
     sizes = [leg.size for leg in equations.mechanism.legs]
     return equations.mechanism.ways.shape[1] + np.cumsum([0, *sizes])
 
 
-def _motions(equations: Balance, starts: npt.NDArray[np.int64]) -> tuple[Array, Array, Array]:
+def motions_of(equations: Balance) -> tuple[Array, Array, Array]:
     """Springs, and what loads and wrenches add, over the twist of the platform and all coordinates; what these obey."""
-    mechanism, ways = equations.mechanism, equations.mechanism.ways
+    mechanism, ways, starts = equations.mechanism, equations.mechanism.ways, starts_of(equations)
     count, size, end = len(equations.left), ways.shape[1], int(starts[-1])
     elastic, geometric = np.zeros((2, count, end, end))
     conditions = np.zeros((count, size * len(mechanism.legs), end))
@@ -156,6 +168,6 @@ def _motions(equations: Balance, starts: npt.NDArray[np.int64]) -> tuple[Array, 
     return elastic, geometric, conditions
 
 
-def _within(matrix: Array, allowed: Array) -> Array:
+def within(matrix: Array, allowed: Array) -> Array:
     """The symmetric part of a matrix over the motions that are allowed, the columns [n x k x k]."""
     return np.asarray(0.5 * np.swapaxes(allowed, 1, 2) @ (matrix + np.swapaxes(matrix, 1, 2)) @ allowed)

@@ -3,7 +3,7 @@
 A format is added here as one row of `KNOWN`. Its writer is imported only when it is used, so that the list is cheap.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -26,6 +26,7 @@ class Format:
             paths of the files it made.
         summary: what is in it, for lists.
         other_suffixes: suffixes that are also common for its files.
+        channels: whether inputs and outputs can be chosen.
     """
 
     name: str
@@ -33,24 +34,36 @@ class Format:
     writer: str
     summary: str
     other_suffixes: tuple[str, ...] = ()
+    channels: bool = False
 
-    def write(self, analysis: Analysis, path: Path) -> list[Path]:
+    def write(self, analysis: Analysis, path: Path, **channels: Sequence[str] | None) -> list[Path]:
         """Write the machine, or its results at the pose, whole or not at all, and return the paths of the files.
 
         Args:
             analysis: of the machine, at a pose where its status is OK.
             path: of the file; one that is there is replaced.
+            channels: names of `inputs` and of `outputs`; None for all that the format has by itself.
 
         Raises:
-            InputError: the format cannot hold this machine, or the file cannot be written.
+            InputError: the format cannot hold this machine, has no inputs and outputs, or the file cannot be written.
         """
+        chosen = {kind: names for kind, names in channels.items() if names is not None}
+        if chosen and not self.channels:
+            able = ", ".join(form.name for form in KNOWN if form.channels)
+            raise InputError(f"The format {self.name} has no {' and '.join(chosen)} to choose; {able} has: use --to.")
         module, _, function = self.writer.partition(".")
-        write: Callable[[Analysis, Path], list[Path]] = getattr(import_module(f"{__package__}.{module}"), function)
-        return write(analysis, path)
+        write: Callable[..., list[Path]] = getattr(import_module(f"{__package__}.{module}"), function)
+        return write(analysis, path, **chosen)
 
 
 KNOWN = (
     Format("mjcf", ".xml", "mjcf.write", "machine for MuJoCo: bodies, joints, springs, closed loops"),
+    Format(
+        "mjcf-vibration",
+        ".xml",
+        "mjcf.write_vibrating",
+        "the same with the machine's own masses and no damping: it vibrates as the machine does",
+    ),
     Format(
         "urdf",
         ".urdf",
@@ -68,11 +81,26 @@ KNOWN = (
     Format("csv", ".csv", "results_files.write_csv", "results at the pose, a number a line with its unit"),
     Format("netcdf", ".nc", "results_files.write_netcdf", "results at the pose, labelled, with units"),
     Format("mat", ".mat", "results_files.write_mat", "K, C, pose and reference point for MATLAB"),
+    Format(
+        "modes",
+        ".csv",
+        "vibration_files.write_modes",
+        "natural frequencies, shapes, masses and shares of energy",
+        (".nc",),
+    ),
+    Format(
+        "state-space",
+        ".mat",
+        "vibration_files.write_state_space",
+        "A, B, C, D of the vibrating machine, from chosen forces to chosen motions",
+        (".nc",),
+        channels=True,
+    ),
     Format("nastran", ".bdf", "finite_elements.write_nastran", "K at the tool point as DMIG"),
     Format("abaqus", ".inp", "finite_elements.write_abaqus", "K at the tool point as a linear user element"),
     Format("ansys", ".mac", "finite_elements.write_ansys", "K at the tool point as MATRIX27, in APDL"),
 )
-"""Every format, machines first."""
+"""Every format, machines first; a suffix belongs to the first of those that have it."""
 
 
 def choose(name: str | None, path: Path | None) -> Format:
@@ -84,11 +112,10 @@ def choose(name: str | None, path: Path | None) -> Format:
     if name is not None:
         known = {form.name: form for form in KNOWN}
         return known[choice(name, known, "--to")]
-    suffix = "" if path is None else path.suffix.lower()
-    for form in KNOWN:
-        if suffix in (form.suffix, *form.other_suffixes):
-            return form
-    names = ", ".join(f"{form.name} ({form.suffix})" for form in KNOWN)
+    by_suffix = {suffix: form for form in reversed(KNOWN) for suffix in (form.suffix, *form.other_suffixes)}
+    if path is not None and path.suffix.lower() in by_suffix:
+        return by_suffix[path.suffix.lower()]
+    names = ", ".join(f"{form.name} ({form.suffix})" for form in KNOWN if by_suffix[form.suffix] is form)
     raise InputError(
         "The format of the export is missing; name it with --to, or give -o a file with one of these suffixes: "
         f"{names}."
@@ -96,13 +123,21 @@ def choose(name: str | None, path: Path | None) -> Format:
 
 
 @checked
-def export(machine: Machine, path: str | Path, to: str | None = None) -> list[Path]:
+def export(
+    machine: Machine,
+    path: str | Path,
+    to: str | None = None,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+) -> list[Path]:
     """Write a machine, or its results at its pose, in the format of another program, whole or not at all.
 
     Args:
         machine: at a pose where it can be analysed.
         path: of the file; one that is there is replaced.
         to: name of the format, as in `kinetostat export --to`; None to go by the suffix of the path.
+        inputs, outputs: of a state space: names of forces fx fy fz mx my mz at the tool point, of motions x y z rx ry
+            rz there, and of actuators in both; forces and motions of the tool point if None.
 
     Returns:
         The paths of the files: some formats need several.
@@ -114,7 +149,7 @@ def export(machine: Machine, path: str | Path, to: str | None = None) -> list[Pa
     form, analysis = choose(to, Path(path)), analyze(machine)
     if analysis.status is not Status.OK:
         raise InputError(analysis.message)
-    return form.write(analysis, Path(path))
+    return form.write(analysis, Path(path), inputs=inputs, outputs=outputs)
 
 
 def one_line(text: str) -> str:

@@ -16,11 +16,13 @@ import numpy.typing as npt
 from kinetostat.algebra.vector import Rotation, Vector
 from kinetostat.kinematics.mobility import task_coordinates
 from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.common_tables import Load, Tool
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.loading import load
-from kinetostat.machine.machine import Configuration, Load, Machine, Tool
+from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.mass import turned_tensor
 from kinetostat.machine.written.plan import BASE, NAME, PLATFORM, SPATIAL_POSE
 from kinetostat.spec.document import Document, toml_key
 from kinetostat.spec.errors import InputError
@@ -42,13 +44,28 @@ def legs_of(name: str) -> str:
     return _text(document_of(machine), machine)
 
 
-def document_of(machine: Machine) -> Document:
+def built_text(machine: Machine, built: Configuration, notes: Sequence[str]) -> str:
+    """The text of a machine file leg by leg of a machine as built.
+
+    Args:
+        machine: as drawn.
+        built: where its legs are as built, at the home pose of the file.
+        notes: lines of comment at its head.
+    """
+    return "".join(f"# {note}\n" for note in notes) + _text(document_of(machine, built), machine)
+
+
+def document_of(machine: Machine, built: Configuration | None = None) -> Document:
     """A machine as what its file leg by leg would say.
+
+    Args:
+        machine: whose tables the file takes over.
+        built: where its legs are; at the machine's pose if None.
 
     Raises:
         InputError: it cannot be placed at its pose.
     """
-    configuration = respond(machine).configuration
+    configuration = built or respond(machine).configuration
     if not all(np.isfinite(_numbers(point)).all() for leg in configuration.legs for point in leg.path):
         raise InputError(f"{machine.name} cannot be placed at its pose; change [pose] until `kinetostat check` is ok.")
     turn, point = configuration.platform.rotation, configuration.platform.translation
@@ -58,6 +75,9 @@ def document_of(machine: Machine) -> Document:
     document["legs"] = [_Chain(leg, point).document() for leg in configuration.legs]
     tool, load_given = _tool(machine, turn), _load(machine, turn)
     document |= {"tool": tool} if tool else {}
+    for name in ("drives", "damping", "cutting"):
+        given = {field: value for field, value in vars(machine.tables[name]).items() if np.any(value)}
+        document |= {name: given} if given else {}
     document |= {"load": load_given} if load_given else {}
     upright = _numbers(turn.z) == [0.0, 0.0, 1.0]
     table = machine.tables["limits"]
@@ -70,9 +90,13 @@ def document_of(machine: Machine) -> Document:
 def _tool(machine: Machine, turn: Rotation) -> dict[str, Any]:
     """The table [tool]; platform axes are those of the base at the home pose of a file leg by leg."""
     table = machine.tables["tool"]
-    given = {name: getattr(table, name) for name in quantities(Tool)}
-    turned = {name: _numbers(turn.apply(Vector(*value))) for name, value in given.items() if isinstance(value, tuple)}
-    return {name: value for name, value in (given | turned).items() if np.any(value)}
+    given: dict[str, Any] = {name: getattr(table, name) for name in quantities(Tool)}
+    for name, value in given.items():
+        if name.endswith("inertia"):
+            given[name] = [float(entry) for entry in turned_tensor(turn.apply, value)]
+        elif isinstance(value, tuple):
+            given[name] = _numbers(turn.apply(Vector(*value)))
+    return {name: value for name, value in given.items() if np.any(value)}
 
 
 def _load(machine: Machine, turn: Rotation) -> dict[str, Any]:

@@ -15,10 +15,12 @@ import numpy.typing as npt
 from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model, build
 from kinetostat.exchange.mjcf_pace import IMPEDANCE, LEAST_STEPS, Pace, pace_of
+from kinetostat.exchange.mjcf_vibration import vibrating_pace
 from kinetostat.exchange.results import reference_point
 from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_text
+from kinetostat.validation.masses import Heavy
 
 Array = npt.NDArray[np.float64]
 
@@ -27,11 +29,18 @@ THICKNESS = 0.008
 NOTES = (
     " Written by kinetostat; SI, axes of the machine's base. Springs are stiffnesses of joints, rigid parts have\n"
     "     none. No gravity. xfrc_applied on the body 'platform': force, moment at the tool point (site 'tool').\n"
-    "     A load has settled after 'settling_time', s. Masses decide nothing that is static; those that the\n"
-    "     machine file does not say are as great as those it says, or 1 kg. Constraints are soft: keep timestep,\n"
-    "     solref and solimp as they are. "
+    "     {}\n"
+    "     Constraints are soft: keep timestep, solref and solimp as they are. "
 )
 """Comment at the top of the file, for its reader."""
+SETTLING = (
+    "A load has settled after 'settling_time', s. Masses decide nothing that is static; those that the\n"
+    "     machine file does not say are as great as those it says, or 1 kg."
+)
+VIBRATING = (
+    "Masses are those of the machine file, nothing is damped: 'settling_time' is ten periods of the slowest\n"
+    "     motion. A part without a mass has very little here. A link that bends is heavy in two rigid halves."
+)
 LEAST_EXTENT = 1e-3
 """Smallest extent of a picture, m."""
 COLOURS = {
@@ -46,18 +55,23 @@ COLOURS = {
 """Red, green, blue and opacity of the materials."""
 
 
-def text_of(analysis: Analysis) -> str:
+def text_of(analysis: Analysis, vibrating: bool = False) -> str:
     """Return the model: unstressed and at rest at the pose; a wrench on the platform acts at the tool point.
 
+    Args:
+        analysis: of the machine.
+        vibrating: whether it has the machine's own masses and no damping, so that it vibrates as the machine does;
+            otherwise masses and damping let it come to rest soon.
+
     Raises:
-        InputError: if the machine has a part that MuJoCo has no counterpart for.
+        InputError: if the machine has a part that MuJoCo has no counterpart for, or no mass that could vibrate.
     """
     model = build(respond(analysis.machine).configuration)
-    pace = pace_of(analysis, model)
+    pace = vibrating_pace(analysis, model) if vibrating else pace_of(analysis, model)
     middle, extent = _middle_and_extent(model)
     radius = THICKNESS * extent
     root = Element("mujoco", model=one_line(analysis.machine.name))
-    root.append(ElementTree.Comment(NOTES))
+    root.append(ElementTree.Comment(NOTES.format(VIBRATING if vibrating else SETTLING)))
     SubElement(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="false")
     option = SubElement(root, "option", timestep=_n(pace.step), gravity="0 0 0", integrator="Euler", solver="Newton")
     option.set("tolerance", "1e-12")
@@ -102,7 +116,7 @@ def _look(root: Element) -> None:
 
 def _body(parent: Element, body: Body, before: Body, pace: Pace, radius: float) -> None:
     element = SubElement(parent, "body", name=body.name, pos=_n(*(body.at - before.at)))
-    _inertia(element, pace.masses[body.name], pace.gyration, np.zeros(3))
+    _inertia(element, pace.inertias[body.name], body.at)
     for freedom in body.freedoms:
         _joint(element, freedom, body, pace)
     _shapes(element, body, radius, "link")
@@ -112,8 +126,13 @@ def _body(parent: Element, body: Body, before: Body, pace: Pace, radius: float) 
         _body(element, child, body, pace, radius)
 
 
-def _inertia(element: Element, mass: float, gyration: float, at: Array) -> None:
-    SubElement(element, "inertial", pos=_n(*at), mass=_n(mass), diaginertia=_n(*[mass * gyration**2] * 3))
+def _inertia(element: Element, part: Heavy, origin: Array) -> None:
+    inertial = SubElement(element, "inertial", pos=_n(*(part.centre - origin)), mass=_n(part.mass))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = part.inertia
+    if xy == 0.0 and xz == 0.0 and yz == 0.0:
+        inertial.set("diaginertia", _n(xx, yy, zz))
+    else:
+        inertial.set("fullinertia", _n(xx, yy, zz, xy, xz, yz))
 
 
 def _joint(element: Element, freedom: Freedom, body: Body, pace: Pace) -> None:
@@ -124,7 +143,7 @@ def _joint(element: Element, freedom: Freedom, body: Body, pace: Pace) -> None:
     if freedom.stiffness > 0.0:
         joint.set("stiffness", _n(freedom.stiffness))
         joint.set("damping", _n(pace.damping(freedom.stiffness)))
-        joint.set("armature", _n(pace.armature(freedom.stiffness)))
+        joint.set("armature", _n(pace.armature(freedom)))
 
 
 def _shapes(element: Element, body: Body, radius: float, material: str) -> None:
@@ -153,11 +172,13 @@ def _joint_shape(element: Element, freedom: Freedom, body: Body, radius: float) 
 
 
 def _platform(world: Element, model: Model, pace: Pace, radius: float, tool: Array) -> None:
-    """Add the platform: free, its centre of mass at the tool point, so that loads on it act there."""
+    """Add the platform: free, its centre of mass at the tool point, so that loads on it act there; what it carries."""
     body = model.platform
     element = SubElement(world, "body", name=body.name, pos=_n(*body.at))
     SubElement(element, "freejoint", name=body.name)
-    _inertia(element, pace.masses[body.name], pace.gyration, tool - body.at)
+    _inertia(element, pace.inertias[body.name], body.at)
+    for number, part in enumerate(pace.carried, 1):
+        _inertia(SubElement(element, "body", name=f"mass {number}"), part, body.at)
     _shapes(element, body, radius, "platform")
     SubElement(element, "geom", type="sphere", size=_n(1.5 * radius), material="platform")
     ring = [*body.reach, body.reach[0]]
@@ -199,4 +220,14 @@ def write(analysis: Analysis, path: Path) -> list[Path]:
         InputError: if the machine has a part that MuJoCo has no counterpart for.
     """
     write_text(path, text_of(analysis))
+    return [path]
+
+
+def write_vibrating(analysis: Analysis, path: Path) -> list[Path]:
+    """Write the model with the machine's own masses and without damping.
+
+    Raises:
+        InputError: if the machine has a part that MuJoCo has no counterpart for, or no mass that could vibrate.
+    """
+    write_text(path, text_of(analysis, vibrating=True))
     return [path]

@@ -100,12 +100,16 @@ class Model:
         world: the base.
         platform: free but for the constraints.
         closings, threads: constraints.
+        chains: bodies of each leg from the base to the platform, one between each piece of `pieces` and the next.
+        bars: near and far half of a strut, or of both bars of a parallelogram, by the numbers of leg and piece.
     """
 
     world: Body
     platform: Body
     closings: list[Closing] = field(default_factory=list)
     threads: list[Thread] = field(default_factory=list)
+    chains: list[list[Body]] = field(default_factory=list)
+    bars: dict[tuple[int, int], list[tuple[Body, Body]]] = field(default_factory=dict)
     _names: Counter[str] = field(default_factory=Counter)
 
     def unique(self, name: str) -> str:
@@ -136,13 +140,18 @@ class _Chain:
         self._body = model.world
         self._ball = False
         chain = pieces(leg, plane)
+        self._bodies = [self._body]
         for i, piece in enumerate(chain):
             self._add(piece, next(filter(None, map(_start, chain[i + 1 :])), None))
+            self._bodies.append(self._body)
+        model.chains.append(self._bodies)
 
     def close(self) -> None:
         """Join the last body to the platform."""
         tip = self._body.reach[-1] if self._ball else self._body.at
         self._model.platform.reach.append(tip)
+        if self._ball:
+            self._bodies[-1] = self._model.platform
         self._model.closings.append(Closing(self._ball, (self._body.name, self._model.platform.name), tip))
 
     def _add(self, piece: Piece, after: Vector | None) -> None:
@@ -216,7 +225,7 @@ class _Chain:
         """Add a rod on a ball joint: two hinges across it, as its spin does nothing, and a slide if it is compliant."""
         start, end = array(strut.start), array(strut.end)
         along = (end - start) / np.linalg.norm(end - start)
-        self._grow(strut.name, start)
+        near = self._grow(strut.name, start)
         for axis in _across(along):
             self._free(f"{strut.name} swing", Joint(Vector(*axis), strut.start))
         if np.isfinite(strut.stiffness):
@@ -224,28 +233,31 @@ class _Chain:
             driven = any(spring.actuated and spring.joint.point is None for spring in self._leg.springs)
             self._free(f"{strut.name} stretch", Joint(Vector(*along)), strut.stiffness, driven)
         self._body.reach.append(end)
+        self._model.bars[len(self._model.chains), len(self._bodies) - 1] = [(near, self._body)]
         self._ball = True
 
     def _after_strut(self) -> None:
         """Add the ball joint at the end of a strut that does not reach the platform: three hinges."""
         end = self._body.reach.pop()
         self._ball = False
-        self._grow(f"{self._leg.name} ball", end)
+        self._bodies[-1] = self._grow(f"{self._leg.name} ball", end)
         for axis in np.eye(3):
             self._free(f"{self._leg.name} ball", Joint(Vector(*axis), Vector(*end)))
 
     def _parallelogram(self, piece: Parallelogram) -> None:
         """Add two bars on hinges: the first carries the far side, the second is closed by a ball joint."""
         near_side, normal = self._body, piece.normal
-        tips = []
+        tips, halves = [], []
         for bar, (near, far) in enumerate(piece.bars, 1):
             self._body = near_side
-            self._grow(f"{piece.name} bar {bar}", array(near))
+            half = self._grow(f"{piece.name} bar {bar}", array(near))
             self._free(f"{piece.name} swing {bar}", Joint(normal, near))
             if np.isfinite(float(piece.bar)):
                 self._grow(f"{piece.name} stretch {bar}", array((near + far) * 0.5))
                 self._free(f"{piece.name} stretch {bar}", Joint(piece.along), float(piece.bar))
             tips.append(self._body)
+            halves.append((half, self._body))
+        self._model.bars[len(self._model.chains), len(self._bodies) - 1] = halves
         (_, first), (_, second) = piece.bars
         tips[1].reach.append(array(second))
         self._body = tips[0]

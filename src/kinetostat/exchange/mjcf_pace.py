@@ -13,10 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinetostat.exchange.mjcf_model import Body, Model
+from kinetostat.exchange.mjcf_model import Body, Freedom, Model
+from kinetostat.exchange.results import reference_point
 from kinetostat.machine.mass import PLATFORM, Mass
 from kinetostat.studies.analysis import Analysis
 from kinetostat.tolerances import RIGID_BLOCK, SOFT_CONSTRAINT
+from kinetostat.validation.masses import Heavy
 
 NOMINAL_MASS = 1.0
 """kg, of every body where no mass is known: deflections do not depend on it."""
@@ -42,23 +44,27 @@ class Pace:
         step: time step, s.
         retardation: damping of a spring per its stiffness, s.
         settling: time after which a deflection has come to rest, s.
-        masses: of every body by name, kg.
-        gyration: radius of gyration of every body, m.
+        inertias: mass, its centre and inertia of every body by name.
+        armatures: inertia added to joints by name, kg or kg·m²; None if `armature` decides it.
+        carried: further mass on the platform.
     """
 
     step: float
     retardation: float
     settling: float
-    masses: dict[str, float]
-    gyration: float
+    inertias: dict[str, Heavy]
+    armatures: dict[str, float] | None = None
+    carried: tuple[Heavy, ...] = ()
 
     def damping(self, stiffness: float) -> float:
         """Damping of a joint with a spring, N·s/m or N·m·s/rad."""
         return stiffness * self.retardation
 
-    def armature(self, stiffness: float) -> float:
+    def armature(self, freedom: Freedom) -> float:
         """Inertia added to a joint with a spring, kg or kg·m², so that no spring is too fast for the time step."""
-        return stiffness * CALM**2 * self.retardation * self.step
+        if self.armatures is not None:
+            return self.armatures.get(freedom.name, 0.0)
+        return freedom.stiffness * CALM**2 * self.retardation * self.step
 
 
 def pace_of(analysis: Analysis, model: Model) -> Pace:
@@ -66,14 +72,22 @@ def pace_of(analysis: Analysis, model: Model) -> Pace:
     masses = _masses(model, analysis.masses)
     length = float(analysis.characteristic_length or 1.0)
     gyration = GYRATION * length
-    stiff, soft = min(_compliances(analysis, gyration)), max(_compliances(analysis, length))
-    step = math.sqrt(SOFT_CONSTRAINT * stiff * min(masses.values()) / (1.0 - IMPEDANCE)) / LEAST_STEPS
-    slowest = math.sqrt(soft * sum(masses.values()))
-    return Pace(step, 2.0 * DAMPING * slowest, 20.0 * slowest, masses, gyration)
+    step = step_for(analysis, min(masses.values()), gyration)
+    slowest = math.sqrt(max(compliances(analysis, length)) * sum(masses.values()))
+    places = {body.name: body.at for body in model.world.every()}
+    places[model.platform.name] = np.array(reference_point(analysis))  # so that loads on the platform act there
+    inertias = {name: Heavy(mass, places[name], mass * gyration**2 * np.eye(3)) for name, mass in masses.items()}
+    return Pace(step, 2.0 * DAMPING * slowest, 20.0 * slowest, inertias)
 
 
-def _compliances(analysis: Analysis, arm: float) -> list[float]:
-    """Sizes of the compliant blocks of C, m/N; rotation as the motion of a point at an arm (m) under a force there."""
+def step_for(analysis: Analysis, least: float, gyration: float) -> float:
+    """Return the time step (s) with which constraints are stiff enough, for a least mass (kg) and its gyration (m)."""
+    stiff = min(compliances(analysis, gyration))
+    return math.sqrt(SOFT_CONSTRAINT * stiff * least / (1.0 - IMPEDANCE)) / LEAST_STEPS
+
+
+def compliances(analysis: Analysis, arm: float) -> list[float]:
+    """Return sizes of the compliant blocks of C, m/N; rotation as a point at an arm (m) moves under a force there."""
     if analysis.compliance is None:
         return [UNKNOWN_COMPLIANCE]
     matrix = np.array(analysis.compliance)

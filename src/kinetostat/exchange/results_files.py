@@ -3,7 +3,8 @@
 import csv
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -14,13 +15,15 @@ from scipy.io import savemat
 
 from kinetostat.exchange.results import UNITS, as_dataset, pose_of, reference_point, unit_of
 from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.plain_data import no_formula
 from kinetostat.studies.storage import replacing, write_dataset, write_text
 
 CSV_HEADER = ("quantity", "row", "column", "value", "unit")
 ABOUT = ("machine", "family", "frame", "kinetostat")
 """Attributes at the top of a CSV file: a line "about" each, their values in the columns of names."""
 
-Line = tuple[str, str, str, float, str]
+Line = tuple[str, str, str, float]
+Unit = Callable[[str, str, str], str]
 
 
 def write_netcdf(analysis: Analysis, path: Path) -> list[Path]:
@@ -30,32 +33,42 @@ def write_netcdf(analysis: Analysis, path: Path) -> list[Path]:
 
 
 def write_csv(analysis: Analysis, path: Path) -> list[Path]:
-    """Write the results as CSV, one number a line: its names, all its digits and its unit; NaN is left empty."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(CSV_HEADER)
+    """Write the results as CSV, one number a line."""
     dataset = as_dataset(analysis)
-    for key in ABOUT:
-        writer.writerow(("about", key, no_formula(str(dataset.attrs[key])), "", ""))
-    for quantity, row, column, value, unit in _lines(dataset):
-        writer.writerow((quantity, no_formula(row), no_formula(column), "" if value != value else repr(value), unit))
-    write_text(path, text.getvalue())
+    write_lines(path, dataset, partial(_unit, dataset))
     return [path]
 
 
-def no_formula(text: str) -> str:
-    """Return a name with an apostrophe before it where a spreadsheet would take it for a formula and compute it."""
-    return f"'{text}" if text.lstrip()[:1] in ("=", "+", "-", "@") else text
+def write_lines(path: Path, dataset: xr.Dataset, unit: Unit) -> None:
+    """Write a dataset as CSV, one number a line: its names, all its digits and its unit; NaN is left empty.
+
+    Args:
+        path: of the file.
+        dataset: with the attributes of `ABOUT`.
+        unit: of a number by its variable, row and column.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(CSV_HEADER)
+    for key in ABOUT:
+        writer.writerow(("about", key, no_formula(str(dataset.attrs[key])), "", ""))
+    for quantity, row, column, value in _lines(dataset):
+        shown = "" if value != value else repr(value)
+        writer.writerow((quantity, no_formula(row), no_formula(column), shown, unit(quantity, row, column)))
+    write_text(path, text.getvalue())
 
 
 def _lines(dataset: xr.Dataset) -> Iterator[Line]:
-    """Every number of a dataset: quantity, label of its row, label of its column, value, unit."""
+    """Every number of a dataset: quantity, label of its row, label of its column, value."""
     for name, variable in dataset.data_vars.items():
         sizes = variable.sizes
         for place in product(*(range(size) for size in sizes.values())):
             labels = [_label(dataset, str(dim), i) for dim, i in zip(sizes, place, strict=True)]
             row, column = (*labels, "", "")[:2]
-            yield str(name), row, column, float(variable.values[place]), _unit(dataset, str(name), row, column)
+            yield str(name), row, column, float(variable.values[place])
 
 
 def _label(dataset: xr.Dataset, dim: str, i: int) -> str:

@@ -13,7 +13,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import groupby
+from itertools import combinations_with_replacement, groupby
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import SubElement
@@ -25,14 +25,18 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.leg_by_leg import compliance_at
 from kinetostat.exchange.results import reference_point
-from kinetostat.kinetostatics.response import respond
+from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram
-from kinetostat.machine.machine import Configuration
+from kinetostat.machine.machine import Configuration, Machine, Member
+from kinetostat.machine.mass import located_members
 from kinetostat.machine.written.plan import BASE, PLATFORM
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import replacing
+from kinetostat.tolerances import COINCIDENT_HINGES
+from kinetostat.validation.masses import Heavy, matrix_of, on_platform, thin_rod, together
 from kinetostat.validation.pieces import array
 
 Array = npt.NDArray[np.float64]
@@ -84,6 +88,8 @@ class _Tree:
         self.motors: list[str] = []
         self.loops: list[tuple[str, str]] = []
         self._platform = array(configuration.platform.translation)
+        self._links: dict[str, tuple[ElementTree.Element, Array]] = {}
+        self._carriers: list[list[tuple[int, UrdfJoint, str]]] = []
         self.link(BASE)
         self._first, *others = [self._leg(leg) for leg in configuration.legs]
         name, at = self._first
@@ -92,9 +98,42 @@ class _Tree:
         for tip, place in others:
             self._close(tip, place)
 
-    def link(self, name: str, reach: Array | None = None) -> None:
-        """Add a link, drawn as a rod from its origin to the point `reach` on it, m."""
+    def weigh(self, machine: Machine, response: Response, joints: Joints | None) -> None:
+        """Add what weighs something to the links, as far as a link carries it whole.
+
+        Args:
+            machine: with its masses.
+            response, joints: of it; joints of a machine written leg by leg.
+        """
+        parts: dict[str, list[Heavy]] = {PLATFORM: [part for part in on_platform(machine, response) if part.mass]}
+        left: list[Heavy] = []
+        names = [leg.name for leg in response.configuration.legs]
+        free = next((i for i, leg in enumerate(response.configuration.legs) if leg.number is None), 0)
+        for member in located_members(machine, response.configuration, None if joints is None else joints.coordinates):
+            if member.mass:
+                number = names.index(member.leg) if member.leg else free
+                link, part = _whole(member, self._carriers[number])
+                (parts.setdefault(link, []) if link else left).append(part)
+        for name, heavy in parts.items():
+            if heavy and name != BASE:
+                self._inertial(*self._links[name], together(heavy))
+        if left:
+            text = "Links that bend, telescope or are parallelograms have a mass that is not written here"
+            self.robot.append(ElementTree.Comment(f" {text}: {sum(part.mass for part in left):.6g} kg. "))
+
+    def _inertial(self, link: ElementTree.Element, origin: Array, part: Heavy) -> None:
+        element = SubElement(link, "inertial")
+        SubElement(element, "origin", xyz=_n(*(part.centre - origin)), rpy="0 0 0")
+        SubElement(element, "mass", value=_n(part.mass))
+        entries = {
+            f"i{'xyz'[i]}{'xyz'[j]}": _n(part.inertia[i, j]) for i, j in combinations_with_replacement(range(3), 2)
+        }
+        SubElement(element, "inertia", entries)
+
+    def link(self, name: str, reach: Array | None = None, at: Array | None = None) -> None:
+        """Add a link at a place (base frame, m), drawn as a rod from its origin to the point `reach` on it, m."""
         element = SubElement(self.robot, "link", name=name)
+        self._links[name] = element, np.zeros(3) if at is None else at
         length = 0.0 if reach is None else float(np.linalg.norm(reach))
         if reach is not None and length > THICKNESS * self._size:
             visual = SubElement(element, "visual")
@@ -115,14 +154,17 @@ class _Tree:
     def _leg(self, leg: Leg) -> tuple[str, Array]:
         """Add a whole leg; return the name and the place of its last link."""
         parent, at = BASE, np.zeros(3)
-        joints = list(joints_of(leg))
-        before = ""
-        for i, joint in enumerate(joints):
+        row = list(joints_of(leg))
+        joints = [joint for _, joint in row]
+        before, carriers = "", []
+        for i, (elements, joint) in enumerate(row):
             last = i == len(joints) - 1
             child = self._unique(f"{leg.name}{TIP}" if last else f"{leg.name} body {i + 1}")
             reach = (self._platform if last else joints[i + 1].at) - joint.at
             before = self._join(joint, parent, child, at, reach, before)
             parent, at = child, joint.at
+            carriers.append((elements, joint, child))
+        self._carriers.append(carriers)
         if not joints:
             parent, at = self._unique(f"{leg.name}{TIP}"), self._platform
             self._join(UrdfJoint(f"{leg.name} foot", "fixed", at), BASE, parent, np.zeros(3))
@@ -132,7 +174,7 @@ class _Tree:
         self, joint: UrdfJoint, parent: str, child: str, at: Array, reach: Array | None = None, before: str = ""
     ) -> str:
         """Add a joint and the link after it and return the joint's name; `at` is the parent's origin, base frame, m."""
-        self.link(child, reach)
+        self.link(child, reach, joint.at)
         name = self._unique(joint.name)
         element = SubElement(self.robot, "joint", name=name, type=joint.kind)
         SubElement(element, "parent", link=parent)
@@ -164,7 +206,11 @@ class _Tree:
 
 def texts_of(analysis: Analysis) -> tuple[str, str]:
     """Return the URDF, with all joint coordinates zero at the pose, and the YAML of its closed loops."""
-    tree = _Tree(analysis, respond(analysis.machine).configuration)
+    machine = analysis.machine
+    joints = solve_joints(machine) if machine.family.chains else None
+    response = respond(machine, joints)
+    tree = _Tree(analysis, response.configuration)
+    tree.weigh(machine, response, joints)
     ElementTree.indent(tree.robot, "  ")
     text = '<?xml version="1.0"?>\n' + ElementTree.tostring(tree.robot, encoding="unicode") + "\n"
     lists = {
@@ -203,8 +249,38 @@ def write(analysis: Analysis, path: Path) -> list[Path]:
     return [path, loops_path]
 
 
-def joints_of(leg: Leg) -> Iterator[UrdfJoint]:
-    """Return the joints of a leg at the pose, from base to platform.
+def _whole(link: Member, carriers: Sequence[tuple[int, UrdfJoint, str]]) -> tuple[str, Heavy]:
+    """The URDF link that carries a link of the machine, or an empty name, and the link as a rigid mass.
+
+    A hinge through the end of a uniform rod moves that end with what is on either side of it.
+    """
+    behind = [BASE, *(child for _, _, child in carriers)]
+    mass = float(link.mass)
+    if link.centre is not None:
+        elements, centre = link.centre()
+        inertia = np.zeros((3, 3)) if link.inertia is None else matrix_of(link.inertia())
+        return behind[sum(number <= elements for number, *_ in carriers)], Heavy(mass, array(centre), inertia)
+    ends = link.ends() if link.ends else ()
+    if len(ends) != 2:
+        return "", Heavy(mass, np.zeros(3), np.zeros((3, 3)))
+    first, last = (sum(number <= elements for number, *_ in carriers) for elements, _ in ends)
+    start, end = (array(point) for _, point in ends)
+    while first < last and _hinged_at(carriers[first][1], start):
+        first += 1
+    while first < last and _hinged_at(carriers[last - 1][1], end):
+        last -= 1
+    return behind[first] if first == last else "", thin_rod(mass, start, end)
+
+
+def _hinged_at(joint: UrdfJoint, point: Array) -> bool:
+    """Whether a joint turns about a line through a point, and nothing else."""
+    if joint.kind != "continuous" or joint.axis is None or "pitch" in joint.extension:
+        return False
+    return float(np.linalg.norm(np.cross(joint.at - point, joint.axis))) < COINCIDENT_HINGES
+
+
+def joints_of(leg: Leg) -> Iterator[tuple[int, UrdfJoint]]:
+    """Return the joints of a leg at the pose, from base to platform, each with how many elements end with its own.
 
     A joint, or a spring that is driven or a hinge, becomes a joint that moves. The springs of one link or bearing
     together become a fixed joint with a compliance. A parallelogram becomes two revolutes, of which the second turns
@@ -214,7 +290,7 @@ def joints_of(leg: Leg) -> Iterator[UrdfJoint]:
     for i, element in enumerate(leg.chain):
         places = [at, *(array(p) for after in leg.chain[i + 1 :] for p in _places(after))]
         for joint in _of_element(leg.name, element, at, places[min(1, len(places) - 1)]):
-            yield joint
+            yield i + 1, joint
             at = joint.at
 
 

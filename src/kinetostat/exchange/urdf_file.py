@@ -14,8 +14,11 @@ from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.machine.common_tables import is_tensor_of_body
+from kinetostat.machine.parameters import TENSOR
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.validation.masses import Heavy, matrix_of
 
 Array = npt.NDArray[np.float64]
 
@@ -75,6 +78,7 @@ class UrdfFile:
         joints: by name of their child link.
         frames: of every link in the root link's frame, m [4 x 4].
         loops: in the order of the file.
+        masses: of the links that have one, in the root link's frame, by name.
     """
 
     origin: str
@@ -84,6 +88,7 @@ class UrdfFile:
     joints: dict[str, FileJoint]
     frames: dict[str, Array]
     loops: tuple[FileLoop, ...]
+    masses: dict[str, Heavy]
 
 
 class _NoDocumentType(TreeBuilder):
@@ -180,9 +185,30 @@ class _Reader:
         loops = tuple(self._loops(frames))
         about = self._robot.find("kinetostat")
         name = self._robot.get("name", "machine")
-        return UrdfFile(
-            self._origin, name, dict(about.attrib if about is not None else {}), roots[0], joints, frames, loops
-        )
+        extension = dict(about.attrib if about is not None else {})
+        masses = dict(self._masses(frames))
+        return UrdfFile(self._origin, name, extension, roots[0], joints, frames, loops, masses)
+
+    def _masses(self, frames: dict[str, Array]) -> Iterator[tuple[str, Heavy]]:
+        """The elements <inertial> of all links that have a mass."""
+        for link, name in zip(self._robot.findall("link"), self._links, strict=True):
+            where = f'"{self._origin}": link {shorten(name)}: inertial'
+            inertial = link.find("inertial")
+            if inertial is None:
+                continue
+            placed = frames[name] @ self._placement(inertial.find("origin"), where)
+            weight, about = inertial.find("mass"), inertial.find("inertia")
+            (mass,) = numbers("0" if weight is None else weight.get("value", "0"), 1, f"{where}: mass")
+            entries = " ".join("0" if about is None else about.get(f"i{entry}", "0") for entry in TENSOR)
+            tensor = numbers(entries, 6, f"{where}: inertia")
+            if mass < 0.0 or not is_tensor_of_body(tensor):
+                raise InputError(
+                    f"{where} has the mass {mass:g} and the inertia {shorten(entries)} ({' '.join(TENSOR)}), which no "
+                    "body has; correct them, or remove <inertial>."
+                )
+            if mass > 0.0:
+                turn = placed[:3, :3]
+                yield name, Heavy(mass, placed[:3, 3], turn @ matrix_of(tensor) @ turn.T)
 
     def _joint(self, element: Element, parent: str, frame: Array) -> FileJoint:
         where = self._where(element)

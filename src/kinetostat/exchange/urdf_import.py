@@ -1,10 +1,11 @@
 """A URDF file with its loops as a machine written leg by leg; its home pose is that of zero joint coordinates.
 
 Legs are the paths from the base to the platform, one of them in the tree and the others through loops. Hinges about one
-point become one joint of the leg. Reading the file itself is the business of `urdf_file`.
+point become one joint of the leg; links that are fixed together are one body with the mass of all. Reading the file
+itself is the business of `urdf_file`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.validation import SCHEMA_VERSION
 from kinetostat.tolerances import COINCIDENT_HINGES, INDEPENDENT_AXES, OPEN_LOOP
 from kinetostat.units import RIGID
+from kinetostat.validation.masses import together
 
 CLOSING = ("fixed", "revolute", "continuous", "prismatic", "spherical")
 """Kinds of joints that may close a loop."""
@@ -30,18 +32,20 @@ ONE_FREEDOM = {"revolute": "revolute", "continuous": "revolute", "prismatic": "p
 LONGEST_NAME = 40
 
 
-def read_machine(path: Path) -> Machine:
-    """Return the machine of a URDF file, at its home pose.
+def read_machine(path: Path) -> tuple[Machine, list[str]]:
+    """Return the machine of a URDF file at its home pose, and the names of the links whose masses it does not have.
 
     Raises:
         InputError: the file lacks something, or is not a machine of legs between a base and a platform.
     """
     file = read(path)
-    document = document_of(file)
+    bodies = Bodies(file)
+    document = document_of(file, bodies)
     machine = build(document, file.origin)
     home = machine.configure([0.0] * machine.chains().size)
     free = [SPATIAL_POSE[number] for number in task_coordinates(home, home.platform.translation)] or ["x"]
-    return build({**document, "pose": {name: document["pose"][name] for name in free}}, file.origin)
+    posed = build({**document, "pose": {name: document["pose"][name] for name in free}}, file.origin)
+    return posed, sorted(bodies.left)
 
 
 def machine_text(path: Path) -> str:
@@ -50,14 +54,56 @@ def machine_text(path: Path) -> str:
     Raises:
         InputError: as `read_machine`.
     """
+    machine, left = read_machine(path)
+    names = shorten(", ".join(left))
+    note = f"# Masses of links between the base and the platform only; not counted: {names}.\n" if left else ""
     return (
         f"# Read from {path.name}. The home pose is the one of zero joint coordinates; actuators of which the URDF\n"
-        f"# gives no stiffness are rigid here.\n{as_file(read_machine(path))}"
+        f"# gives no stiffness are rigid here.\n{note}{as_file(machine)}"
     )
 
 
-def document_of(file: UrdfFile) -> Document:
+class Bodies:
+    """What weighs something in a file: links that fixed joints hold together are one body.
+
+    Attributes:
+        left: names of the links with a mass that nobody has asked for yet; those of the base do not count.
+    """
+
+    def __init__(self, file: UrdfFile) -> None:
+        self._masses = file.masses
+        self._parts: dict[str, list[str]] = {}
+        self._body = {file.root: file.root}  # the first link of the body that a link belongs to
+        for link in file.frames:  # from the root outwards
+            joint = file.joints.get(link)
+            if joint is not None:
+                fixed = joint.kind == "fixed" and not joint.extension
+                self._body[link] = self._body[joint.parent] if fixed else link
+        for link in file.masses:
+            self._parts.setdefault(self._body[link], []).append(link)
+        self.left = {link for link in file.masses if self._body[link] != file.root}
+
+    def links(self, link: str) -> list[str]:
+        """The links with a mass in the body of a link."""
+        return self._parts.get(self._body[link], [])
+
+    def table(self, links: Iterable[str]) -> Document:
+        """Mass, centre and inertia of some links in one, in the root link's frame; empty without a mass."""
+        names = {name for link in links for name in self.links(link)} & self.left
+        self.left -= names
+        if not names:
+            return {}
+        whole = together([self._masses[name] for name in sorted(names)])
+        entries = [float(whole.inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+        return {"mass": whole.mass, "centre_of_mass": whole.centre.tolist(), "inertia": entries}
+
+
+def document_of(file: UrdfFile, bodies: Bodies | None = None) -> Document:
     """Return the machine as a document with all coordinates of its pose.
+
+    Args:
+        file: that was read.
+        bodies: of it, from which what the machine weighs is taken.
 
     Raises:
         InputError: if the file is not legs between the root link and a platform.
@@ -73,10 +119,11 @@ def document_of(file: UrdfFile) -> Document:
     ways = [(_path(file, platform), None), *((_path(file, _tip(file, loop, rigid)), loop) for loop in file.loops)]
     _check_apart(file, [path for path, _ in ways])
     names = [_leg_name(path, number) for number, (path, _) in enumerate(ways, 1)]
-    legs = [
-        {"name": name, "joints": leg_joints(name, path, loop, file.origin)}
-        for name, (path, loop) in zip(names, ways, strict=True)
-    ]
+    bodies = bodies or Bodies(file)
+    carried = bodies.table(
+        [platform, *(path[-1].child for path, loop in ways if path and loop and loop.kind == "fixed")]
+    )
+    legs = [_leg(name, path, loop, bodies, file.origin) for name, (path, loop) in zip(names, ways, strict=True)]
     point = file.frames[platform][:3, 3]
     given = PLANAR_POSE if space == "planar" else SPATIAL_POSE
     pose = {name: float(point["xyz".index(name)]) if name in "xyz" else 0.0 for name in given}
@@ -88,10 +135,12 @@ def document_of(file: UrdfFile) -> Document:
         "pose": pose,
     }
     document |= {"platform": {"point": point.tolist()}, "legs": legs}
+    if carried:
+        carried["centre_of_mass"] = (np.array(carried["centre_of_mass"]) - point).tolist()
     tool = file.about.get("tool", "tool")
     if tool in file.frames:
-        document["tool"] = {"offset": _tool(file, tool, rigid, point)}
-    return document
+        carried["offset"] = _tool(file, tool, rigid, point)
+    return document | ({"tool": carried} if carried else {})
 
 
 def _tool(file: UrdfFile, tool: str, rigid: set[str], point: Array) -> list[float]:
@@ -132,6 +181,10 @@ def _tip(file: UrdfFile, loop: FileLoop, rigid: set[str]) -> str:
         )
     if loop.kind not in CLOSING:
         raise InputError(f"{where} is of type {shorten(loop.kind)}; its type may be {', '.join(CLOSING)}.")
+    if tips[0] == file.root and loop.kind == "fixed":
+        raise InputError(
+            f"{where} fixes the platform to {shorten(file.root)}, the base, so that nothing moves; leave it out."
+        )
     first, second = loop.frames
     gap = float(np.linalg.norm(first[:3, 3] - second[:3, 3]))
     angle = float(np.linalg.norm(first[:3, :3] - second[:3, :3])) if loop.kind == "fixed" else 0.0
@@ -162,13 +215,14 @@ def _leg_name(path: Sequence[FileJoint], number: int) -> str:
     return links[-1].removesuffix(TIP).replace(".", "-")[:LONGEST_NAME] if links else f"leg {number}"
 
 
-def leg_joints(leg: str, path: Sequence[FileJoint], loop: FileLoop | None, origin: str) -> list[Document]:
-    """Return the joints of a leg from base to platform, as a machine file lists them.
+def _leg(leg: str, path: Sequence[FileJoint], loop: FileLoop | None, bodies: Bodies, origin: str) -> Document:
+    """A leg from base to platform, as a machine file lists its joints and the links that weigh something.
 
     Args:
         leg: its name, which is taken off the names of joints.
         path: the joints from the root to the platform, or to the tip of the leg.
         loop: the joint between the tip and the platform, if it closes a loop.
+        bodies: of the file.
         origin: name of the file, for messages.
 
     Raises:
@@ -178,18 +232,21 @@ def leg_joints(leg: str, path: Sequence[FileJoint], loop: FileLoop | None, origi
     if loop is not None and loop.kind != "fixed":
         row.append(_as_joint(loop))
     tables: list[Document] = []
+    links: Document = {}
     at = 0
     while at < len(row):
         where = f'"{origin}": joint {shorten(row[at].name)}'
-        count, table = _next(row[at:], where)
+        count, table = _next(row[at:], bodies, where)
         tables.append({"name": _name(row[at].name, leg), "point": row[at].frame[:3, 3].tolist(), **table})
         at += count
+        weight = bodies.table([row[at - 1].child]) if at < len(row) else {}
+        links |= {f"body {len(tables)}": {"model": "rigid", **weight}} if weight else {}
     if not tables:
         tables = [{"name": "foot", "point": path[-1].frame[:3, 3].tolist(), "type": "fixed"}]
-    bodies = [BASE, *(f"body {i}" for i in range(1, len(tables))), PLATFORM]
-    for table, near, far in zip(tables, bodies, bodies[1:], strict=False):
+    names = [BASE, *(f"body {i}" for i in range(1, len(tables))), PLATFORM]
+    for table, near, far in zip(tables, names, names[1:], strict=False):
         table["joins"] = [near, far]
-    return tables
+    return {"name": leg, "joints": tables} | ({"links": links} if links else {})
 
 
 def _as_joint(loop: FileLoop) -> FileJoint:
@@ -202,7 +259,7 @@ def _name(text: str, leg: str) -> str:
     return text.removeprefix(f"{leg}_").replace(".", "-")[:LONGEST_NAME]
 
 
-def _next(row: Sequence[FileJoint], where: str) -> tuple[int, Document]:
+def _next(row: Sequence[FileJoint], bodies: Bodies, where: str) -> tuple[int, Document]:
     """How many of the first joints of a row make one joint of a leg, and the table of that joint."""
     first = row[0]
     if len(row) > 1 and row[1].mimics is not None:
@@ -216,7 +273,7 @@ def _next(row: Sequence[FileJoint], where: str) -> tuple[int, Document]:
     if first.kind not in ONE_FREEDOM:
         kinds = ", ".join(ONE_FREEDOM)
         raise InputError(f"{where} is of type {shorten(first.kind)}; a leg may have {kinds} and fixed joints.")
-    hinges = _hinges(row)
+    hinges = _hinges(row, bodies)
     if hinges > 1:
         axes = [joint.axis.tolist() for joint in row[:hinges]]
         universal = {"type": "universal", "first_axis": axes[0], "second_axis": axes[1]}
@@ -224,14 +281,19 @@ def _next(row: Sequence[FileJoint], where: str) -> tuple[int, Document]:
     return 1, _single(first)
 
 
-def _hinges(row: Sequence[FileJoint]) -> int:
-    """How many of the first joints are free hinges about one point with independent axes: 1, 2 or 3."""
+def _hinges(row: Sequence[FileJoint], bodies: Bodies) -> int:
+    """How many of the first joints are free hinges about one point with independent axes: 1, 2 or 3.
+
+    Hinges with something heavy between them stay apart, since a joint of a leg has no bodies inside.
+    """
     for count in (3, 2):
         hinges = row[:count]
         free = [
             j for j in hinges if j.kind in ("revolute", "continuous") and not (j.actuated or j.extension or j.mimics)
         ]
         if len(free) < count or (len(row) > count and row[count].mimics is not None):
+            continue
+        if any(bodies.links(joint.child) for joint in hinges[:-1]):
             continue
         apart = max(float(np.linalg.norm(joint.frame[:3, 3] - hinges[0].frame[:3, 3])) for joint in hinges)
         spanned = np.linalg.svd(np.array([joint.axis for joint in hinges]), compute_uv=False).min()

@@ -213,9 +213,8 @@ def followed(chains: Chains, goal: Array) -> tuple[Array, Codes]:
     count, free = len(goal), free_coordinates(chains)
     coordinates, status = np.zeros((count, chains.size)), np.full(count, int(Status.OK))
     stated = [(problems, goal_of(problems, goal)) for problems in problems_of(chains, count, free)]
-    if not free:
-        for problems, there in stated:
-            status[problems.poses[too_far_or_near(problems, there)]] = int(Status.OUT_OF_REACH)
+    for problems, there in stated:
+        status[problems.poses[too_far_or_near(problems, there)]] = int(Status.OUT_OF_REACH)
     for whole, everywhere in stated:
         tried = np.flatnonzero(status[whole.poses] == Status.OK)
         problems, there = whole.take(tried), some(everywhere, tried)

@@ -10,7 +10,7 @@ import numpy as np
 from kinetostat.kinematics.closing import ANGLES, POINT, Array
 from kinetostat.kinematics.leg_gaps import Numbers, Problems, free_coordinates, least_norm, problems_of
 from kinetostat.machine.machine import Machine
-from kinetostat.tolerances import CLOSED, DEPENDENT, NEAREST_GAIN, NEAREST_SETTLED, NO_COORDINATE
+from kinetostat.tolerances import CLOSED, DEPENDENT, NEAREST_GAIN, NO_COORDINATE
 
 MOST_STEPS, MOST_CORRECTIONS = 30, 8
 """Towards the nearest pose; and of Newton's method, which closes the legs again after each of them."""
@@ -18,6 +18,13 @@ DAMPINGS: Array = 5.0 ** np.arange(-3.0, 6.0)
 """Dampings of a step that are tried in one batch, in units of the one that led nearest in the step before."""
 CONTRACTION = 0.25
 """Share of a gap that a correction may leave; a step from which it leaves more was too long."""
+BESIDE = 1e-6
+"""Displacement of the unknowns, rad or in units of the machine's length, whose rates show how ways are curved."""
+NEARLY_CLOSED = 1e-3
+"""Gap of the legs after a step, as a share of its square, that is left to the next step: what a step gains in distance
+falls with the same square."""
+LONG = 0.1
+"""Size of a step, rad or in units of the machine's length, from which this gap grows no more."""
 
 
 def nearest_pose(machine: Machine) -> dict[str, float]:
@@ -58,57 +65,75 @@ class _Search:
     goal: Array
 
     def nearest(self) -> Array:
-        """Go on from the home pose until no way that the legs allow leads nearer by more than the figures show."""
-        best, last, damping = np.zeros(self.problems.size), np.zeros(self.problems.size), 1e-3
-        rates = self.problems.gaps(best[None], self.home)[1][0]
+        """Go on from the home pose until the next step would lead nearer by less than the figures show.
+
+        Each step is Newton's for the squared distance, along the ways that the legs allow. It is tried with several
+        dampings, which are added to the curvatures; these count without their sign, so that every step leads nearer.
+        """
+        best, damping = np.zeros(self.problems.size), 1e-3
+        gap, rates = (each[0] for each in self.problems.gaps(best[None], self.home))
         for _ in range(MOST_STEPS):
-            left, ways = self.goal - best[self.rows], _ways(rates)
-            far, slope = np.linalg.norm(left), ways[self.rows].T @ left
-            if np.linalg.norm(slope) <= NEAREST_SETTLED * far:
-                break
+            pull = np.zeros(len(best))
+            pull[self.rows] = self.goal - best[self.rows]
+            far, ways = np.linalg.norm(pull), _ways(rates)
+            loads = np.linalg.lstsq(rates.T, pull, rcond=DEPENDENT)[0]
+            sizes, turn = np.linalg.eigh(self._curvature(best, rates, ways, loads))
+            along, stiff = ways @ turn, np.maximum(np.abs(sizes), DEPENDENT)
+            slope = along.T @ pull
             tried = damping * DAMPINGS
-            steps = self._steps(ways, slope, tried)
-            # Along a curved border of the reach each step is a constant share of the one before: go on along that, too.
-            ends, rates_there = self._closed(best + np.concatenate([steps, steps + ways @ (ways.T @ last)]))
-            apart = np.linalg.norm(self.goal - ends[:, self.rows], axis=1)
-            least = int(np.argmin(np.where(np.isfinite(apart), apart, np.inf)))
-            gain = far - apart[least]
-            if not gain > 0.0:
+            steps = slope / (stiff + tried[:, None]) @ along.T
+            settled = slope @ (slope / stiff) <= NEAREST_GAIN * far * far
+            ends, gaps, rates_there = self._closed(best, steps[:1] if settled else steps)
+            worth = self._half_squares(ends, gaps, loads)
+            least = int(np.argmin(np.where(np.isfinite(worth), worth, np.inf)))
+            if worth[least] < self._half_squares(best[None], gap[None], loads)[0]:
+                best, gap, rates, damping = ends[least], gaps[least], rates_there[least], float(tried[least])
+            else:
                 damping = float(tried[-1])
-                continue
-            last, best, rates = ends[least] - best, ends[least], rates_there[least]
-            damping = float(tried[least % len(tried)])
-            if gain <= NEAREST_GAIN * far:
+            if settled:
                 break
-        return best
+        return self._closed(best, 0.0 * best[None])[0][0]
 
-    def _steps(self, ways: Array, slope: Array, dampings: Array) -> Array:
-        """Steps of Levenberg's and Marquardt's method along the ways that the legs allow [dampings x unknowns]."""
-        slopes = ways[self.rows]
-        squares = slopes.T @ slopes + dampings[:, None, None] * np.eye(len(slope))
-        amounts = np.linalg.solve(squares, np.broadcast_to(slope[:, None], (len(dampings), len(slope), 1)))
-        return np.asarray(amounts[:, :, 0] @ ways.T)
-
-    def _closed(self, unknowns: Array) -> tuple[Array, Array]:
-        """Close the legs again, wherever that takes the platform.
+    def _curvature(self, best: Array, rates: Array, ways: Array, loads: Array) -> Array:
+        """The curvature of half the squared distance along the ways [ways x ways], those of the closed legs included.
 
         Args:
-            unknowns: near closed legs [n x unknowns].
+            best: unknowns that nearly close them [unknowns].
+            rates: of the gaps there [rows x unknowns].
+            ways: along which they stay closed to first order [unknowns x ways].
+            loads: Lagrange's multipliers: how strongly each gap keeps the unknowns from the goal [rows].
+        """
+        problems = self.problems.take(np.zeros(ways.shape[1], dtype=int))
+        beside = problems.gaps(best + BESIDE * ways.T, self.home)[1]
+        bent = np.einsum("r,nrc->nc", loads, beside - rates) @ ways / BESIDE
+        return np.asarray(ways[self.rows].T @ ways[self.rows] + 0.5 * (bent + bent.T))
+
+    def _half_squares(self, ends: Array, gaps: Array, loads: Array) -> Array:
+        """Half the squared distances from the goal as they will be once the gaps that are left are closed [n]."""
+        return np.asarray(0.5 * ((self.goal - ends[:, self.rows]) ** 2).sum(axis=1) - gaps @ loads)
+
+    def _closed(self, start: Array, steps: Array) -> tuple[Array, Array, Array]:
+        """Close the legs again after steps, wherever that takes the platform.
+
+        Args:
+            start: unknowns that nearly close them [unknowns].
+            steps: from there [n x unknowns].
 
         Returns:
-            Unknowns that close them, NaN where that fails, and the rates of the gaps there.
+            Unknowns that nearly close them, NaN where that fails; the gaps that are left there, and their rates.
         """
-        problems = self.problems.take(np.zeros(len(unknowns), dtype=int))
+        unknowns, problems = start + steps, self.problems.take(np.zeros(len(steps), dtype=int))
+        enough = np.maximum(CLOSED, NEARLY_CLOSED * np.minimum(np.abs(steps).max(axis=1), LONG) ** 2)
         last, active = np.full(len(unknowns), np.inf), np.ones(len(unknowns), dtype=bool)
         for _ in range(MOST_CORRECTIONS):
             left, rates = problems.gaps(unknowns, self.home)
             gap = np.max(np.abs(left), axis=1)
-            active = (gap > CLOSED) & (gap < CONTRACTION * last)
+            active = (gap > enough) & (gap < CONTRACTION * last)
             if not active.any():
                 break
             unknowns = unknowns + np.where(active[:, None], least_norm(rates, left), 0.0)
             last = gap
-        return np.where((gap <= CLOSED)[:, None], unknowns, np.nan), rates
+        return np.where((gap <= enough)[:, None], unknowns, np.nan), left, rates
 
 
 def _ways(rates: Array) -> Array:

@@ -31,6 +31,9 @@ class Status(IntEnum):
         return _SENTENCES[self]
 
 
+PLACELESS = (Status.OUT_OF_REACH, Status.NOT_CONVERGED)
+"""Statuses of poses at which the machine has no place."""
+
 _SENTENCES = {
     Status.OK: "The pose can be reached and the machine resists every load.",
     Status.OUT_OF_REACH: "A leg is too short or too long to close.",

@@ -66,6 +66,46 @@ def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
 
     Source: theory (4), (8) and (9), eqs. 21 and 32.
     """
+    shared = _shared(legs, length, guide)
+    resistances = [leg_resistance(leg) for leg in legs]
+    shares_of_k = [share for resistance in resistances for share in resistance.shares]
+    return Statics(
+        tuple(mode.wrenches for mode in shared.modes),
+        tuple(shared.sharing),
+        tuple(shared.flexibility),
+        tuple(s for leg in legs for s in leg.compliance),
+        tuple(b for b, _ in shares_of_k),
+        tuple(k for _, k in shares_of_k),
+        tuple(shared.motions),
+        tuple(mode for resistance in resistances for mode in resistance.modes),
+        length,
+        shared.singularity_margin,
+    )
+
+
+def compliance_of(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench] = ()) -> Symmetric6:
+    """C alone (rad, m per N·m, N), as `compliance_matrix(solve_statics(...))` has it, without what only K needs.
+
+    Args:
+        legs, guide: as for `solve_statics`.
+        length: characteristic length, m.
+    """
+    return weighted_sum(_shared(legs, length, guide).motions, reciprocal(length))
+
+
+@dataclass(frozen=True)
+class _Shared:
+    """What C needs of `Statics`, and the modes of the legs."""
+
+    modes: Sequence[Modes]
+    sharing: Sequence[tuple[Twist, ...]]
+    flexibility: Sequence[Twist]
+    motions: Sequence[Motion]
+    singularity_margin: Scalar
+
+
+def _shared(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) -> _Shared:
+    """How the legs share any load."""
     redundant = sum(len(leg.wrenches) for leg in legs) + len(guide) > SIZE
     balanced = [relaxed(leg) for leg in legs] if redundant else legs
     modes = [modes_of(leg) if redundant or _in_series(leg) else _unchanged(leg) for leg in balanced]
@@ -86,20 +126,7 @@ def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
         flexibility += felt
         # Springs in series: the fewest shares of C are those of the leg's modes; otherwise one per spring.
         motions += zip(*((shares, mode.compliance) if _in_series(leg) else (felt, leg.compliance)), strict=True)
-    resistances = [leg_resistance(leg) for leg in legs]
-    shares_of_k = [share for resistance in resistances for share in resistance.shares]
-    return Statics(
-        tuple(mode.wrenches for mode in modes),
-        tuple(sharing),
-        tuple(flexibility),
-        tuple(s for leg in legs for s in leg.compliance),
-        tuple(b for b, _ in shares_of_k),
-        tuple(k for _, k in shares_of_k),
-        tuple(motions),
-        tuple(mode for resistance in resistances for mode in resistance.modes),
-        length,
-        singularity_margin,
-    )
+    return _Shared(modes, sharing, flexibility, motions, singularity_margin)
 
 
 def _in_series(leg: LegScrews) -> bool:

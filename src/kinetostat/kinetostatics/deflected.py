@@ -49,6 +49,21 @@ class DeflectedLink:
         return self.start + span * s + shift * factor
 
 
+@dataclass(frozen=True)
+class Deflection:
+    """Small motions of a loaded machine.
+
+    Attributes:
+        load: at the tool point, base axes, N·m and N.
+        motion: of the tool point, rad and m.
+        links: deflected links of the legs.
+    """
+
+    load: Wrench
+    motion: Twist
+    links: tuple[DeflectedLink, ...]
+
+
 def deflected_links(response: Response, load: Wrench) -> list[DeflectedLink]:
     """All links of a machine under a wrench at its tool point (N·m; N, base axes).
 

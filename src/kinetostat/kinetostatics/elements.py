@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.symmetric import SIZE, Symmetric6
-from kinetostat.kinetostatics.assembly import compliance_matrix, solve_statics, stiffness_coefficients, weighted_sum
+from kinetostat.kinetostatics.assembly import compliance_of, stiffness_coefficients, weighted_sum
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Configuration
@@ -25,7 +25,9 @@ SOFTEST = 1e12
 LINKS_TOGETHER = "links together"
 """Name of all elements but the actuators, as one."""
 SECANTS = 12
-"""Steps of the search for the limit of rigidity: they converge faster than by halving, six to eight are needed."""
+"""Most steps of the search for the limit of rigidity: they converge faster than by halving, two to eight are needed."""
+SETTLED = 1e-12
+"""Share of a factor below which a step of that search is its last: the next one would be round-off."""
 
 Array = npt.NDArray[np.float64]
 
@@ -124,7 +126,7 @@ def diagonal_with(response: Response, element: Element, factor: Scalar) -> list[
         compliance = [chosen[i] * factor if i in chosen else s for i, s in zip(places, leg.compliance, strict=True)]
         legs.append(replace(leg, compliance=tuple(compliance)))
         number += len(leg.compliance)
-    return list(compliance_matrix(solve_statics(legs, response.statics.length, response.guide)).diagonal())
+    return list(compliance_of(legs, response.statics.length, response.guide).diagonal())
 
 
 def rigid_from(response: Response, element: Element, excess: float) -> Array:
@@ -202,6 +204,9 @@ def _factor_for(response: Response, element: Element, rest: Array, excess: Array
         now = 1.0 / more(1.0 / here)
         steep = (now - then) / (here - before)
         step = np.where(np.isfinite(steep) & (steep > 0.0), (aim - now) / steep, 0.0)
+        last = not (np.abs(step) > SETTLED * here).any()
         before, then, here = here, now, np.where(here + step > 0.0, here + step, 0.5 * here)
+        if last:
+            break
     never = more(np.full_like(rest, SOFTEST)) <= excess
     return np.where(rest > 0.0, np.where(never, math.inf, 1.0 / here), 0.0)

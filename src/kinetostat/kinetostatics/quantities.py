@@ -3,6 +3,7 @@
 Source: theory section 10. At the tool point, base axes.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -27,6 +28,9 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import LIMITS
 from kinetostat.tolerances import UNMOVED_TOOL
 
+MODES = 6
+"""Natural frequencies that are quantities, from the lowest."""
+
 Better: TypeAlias = Literal["more", "less"] | None
 
 
@@ -44,6 +48,8 @@ class MapQuantity:
         needs: what a machine must have for it to mean something; empty if nothing. It is NaN where that is missing.
         loaded: which number of the machine at rest under its loads it needs (`equilibrium.numbers`); empty if none.
         whole: whether it counts, so that its values are whole numbers.
+        modal: whether it is about natural vibrations, so that the machine must have masses.
+        cut: whether it is about the receptance across a cut, which is computed pose by pose and has no derivatives.
     """
 
     name: str
@@ -55,6 +61,13 @@ class MapQuantity:
     needs: str = ""
     loaded: str = ""
     whole: bool = False
+    modal: bool = False
+    cut: bool = False
+
+    @property
+    def stateful(self) -> bool:
+        """Whether it needs more of a pose than its linear response: a state of rest, or natural vibrations."""
+        return bool(self.loaded) or self.modal
 
 
 def _compliance(response: Response, i: int, j: int) -> Scalar:
@@ -139,6 +152,43 @@ def _tangent_free(response: Response, row: int) -> Scalar:
     return reciprocal(_under_load(response, "compliance", row))
 
 
+def _free_frequency(response: Response, row: int) -> Scalar:
+    """A natural frequency with relaxed springs; NaN where it has not been computed."""
+    return float("nan") if response.frequencies is None else response.frequencies[row]
+
+
+def _frequencies(prefix: str, loaded: str = "") -> list[MapQuantity]:
+    entries = []
+    for row in range(MODES):
+        value = partial(_under_load, what=loaded, row=row) if loaded else partial(_free_frequency, row=row)
+        index = rf"\mathrm{{t}},{row + 1}" if loaded else str(row + 1)
+        name, symbol = f"{prefix}_{row + 1}", f"$f_{{{index}}}$"
+        entries.append(MapQuantity(name, "Hz", symbol, value, (), "more", loaded=loaded, modal=True))
+    return entries
+
+
+def _least_real_part(response: Response) -> Scalar:
+    """The least real part of the receptance across the cut; NaN where it has not been computed."""
+    return float("nan") if response.softest is None else response.softest
+
+
+def _stable_width(response: Response) -> Scalar:
+    """The width of cut up to which every spindle speed is stable, theory (60); infinite where nothing rings."""
+    if response.softest is None:
+        return float("nan")
+    rings = response.softest < 0.0
+    width = reciprocal(response.cutting_pressure) * (-0.5 / where(rings, response.softest, -1.0))
+    return where(rings, width, math.inf)
+
+
+def _of_the_cut() -> list[MapQuantity]:
+    real, width = r"$\mathrm{min\,Re}\,H$", "stable width of cut"
+    return [
+        MapQuantity("least_real_receptance", "m/N", real, _least_real_part, better="more", modal=True, cut=True),
+        MapQuantity("stable_width", "m", width, _stable_width, better="more", modal=True, cut=True),
+    ]
+
+
 def _of_loaded_state() -> list[MapQuantity]:
     entries = []
     for i, name in enumerate(COMPONENTS):
@@ -161,6 +211,7 @@ def _of_loaded_state() -> list[MapQuantity]:
                 loaded="compliance",
             ),
         ]
+    entries += _frequencies("loaded_frequency", "frequency")
     factor, slack = partial(_under_load, what="factor"), partial(_under_load, what="slack")
     return [
         *sorted(entries, key=lambda entry: entry.name.rpartition("_")[0]),
@@ -198,6 +249,8 @@ QUANTITIES = {
             better="less",
             needs=LIMITS["actuator_moment"].needs,
         ),
+        *_frequencies("frequency"),
+        *_of_the_cut(),
         *_of_loaded_state(),
     )
 }
@@ -207,11 +260,13 @@ GROUPS = {
     "compliance": tuple(f"compliance_{name}" for name in COMPONENTS),
     "stiffness": tuple(f"stiffness_{name}" for name in COMPONENTS),
     "free_stiffness": tuple(f"free_stiffness_{name}" for name in COMPONENTS),
+    "frequency": tuple(f"frequency_{number}" for number in range(1, MODES + 1)),
+    "loaded_frequency": tuple(f"loaded_frequency_{number}" for number in range(1, MODES + 1)),
     "displacement": tuple(f"displacement_{name}" for name in COMPONENTS),
     "tangent_stiffness": tuple(f"tangent_stiffness_{name}" for name in COMPONENTS),
     "tangent_free_stiffness": tuple(f"tangent_free_stiffness_{name}" for name in COMPONENTS),
 }
-"""Names that stand for several quantities: diagonals of C and of K, 1/C_ii, and those under load."""
+"""Names that stand for several quantities: diagonals of C and of K, 1/C_ii, frequencies, and those under load."""
 
 
 def spoken(name: str) -> str:

@@ -6,7 +6,7 @@ the status is not OK, results are meaningless; the engine and the studies mask t
 Source: theory sections 2 to 9, in their order; loads of actuators, theory (29).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,6 +47,9 @@ class Response:
         mass: of what moves, as far as it is known, kg.
         joint_status: `Status` code of the joints alone, before the pose is judged.
         place_status: as `status`, but a singular pose may count as OK: loads can hold a machine there.
+        frequencies: the lowest natural frequencies, Hz, where they have been computed.
+        cutting_pressure: of the machine's table [cutting], N/m².
+        softest: the least real part of the receptance across the cut, m/N, where it has been computed.
         loaded: numbers of the loaded state (`equilibrium.numbers`), where they have been computed.
     """
 
@@ -65,6 +68,9 @@ class Response:
     joint_status: Scalar = int(Status.OK)
     place_status: Scalar = int(Status.OK)
     loaded: Mapping[str, Any] | None = None
+    frequencies: Sequence[Scalar] | None = None
+    cutting_pressure: Scalar = 0.0
+    softest: Scalar | None = None
     regularity = renamed_property("singularity_margin")
 
 
@@ -78,11 +84,7 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
     if joints is None:
         joints = solve_joints(machine) if machine.family.chains else CLOSED_FORM
     configuration = machine.configure(joints.coordinates)
-    reference, length = machine.tool_point(configuration.platform), configuration.length
-    reference = reference if configuration.plane is None else configuration.plane.nearest(reference)
-    absent, guide = _out_of_plane(configuration, reference)
-    legs = tuple(leg.screws(reference, length, absent) for leg in configuration.legs)
-    statics = solve_statics(legs, length, guide)
+    reference, guide, legs, statics = _statics(machine, configuration)
     singularity_margin: Scalar = 1.0
     for leg in legs:
         singularity_margin = smaller(singularity_margin, leg.singularity_margin)
@@ -106,6 +108,27 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
         joints.status,
         pose_status(joints.status, reached, singularity_margin if loaded else 1.0, within(geometric), within(loaded)),
     )
+
+
+def compliance_at(machine: Machine, configuration: Configuration) -> Symmetric6:
+    """C of a machine whose legs are where a configuration says, at its tool point, base axes (rad, m per N·m, N).
+
+    Args:
+        machine: whose tool counts.
+        configuration: of its legs, which need not be that of its own numbers.
+    """
+    return compliance_matrix(_statics(machine, configuration)[3])
+
+
+def _statics(
+    machine: Machine, configuration: Configuration
+) -> tuple[Vector, tuple[Wrench, ...], tuple[LegScrews, ...], Statics]:
+    """The tool point, the guide of a planar machine, the screws of all legs, and how springs share loads."""
+    reference, length = machine.tool_point(configuration.platform), configuration.length
+    reference = reference if configuration.plane is None else configuration.plane.nearest(reference)
+    absent, guide = _out_of_plane(configuration, reference)
+    legs = tuple(leg.screws(reference, length, absent) for leg in configuration.legs)
+    return reference, guide, legs, solve_statics(legs, length, guide)
 
 
 CLOSED_FORM = Joints((), int(Status.OK))

@@ -13,6 +13,7 @@ from typing import Any
 from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.machine.leg import Leg, Spring, Station
+from kinetostat.machine.link import Parallelogram
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Field, Quantity, made_table
 from kinetostat.units import KINDS
@@ -93,13 +94,25 @@ def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[Pla
     ]
 
 
-def _stations(leg: Leg, segment: int | None = None) -> tuple[Station, ...]:
-    """Both ends of a piece of a leg's path, or of the whole path; a driven joint at the base is its beginning."""
+def _stations(leg: Leg, segment: int | None = None, bar: int | None = None) -> tuple[Station, ...]:
+    """Both ends of a piece of a leg's path, or of the whole path; a driven joint at the base is its beginning.
+
+    Args:
+        leg: the leg.
+        segment: which piece from the base; None for the whole path.
+        bar: which bar of the parallelogram that the piece is; None where it is none.
+    """
     stations, first = leg.stations, leg.chain[0]
     foot = first.joint.point if isinstance(first, Spring) else None
     if foot is not None and not foot.is_at(stations[0][1]):
         stations = ((0, foot), *stations)
-    return (stations[0], stations[-1]) if segment is None else stations[segment : segment + 2]
+    if segment is None:
+        return stations[0], stations[-1]
+    piece = stations[segment : segment + 2]
+    if bar is None:
+        return piece
+    pair = next(element for element in leg.chain if isinstance(element, Parallelogram))
+    return tuple((number, point) for (number, _), point in zip(piece, pair.bars[bar], strict=True))
 
 
 def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:
@@ -116,9 +129,9 @@ def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:
         names = [what] if bars == 1 else [f"{what} {i}" for i in range(1, bars + 1)]
         length = getattr(geometry, field)
         return [
-            (leg.name, f"{leg.name} {name}", length, partial(_stations, leg, segment))
+            (leg.name, f"{leg.name} {name}", length, partial(_stations, leg, segment, None if bars == 1 else place))
             for leg in actuated_legs(legs)
-            for name in names
+            for place, name in enumerate(names)
         ]
 
     return lengths

@@ -18,9 +18,10 @@ from kinetostat.algebra.scalar import Scalar
 from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.machine import pickling as _pickling  # noqa: F401  # machines that are loaded can be pickled
 from kinetostat.machine.catalogue import families, family_named
+from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_inertia
 from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.limits import Parts, check_limits
-from kinetostat.machine.machine import COMMON, STATES, Family, Machine, NamedLoad, Written
+from kinetostat.machine.machine import Family, Machine, Written
 from kinetostat.machine.named_loads import family_with_loads
 from kinetostat.machine.orientation import ANGLES, form_of, make_room, orientation_schema, with_angles
 from kinetostat.machine.parameters import POSE, check_contrast, find, with_values
@@ -39,6 +40,8 @@ from kinetostat.spec.errors import InputError, choice, several, shorten
 from kinetostat.spec.fields import NO_LIMIT, optional, quantities
 from kinetostat.spec.immutable import FixedDict
 from kinetostat.spec.requirements import TABLE, requirement_lines, requirements_schema, take_requirements
+from kinetostat.spec.tolerance_table import TABLE as TOLERANCES
+from kinetostat.spec.tolerance_table import take_tolerances, tolerance_lines, tolerances_schema
 from kinetostat.spec.validation import SCHEMA_VERSION, file_model, tables_in, validate
 from kinetostat.units import RIGID, UnitError
 
@@ -101,8 +104,9 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
     if documents.is_study(document):
         raise InputError(f'"{origin}" {STUDY}')
     rest, others, required = take_requirements(document, _in_full(document, settings), origin)
+    rest, others, tolerated = take_tolerances(rest, others, origin)
     build_kind = _build_written if rest.get("family") == NAME else _build_family
-    return replace(build_kind(rest, origin, others), requirements=required)
+    return replace(build_kind(rest, origin, others), requirements=required, tolerances=tolerated)
 
 
 def _in_full(document: Document, settings: Sequence[str]) -> list[str]:
@@ -127,7 +131,7 @@ def _whole_path(document: Document, name: str) -> str:
 
 
 STATE = "what is shown where no quantity is named: the free machine, or the machine at rest under its loads"
-KEYS = ("schema", "name", "family", "display", "sections", TABLE)
+KEYS = ("schema", "name", "family", "display", "sections", TABLE, TOLERANCES)
 """What a file may hold at its top beside the tables of its family."""
 
 
@@ -205,6 +209,7 @@ def _validated(family: Family, document: Document, origin: str, display: Display
     data: Any = validate(document, origin, file_model(family.name, tables), tables)
     machine = Machine(data.name, family, tables_in(data, tables), display)
     check_contrast(machine, origin)
+    check_inertia(machine.tables, origin)
     return machine
 
 
@@ -277,7 +282,7 @@ def as_toml(machine: Machine, readable: bool = False) -> str:
     if machine.display != ENGINEERING:
         units = json.dumps(machine.display.units, ensure_ascii=False)
         lines += ["", "[display]", f"units = {units}", f"digits = {machine.display.digits}"]
-    return "\n".join([*lines, *requirement_lines(machine.requirements)]) + "\n"
+    return "\n".join([*lines, *requirement_lines(machine.requirements), *tolerance_lines(machine.tolerances)]) + "\n"
 
 
 def _left_out(fields: type, table: Any) -> bool:
@@ -322,7 +327,7 @@ def machine_schema() -> dict[str, Any]:
     schema["anyOf"].append(written_schema(SCHEMA_VERSION))
     files = [kind for kind in (*schema["$defs"].values(), *schema["anyOf"]) if "family" in kind.get("properties", {})]
     for kind in files:
-        kind["properties"]["requirements"] = requirements_schema()
+        kind["properties"] |= {TABLE: requirements_schema(), TOLERANCES: tolerances_schema()}
     for table in schema["$defs"].values():
         if {*ANGLES} <= table.get("properties", {}).keys():
             table["properties"] |= orientation_schema()

@@ -5,27 +5,27 @@ Parameters may be floats or traced scalars; nothing here validates (that is `spe
 Points and axes are in the base frame.
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, Any, Protocol
+from typing import Any, Protocol
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import COMPONENTS, Wrench
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.display import ENGINEERING, Display, read_display
+from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_inertia
 from kinetostat.machine.leg import Joint, Leg, Spring, Station, Turn
-from kinetostat.machine.limits import Limits
 from kinetostat.machine.links import LinkKind, link_tables
 from kinetostat.machine.orientation import numbers_for, single_angles
 from kinetostat.machine.parameters import Given, check_contrast, read_numbers, with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.fields import Quantity, quantities, table
+from kinetostat.spec.fields import quantities
 from kinetostat.spec.immutable import FixedDict, Immutable, fixed
 from kinetostat.spec.renamed import renamed_property
 from kinetostat.spec.requirements import Requirement
+from kinetostat.spec.tolerance_table import Tolerance
 from kinetostat.units import UnitError
 
 
@@ -112,6 +112,8 @@ class Member:
         growth: by which it makes its leg longer because it is warmer than when the machine was built, m.
         ends: gives both ends of its axis at the pose; None where they are not known.
         centre: gives its centre of mass at the pose; None for a uniform link.
+        inertia: gives its inertia about that centre at the pose, base axes: xx, yy, zz, xy, xz, yz, kg·m²; None where
+            nothing says it.
     """
 
     leg: str
@@ -122,73 +124,9 @@ class Member:
     growth: Scalar = 0.0
     ends: Callable[[], tuple[Station, ...]] | None = None
     centre: Callable[[], Station] | None = None
+    inertia: Callable[[], tuple[Scalar, ...]] | None = None
 
 
-@table
-class Tool:
-    """Table [tool], in any machine file: where on the platform loads act and motions are given."""
-
-    offset: Annotated[
-        tuple[float, float, float],
-        Quantity(
-            "length",
-            "tool point T from P in platform axes: x, y, z; K, C and the load are given at T",
-            count=3,
-            apart=True,
-        ),
-    ] = (0.0, 0.0, 0.0)
-    mass: Annotated[float, Quantity("mass", "of the platform and the tool together; 0: not counted")] = 0.0
-    centre_of_mass: Annotated[
-        tuple[float, float, float],
-        Quantity("length", "centre of that mass from P in platform axes: x, y, z", count=3, apart=True),
-    ] = (0.0, 0.0, 0.0)
-    payload: Annotated[float, Quantity("mass", "mass of what the tool carries; 0: nothing")] = 0.0
-    payload_centre: Annotated[
-        tuple[float, float, float],
-        Quantity("length", "centre of the payload from the tool point T in platform axes", count=3, apart=True),
-    ] = (0.0, 0.0, 0.0)
-
-
-Moment = Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3, apart=True)]
-Force = Annotated[tuple[float, float, float], Quantity("force", "force along x, y, z", count=3, apart=True)]
-
-
-@table
-class Load:
-    """Table [load], in any machine file: a wrench on the platform at the tool point, and gravity; base axes."""
-
-    moment: Moment = (0.0, 0.0, 0.0)
-    force: Force = (0.0, 0.0, 0.0)
-    gravity: Annotated[
-        tuple[float, float, float],
-        Quantity("acceleration", "along x, y, z: pulls at all masses of a loaded machine", count=3, apart=True),
-    ] = (0.0, 0.0, 0.0)
-    gravity_angle: Annotated[float, Quantity("angle", "by which gravity is turned about gravity_axis")] = 0.0
-    gravity_axis: Annotated[
-        tuple[float, float, float], Quantity("direction", "axis of that turn, of any length", count=3, apart=True)
-    ] = (1.0, 0.0, 0.0)
-    min_tension: Annotated[
-        float, Quantity("force", "least load of what only pulls or pushes; chooses preloads", unset=math.inf)
-    ] = math.inf
-    max_tension: Annotated[float, Quantity("force", "greatest load of them", unset=math.inf)] = math.inf
-
-
-@table
-class NamedLoad:
-    """Table [load.NAME], in any machine file: another wrench on the platform, at a point of it; base axes."""
-
-    point: Annotated[
-        tuple[float, float, float],
-        Quantity("length", "where it acts: from P, in platform axes: x, y, z", count=3, apart=True),
-    ] = (0.0, 0.0, 0.0)
-    moment: Moment = (0.0, 0.0, 0.0)
-    force: Force = (0.0, 0.0, 0.0)
-
-
-STATES = {"free": False, "loaded": True}
-"""What `state` of the table [load] may be, and whether the machine is then shown at rest under its loads."""
-
-COMMON = {"tool": Tool, "load": Load, "limits": Limits}
 """Tables that every machine file may have."""
 
 
@@ -308,6 +246,7 @@ class Machine(Immutable):
         display: units and digits in which people read its results, from the table [display].
         written: the file it was read from; None where it was made of data. Comparisons leave it out.
         requirements: of its file's table [requirements], by name; they change no number (`studies.requirements`).
+        tolerances: of its file's table [tolerances], by what they are about; only an error budget reads them.
         loaded: whether its file says `state = "loaded"` in [load]: what is shown where no quantity is named is then the
             machine at rest under its loads.
     """
@@ -318,6 +257,7 @@ class Machine(Immutable):
     display: Display = ENGINEERING
     written: Written | None = field(default=None, compare=False, repr=False)
     requirements: Mapping[str, Requirement] = field(default_factory=dict)
+    tolerances: Mapping[str, Tolerance] = field(default_factory=dict)
     loaded: bool = False
 
     sections = renamed_property("tables")
@@ -359,6 +299,7 @@ class Machine(Immutable):
         given = numbers_for(coordinates, {**(values or {}), **fields}, single_angles)
         machine = with_values(self, read_numbers(self.family, given))
         check_contrast(machine, self.name)
+        check_inertia(machine.tables, self.name)
         return machine
 
     def chains(self) -> Chains:
@@ -391,6 +332,12 @@ class Machine(Immutable):
         """Of each table [load.NAME], its point from P in platform axes (m), and its wrench there, base axes."""
         tables = [self.tables[f"load.{name}"] for name in self.family.loads]
         return [(Vector(*table.point), _wrench(table)) for table in tables]
+
+    @property
+    def pushed(self) -> bool:
+        """Whether its file gives a wrench on the platform, in [load] or in a table [load.NAME], that is not zero."""
+        wrenches = [self.load, *(wrench for _, wrench in self.named_loads)]
+        return any(any(wrench.components()) for wrench in wrenches)
 
     def load_at(self, platform: Displacement) -> Wrench:
         """All loads on the platform together, at the tool point, base axes (N·m, N)."""

@@ -3,15 +3,16 @@
 A mass is a plain sum, over any scalar: how it is distributed, and what it does to dynamics, is not asked here.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, is_zero, total
+from kinetostat.algebra.vector import Vector
 from kinetostat.machine.leg import Turn
 from kinetostat.machine.links import LINK_TABLES, growth_of
 from kinetostat.machine.machine import Configuration, Machine, Member
 
-PLATFORM = "platform and tool"
+PLATFORM, PAYLOAD = "platform and tool", "payload"
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,22 @@ def located_members(
     else:
         links = machine.family.members(joints=joints, **machine.family_tables)
     return [link for link in links if link.ends is not None]
+
+
+def turned_tensor(turn: Callable[[Vector], Vector], tensor: Sequence[Scalar]) -> tuple[Scalar, ...]:
+    """Turn an inertia tensor: xx, yy, zz, xy, xz, yz in the axes of a body to those of the base, R I R^T.
+
+    Args:
+        turn: turns (or mirrors) a vector with the body.
+        tensor: its six entries, kg·m².
+    """
+    if all(is_zero(entry) for entry in tensor):
+        return (0.0,) * 6
+    xx, yy, zz, xy, xz, yz = tensor
+    columns = [Vector(xx, xy, xz), Vector(xy, yy, yz), Vector(xz, yz, zz)]
+    half = [turn(column).components() for column in columns]  # R I, by columns
+    rows = [turn(Vector(*row)).components() for row in zip(*half, strict=True)]
+    return tuple(rows[i][j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
 
 
 def _weighed(link: Member) -> Scalar | None:

@@ -6,7 +6,8 @@ A machine whose file has some gets a family of its own, whose files have these t
 from dataclasses import replace
 from functools import lru_cache
 
-from kinetostat.machine.machine import Family, Load
+from kinetostat.machine.common_tables import Load
+from kinetostat.machine.machine import Family
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import quantities

@@ -87,13 +87,17 @@ class Parameter:
 AXES = ("x", "y", "z")
 VECTORS = (
     "offset", "moment", "force", "gravity", "gravity_axis", "centre_of_mass", "payload_centre", "point", "axis",
-    "first_axis", "second_axis", "far",
+    "first_axis", "second_axis", "far", "direction",
 )  # fmt: skip
 """Fields whose entries are along x, y, z."""
+TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
+"""Entries of an inertia tensor."""
 
 
 def entry_name(field: str, entry: int) -> str:
     """Return the name of an entry, counted from 0: x, y or z of a vector, else its number from 1."""
+    if field.endswith("inertia"):
+        return TENSOR[entry]
     return AXES[entry] if field in VECTORS else str(entry + 1)
 
 

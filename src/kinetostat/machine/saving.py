@@ -20,6 +20,8 @@ from kinetostat.spec.document import setting_value
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Quantity, quantities
 from kinetostat.spec.requirements import requirement_lines
+from kinetostat.spec.tolerance_table import TABLE as TOLERANCES
+from kinetostat.spec.tolerance_table import tolerance_lines
 
 LONGEST = 1 << 17
 """Characters of a file that is edited: tomlkit needs a second for as many."""
@@ -45,7 +47,7 @@ def _edited(written: Written, machine: Machine) -> str | None:
     try:
         document = tomlkit.parse(written.text)
         make_room(document, written.settings, tuple(quantities(machine.family.tables["pose"])), machine.name)
-        for setting in written.settings:
+        for setting in (text for text in written.settings if not text.startswith(TOLERANCES)):
             path, _, text = setting.partition("=")
             *table, key = path.strip().split(".")
             home = _place(document, table)
@@ -69,6 +71,7 @@ def _same(first: Machine, second: Machine) -> bool:
         and first.loaded == second.loaded
         and first.display == second.display
         and first.requirements == second.requirements
+        and list(first.tolerances.items()) == list(second.tolerances.items())
     )
     return alike and first.family.name == second.family.name and values(first) == values(second)
 
@@ -79,6 +82,8 @@ def _bring(document: Any, present: Machine, machine: Machine) -> None:
         _put(document, "name", machine.name)
     if machine.requirements != present.requirements:
         document.update(tomlkit.parse("\n".join(requirement_lines(machine.requirements))))
+    if list(machine.tolerances.items()) != list(present.tolerances.items()):
+        document.update(tomlkit.parse("\n".join(tolerance_lines(machine.tolerances))))
     if machine.loaded != present.loaded:
         _put(_place(document, ["load"]), "state", machine.state)
     for table, literals in machine.family.literals.items():

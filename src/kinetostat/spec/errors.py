@@ -55,8 +55,25 @@ def choice(value: object, known: Iterable[str], what: str) -> str:
     if isinstance(value, str) and value in names:
         return value
     near = difflib.get_close_matches(value, names, 1) if isinstance(value, str) else []
-    hint = f'did you mean "{near[0]}"?' if near else f"choose from {', '.join(names) or 'none: nothing is defined'}."
+    hint = f'did you mean "{near[0]}"?' if near else f"choose from {_listed(names) or 'none: nothing is defined'}."
     raise InputError(f"{what} is {'missing' if value is None else shorten(value)}; {hint}")
+
+
+def _listed(names: Sequence[str]) -> str:
+    """All names with commas; those that count on by the first and the last: frequency_1 to frequency_6."""
+    runs: list[list[str]] = []
+    for name in names:
+        if runs and _next(runs[-1][-1]) == name:
+            runs[-1].append(name)
+        else:
+            runs.append([name])
+    return ", ".join(f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(run) for run in runs)
+
+
+def _next(name: str) -> str | None:
+    """The name that counts on: leg_2 after leg_1; None after a name without a number."""
+    stem = name.rstrip("0123456789")
+    return f"{stem}{int(name[len(stem) :]) + 1}" if stem != name else None
 
 
 def first_mistakes(mistakes: Sequence[Any], sentence: Callable[[dict[str, Any]], str]) -> str:

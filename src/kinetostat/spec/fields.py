@@ -21,7 +21,7 @@ LARGEST = {"length": 1e6, "angle": 1e3}
 """Bounds on size, in SI: far beyond any machine, well inside float64."""
 LARGEST_OTHER = 1e20
 """The bound of every other kind."""
-LEAST = {"length": 1e-12, "area": 1e-24, "second moment of area": 1e-48, "elastic modulus": 1.0}
+LEAST = {"length": 1e-12, "angle": 1e-12, "area": 1e-24, "second moment of area": 1e-48, "elastic modulus": 1.0}
 """Least values of what must be greater than 0, in SI: less than an atom, softer than a gel."""
 SOFTEST = 1e-12
 """Least stiffness and rigidity but 0, in SI: far below a strand of protein, where machines are not."""
@@ -130,7 +130,7 @@ class Quantity:
             raise UnitError(
                 f'a {self.kind.split()[-1]} cannot be negative; write 0 for a free element, {example}, or "{RIGID}"'
             )
-        if kind.heavy and number < 0:
+        if kind.unsigned and number < 0:
             raise UnitError(f"a {self.kind} cannot be negative, {example}")
         if self.positive and number <= 0:
             raise UnitError(f"it must be greater than 0, {example}")

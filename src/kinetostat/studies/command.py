@@ -20,7 +20,7 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.driven import Driven, driven
 from kinetostat.studies.evaluation.columns import PoseColumns
 from kinetostat.studies.evaluation.given_poses import given_poses
-from kinetostat.studies.plain_data import as_answer
+from kinetostat.studies.plain_data import as_answer, no_formula
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +147,7 @@ def as_csv(answer: Command, corrections: bool = False) -> str:
     for what, table in tables.items():
         for name, unit, values in zip(answer.actuators, answer.units, table.T, strict=False):
             pairs = zip(values.tolist(), answer.settled, strict=True)
-            columns[f"{name}{what} [{unit}]"] = [value if known else "" for value, known in pairs]
+            columns[no_formula(f"{name}{what} [{unit}]")] = [value if known else "" for value, known in pairs]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.engine.batch import Progress, silent
+from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.commanding import commanded
 from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import loaded_mechanism
@@ -17,7 +18,7 @@ from kinetostat.equilibrium.tangent import stabilities
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.forward import leg_names
-from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.status import PLACELESS
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators, senses_of
 from kinetostat.machine.machine import Machine
@@ -25,10 +26,8 @@ from kinetostat.machine.parameters import with_values
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 
-SLAB = 256
-"""Poses that are solved together: enough that NumPy's calls cost little, few enough for the cache."""
-PLACELESS = (Status.OUT_OF_REACH, Status.NOT_CONVERGED)
-"""Statuses of poses at which the machine has no place."""
+SLAB = Way.ANY_MACHINE.slab
+"""Poses that are solved together."""
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 The formulas are in `kinetostatics`.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from numbers import Real
@@ -120,6 +121,23 @@ def three_numbers(direction: Sequence[float]) -> tuple[float, ...]:
             "--along 0,0,1; its length does not matter."
         )
     return tuple(numbers)
+
+
+def unit_direction(direction: Sequence[float], name: str) -> tuple[float, ...]:
+    """A direction at unit length.
+
+    Args:
+        direction: three numbers of any size.
+        name: of the argument, for messages.
+
+    Raises:
+        InputError: it is something else, or zero.
+    """
+    numbers = three_numbers(direction)
+    size = math.hypot(*numbers)
+    if size == 0.0:
+        raise InputError(f"{name} is {shorten(direction)}; give three numbers that are not all zero, e.g. (0, 0, 1).")
+    return tuple(c / size for c in numbers)
 
 
 def indices_of(stiffness: Rows | None, compliance: Rows | None, length: float, components: tuple[int, ...]) -> Indices:

@@ -61,3 +61,8 @@ def _nested_lists(values: np.ndarray[Any, Any]) -> Any:
 def stiffness_of_spring(stiffness: float | None) -> float | str | None:
     """A spring's stiffness as machine files write it: infinity is "rigid"."""
     return "rigid" if stiffness is not None and math.isinf(stiffness) else stiffness
+
+
+def no_formula(text: str) -> str:
+    """Return a name with an apostrophe before it where a spreadsheet would take it for a formula and compute it."""
+    return f"'{text}" if text.lstrip()[:1] in ("=", "+", "-", "@") else text

@@ -11,7 +11,7 @@ import numpy as np
 
 from kinetostat.display import Display
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.points import Array, Axis, Grid, Points, Table
+from kinetostat.engine.points import Array, Points, Table
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
@@ -22,6 +22,7 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.ranges import parse_range
 from kinetostat.spec.requirements import Requirement
 from kinetostat.studies.evaluation.columns import Column, read_columns
+from kinetostat.studies.grid.axes import grid_of
 from kinetostat.studies.grid.quantities import refuse_absent
 from kinetostat.studies.workspace.conditions import Condition, parse_condition
 
@@ -139,7 +140,7 @@ def _poses(machine: Machine, requirement: Requirement) -> tuple[Points, list[Par
     if requirement.over:
         ranges = [parse_range(text) for text in requirement.over]
         fields = [find(machine.family, span.field) for span in ranges]
-        grid = Grid([Axis(f.leaves, span.values(f.quantity)) for span, f in zip(ranges, fields, strict=True)])
+        grid = grid_of([*zip(ranges, fields, strict=True)])
         if grid.size > MOST_POSES:
             raise InputError(f"the box has {grid.size:,} poses; at most {MOST_POSES:,} are judged: lower the counts.")
         for path in grid.paths:

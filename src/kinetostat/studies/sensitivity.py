@@ -4,7 +4,7 @@ Tables and bars of it are in `views`; the derivatives come from `engine.derivati
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from kinetostat.engine.points import Array, Table
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.common_tables import OF_VIBRATIONS
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, parameters, shown, values
 from kinetostat.spec.arguments import checked
@@ -32,10 +33,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
 WITHOUT_INFLUENCE = (
-    "load.", "limits.", "tool.centre_of_mass", "tool.payload", "bending_rigidity.", "expansion.", "temperature_rise.",
+    "load.", "limits.", "tool.payload", "bending_rigidity.", "expansion.", "temperature_rise.",
 )  # fmt: skip
 """How the fields begin on which no index depends: loads, limits, weights, buckling and growth."""
-NOT_EVEN_LOADED = ("limits.", "bending_rigidity.", "load.min_tension", "load.max_tension")
+NEVER = ("limits.", "bending_rigidity.", "damping.", "cutting.", "drives.rotor_damping")
+"""Those on which nothing depends that has derivatives."""
+NOT_EVEN_LOADED = ("load.min_tension", "load.max_tension")
 """Those on which nothing about the loaded machine depends; chosen tensions have no derivatives."""
 FAR_AWAY = (
     "Newton's method does not lead from the unloaded pose to a stable state of rest nearby, so that there are no "
@@ -183,8 +186,8 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
         raise InputError("quantities names none; give at least one quantity or group.")
     refuse_loaded(machine, names)
     refuse_absent(machine, names)
-    candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(p, names)]
     here = values(machine)
+    candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(p, names, here)]
     by = [p.path for p in candidates if not math.isinf(here[p.path])]
     # One point with the pose as it is: any coordinate of it can be the column that a batch must have.
     column = next(path for path in here if path.startswith("pose."))
@@ -211,7 +214,7 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
 def _without_round_off(name: str, value: float, response: Response) -> float:
     """An index, set to zero where it is an entry of C or K that is only round-off: of a rigid or a free direction."""
     about = QUANTITIES[name].components
-    if not about or not math.isfinite(value) or QUANTITIES[name].loaded:
+    if not about or not math.isfinite(value) or QUANTITIES[name].stateful:
         return value
     matrix = response.compliance if name.startswith("compliance") else response.stiffness
     shrink = 1.0 / float(response.configuration.length)
@@ -224,12 +227,22 @@ def _without_round_off(name: str, value: float, response: Response) -> float:
     return value if present and abs(value) * arms[first] * arms[last] > ROUND_OFF_OF_ENTRY * compared else 0.0
 
 
-def _decides(parameter: Parameter, names: Sequence[str]) -> bool:
-    if any(QUANTITIES[name].loaded for name in names):
-        return not parameter.path.startswith(NOT_EVEN_LOADED)
-    if KINDS[parameter.quantity.kind].heavy and "mass" not in names:
+def _decides(parameter: Parameter, names: Sequence[str], here: Mapping[str, float]) -> bool:
+    """Whether any of the quantities may depend on a parameter."""
+    path, wanted = parameter.path, [QUANTITIES[name] for name in names]
+    loaded, modal = any(quantity.loaded for quantity in wanted), any(quantity.modal for quantity in wanted)
+    if path.startswith(NEVER) or (path.startswith(OF_VIBRATIONS) and not modal):
         return False
-    return not parameter.path.startswith(WITHOUT_INFLUENCE)
+    if parameter.quantity.kind == "inertia":
+        return modal
+    massive = KINDS[parameter.quantity.kind].heavy or path.startswith("drives.")
+    if modal and massive and not path.startswith("tool."):
+        return here[path] != 0.0  # a link or rotor without mass has no motion of its own
+    if loaded:
+        return not path.startswith(NOT_EVEN_LOADED)
+    if ".centre_of_mass." in path or (modal and path.startswith("tool.")):
+        return modal
+    return not path.startswith(WITHOUT_INFLUENCE) and ("mass" in names or not massive)
 
 
 def _no_derivative(parameter: Parameter, here: dict[str, float], slopes: dict[str, list[float]]) -> str:

@@ -15,22 +15,22 @@ from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.balance import Balance, balance, free_state
 from kinetostat.equilibrium.buckling import Strut, struts
-from kinetostat.equilibrium.limit import LEAP, limit_of
+from kinetostat.equilibrium.limit import limit_of
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import loaded_mechanism
 from kinetostat.equilibrium.shape import loaded_links
 from kinetostat.equilibrium.solving import Rest, at_rest, solve, with_share
-from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, inverse, stability
+from kinetostat.equilibrium.tangent import compliance, elastic_stiffness, inverse, stability
 from kinetostat.kinematics.closure import solve_joints
-from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.deflected import DeflectedLink
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.mass import located_members
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.load_limit import ADVICE, how_it_gives_way, moving_legs
+from kinetostat.studies.loaded_sentences import about_rest, moving_legs, why_no_rest, why_no_tensions
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.refusal import why_not
 from kinetostat.studies.rounding import clean_matrix, clean_screw
@@ -68,7 +68,7 @@ class LoadedState(Immutable):
 
     Attributes:
         machine: at the pose that it has without loads.
-        rest: whether it comes to rest.
+        rest: whether it comes to rest, and whether it stays there: with stable springs, and struts that do not bend.
         message: what is special about it, or why there is no state of rest.
         components: names of rows and columns: rx ry rz x y z, or rz x y.
         displacement: rotation vector (rad) and displacement of the tool point (m), from the unloaded pose.
@@ -78,8 +78,8 @@ class LoadedState(Immutable):
         elastic, tangent: stiffness of the springs alone where they are now, and that which further loads meet: with
             what the loads do by turning; None where it is not finite.
         compliance: inverse of the tangent stiffness.
-        factor: by which the loads may grow in proportion until the machine is unstable; infinite if no growth does it,
-            None where springs alone hold nothing. Without a state of rest, the share of them up to which it stands.
+        factor: by which the loads may grow in proportion until the springs are unstable; infinite if no growth does
+            it, None where springs alone hold nothing. Without a state of rest, the share of them up to which it stands.
         mode: small motion of the tool point when it becomes unstable, of any size, rad and m.
         mode_legs: the legs that move most then.
         struts: what presses each strut whose E I is known, and Euler's load at which it bends away.
@@ -126,11 +126,11 @@ def under_load(machine: Machine) -> LoadedState:
     joints = solve_joints(machine) if machine.family.chains else None
     response = respond(machine, joints)
     names = machine.family.component_names
-    if int(response.status) in (Status.OUT_OF_REACH, Status.NOT_CONVERGED):
+    if int(response.status) in PLACELESS:
         return LoadedState(machine, Rest.NO_REST, why_not(machine, response, []), names)
     mechanism, balanced = loaded_mechanism(machine, response, joints)
     if not balanced[0]:
-        return LoadedState(machine, Rest.NO_REST, _not_held(machine), names)
+        return LoadedState(machine, Rest.NO_REST, why_no_tensions(machine), names)
     solution = at_rest(mechanism)
     if not solution.settled[0]:
         return _without_rest(machine, mechanism)
@@ -190,16 +190,11 @@ def _state(machine: Machine, response: Response, equations: Balance, pressed: tu
     states = _springs(equations)
     slack = tuple(dict.fromkeys(state.leg for state in states if state.slack))
     moving = moving_legs(equations, judged)
+    passed = [why_not(machine, response, [])] if int(response.status) == Status.JOINT_LIMIT else []
     return LoadedState(
         machine,
-        Rest.OK if judged.stable else Rest.UNSTABLE,
-        " ".join(
-            [
-                _message(judged, slack, mechanism, equations.state.platform.amounts()[0]),
-                *_buckled(machine, pressed),
-                *_passed_limit(machine, response),
-            ]
-        ),
+        Rest.OK if judged.stable and not any(strut.bends_away for strut in pressed) else Rest.UNSTABLE,
+        " ".join([about_rest(machine, equations, judged, slack, pressed), *passed]),
         machine.family.component_names,
         _in_si(mechanism, equations.state.platform.amounts()[0], parts),
         _linear(response, mechanism, parts),
@@ -272,53 +267,10 @@ def _cleaned(stiffness: Array) -> list[list[float]] | None:
     return clean_matrix(np.where(negligible, 0.0, stiffness).tolist())
 
 
-def _message(judged: Stability, slack: tuple[str, ...], mechanism: Mechanism, moved: Array) -> str:
-    sentences = []
-    if not judged.stable:
-        stands = how_it_gives_way(limit_of(mechanism))
-        sentences.append(
-            f"The machine is not stable under this load: the least disturbance moves it away. {stands} {ADVICE}"
-        )
-    elif np.abs(moved).max() > LEAP:
-        limit = limit_of(mechanism)
-        if limit is not None and limit.share < 1.0 and not limit.least:
-            sentences.append(f"The machine has snapped over to another state on the way. {how_it_gives_way(limit)}")
-    if slack:
-        sentences.append(f"Slack, so that they carry nothing: {', '.join(slack)}.")
-    return " ".join(sentences) or "At rest and stable."
-
-
-def _buckled(machine: Machine, pressed: Sequence[Strut]) -> list[str]:
-    """A sentence about each strut that is pressed with more than Euler's load, which the springs do not know."""
-    show = machine.display.show
-    return [
-        f"{strut.name} bends away: it is pressed with {show(strut.compression, 'N')}, and Euler's load of a column of "
-        f"{show(strut.length, 'm')} between two hinges is {show(strut.euler_load, 'N')}. Make it shorter or its "
-        "cross-section stiffer."
-        for strut in pressed
-        if strut.factor < 1.0
-    ]
-
-
-def _passed_limit(machine: Machine, response: Response) -> list[str]:
-    """The sentence about a limit that the machine passes without its weights, if it does."""
-    return [why_not(machine, response, [])] if int(response.status) == Status.JOINT_LIMIT else []
-
-
-def _not_held(machine: Machine) -> str:
-    load, show = machine.tables["load"], machine.display.show
-    least = 0.0 if math.isinf(load.min_tension) else load.min_tension
-    upper = "or more" if math.isinf(load.max_tension) else f"to {show(load.max_tension, 'N')}"
-    return (
-        f"No tensions of {show(least, 'N')} {upper} hold this load at the pose of {machine.name}; change the bounds "
-        "load.min_tension and load.max_tension, the load, or the pose."
-    )
-
-
 def _without_rest(machine: Machine, mechanism: Mechanism) -> LoadedState:
     """A machine that comes to no rest, with the state in which it stood last while its loads grew."""
     names, parts, limit = machine.family.component_names, list(machine.family.components), limit_of(mechanism)
-    message = f"{machine.name} comes to no rest under this load. {how_it_gives_way(limit)} {ADVICE}"
+    message = why_no_rest(machine, limit)
     if limit is None:
         return LoadedState(machine, Rest.NO_REST, message, names)
     mode = (limit.judged.mode * mechanism.twist_units[0])[parts]

@@ -13,8 +13,9 @@ from dataclasses import replace
 from urllib.parse import quote, urlencode
 
 from kinetostat.machine.changing import changed, rebuilt
+from kinetostat.machine.common_tables import STATES
 from kinetostat.machine.loading import as_toml, build, bundled, load
-from kinetostat.machine.machine import STATES, Machine
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError, choice

@@ -14,16 +14,20 @@ from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Array, Axis, Grid
 from kinetostat.kinematics.singularity import free_twist
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.common_tables import Load
 from kinetostat.machine.limits import is_set
-from kinetostat.machine.machine import Load, Machine
-from kinetostat.machine.parameters import find, values
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import find, parameters, values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis, analyze
+from kinetostat.studies.grid.quantities import without_derivatives
 from kinetostat.studies.sensitivity import Sensitivity, sensitivity
 from kinetostat.studies.under_load import LoadedState, under_load
 from kinetostat.studio.pulling import handles
 from kinetostat.tolerances import SINGULAR
+from kinetostat.units import KINDS
 from kinetostat.views.scene import machine_scene as scenes
 from kinetostat.views.scene.analysis_overlays import loaded_overlays, overlays_of
 from kinetostat.views.scene.overlays import twist_solids
@@ -32,7 +36,10 @@ from kinetostat.views.scene.solids import Scene, as_data, solid_data
 
 MAP_POINTS = 41
 """Points of a map along each coordinate."""
+SLOW_POINTS = 11
+"""The same of a quantity that is solved for pose by pose."""
 CURVE_POINTS = 61
+SINGULARITY = "singularity_margin"
 
 
 @dataclass(frozen=True)
@@ -103,8 +110,9 @@ class Report:
 
     Attributes:
         analysis: of the machine at its pose.
-        legs: name of the leg in which each joint or link is.
-        solids: that show the answers in the picture.
+        legs: name of the leg in which each joint or link is; empty where the joints have no place.
+        sizes: proportions of the picture.
+        solids: that show the answers in it.
         exaggeration: factor by which deflections are drawn larger; None without a load.
         loaded: the state of rest, where the machine is to be shown under its loads.
         refused: why its loads are refused; empty if they are not.
@@ -112,6 +120,7 @@ class Report:
 
     analysis: Analysis
     legs: Mapping[str, str]
+    sizes: Proportions
     solids: list[dict[str, Any]]
     exaggeration: float | None
     loaded: LoadedState | None = None
@@ -128,14 +137,16 @@ class Report:
 def report(request: ReportRequest) -> Report:
     """Analyse the machine at its pose and make the solids that are drawn over it."""
     analysis = analyze(request.machine)
-    placed = respond(request.machine).configuration.legs
+    unplaced = analysis.status in (Status.OUT_OF_REACH, Status.NOT_CONVERGED)
+    placed = () if unplaced else respond(request.machine).configuration.legs
     legs = {str(spring.of): leg.name for leg in placed for spring in leg.springs}
     loaded, refused = _at_rest(request.machine) if request.machine.loaded else (None, "")
     if loaded is None:
         solids, factor = overlays_of(analysis, request.sizes, request.exaggeration)
     else:
         solids, factor = loaded_overlays(loaded, request.sizes, request.exaggeration)
-    return Report(analysis, legs, [solid_data(solid) for solid in solids], factor, loaded, refused)
+    data = [solid_data(solid) for solid in solids]
+    return Report(analysis, legs, request.sizes, data, factor, loaded, refused)
 
 
 def _at_rest(machine: Machine) -> tuple[LoadedState | None, str]:
@@ -160,30 +171,44 @@ class MapRequest:
     """A map over two fields of a machine; `since` is the time at which the designer changed something, s."""
 
     machine: Machine
+    quantity: str
     across: Ends
     up: Ends
     since: float
 
 
-def compliance_map(request: MapRequest) -> dict[str, Array]:
-    """Evaluate every quantity of `map_quantities` at 41 x 41 points.
+def quantity_map(request: MapRequest) -> dict[str, Array] | str:
+    """Evaluate a quantity at 41 x 41 points, with all others of `map_quantities` that cost nothing more.
 
     A program is compiled once and must then serve while the designer moves the machine. Therefore all coordinates of
     the pose are its inputs, also those that do not vary over the map, and the load is left out where it has no effect.
+    Natural frequencies that have no program are solved for pose by pose, and so at fewer points.
 
     Returns:
-        Values by quantity, the second field running fastest; NaN at a pose without an answer.
+        Values by quantity, the second field running fastest, NaN at a pose without an answer; or what the file lacks.
     """
-    machine = _unloaded(request.machine)
+    try:
+        return _values_of(request)
+    except InputError as error:
+        return str(error)
+
+
+def _values_of(request: MapRequest) -> dict[str, Array]:
+    modal = QUANTITIES[request.quantity].modal
+    machine = request.machine if modal else _unloaded(request.machine)
     present, family = values(machine), machine.family
+    leaves = [find(family, ends.path).leaves for ends in (request.across, request.up)]
+    varied = {leaf for paths in leaves for leaf in paths}
+    slow = modal and without_derivatives(machine, [request.quantity], sorted(varied)) is not None
+    points = SLOW_POINTS if slow else MAP_POINTS
     axes = [
-        Axis(find(family, ends.path).leaves, np.linspace(ends.low, ends.high, MAP_POINTS))
-        for ends in (request.across, request.up)
+        Axis(paths, np.linspace(ends.low, ends.high, points))
+        for paths, ends in zip(leaves, (request.across, request.up), strict=True)
     ]
-    varied = {leaf for axis in axes for leaf in axis.paths}
     fixed = [path for path in present if path.startswith("pose.") and path not in varied]
     grid = Grid([*axes, *(Axis((path,), np.array([float(present[path])])) for path in fixed)])
-    return evaluate(machine, grid, list(map_quantities(machine)), repeated=True).values
+    wanted = [request.quantity] if modal else [*_linear_quantities(machine), SINGULARITY]
+    return evaluate(machine, grid, wanted, repeated=not slow).values
 
 
 def _unloaded(machine: Machine) -> Machine:
@@ -232,13 +257,38 @@ class RankingRequest:
     quantity: str
 
 
-def ranking(request: RankingRequest) -> Sensitivity:
-    """Rank the parameters by their influence on the quantity."""
-    return sensitivity(request.machine, [request.quantity])
+def ranking(request: RankingRequest) -> Sensitivity | str:
+    """Rank the parameters by their influence on the quantity, or say why it has no derivatives."""
+    try:
+        return sensitivity(request.machine, [request.quantity])
+    except InputError as error:
+        return str(error)
 
 
 def map_quantities(machine: Machine) -> dict[str, str]:
-    """Return names and labels of what may be mapped: diagonals of C and K, 1/C_ii, and the singularity margin."""
+    """Return names and labels of what may be mapped: diagonals of C and K, 1/C_ii, the singularity margin, frequencies.
+
+    Natural frequencies are offered where the machine has masses, about its state under load where that is shown.
+    """
+    return {**_linear_quantities(machine), SINGULARITY: "singularity margin", **_frequencies(machine)}
+
+
+def _linear_quantities(machine: Machine) -> dict[str, str]:
     names, groups = machine.family.component_names, ("compliance", "stiffness", "free_stiffness")
-    diagonals = {f"{group}_{name}": f"{group.replace('_', ' ')} {name}" for group in groups for name in names}
-    return {**diagonals, "singularity_margin": "singularity margin"}
+    return {f"{group}_{name}": f"{group.replace('_', ' ')} {name}" for group in groups for name in names}
+
+
+def weighs(machine: Machine) -> bool:
+    """Whether any number of a machine says a mass or an inertia."""
+    present = values(machine)
+    weighing = [p for p in parameters(machine.family) if KINDS[p.quantity.kind].heavy or p.quantity.kind == "inertia"]
+    return any(present[leaf] for parameter in weighing for leaf in parameter.leaves)
+
+
+def _frequencies(machine: Machine) -> dict[str, str]:
+    """The lowest natural frequencies: as many as a platform has whose file gives a mass and no more."""
+    if not weighs(machine):
+        return {}
+    group = "loaded_frequency" if machine.loaded else "frequency"
+    ways = [name for name in machine.family.component_names if name in "xyz"]
+    return {f"{group}_{number}": f"frequency {number}" for number in range(1, len(ways) + 1)}

@@ -5,14 +5,16 @@ Positions of a slider become SI values and back; the sliders themselves are elem
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from kinetostat.machine.common_tables import OF_VIBRATIONS
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import VECTORS, Parameter, parameters, values
+from kinetostat.machine.parameters import AXES, VECTORS, Parameter, parameters, values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studio.wording import label, table_of
+from kinetostat.units import KINDS
 
-PANELS = ("Pose", "Geometry", "Stiffness", "Load")
+PANELS = ("Pose", "Geometry", "Stiffness", "Mass", "Load")
 STEPS = 1000
 """Positions of a slider."""
 LENGTH_SHARE = 0.75
@@ -25,15 +27,35 @@ USUAL_STIFFNESS = 1e6
 """Middle of the range of a stiffness that is rigid or free, SI."""
 LARGEST_LOAD = {"force": 1000.0, "moment": 100.0, "acceleration": 9.81}
 """Ends of the range of a load that is zero: N, N·m, m/s²."""
+OF_MASSES = (*OF_VIBRATIONS, "tool.mass", "tool.centre_of_mass", "tool.payload")
+"""How the fields begin that stand in the panel Mass; so do all whose kind says how much matter there is."""
+LARGEST_MASS = 1000.0
+"""Upper end of the range of a mass that is zero, in kg per square of the machine's length."""
+SLENDERNESS = 10.0
+"""Lengths of the machine over which such a mass would be spread as that of links."""
+LARGEST = {
+    "drives.rotor_inertia": 1e-4,
+    "drives.lead": 0.02,
+    "drives.ratio": 100.0,
+    "drives.rotor_damping": 0.01,
+    "damping.ratio": 0.1,
+    "damping.per_mass": 50.0,
+    "damping.per_stiffness": 1e-4,
+    "damping.hinges": 1.0,
+    "damping.slides": 1000.0,
+    "cutting.pressure": 4e9,
+}
+"""Upper ends of the ranges of other numbers of vibrations that are zero, SI."""
+PRODUCTS = ("xy", "xz", "yz")
+"""Entries of an inertia that may be negative."""
+ROOM = 3.0
+"""Upper end of the range of such a number that is not zero, in units of itself."""
 OF_LOADED_STATES = (
     "load.gravity",
     "load.gravity_angle",
     "load.gravity_axis",
     "load.min_tension",
     "load.max_tension",
-    "tool.centre_of_mass",
-    "tool.payload",
-    "tool.payload_centre",
     *(f"{table}." for table in ("bending_rigidity", "expansion", "temperature_rise")),
 )
 """Fields that change nothing unless the machine is shown under its loads: they are offered only then."""
@@ -75,6 +97,11 @@ class Control:
         return self.path.startswith(OF_LOADED_STATES)
 
     @property
+    def joined(self) -> bool:
+        """Whether it moves entries together that a file gives apart, so that its path alone names none of them."""
+        return self.parameter.quantity.apart and len(self.parameter.leaves) > 1
+
+    @property
     def slides(self) -> bool:
         """Whether it has a slider; limits of actuators and joints are typed only."""
         return self.low < self.high
@@ -114,8 +141,13 @@ def controls(machine: Machine, length: float) -> tuple[Control, ...]:
 
 
 def _offered(machine: Machine, present: dict[str, float]) -> Iterator[Parameter]:
-    """Offer every number, and a field of several as one control where its entries are alike in kind and value."""
-    for parameter in parameters(machine.family):
+    """Offer every number, and a field of several as one control where its entries are alike in kind and value.
+
+    Of an inertia the three moments move together: no body has a moment about one axis alone.
+    """
+    for given in parameters(machine.family):
+        inertia = given.quantity.kind == "inertia" and len(given.leaves) > 1
+        parameter = replace(given, leaves=given.leaves[: len(AXES)]) if inertia else given
         several = len(parameter.leaves) > 1
         alike = len({present[leaf] for leaf in parameter.leaves}) == 1
         vector = parameter.path.split(".")[-1] in VECTORS
@@ -128,9 +160,16 @@ def _control(parameter: Parameter, present: dict[str, float], length: float) -> 
     value, quantity = present[parameter.leaves[0]], parameter.quantity
     panel = "Stiffness" if quantity.stiff else "Pose" if table == "pose" else "Geometry"
     panel = "Load" if table in ("load", "tool", "limits") or parameter.path.startswith(OF_LOADED_STATES) else panel
+    panel = "Mass" if parameter.path.startswith(OF_MASSES) or KINDS[quantity.kind].heavy else panel
     group = table_of(parameter)
     if quantity.unset is not None:
         return Control(parameter, panel, group, 0.0, 0.0, False)
+    usual = _usual(parameter, length) if panel == "Mass" else None
+    if usual is not None:
+        most = ROOM * abs(value) or usual
+        product = quantity.kind == "inertia" and label(parameter).endswith(PRODUCTS)
+        least = LEAST_SHARE * most if quantity.positive else 0.0
+        return Control(parameter, panel, group, -most if product else least, most, False)
     low, high, logarithmic = _range(quantity.kind, quantity.stiff, value, table, length)
     if quantity.positive and not quantity.stiff:
         low = max(low, LEAST_SHARE * high)
@@ -154,6 +193,13 @@ def _range(kind: str, stiff: bool, value: float, table: str, length: float) -> t
     if kind == "direction":
         return -1.0, 1.0, False
     return value / 10.0, value * 10.0, True
+
+
+def _usual(parameter: Parameter, length: float) -> float | None:
+    """Return the upper end of the slider of a number that is zero; None for what has a range as any other number."""
+    mass = LARGEST_MASS * length**2
+    kinds = {"mass": mass, "inertia": mass * length**2, "linear density": mass / (SLENDERNESS * length)}
+    return LARGEST.get(parameter.path, kinds.get(parameter.quantity.kind))
 
 
 # The factor by which the deflected shape is exaggerated: a slider as well, but no number of the machine.

@@ -32,7 +32,11 @@ class Labelled(Element):
 
 
 class MachineView(Labelled, component=RENDERER / "machine_view.js", esm=MODULES):
-    """Scenes of solids, with light, shadows and a camera; methods `show`, `overlay`, `look`."""
+    """Scenes of solids, with light, shadows and a camera.
+
+    Methods `show`, `overlay`, `look`, and `swing` and `sway` for a shape that swings; the event `swinging` says
+    whether it moves.
+    """
 
     def __init__(self, label: str) -> None:
         super().__init__(label)
@@ -62,7 +66,7 @@ class MapView(Labelled, component=COMPONENTS / "map_view.js"):
 
 
 class CurveView(Labelled, component=COMPONENTS / "curve_view.js"):
-    """Curves over one number; method `show`."""
+    """Curves over one number; method `show`; event `pick` with the number of the mark next to a click."""
 
 
 class FrontView(Labelled, component=COMPONENTS / "front_view.js"):
@@ -70,16 +74,18 @@ class FrontView(Labelled, component=COMPONENTS / "front_view.js"):
 
 
 class DesignTable(Labelled, component=COMPONENTS / "design_table.js"):
-    """Designs as rows that sort by any column; event `pick` with the number of a design."""
+    """Designs or other things as rows that sort by any column; event `pick` with the number of a row."""
 
-    def __init__(self, label: str) -> None:
+    def __init__(self, label: str, action: str = "load design") -> None:
+        """An empty table; `action` is what a screen reader says of the button of a row, before its number."""
         super().__init__(label)
-        self.put([], [], [], 0, None)
+        self._props["action"] = action
+        self.put([], [], [], None, None)
 
     def put(
-        self, names: list[str], values: list[list[float]], texts: list[list[str]], knee: int, chosen: int | None
+        self, names: list[str], values: list[list[float]], texts: list[list[str]], knee: int | None, chosen: int | None
     ) -> None:
-        """Show other designs: what each column is, numbers to sort by, and how they are written."""
+        """Show other rows: what each column is, numbers to sort by, and how they are written."""
         self._props.update(names=names, values=values, texts=texts, knee=knee, chosen=chosen)
         self.update()
 

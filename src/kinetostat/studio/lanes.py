@@ -20,6 +20,8 @@ WORKERS = 4
 """Threads for all pages: Python computes one thing at a time, so more of them would only delay the event loop."""
 SHARE = 2
 """Threads that one page may use at a time, so that a page with a slow machine leaves some to the others."""
+PATIENCE = 0.3
+"""Seconds for which a computation may take without a word."""
 
 log = logging.getLogger("kinetostat")
 
@@ -32,6 +34,7 @@ class Lane(Generic[Request, Result]):
         work: Callable[[Request], Result],
         deliver: Callable[[Request, Result], None],
         failed: Callable[[Exception], None] | None = None,
+        slow: Callable[[], None] = lambda: None,
     ) -> None:
         """Create an idle lane of the page that is being built.
 
@@ -39,8 +42,9 @@ class Lane(Generic[Request, Result]):
             work: computes the result of a request, in a thread; it must not touch the page.
             deliver: shows the result, on the event loop.
             failed: says on the page that `work` has raised an exception; by default the page's exception handler.
+            slow: says on the page that `work` takes longer than people wait without a word.
         """
-        self._work, self._deliver = work, deliver
+        self._work, self._deliver, self._slow = work, deliver, slow
         self._page = context.client
         self._failed = failed or self._page.handle_exception
         self._share = _share(self._page)
@@ -73,7 +77,12 @@ class Lane(Generic[Request, Result]):
                 return
             request = self._waiting.pop()
             try:
-                result = await asyncio.get_running_loop().run_in_executor(_workers(), self._work, request)
+                working = asyncio.get_running_loop().run_in_executor(_workers(), self._work, request)
+                ended, _ = await asyncio.wait([working], timeout=PATIENCE)
+                if self._open and not ended:
+                    with self._page:
+                        self._slow()
+                result = await working
                 if self._open and result is not None:
                     with self._page:
                         self._deliver(request, result)

@@ -1,8 +1,9 @@
 """The map of one quantity over two numbers of the machine; a click moves the machine there.
 
-The values are computed by `answers.compliance_map`; this panel chooses, shows, and passes clicks to the session.
+The values are computed by `answers.quantity_map`; this panel chooses, shows, and passes clicks to the session.
 """
 
+import math
 import time
 from collections.abc import Callable
 
@@ -14,7 +15,7 @@ from kinetostat.display import Scale
 from kinetostat.engine.points import Array
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.studio.answers import MAP_POINTS, Ends, MapRequest, compliance_map, finite, map_quantities
+from kinetostat.studio.answers import Ends, MapRequest, finite, map_quantities, quantity_map
 from kinetostat.studio.controls import Control
 from kinetostat.studio.elements import THROTTLE, MapView, choice, icon_button, refuse
 from kinetostat.studio.lanes import Lane
@@ -25,6 +26,8 @@ from kinetostat.views.usual_values import usual_range
 
 LENGTHS = ("m", "mm")
 """Units of axes that have one scale if both have the same."""
+LOADED = "loaded_"
+"""How the names of quantities begin that are about the machine under its loads."""
 RANGE = 'range of the {} axis, such as "-5 to 8 cm"; empty for the whole range of the slider'
 
 
@@ -39,7 +42,7 @@ class MapPanel:
             on_change: called after the map has moved the machine.
         """
         self._session, self._on_change = session, on_change
-        self._lane = Lane(compliance_map, self._deliver)
+        self._lane = Lane(quantity_map, self._deliver)
         with ui.row().classes("panel-tools"):
             self.quantity = choice({}, "map of", self._chosen, "map-quantity")
             self.across = choice({}, "horizontal axis", self._chosen, "map-across")
@@ -60,30 +63,41 @@ class MapPanel:
         """Offer the numbers and quantities of a machine that has just been loaded; nothing is computed yet."""
         self._asking = False
         self._chosen_ranges.clear()
-        machine = self._session.machine
         fields = {control.path: full_label(control.parameter) for control in self._mappable()}
         first, second, *_ = fields
-        quantities = map_quantities(machine)
-        kept = self.quantity.value if self.quantity.value in quantities else "compliance_x"
-        self.quantity.set_options(quantities, value=kept)
+        self._offer_quantities()
         self.across.set_options(fields, value=first)
         self.up.set_options(fields, value=second)
         self._asking = True
 
+    def _offer_quantities(self) -> None:
+        """Offer what the machine has now: it may have got a mass, or be shown under its loads."""
+        quantities, asking = map_quantities(self._session.machine), self._asking
+        if self.quantity.options == quantities:
+            return
+        present = str(self.quantity.value)
+        other = present.removeprefix(LOADED) if present.startswith(LOADED) else f"{LOADED}{present}"
+        kept = next((name for name in (present, other) if name in quantities), "compliance_x")
+        self._asking = False
+        self.quantity.set_options(quantities, value=kept)
+        self._asking = asking
+
     def _mappable(self) -> list[Control]:
         """List the controls over whose range a map can be drawn, the pose first."""
         every = self._session.controls.values()
-        mappable = [control for control in every if control.slides and not control.logarithmic]
-        return sorted((c for c in mappable if c.panel != "Load"), key=lambda control: control.panel != "Pose")
+        sliding = [control for control in every if control.slides and not control.logarithmic]
+        mappable = [control for control in sliding if control.panel not in ("Load", "Mass")]
+        return sorted(mappable, key=lambda control: control.panel != "Pose")
 
     def refresh(self, since: float | None = None) -> None:
         """Request the map of the present machine; `since` is the time of the change behind it, s (default: now)."""
+        self._offer_quantities()
         across, up = self._ends()
         if across.path == up.path:
             self.time.set_text("Choose two different axes.")
             return
         start = time.perf_counter() if since is None else since
-        self._lane.ask(MapRequest(self._session.machine, across, up, start))
+        self._lane.ask(MapRequest(self._session.machine, str(self.quantity.value), across, up, start))
 
     def close(self) -> None:
         self._lane.close()
@@ -101,20 +115,22 @@ class MapPanel:
         kind = KINDS[control.parameter.quantity.kind]
         return control, self._session.machine.display.scale(kind.unit)
 
-    def _deliver(self, request: MapRequest, maps: dict[str, Array]) -> None:
+    def _deliver(self, request: MapRequest, maps: dict[str, Array] | str) -> None:
         quantity = str(self.quantity.value)
-        if (request.across, request.up) != self._ends() or quantity not in maps:
+        refused = isinstance(maps, str) and request.quantity == quantity
+        if (request.across, request.up) != self._ends() or not (refused or quantity in maps):
             return  # the designer has chosen other axes meanwhile, and that map is on its way
         (across, x), (up, y) = self._scale(request.across.path), self._scale(request.up.path)
-        values = maps[quantity]
+        values = np.full(4, np.nan) if isinstance(maps, str) else maps[quantity]
+        points = math.isqrt(values.size)
         known = values[np.isfinite(values)]
         ends = np.array(usual_range(known) if known.size else (0.0, 0.0))
         scale = self._session.machine.display.fitting(QUANTITIES[quantity].unit, known)
         self.view.run_method(
             "show",
             {
-                "nx": MAP_POINTS,
-                "ny": MAP_POINTS,
+                "nx": points,
+                "ny": points,
                 "values": finite(values * scale.factor),
                 "ends": (ends * scale.factor).tolist(),
                 "unit": scale.unit,
@@ -125,7 +141,7 @@ class MapPanel:
             },
         )
         took = 1e3 * (time.perf_counter() - request.since)
-        self.time.set_text(f"{MAP_POINTS} × {MAP_POINTS} poses in {took:.0f} ms")
+        self.time.set_text(maps if isinstance(maps, str) else f"{points} × {points} poses in {took:.0f} ms")
 
     def _range_field(self, side: str) -> ui.input:
         field = ui.input(f"{side} axis").props("dense outlined").classes("field").tooltip(RANGE.format(side))

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from nicegui import events, ui
 
+from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.machine import Machine
@@ -26,6 +27,7 @@ from kinetostat.studio.panels.contributions import ContributionsPanel, Sensitivi
 from kinetostat.studio.panels.link_stiffness import LinkPanel
 from kinetostat.studio.panels.requirements import RequirementsPanel
 from kinetostat.studio.panels.tables import IndicesPanel, LoadsPanel, MatricesPanel
+from kinetostat.studio.panels.vibration import VibrationPanel
 from kinetostat.studio.parameters_panel import ParametersPanel
 from kinetostat.studio.playback import Playback
 from kinetostat.studio.pulling import free_axes
@@ -36,7 +38,8 @@ from kinetostat.studio.uploads import check_upload
 from kinetostat.views.scene.proportions import proportions_of
 
 PANELS: tuple[type[Panel], ...] = (
-    ContributionsPanel, MatricesPanel, IndicesPanel, SensitivityPanel, LinkPanel, LoadsPanel, RequirementsPanel,
+    ContributionsPanel, MatricesPanel, IndicesPanel, SensitivityPanel, LinkPanel, LoadsPanel, VibrationPanel,
+    RequirementsPanel,
 )  # fmt: skip
 """The linked views, in the order of their tabs."""
 ACCENT = "#0b5ea8"
@@ -60,9 +63,10 @@ class StudioPage:
             workshop: searches and favourites of the server.
         """
         self.session, self._remember = Session(memory), remember
-        self._pictures = Lane(picture, self._show_picture, self._unanswered)
+        self._pictures = Lane(picture, self._show_picture, self._unanswered, lambda: self.scene.wait())
         self._reports = Lane(report, self._show_report, self._unanswered)
         self._latest: Report | None = None
+        self._front: Panel | None = None
         self.dark = ui.dark_mode(value=None)
         self.browser = BrowserLink().on("undo", self._undo).on("redo", self._redo).mark("browser")
         self.browser.on("theme", lambda event: self.dark.set_value(event.args))
@@ -109,8 +113,8 @@ class StudioPage:
         self.panels: dict[str, Panel] = {}
         made = [panel() for panel in PANELS]
         for panel in made:
-            panel.changed = self.changed
-        with ui.tabs(on_change=self._show_front).classes("panel-tabs").props("dense no-caps") as self.tabs:
+            panel.changed, panel.view = self.changed, self.scene.view
+        with ui.tabs(on_change=self._other_front).classes("panel-tabs").props("dense no-caps") as self.tabs:
             for panel in made:
                 ui.tab(panel.name).mark(f"tab-{panel.name}")
         with ui.tab_panels(self.tabs, value=made[0].name, animated=False).classes("panel-body").props("keep-alive"):
@@ -143,6 +147,7 @@ class StudioPage:
         self._sizes = proportions_of(machine, respond(self.session.origin).configuration)
         self._axes = free_axes(machine)
         self.playback.clear()
+        self._leave_front()
         self._show_state()
         self.parameters.fill()
         self.text.renew()
@@ -178,9 +183,11 @@ class StudioPage:
         self._remember(memory, address)
         self.browser.put(address)
 
-    def _show_picture(self, _request: PictureRequest, drawn: Picture) -> None:
+    def _show_picture(self, request: PictureRequest, drawn: Picture) -> None:
         """Draw, then let a waiting slider go on, then request the figures: the eye follows the picture first."""
         self.scene.draw(drawn)
+        if drawn.status is Status.OUT_OF_REACH and request.machine.family.chains is not None:
+            self.scene.look_for_nearest()
         self.parameters.go_on()
         self._report()
 
@@ -203,11 +210,25 @@ class StudioPage:
         if new.answered:
             self._latest = new
             self._show_front()
+        else:
+            self._leave_front()
+
+    def _other_front(self) -> None:
+        """Bring another linked view to the front."""
+        self._leave_front()
+        self._show_front()
 
     def _show_front(self) -> None:
         panel = self.panels.get(str(self.tabs.value))
-        if self._latest is not None and panel is not None and panel.shows(self._latest):
+        designing = self.mode.value == DESIGN
+        if self._latest is not None and panel is not None and panel.shows(self._latest) and not designing:
+            self._front = panel
             panel.show(self._latest, self.session)
+
+    def _leave_front(self) -> None:
+        if self._front is not None:
+            self._front.leave()
+        self._front = None
 
     def _choose(self) -> None:
         if self._listening and self.machines.value != OTHER:
@@ -236,6 +257,10 @@ class StudioPage:
     def _to_front(self) -> None:
         mode = str(self.mode.value)
         self.main.classes(replace=MODES[mode])
+        if mode == DESIGN:
+            self._leave_front()
+        elif self._front is None:
+            self._show_front()
         self.text.front(mode == TEXT)
         self.design.front(mode == DESIGN)
 

@@ -1,4 +1,4 @@
-"""The left of the page: every number of the machine as a slider and as text, in four panels.
+"""The left of the page: every number of the machine as a slider and as text, in panels.
 
 Ranges and positions come from `controls`, changes go to the session; this panel only shows rows and passes events on.
 """

@@ -14,6 +14,7 @@ import numpy as np
 from kinetostat.algebra.vector import IDENTITY, Displacement, Rotation, Vector, rotation_along
 from kinetostat.engine.points import Array
 from kinetostat.kinematics.closure import solve_joints
+from kinetostat.machine.common_tables import OF_VIBRATIONS
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.views.scene.anatomy import anatomy
@@ -202,7 +203,7 @@ def _pose(machine: Machine) -> dict[str, str]:
 
 def _geometry(machine: Machine, leg: str) -> dict[str, str]:
     """Lengths and angles of the machine itself; of a machine written leg by leg, those of one leg."""
-    apart = ("pose.", "tool.", "load.", "limits.", "sections.")
+    apart = ("pose.", "tool.", "load.", "limits.", "sections.", *OF_VIBRATIONS)
     written = machine.family.chains is not None
     mine = (f"legs.{leg}.", "geometry.")
     return _fields(machine, lambda path: not path.startswith(apart) and (not written or path.startswith(mine)))

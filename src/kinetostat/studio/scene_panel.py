@@ -32,6 +32,8 @@ LAYERS = {
 GHOST = "Keep the present machine as a ghost behind later changes; click again to remove it"
 EXAGGERATION = "factor by which the deflected shape is drawn larger than it is: a number, or auto"
 UNDER_LOAD = "the machine at rest under its weight, preloads and load; gravity is set under Load on the left"
+COMPUTING = "The next pose is being computed ..."
+LOOKING = "The legs cannot close at this pose on the branch of the home pose; the nearest pose is being looked for ..."
 KEPT = "The picture and the figures still show the last good pose."
 UNLOADED = "The picture shows the machine without its loads, and the figures still show the last state of rest."
 VIEWS = {"iso": "view from the corner", "front": "front view", "side": "side view", "top": "view from above"}
@@ -133,6 +135,14 @@ class ScenePanel:
         if report.exaggeration is not None:
             self.scale.put(factor_text(report.exaggeration, automatic), factor_position(report.exaggeration))
         self.figures.set_content(headline(report))
+
+    def wait(self) -> None:
+        """Say that a pose takes its time; its picture, or the reason why it has none, follows."""
+        self.message.set_text(COMPUTING)
+
+    def look_for_nearest(self) -> None:
+        """Say at once that a pose is out of reach, while the nearest one is being looked for; `explain` names it."""
+        self._tell(False, Status.OUT_OF_REACH.word.replace("_", " "), LOOKING)
 
     def fail(self, error: Exception) -> None:
         """Say that the machine could not be drawn or analysed because of a mistake of the program."""

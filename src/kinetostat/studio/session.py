@@ -134,7 +134,8 @@ class Session:
         Raises:
             InputError: the machine cannot have this value; it stays as it was.
         """
-        self._change({path: self.controls[path].value_at(position)})
+        control = self.controls[path]
+        self._change(dict.fromkeys(control.parameter.leaves, control.value_at(position)))
 
     def settle(self) -> None:
         """End a drag, and check the numbers that changed against all others.
@@ -162,7 +163,7 @@ class Session:
         value = read_typed(parameter, text, unit)
         present = values(self.machine)
         if any(present[leaf] != value for leaf in parameter.leaves):
-            self._change({path: value})
+            self._change(dict.fromkeys(parameter.leaves, value))
             self.settle()
 
     def move(self, where: Mapping[str, float]) -> None:

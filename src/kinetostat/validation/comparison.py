@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,10 @@ import numpy.typing as npt
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.vector import Vector
+from kinetostat.equilibrium.balance import balance, free_state
+from kinetostat.equilibrium.mechanism import mechanism_of
+from kinetostat.equilibrium.solving import with_share
+from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Configuration, Machine
@@ -28,6 +33,7 @@ from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.rounding import clean_matrix
 from kinetostat.tolerances import AGREED, ROUND_OFF_OF_ENTRY
 from kinetostat.validation.answer import Answer, block_differences, difference
+from kinetostat.vibration.modes import frequencies
 
 Array = npt.NDArray[np.float64]
 
@@ -44,6 +50,7 @@ class Engine:
         needs: modules that must be installed.
         builder: the kinetostat module whose `solve` rebuilds a machine in it.
         summary: how it models a machine.
+        modes: the kinetostat module whose `frequencies` rebuilds it with its masses; empty if the engine has none.
     """
 
     name: str
@@ -51,6 +58,7 @@ class Engine:
     needs: tuple[str, ...]
     builder: str
     summary: str
+    modes: str = ""
 
     @property
     def version(self) -> str | None:
@@ -68,11 +76,22 @@ class Engine:
         Raises:
             InputError: if the engine is not installed, has no counterpart of a part of the machine, or fails.
         """
+        return self._asked(lambda: import_module(self.builder).solve(configuration, reference))
+
+    def frequencies(self, machine: Machine) -> Array:
+        """Return the natural frequencies of a machine at its pose, ascending, Hz; none if the engine has no modes.
+
+        Raises:
+            InputError: see `solve`.
+        """
+        return self._asked(lambda: import_module(self.modes).frequencies(machine)) if self.modes else np.zeros(0)
+
+    def _asked(self, question: Callable[[], Any]) -> Any:
+        """What a question to the engine returns; its trouble is an InputError."""
         if self.version is None:
             raise InputError(f"The engine {self.name} is not installed. {INSTALL.format(adding('validate'))}")
-        solve: Callable[[Configuration, Vector], Answer] = import_module(self.builder).solve
         try:
-            return solve(configuration, reference)
+            return question()
         except InputError:
             raise
         except Exception as trouble:  # engines raise anything, down to bare exceptions
@@ -87,6 +106,7 @@ KNOWN = (
         ("exudyn", "scipy"),
         "kinetostat.validation.exudyn_machine",
         "multibody dynamics: rigid bodies, exact constraints and springs",
+        "kinetostat.validation.exudyn_modes",
     ),
     Engine(
         "pynite",
@@ -111,6 +131,8 @@ class Validation(Immutable):
         uncertainty: how far the engine's two best results differ, in the same measure; infinite if it has only one.
         varied: the quantity that the engine's trials vary, in words.
         trials: scale of each, and its difference from kinetostat's C.
+        frequencies: the lowest natural frequencies of the unloaded machine by kinetostat and by the engine, Hz; none
+            where nothing has a mass, or the engine has no modes.
     """
 
     machine: Machine
@@ -122,14 +144,20 @@ class Validation(Immutable):
     uncertainty: float
     varied: str
     trials: tuple[tuple[float, float], ...]
+    frequencies: tuple[tuple[float, float], ...] = ()
 
     def __repr__(self) -> str:
         return f"<Validation of {self.machine.name!r} with {self.engine}: differs by {self.difference:.1e}>"
 
     @property
     def difference(self) -> float:
-        """The largest of the blocks' relative differences."""
-        return max(self.differences.values())
+        """The largest of the relative differences of the blocks and of the natural frequencies."""
+        return max(*self.differences.values(), self.frequency_difference)
+
+    @property
+    def frequency_difference(self) -> float:
+        """The largest relative difference of the natural frequencies; infinite where only one of the two has a mode."""
+        return max((frequency_difference(*pair) for pair in self.frequencies), default=0.0)
 
 
 def as_json(validation: Validation) -> dict[str, Any]:
@@ -151,6 +179,10 @@ def as_json(validation: Validation) -> dict[str, Any]:
             "uncertainty": validation.uncertainty,
             "varied": validation.varied,
             "trials": [{"scale": scale, "difference": apart} for scale, apart in validation.trials],
+            "frequencies": [
+                {"ours": ours, "theirs": theirs, "difference": frequency_difference(ours, theirs)}
+                for ours, theirs in validation.frequencies
+            ],
         }
     )
 
@@ -208,7 +240,37 @@ def validate(machine: Machine, engine: str | None = None) -> Validation:
         uncertainty,
         answer.varied,
         tuple((trial.scale, difference(trial.compliance, ours, length)) for trial in answer.trials),
+        frequency_pairs(machine, chosen),
     )
+
+
+def frequency_difference(ours: float, theirs: float) -> float:
+    """Return the relative difference of two frequencies (Hz), of which one that is infinite belongs to no mode."""
+    return 0.0 if ours == theirs else abs(theirs / ours - 1.0)
+
+
+def frequency_pairs(machine: Machine, engine: Engine) -> tuple[tuple[float, float], ...]:
+    """Return the lowest natural frequencies of an unloaded machine by kinetostat and by an engine, Hz.
+
+    Args:
+        machine: at its pose, where it must be sound.
+        engine: that is installed.
+
+    Returns:
+        A pair for each mode, infinite where one of them has no further mode; none without a mass, or if the engine
+        has no modes.
+
+    Raises:
+        InputError: if the machine has a part that the engine cannot have.
+    """
+    joints = solve_joints(machine) if machine.family.chains else None
+    mechanism = with_share(mechanism_of(machine, respond(machine, joints), joints), 0.0)
+    counted = frequencies(balance(mechanism, free_state(mechanism)))[0].tolist()
+    ours = [frequency for frequency in counted if math.isfinite(frequency)]
+    if not ours or not engine.modes:
+        return ()
+    theirs = engine.frequencies(machine)[: len(counted)].tolist()
+    return tuple(zip_longest(ours, theirs, fillvalue=math.inf))
 
 
 def _uncertainty(answer: Answer, ours: Array, length: float) -> float:

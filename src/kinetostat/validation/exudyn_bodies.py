@@ -56,11 +56,75 @@ class Multibody:
         self.chains: list[list[Body]] = []
 
     def body(self, at: Array) -> Body:
-        """Add a body with its frame at a point (m); mass and inertia (1 kg, 1 kg·m²) do not matter in statics."""
-        inertia = import_module("exudyn.rigidBodyUtilities").RigidBodyInertia(mass=1.0, inertiaTensor=np.eye(3))
-        kind = self.engine.NodeType.RotationRxyz
-        numbers = self.system.CreateRigidBody(referencePosition=at, inertia=inertia, nodeType=kind, returnDict=True)
-        return Body(numbers["bodyNumber"], numbers["nodeNumber"], at)
+        """Add a body without mass with its frame at a point (m)."""
+        node = int(self.system.AddNode(self.items.NodeRigidBodyRxyz(referenceCoordinates=[*at, 0.0, 0.0, 0.0])))
+        return Body(self._rigid(node, 0.0, np.zeros(3), np.zeros((3, 3))), node, at)
+
+    def weigh(self, body: Body, mass: float, centre: Array, inertia: Array) -> None:
+        """Add a mass (kg) to a body, with its centre at a point (m) and its inertia about it (kg·m² [3 x 3])."""
+        if body.node is not None:
+            self._rigid(body.node, mass, centre - body.at, inertia)
+
+    def _rigid(self, node: int, mass: float, arm: Array, inertia: Array) -> int:
+        """A rigid body on a node, which several may share, with its centre of mass at an arm (m)."""
+        about_node = (inertia + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))) / self.unit
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = about_node
+        return int(
+            self.system.AddObject(
+                self.items.ObjectRigidBody(
+                    nodeNumber=node, mass=mass / self.unit, inertia=[xx, yy, zz, yz, xz, xy], centerOfMass=list(arm)
+                )
+            )
+        )
+
+    def rod(self, bodies: Sequence[Body], ends: Sequence[Array], mass: float) -> None:
+        """Add a straight uniform rod (kg) between points of two bodies (m), whose ends may come nearer to each other.
+
+        Its points move as its ends do in proportion, so that its kinetic energy is m/6 (v1² + v1·v2 + v2²). Its ends
+        are nodes of an element with that matrix of mass, exactly at the points of the bodies, however these are placed.
+        """
+        nodes = [self.system.AddNode(self.items.NodePoint(referenceCoordinates=list(end))) for end in ends]
+        matrix = np.kron([[2.0, 1.0], [1.0, 2.0]], np.eye(3)) * (mass / 6.0 / self.unit)
+        nothing = np.zeros((6, 6))
+        self.system.AddObject(
+            self.items.ObjectGenericODE2(
+                nodeNumbers=nodes, massMatrix=matrix, stiffnessMatrix=nothing, dampingMatrix=nothing
+            )
+        )
+        for body, end, node in zip(bodies, ends, nodes, strict=True):
+            place = self.items.MarkerBodyPosition(bodyNumber=body.number, localPosition=end - body.at)
+            markers = [self.items.MarkerNodePosition(nodeNumber=node), place]
+            self.system.AddObject(self.items.SphericalJoint(markerNumbers=[self.system.AddMarker(m) for m in markers]))
+
+    def rotor(self, bodies: Sequence[Body], line: tuple[Array | None, Array], inertia: float) -> None:
+        """Add what turns with the motion between two unloaded bodies, kg along a direction or kg·m² about a line.
+
+        It is an element with a matrix of mass over the coordinates of both bodies, at the place where they were built.
+
+        Args:
+            bodies: near, far.
+            line: point (m) of an axis to turn about, None for a slide; its direction.
+            inertia: as the motion feels it.
+        """
+        point, axis = line
+        rates, nodes = [], []
+        for body, sign in zip(bodies, (-1.0, 1.0), strict=True):
+            if body.node is not None:
+                turning = axis if point is not None else np.zeros(3)
+                moving = np.zeros(3) if point is not None else axis
+                arm = np.zeros(3) if point is not None else np.cross(bodies[0].at - body.at, axis)
+                rates.append(sign * np.concatenate([moving, turning + arm]))
+                nodes.append(body.node)
+        row = np.concatenate(rates)
+        nothing = np.zeros((len(row), len(row)))
+        self.system.AddObject(
+            self.items.ObjectGenericODE2(
+                nodeNumbers=nodes,
+                massMatrix=np.outer(row, row) * (inertia / self.unit),
+                stiffnessMatrix=nothing,
+                dampingMatrix=nothing,
+            )
+        )
 
     def marker(self, body: Body, point: Array, axes: Array) -> int:
         """Add a frame on a body, at a point (m) with the given axes as columns (base frame)."""

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.algebra.vector import Vector
-from kinetostat.machine.leg import Joint, Leg, Spring
+from kinetostat.machine.leg import Joint, Spring
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration, Plane
 from kinetostat.spec.errors import InputError
@@ -54,7 +54,7 @@ def solve(configuration: Configuration, reference: Vector) -> Answer:
     length = float(configuration.length)
     model, _ = build(configuration, reference)
     model.system.Assemble()
-    greatest = float(np.max(np.abs(model.system.ComputeLinearizedSystem(_settings(model))[1]))) or 1.0
+    greatest = float(np.max(np.abs(model.system.ComputeLinearizedSystem(settings_of(model))[1]))) or 1.0
     model, platform = build(configuration, reference, unit=greatest)
     tangent = _tangent(model, platform)
     if not np.any(tangent):
@@ -76,7 +76,7 @@ def _tangent(model: Multibody, platform: Body) -> Array:
     """C of the unloaded system; the engine linearises and projects onto what its constraints leave free."""
     model.system.Assemble()
     system = model.system.ComputeLinearizedSystem(
-        _settings(model), projectIntoConstraintNullspace=True, returnConstraintNullspace=True
+        settings_of(model), projectIntoConstraintNullspace=True, returnConstraintNullspace=True
     )
     stiffness = system[1]
     free = np.asarray(system[4]) if len(system) > 3 else np.eye(len(stiffness))
@@ -131,13 +131,13 @@ def _displacement(model: Multibody, platform: Body, loads: list[Any], rest: Any,
     for load, part in zip(loads, (wrench[:3], wrench[3:]), strict=True):
         system.SetLoadParameter(load, "loadVector", part)
     system.systemData.SetODE2Coordinates(rest, engine.ConfigurationType.Initial)
-    if not engine.MainSolverStatic().SolveSystem(system, _settings(model)):
+    if not engine.MainSolverStatic().SolveSystem(system, settings_of(model)):
         return None
     moved = np.array(system.GetNodeOutput(platform.node, engine.OutputVariableType.Coordinates))
     return moved[TRANSLATION_FIRST]
 
 
-def _settings(model: Multibody) -> Any:
+def settings_of(model: Multibody) -> Any:
     """Settings: silent, without files, and with a solver that copes with redundant constraints and idle motions."""
     settings = model.engine.SimulationSettings()
     settings.linearSolver.solverType = model.engine.LinearSolverType.EigenDense
@@ -153,7 +153,7 @@ def _settings(model: Multibody) -> Any:
 
 
 def build(
-    configuration: Configuration, reference: Vector, unit: float = 1.0, preloaded: bool = False
+    configuration: Configuration, reference: Vector, unit: float = 1.0, preloaded: bool = False, struts: bool = True
 ) -> tuple[Multibody, Body]:
     """Build the machine; return it and its platform, whose frame is at `reference` (base frame, m); `unit` in N.
 
@@ -162,6 +162,7 @@ def build(
         reference: see above.
         unit: see above.
         preloaded: whether its springs carry their preloads; without them it is at rest unloaded.
+        struts: whether the parts between two spherical joints are one bar, without bodies of its own.
 
     Raises:
         InputError: if the machine has a part that cannot be built.
@@ -169,7 +170,8 @@ def build(
     model = Multibody(unit, preloaded)
     platform = _body(model, array(reference), configuration.plane)
     for leg in configuration.legs:
-        model.chains.append(_leg(model, leg, platform, configuration.plane))
+        chain = pieces(leg, configuration.plane, struts)
+        model.chains.append(_leg(model, chain, platform, configuration.plane))
     return model, platform
 
 
@@ -182,9 +184,8 @@ def _body(model: Multibody, at: Array, plane: Plane | None) -> Body:
     return body
 
 
-def _leg(model: Multibody, leg: Leg, platform: Body, plane: Plane | None) -> list[Body]:
+def _leg(model: Multibody, chain: Sequence[Piece], platform: Body, plane: Plane | None) -> list[Body]:
     """The bodies of one leg from ground to platform, with their connectors."""
-    chain = pieces(leg, plane)
     bodies = [model.ground]
     for piece in chain[:-1]:
         bodies.append(_body(model, _far_point(piece, bodies[-1].at), plane))

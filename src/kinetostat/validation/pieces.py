@@ -7,13 +7,13 @@ this keeps the comparison independent.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from kinetostat.algebra.vector import Rotation, Vector
-from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring
+from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Beam, Parallelogram, Rigidity
 from kinetostat.machine.machine import Plane
 from kinetostat.machine.parts import Arm
@@ -55,11 +55,16 @@ def columns(rotation: Rotation) -> Array:
     return np.column_stack([array(rotation.x), array(rotation.y), array(rotation.z)])
 
 
-def pieces(leg: Leg, plane: Plane | None = None) -> tuple[Piece, ...]:
+def pieces(leg: Leg, plane: Plane | None = None, struts: bool = True) -> tuple[Piece, ...]:
     """Return the chain of a leg from base to platform, one piece between each body and the next.
 
-    A spring of zero stiffness becomes a joint and an infinitely stiff one is omitted; the parts between two spherical
-    joints become a strut; of a planar machine only the pieces that move in its plane remain.
+    A spring of zero stiffness becomes a joint and an infinitely stiff one is omitted; of a planar machine only the
+    pieces that move in its plane remain.
+
+    Args:
+        leg: at the pose.
+        plane: of a planar machine.
+        struts: whether the parts between two spherical joints become a strut.
 
     Raises:
         InputError: if an element is of a kind that cannot be built in another engine.
@@ -68,9 +73,33 @@ def pieces(leg: Leg, plane: Plane | None = None) -> tuple[Piece, ...]:
     chain: list[Piece] = []
     for element in leg.chain:
         chain += _plain(leg, element)
-    if plane is None:
+    if plane is None and struts:
         return _with_struts(leg.name, chain, COINCIDENT * size)
-    return tuple(piece for piece in chain if moves_in(plane, piece))
+    return tuple(piece for piece in chain if plane is None or moves_in(plane, piece))
+
+
+def bodies_before(leg: Leg, station: Station, plane: Plane | None = None, struts: bool = True) -> int:
+    """Return how many pieces of a leg are between the base and the body that carries a station.
+
+    What is on a strut is carried by its neighbours: the body at the end that is nearer.
+
+    Args:
+        leg, plane, struts: as for `pieces`.
+        station: a point of the leg.
+
+    Raises:
+        InputError: if the station is within a part that another program cannot cut.
+    """
+    carried, point = station
+    whole, part = pieces(leg, plane, struts), pieces(replace(leg, chain=leg.chain[:carried]), plane, struts)
+    same = next((i for i, (a, b) in enumerate(zip(whole, part, strict=False)) if a != b), len(part))
+    if same == len(part):
+        return same
+    cut = whole[same]
+    if not isinstance(cut, Strut):
+        raise InputError(f"{leg.name} has a mass within {cut.name}, which cannot be rebuilt in another program.")
+    near, far = (float((end - point).norm()) for end in (cut.start, cut.end))
+    return same if near < far else same + 1
 
 
 def _plain(leg: Leg, element: Element) -> list[Piece]:

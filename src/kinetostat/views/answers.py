@@ -18,9 +18,11 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.studies import analysis, assembly, carrying, command, sensitivity, under_load
+from kinetostat.studies import analysis, assembly, carrying, command, sensitivity, under_load, vibration
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.assembly import Forward
+from kinetostat.studies.budget import data as budget_data
+from kinetostat.studies.budget.budget import Budget
 from kinetostat.studies.carrying import Carrying
 from kinetostat.studies.command import Command
 from kinetostat.studies.comparison import designs
@@ -30,11 +32,16 @@ from kinetostat.studies.correction.table import CorrectionTable
 from kinetostat.studies.grid import grid
 from kinetostat.studies.guidelines import sentences
 from kinetostat.studies.guidelines.guidelines import Guidelines
+from kinetostat.studies.identification import identification
+from kinetostat.studies.identification.identification import Identification
+from kinetostat.studies.measured import comparison as measured
+from kinetostat.studies.measured.comparison import MeasuredComparison
 from kinetostat.studies.optimisation import result_data
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.sensitivity import Sensitivity
 from kinetostat.studies.storage import write_bytes, write_dataset, write_json, write_text
 from kinetostat.studies.under_load import LoadedState
+from kinetostat.studies.vibration import Vibration
 from kinetostat.studies.workspace import workspace
 from kinetostat.studies.workspace.workspace import Workspace
 from kinetostat.tolerances import AGREED
@@ -43,6 +50,8 @@ from kinetostat.validation.comparison import Validation
 from kinetostat.views import optimisation_figures, workspace_figures
 from kinetostat.views.analysis_tables import print_analysis
 from kinetostat.views.assembly_tables import print_forward
+from kinetostat.views.budget_figures import budget_figures
+from kinetostat.views.budget_tables import print_budget
 from kinetostat.views.carrying_views import carrying_map, print_carrying
 from kinetostat.views.comparison_figure import comparison_figure
 from kinetostat.views.comparison_tables import print_comparison, print_validation
@@ -50,15 +59,21 @@ from kinetostat.views.correction_tables import print_corrections
 from kinetostat.views.drawing import three_views
 from kinetostat.views.figures import FORMATS, Drawings, contour_maps, curves, save_figure
 from kinetostat.views.grid_tables import print_dataset, print_workspace
+from kinetostat.views.identification_figures import identification_figures
+from kinetostat.views.identification_tables import print_identification
 from kinetostat.views.influence_figures import guideline_figures, sensitivity_figure
 from kinetostat.views.influence_tables import print_guidelines, print_sensitivity
 from kinetostat.views.loaded_figures import load_figure, shape_figure
 from kinetostat.views.loaded_tables import print_command, print_loaded
+from kinetostat.views.measured_figure import measured_figure
+from kinetostat.views.measured_tables import print_measured
 from kinetostat.views.optimisation_tables import print_result
 from kinetostat.views.picture import Picture, machine_picture
 from kinetostat.views.scene.glb import glb
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.tables import print_machine
+from kinetostat.views.vibration_figures import vibration_figures
+from kinetostat.views.vibration_tables import print_vibration
 
 
 @dataclass(frozen=True)
@@ -114,6 +129,7 @@ KINDS = (
     Kind(Analysis, print_analysis, data=analysis.as_json),
     Kind(Forward, print_forward, data=assembly.as_json),
     Kind(LoadedState, print_loaded, _loaded_figures, under_load.as_json),
+    Kind(Vibration, print_vibration, vibration_figures, vibration.as_json),
     Kind(Command, print_command, data=command.as_json),
     Kind(CorrectionTable, print_corrections, data=table.as_json),
     Kind(
@@ -130,12 +146,20 @@ KINDS = (
     ),
     Kind(Workspace, print_workspace, _workspace_figures, workspace.as_json),
     Kind(Sensitivity, print_sensitivity, _sensitivity_figures, sensitivity.as_json),
+    Kind(Identification, print_identification, identification_figures, identification.as_json),
     Kind(Guidelines, print_guidelines, guideline_figures, sentences.as_json),
+    Kind(Budget, print_budget, budget_figures, budget_data.as_json),
     Kind(
         Comparison,
         print_comparison,
         lambda comparison: {"comparison": partial(comparison_figure, comparison)},
         designs.as_json,
+    ),
+    Kind(
+        MeasuredComparison,
+        print_measured,
+        lambda answer: {"measured": partial(measured_figure, answer)},
+        measured.as_json,
     ),
     Kind(Result, print_result, optimisation_figures.pictures, result_data.as_json),
     Kind(
@@ -230,4 +254,7 @@ def _writers(what: object) -> dict[str, Writer]:
             written[".nc"] = lambda path: write_dataset(path, what)
         case Workspace() | Carrying():
             written[".nc"] = lambda path: write_dataset(path, what.dataset)
+        case Budget():
+            written[".csv"] = lambda path: write_text(path, budget_data.contributions_csv(what))
+            written[".nc"] = lambda path: write_dataset(path, budget_data.as_dataset(what))
     return written

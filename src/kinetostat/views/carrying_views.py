@@ -16,6 +16,7 @@ from kinetostat.views.figures import (
     axis_values,
     fill_regions,
     fix_layout,
+    region_colours,
     set_axis_scales,
     set_title,
     setting_lines,
@@ -54,7 +55,7 @@ def carrying_map(carrying: Carrying) -> Figure:
     dataset = carrying.dataset
     across, up = (str(dim) for dim in dataset["status"].dims)
     named = [f"{name}: {100.0 * n / dataset['status'].size:.0f} %" for name, n in _shares(carrying)]
-    colours = mpl.colormaps["viridis"](np.linspace(0.1, 0.95, max(len(named), 1)))
+    colours = region_colours(max(len(named), 1))
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(4.6, 4.4 + ROW * len(named)), layout="constrained")
         panel = figure.subplots()

@@ -14,7 +14,7 @@ from kinetostat.display import Display, number
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.studies.comparison.design_rows import Better, Row
 from kinetostat.studies.comparison.designs import Comparison, SoftDirection
-from kinetostat.validation.comparison import Validation
+from kinetostat.validation.comparison import Validation, frequency_difference
 from kinetostat.views.analysis_tables import matrix_table
 from kinetostat.views.tables import numeric_table, readable, text_table
 
@@ -145,9 +145,21 @@ def print_validation(console: Console, validation: Validation, agreed: float) ->
         console.print(matrix_table(shown, "compliance", family.component_names, rows, validation.machine.display))
     console.print(difference_table(validation))
     console.print(trial_table(validation))
+    if validation.frequencies:
+        console.print(frequency_table(validation))
     verdict = "agree" if validation.difference <= agreed else "DIFFER"
     largest = f"the largest relative difference is {validation.difference:.1e}, allowed is {agreed:g}"
     console.print(f"The two {verdict}: {largest}.", highlight=False)
+
+
+def frequency_table(validation: Validation) -> Table:
+    """The lowest natural frequencies, ours and theirs, and the relative difference of each pair."""
+    columns = ["kinetostat", validation.engine, "difference", "unit"]
+    table = numeric_table("Natural frequencies, unloaded", "mode", columns)
+    for order, pair in enumerate(validation.frequencies, 1):
+        cells = (number(value, digits=DIGITS) for value in pair)
+        table.add_row(str(order), *cells, f"{frequency_difference(*pair):.1e}", "Hz")
+    return table
 
 
 def diagonal_table(validation: Validation) -> Table:

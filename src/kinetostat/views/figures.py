@@ -255,12 +255,17 @@ def _count_panel(panel: Axes, x: Array, y: Array, data: xr.DataArray, scale: Sca
     if values.size < 2:
         return _contour_panel(panel, x, y, data, scale)
     panel.set_title(scale.label(data.attrs["symbol"]))
-    colours = mpl.colormaps["viridis"](np.linspace(0.1, 0.95, values.size))
+    colours = region_colours(values.size)
     mesh = fill_regions(panel, x, y, np.searchsorted(values, data.values), np.isfinite(data.values), colours)
     bar = panel.figure.colorbar(mesh, ax=panel, shrink=0.85, pad=0.03, ticks=np.arange(values.size))
     bar.set_ticklabels([f"{value:g}" for value in values])
     slim_bar(bar)
     return []
+
+
+def region_colours(count: int) -> Array:
+    """Return so many colours for regions, from dark to light [count x 4]."""
+    return np.asarray(mpl.colormaps["viridis"](np.linspace(0.1, 0.95, count)))
 
 
 def fill_regions(panel: Axes, x: Array, y: Array, places: Any, known: Any, colours: Any) -> QuadMesh:
@@ -315,6 +320,7 @@ def _curve_panel(panel: Axes, dataset: xr.Dataset, across: str, names: Sequence[
         panel.plot(x, dataset[name].values * scale.factor, dash, color=colour, label=dataset[name].attrs["symbol"])
     if logarithmic:
         panel.set(xscale="log", yscale="log" if np.nanmin(values) > 0 else "linear")
-    panel.set(xlabel=x_label, ylabel=scale.label(spoken(group_of(names) or names[0])))
+    about = dataset[names[0]].attrs.get("long_name") or spoken(group_of(names) or names[0])
+    panel.set(xlabel=x_label, ylabel=scale.label(about))
     panel.margins(x=0.0)
     panel.legend(loc="best")

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import xarray as xr
 from rich.console import Console
 
-from kinetostat.display import Display, Scale, number
+from kinetostat.display import Display, number
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.machine.limits import Limits, unlimited
@@ -71,9 +71,9 @@ def _print_curve(console: Console, dataset: xr.Dataset, names: Sequence[str]) ->
     group = group_of(names)
     title = f"{dataset.attrs['machine']}: {spoken(group)}".removesuffix(": ")
     scales = {name: display.fitting(QUANTITIES[name].unit, _of_unit(dataset, name, names)) for name in names}
-    heads = [f"{spoken(name.removeprefix(f'{group}_'))}\n{_head(scales[name])}" for name in names]
+    heads = [f"{spoken(name.removeprefix(f'{group}_'))}\n{scales[name].head}" for name in names]
     unit = coordinate.attrs["units"]
-    table = numeric_table(title, f"{shown(field_of(coordinate))}\n{_head(display.scale(unit))}", heads)
+    table = numeric_table(title, f"{shown(field_of(coordinate))}\n{display.scale(unit).head}", heads)
     for i, value in enumerate(coordinate.values):
         cells = (number(float(dataset[name].values[i]) * scales[name].factor) for name in names)
         table.add_row(display.number(float(value), unit), *cells)
@@ -84,10 +84,6 @@ def _of_unit(dataset: xr.Dataset, name: str, names: Sequence[str]) -> Iterator[f
     """All values of the quantities that have the unit of one of them."""
     unit = QUANTITIES[name].unit
     return (float(v) for other in names if QUANTITIES[other].unit == unit for v in dataset[other].values.flat)
-
-
-def _head(scale: Scale) -> str:
-    return "" if scale.unit == "1" else scale.unit
 
 
 def _extremes(data: xr.DataArray) -> Extremes:
@@ -104,7 +100,7 @@ def _print_extremes(
         mean = 0.0 if abs(extreme.mean) < ROUND_OFF_OF_ENTRY * greatest else extreme.mean
         statistics = (extreme.least, mean, extreme.largest)
         scale = display.fitting(QUANTITIES[name].unit, statistics)
-        table.add_row(name, _head(scale), *(number(value * scale.factor) for value in statistics))
+        table.add_row(name, scale.head, *(number(value * scale.factor) for value in statistics))
     console.print(table)
 
 

@@ -10,7 +10,9 @@ from matplotlib.lines import Line2D
 
 from kinetostat.display import Scale, number
 from kinetostat.engine.points import Array
-from kinetostat.kinetostatics.response import respond
+from kinetostat.kinetostatics.deflected import Deflection
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.machine import Machine
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.under_load import LoadedState, load_curve
 from kinetostat.views.drawing import flat, loop, views_of
@@ -71,8 +73,33 @@ def shape_figure(state: LoadedState, title: str = "{}: under load") -> Figure:
         state: of a machine that is at rest.
         title: over the figure, with braces for the name of the machine.
     """
-    machine, configuration, moved = state.machine, respond(state.machine).configuration, motions_of(state)
-    factor = exaggeration_of(state, moved, proportions_of(machine, configuration).diagonal)
+    machine, response = state.machine, respond(state.machine)
+    moved, named = motions_of(state, response), ("without loads", "at rest under load")
+    return moved_figure(machine, response, moved, title.format(machine.name), named, state.slack_legs)
+
+
+def moved_figure(
+    machine: Machine,
+    response: Response,
+    moved: Deflection,
+    title: str,
+    named: tuple[str, str],
+    slack_legs: Sequence[str] = (),
+    size: str = "",
+) -> Figure:
+    """Draw a machine with exaggerated motions over the machine where it was, in front, side and plan.
+
+    Args:
+        machine: at its pose.
+        response: of it.
+        moved: motions of tool and links from there.
+        title: over the figure.
+        named: what the machine is called where it was, and as it has moved.
+        slack_legs: names of those whose links are dashed.
+        size: says how large the motions are; by how much they are exaggerated if empty.
+    """
+    configuration = response.configuration
+    factor = exaggeration_of(response, moved, proportions_of(machine, configuration).diagonal)
     point = machine.tool_point(configuration.platform)
     motion = exaggerated(moved.motion, point, factor)
     heads = loop([leg.path[-1] for leg in configuration.legs if leg.actuated and leg.path])
@@ -84,7 +111,7 @@ def shape_figure(state: LoadedState, title: str = "{}: under load") -> Figure:
             panel.fill(*flat(points, across, up), facecolor=colour, alpha=0.25, edgecolor=colour, linewidth=0.8)
         for link in moved.links:
             bent = [link.point(i / BENDS, factor) for i in range(BENDS + 1)]
-            slack = link.leg in state.slack_legs
+            slack = link.leg in slack_legs
             dash, wide = ("--", 0.9) if slack else ("-", 1.6)
             panel.plot(*flat(bent, across, up), dash, color=SLACK if slack else LOADED, linewidth=wide)
         for tip, colour in ((point, UNLOADED), (motion.apply(point), LOADED)):
@@ -92,14 +119,14 @@ def shape_figure(state: LoadedState, title: str = "{}: under load") -> Figure:
 
     with mpl.rc_context(STYLE):
         figure = views_of(configuration, draw)
-        styles: list[tuple[str, str, Any]] = [("without loads", UNLOADED, "-"), ("at rest under load", LOADED, "-")]
-        styles += [("slack", SLACK, "--")] if state.slack_legs else []
+        styles: list[tuple[str, str, Any]] = [(named[0], UNLOADED, "-"), (named[1], LOADED, "-")]
+        styles += [("slack", SLACK, "--")] if slack_legs else []
         figure.legend(
             handles=[Line2D([], [], color=colour, linestyle=dash, label=text) for text, colour, dash in styles],
             loc="outside lower center", ncols=len(styles), title_fontsize=6.5,
-            title=f"{setting_of(machine, [])}\n{drawn_larger(factor)}",
+            title=f"{setting_of(machine, [])}\n{size or drawn_larger(factor)}",
         )  # fmt: skip
-        set_title(figure, title.format(machine.name))
+        set_title(figure, title)
         fix_layout(figure)
     return figure
 

@@ -10,7 +10,6 @@ from rich.text import Text
 
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.display import DASH, Display, number
-from kinetostat.equilibrium.solving import Rest
 from kinetostat.studies.command import Command
 from kinetostat.studies.requirements import Verdict
 from kinetostat.studies.setting import pose_of
@@ -51,14 +50,22 @@ def print_loaded(console: Console, state: LoadedState, requirements: Sequence[Ve
 
 
 def stability_of(state: LoadedState) -> str:
-    """Say how far the load may grow."""
-    if state.factor is None:
+    """Say how far the load may grow, for the springs and for the struts."""
+    first = min(state.struts, key=lambda strut: strut.factor, default=None)
+    if first is None or math.isinf(first.factor):
+        return _stability_of_springs(state.factor)
+    bends = f"Strut {first.name} bends away at about {number(first.factor, digits=3)} times this load."
+    return f"{bends} {_stability_of_springs(state.factor)}"
+
+
+def _stability_of_springs(factor: float | None) -> str:
+    if factor is None:
         return "The springs alone hold nothing here: weight and tension do."
-    if math.isinf(state.factor):
-        return "No growth of this load makes the machine unstable."
-    if state.rest is Rest.UNSTABLE:
-        return f"The machine is unstable beyond {number(state.factor)} times this load."
-    return f"The load may grow to {number(state.factor)} times its size until the machine becomes unstable."
+    if math.isinf(factor):
+        return "No growth of this load makes the springs unstable."
+    if factor < 1.0:
+        return f"The springs are unstable beyond {number(factor)} times this load."
+    return f"The load may grow to {number(factor)} times its size until the springs become unstable."
 
 
 def displacement_table(state: LoadedState, display: Display) -> Table:
@@ -107,18 +114,13 @@ def tangent_table(state: LoadedState, free: Sequence[float] = (), stiff: Sequenc
     return table
 
 
-def word_of(spring: SpringState) -> str:
-    """Say whether a spring carries."""
-    return "slack" if spring.slack else "carries"
-
-
 def spring_table(state: LoadedState, display: Display) -> Table:
     """Load, deformation and state of every spring."""
     table = numeric_table("Springs", "spring", ["load", "deformation", "state"])
     for spring in state.springs:
         load = display.show(spring.load, "N·m" if spring.turning else "N")
         amount = display.show_deflection(spring.deformation, "rad" if spring.turning else "m")
-        table.add_row(spring.name, load, amount, word_of(spring))
+        table.add_row(spring.name, load, amount, "slack" if spring.slack else "carries")
     return table
 
 

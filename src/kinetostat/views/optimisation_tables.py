@@ -102,12 +102,12 @@ def worth_table(result: Result) -> Table:
         gain = before / after if objective.sign > 0 else after / before
         name, scale = f"{objective.goal} {objective.term.label}", display.scale(objective.term.unit)
         cells = (_exact(value * scale.factor) for value in (before, after))
-        table.add_row(name, *cells, _times(gain), "" if scale.unit == "1" else scale.unit)
+        table.add_row(name, *cells, _times(gain), scale.head)
     for k, constraint in enumerate(result.problem.constraints):
         before, after = result.initial.constraints[0, k], result.outcome.constraints[0, k]
         unit = constraint.term.unit
         cells = (display.number(value, unit) for value in (before, after))
-        table.add_row(constraint.shown(display), *cells, "", "" if unit == "1" else display.scale(unit).unit)
+        table.add_row(constraint.shown(display), *cells, "", display.scale(unit).head)
     return table
 
 

@@ -28,6 +28,5 @@ def print_path(console: Console, answers: PoseAnswers) -> None:
         low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
         scale = display.fitting(QUANTITIES[name].unit, (values[low], values[high]))
         least, largest = (number(float(values[k]) * scale.factor, digits=display.digits) for k in (low, high))
-        head = "" if scale.unit == "1" else scale.unit
-        table.add_row(name, head, least, str(low + 1), largest, str(high + 1))
+        table.add_row(name, scale.head, least, str(low + 1), largest, str(high + 1))
     console.print(table)

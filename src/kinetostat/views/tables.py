@@ -74,6 +74,8 @@ def machine_table(machine: Machine) -> Table:
         table.add_row(parameter.path, shown, parameter.quantity.meaning)
     if machine.loaded:
         table.add_row("load.state", machine.state, "what is shown where no quantity is named")
+    for about, tolerance in machine.tolerances.items():
+        table.add_row(f"tolerances.{about}", tolerance.text, "how far manufacture may miss the drawing")
     return table
 
 

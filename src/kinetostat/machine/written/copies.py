@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Vector
+from kinetostat.machine.mass import turned_tensor
 from kinetostat.machine.written.plan import Copies, JointPlan, LegPlan, Matrix
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.units import UnitError, parse
@@ -142,6 +144,11 @@ def matrix_in(leg: LegPlan, matrix: Matrix) -> Matrix:
 def direction_in(leg: LegPlan, direction: Sequence[float]) -> Vector:
     """A direction that is written for a leg, where it points in this leg."""
     return Vector(*direction) if leg.placing is None else leg.placing.vector(Vector(*direction))
+
+
+def inertia_in(leg: LegPlan, tensor: Sequence[Scalar]) -> tuple[Scalar, ...]:
+    """An inertia tensor that is written for a leg, in the axes of this leg; a mirror image is turned likewise."""
+    return tuple(tensor) if leg.placing is None else turned_tensor(leg.placing.vector, tensor)
 
 
 def _placed(value: Any, placing: Placing) -> Any:

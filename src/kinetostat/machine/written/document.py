@@ -5,6 +5,7 @@ Every message names the leg and the joint. Numbers are checked by `spec`, as in 
 
 import copy
 from collections.abc import Iterable, Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -368,15 +369,17 @@ def _link(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str]
         raise InputError(
             f'{where}: model = "matrix" needs compliance, and no other model may have it; add it or leave it out.'
         )
-    weighed, centred = ("mass" in part, "centre_of_mass" in part)
     for key in part.keys() - WEIGHT.keys():
+        *first, last = WEIGHT
         raise InputError(
-            f"{where}: {key} is not known; a link has model, section, up, compliance, {' and '.join(WEIGHT)}."
+            f"{where}: {key} is not known; a link has model, section, up, compliance, {', '.join(first)} and {last}."
         )
-    if centred and not weighed:
-        raise InputError(f"{where} has centre_of_mass, but no mass; give its mass, or leave centre_of_mass out.")
+    weight = tuple(key for key in WEIGHT if key in part)
+    for needed, key in pairwise(WEIGHT):
+        if key in weight and needed not in weight:
+            raise InputError(f"{where} has {key}, but no {needed}; give its {needed}, or leave {key} out.")
     direction = (float(up[0]), float(up[1]), float(up[2])) if up else None
-    return LinkPlan(name, model, section, direction, compliance, weighed, centred)
+    return LinkPlan(name, model, section, direction, compliance, weight)
 
 
 def _matrix(value: object, where: str) -> Matrix:

@@ -15,8 +15,9 @@ from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Statio
 from kinetostat.machine.link import Beam, any_up, lumped_springs, matrix_springs, seat_springs
 from kinetostat.machine.links import growth_of
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
+from kinetostat.machine.mass import turned_tensor
 from kinetostat.machine.series import springs_in_a_row
-from kinetostat.machine.written.copies import direction_in, joint_numbers, matrix_in
+from kinetostat.machine.written.copies import direction_in, inertia_in, joint_numbers, matrix_in
 from kinetostat.machine.written.joints import JOINT_TYPES, own_axis
 from kinetostat.machine.written.plan import NAME, SUMMARY, JointPlan, LegPlan, LinkPlan, Plan, literals
 from kinetostat.machine.written.struts import rod_of, with_rods
@@ -209,13 +210,16 @@ def _member(
         shape, data = plan.shapes[section], tables[f"sections.{section}"]
         mass, bending = linear_density_of(shape, data) * length, least_bending_of(shape, data)
         growth = growth_of(data.expansion, data.temperature_rise, f'the links of section "{section}"') * length
-    link, centre = leg.links.get(body), None
-    if link is not None and link.weighed:
+    link, at, tensor = leg.links.get(body), None, None
+    if link is not None and link.weight:
         given = tables[leg.table(body)]
-        mass, centre = given.mass, direction_in(leg, given.centre_of_mass) if link.centred else None
+        mass = given.mass
+        if carrier is not None and "centre_of_mass" in link.weight:
+            at = partial(_station, carrier, direction_in(leg, given.centre_of_mass))
+        if carrier is not None and "inertia" in link.weight:
+            tensor = partial(turned_tensor, carrier[0].rotation.apply, inertia_in(leg, given.inertia))
     whole = None if carrier is None else partial(_stations, carrier, ends)
-    at = None if carrier is None or centre is None else partial(_station, carrier, centre)
-    return Member(leg.name, f"{leg.name} {body}", length, mass, bending, growth, whole, at)
+    return Member(leg.name, f"{leg.name} {body}", length, mass, bending, growth, whole, at, tensor)
 
 
 def _stations(carrier: Carrier, ends: tuple[Vector, Vector]) -> tuple[Station, ...]:

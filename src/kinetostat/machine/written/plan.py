@@ -81,7 +81,7 @@ class LinkPlan:
         cross_section: name of its cross-section, or empty.
         up: direction in which the cross-section's z axis points, base axes at the home pose; None to leave the choice.
         compliance: of model "matrix", as for a joint, at the link's end.
-        weighed, centred: whether the file gives its mass, and its centre of mass.
+        weight: what the file gives of its mass, its centre and its inertia: keys of `tables.WEIGHT`.
     """
 
     name: str
@@ -89,8 +89,7 @@ class LinkPlan:
     cross_section: str
     up: tuple[float, float, float] | None
     compliance: Matrix
-    weighed: bool = False
-    centred: bool = False
+    weight: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

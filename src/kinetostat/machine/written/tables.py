@@ -21,8 +21,16 @@ ROD = Field(Quantity("axial rigidity", "EA of a strut's rod, whose stiffness is 
 WEIGHT = {
     "mass": Field(Quantity("mass", "of the link, in the place of what its cross-section weighs")),
     "centre_of_mass": Field(Quantity("length", "of that mass, base frame at the home pose", count=3, apart=True)),
+    "inertia": Field(
+        Quantity(
+            "inertia",
+            "of that mass about its centre, base axes at the home pose: xx, yy, zz, xy, xz, yz",
+            count=6,
+            apart=True,
+        )
+    ),
 }
-"""What a link may say about its mass."""
+"""What a link may say about its mass; each needs those before it."""
 
 
 def tables_of(plan: Plan) -> dict[str, type]:
@@ -37,9 +45,8 @@ def tables_of(plan: Plan) -> dict[str, type]:
             if joint.series:
                 tables[f"{leg.table(joint.name)}.stiffness"] = made_table("Series", _series_fields(joint))
         for link in leg.links.values():
-            given = [name for name, there in zip(WEIGHT, (link.weighed, link.centred), strict=True) if there]
-            if given:
-                tables[leg.table(link.name)] = made_table("Link", {name: WEIGHT[name] for name in given})
+            if link.weight:
+                tables[leg.table(link.name)] = made_table("Link", {name: WEIGHT[name] for name in link.weight})
     pose = {name: Field(Quantity(POSE_KINDS[name], f"{name} of the platform")) for name in plan.pose}
     return {**tables, "pose": made_table("Pose", pose)}
 

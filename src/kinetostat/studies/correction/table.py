@@ -22,7 +22,7 @@ from kinetostat.studies.command import Command, answer_of, refuse_tensions
 from kinetostat.studies.correction.law import Law, shortest_law
 from kinetostat.studies.driven import Driven, driven
 from kinetostat.studies.evaluation.columns import PoseColumns
-from kinetostat.studies.grid.axes import chosen_axes
+from kinetostat.studies.grid.axes import chosen_axes, grid_of
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.tolerances import EXACT_LAW
 from kinetostat.units import UnitError, parse
@@ -103,7 +103,7 @@ def correction_table(
     refuse_tensions(machine)
     ranges = [over] if isinstance(over, str) else over
     pairs = chosen_axes(machine, ranges)
-    grid = Grid([Axis(parameter.leaves, span.values(parameter.quantity)) for span, parameter in pairs])
+    grid = grid_of(pairs)
     if grid.size > MOST_POINTS:
         raise InputError(f"the table has {grid.size:,} points; at most {MOST_POINTS:,} are computed: lower the counts.")
     wanted = None if tolerance is None else _length(tolerance)

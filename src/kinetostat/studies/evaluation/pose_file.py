@@ -2,15 +2,17 @@
 
 import csv
 import re
+from collections import Counter
 from pathlib import Path
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.studies.evaluation.columns import Column, PoseColumns, read_columns
+from kinetostat.studies.evaluation.columns import MOST_POSES, Column, PoseColumns, read_columns
 
 LARGEST = 1 << 30
 """Bytes of a file of poses."""
+MOST_COLUMNS = 1000
 SEPARATORS = (";", "\t", ",")
 """Looked for in this order: where a semicolon separates, a comma is the decimal sign."""
 ANSWERS = {"pose", "status", *QUANTITIES}
@@ -33,28 +35,58 @@ def read_poses(machine: Machine, path: Path) -> PoseColumns:
         InputError: the file cannot be read or holds no poses, a column is not a field of the machine, a line is too
             short or too long, or a value is not a number of the right kind.
     """
+    columns, numbers = columns_of(path)
+    columns = [column for column in columns if column.name not in ANSWERS]
+    try:
+        return read_columns(machine, columns, lambda name, i: f"line {numbers[i]}, column {name}")
+    except InputError as error:
+        raise InputError(f'"{path}": {error}') from None
+
+
+def columns_of(path: Path, most: int = MOST_POSES) -> tuple[list[Column], list[int]]:
+    """Read the columns of a CSV file as texts with the units of their heads, and the number of each line below these.
+
+    Args:
+        path: of the file.
+        most: lines below the heads that it may have.
+
+    Raises:
+        InputError: the file cannot be read or holds no lines below its heads, it has too many lines or columns, or a
+            line is too short or too long.
+    """
     lines = _lines(path)
     if len(lines) < 2:
         what = "is empty" if not lines else "names columns, but has no poses below them"
         raise InputError(f'"{path}" {what}; write a line such as x [mm], y [mm], and below it a line for each pose.')
     separator = next((sign for sign in SEPARATORS if sign in lines[0][1]), ",")
-    rows = [next(csv.reader([line], delimiter=separator, skipinitialspace=True)) for _, line in lines]
+    wide = lines[0][1].count(separator) + 1
+    for count, bound, what in ((len(lines) - 1, most, "poses"), (wide, MOST_COLUMNS, "columns")):
+        if count > bound:
+            raise InputError(f'"{path}" has {count:,} {what}, and may have at most {bound:,}; leave some out.')
+    rows = [_cells(path, number, line, separator) for number, line in lines]
     numbers = [number for number, _ in lines]
     for number, cells in zip(numbers, rows, strict=True):
         if len(cells) != len(rows[0]):
             raise InputError(
                 f'"{path}", line {number}: the number of values is {len(cells)}, not {len(rows[0])} as above.'
             )
-    heads = [_head(text) for text in rows[0]]
+    heads = [_head(path, text) for text in rows[0]]
+    twice = next((name for name, times in Counter(name for name, _ in heads).items() if times > 1), None)
+    if twice is not None:
+        raise InputError(f'"{path}": several columns are called {shorten(twice)}; keep one of them.')
     columns = [
         Column(name, [_decimal(cell, separator) for cell in cells], unit)
         for (name, unit), cells in zip(heads, zip(*rows[1:], strict=True), strict=True)
-        if name not in ANSWERS
     ]
+    return columns, numbers[1:]
+
+
+def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
+    """The cells of a line."""
     try:
-        return read_columns(machine, columns, lambda name, i: f"line {numbers[i + 1]}, column {name}")
-    except InputError as error:
-        raise InputError(f'"{path}": {error}') from None
+        return next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    except csv.Error as error:
+        raise InputError(f'"{path}", line {number} cannot be read: {error}; correct it, or remove it.') from None
 
 
 def _decimal(cell: str, separator: str) -> str:
@@ -77,9 +109,9 @@ def _lines(path: Path) -> list[tuple[int, str]]:
     return [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
 
 
-def _head(text: str) -> tuple[str, str]:
+def _head(path: Path, text: str) -> tuple[str, str]:
     """Return the name and the unit in a heading, "x [mm]" or "x (mm)"."""
     match = _HEAD.fullmatch(text.strip())
     if match is None:
-        raise InputError(f"a column of the poses is called {shorten(text)}; name a field of the machine, e.g. x [mm].")
+        raise InputError(f'"{path}": a column is called {shorten(text)}; write its name, with a unit, e.g. x [mm].')
     return match[1], match[2] or match[3] or ""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from kinetostat.engine.points import Axis, Grid
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find
 from kinetostat.spec.errors import InputError, several
@@ -29,3 +30,8 @@ def chosen_axes(machine: Machine, ranges: Sequence[str]) -> list[tuple[Range, Pa
         if taken.count(leaf) > 1:
             raise InputError(f"{leaf} is varied twice; give each field one range.")
     return list(zip(wanted, chosen, strict=True))
+
+
+def grid_of(axes: Sequence[tuple[Range, Parameter]]) -> Grid:
+    """The points of a grid with these axes."""
+    return Grid([Axis(parameter.leaves, span.values(parameter.quantity)) for span, parameter in axes])

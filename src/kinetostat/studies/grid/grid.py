@@ -10,7 +10,7 @@ import xarray as xr
 
 from kinetostat.engine.batch import Evaluation, Progress, evaluate, silent
 from kinetostat.engine.chunks import Compute, here, in_chunks
-from kinetostat.engine.points import Axis, Grid
+from kinetostat.engine.points import Grid
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.loading import as_toml
@@ -19,7 +19,7 @@ from kinetostat.machine.parameters import Parameter, dimension
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.ranges import Range
-from kinetostat.studies.grid.axes import chosen_axes
+from kinetostat.studies.grid.axes import chosen_axes, grid_of
 from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.setting import frame_of, pose_of
@@ -68,7 +68,7 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
     pairs = chosen_axes(machine, ranges)
     chosen = [parameter for _, parameter in pairs]
     taken = [leaf for parameter in chosen for leaf in parameter.leaves]
-    grid = Grid([Axis(parameter.leaves, span.values(parameter.quantity)) for span, parameter in pairs])
+    grid = grid_of(pairs)
     names = resolve_quantities(quantities, machine.family.component_names)
     refuse_absent(machine, names, chosen)
     origin = {

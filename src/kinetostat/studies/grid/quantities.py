@@ -58,14 +58,18 @@ def _exists(name: str, components: Sequence[str]) -> bool:
 
 
 def without_derivatives(machine: Machine, names: Sequence[str], varied: Sequence[str] = ()) -> str | None:
-    """The first quantity about the loaded machine whose derivatives are not known; None if there is none.
+    """The first quantity about loaded machines or cuts whose derivatives are not known; None if there is none.
 
     Args:
         machine: with its loads.
         names: of quantities.
         varied: leaf paths of parameters that vary.
     """
-    loaded = [name for name in names if name in QUANTITIES and QUANTITIES[name].loaded]
+    known = [name for name in names if name in QUANTITIES]
+    across = [name for name in known if QUANTITIES[name].cut]
+    if across:
+        return across[0]
+    loaded = [name for name in known if QUANTITIES[name].loaded]
     return loaded[0] if loaded and cut_machine(machine, varied) is None else None
 
 
@@ -76,6 +80,11 @@ def refuse_loaded(machine: Machine, names: Sequence[str], varied: Sequence[str] 
         InputError: names the first such quantity.
     """
     name = without_derivatives(machine, names, varied)
+    if name is not None and QUANTITIES[name].cut:
+        raise InputError(
+            f'"{name}" has no derivatives: its frequency is looked for at each pose; look at it in a sweep or map, or '
+            "search without derivatives, optimizer.method = genetic."
+        )
     if name is not None:
         raise InputError(
             f'"{name}" of {machine.name} has no derivatives: those of a loaded machine are known where at most a '
@@ -95,8 +104,10 @@ def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Param
     Raises:
         InputError: names the quantity, and what the machine lacks or its file must say.
     """
-    if "mass" in names and not any(KINDS[parameter.quantity.kind].heavy for parameter in varied):
-        _refuse_unknown_mass(machine)
+    weighing = [name for name in names if name == "mass" or QUANTITIES[name].modal]
+    if weighing and not any(KINDS[parameter.quantity.kind].heavy for parameter in varied):
+        refuse_unknown_mass(machine, weighing[0])
+    _refuse_unknown_cut(machine, names, [parameter.path for parameter in varied])
     wanted = [name for name in names if QUANTITIES[name].needs]
     if not wanted:
         return
@@ -105,10 +116,7 @@ def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Param
         if np.isnan(QUANTITIES[name].value(response)) and response.status == Status.OK:
             lacking = QUANTITIES[name].needs
             raise InputError(f'"{name}" has no meaning here: {machine.name} lacks {lacking}; leave it out.')
-    wrenches = [machine.load, *(wrench for _, wrench in machine.named_loads)]
-    loaded = any(any(wrench.components()) for wrench in wrenches) or any(
-        parameter.path.startswith("load.") for parameter in varied
-    )
+    loaded = machine.pushed or any(parameter.path.startswith("load.") for parameter in varied)
     for name in UNDER_LOAD:
         if name in names and not loaded:
             raise InputError(
@@ -117,10 +125,40 @@ def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Param
             )
 
 
-def _refuse_unknown_mass(machine: Machine) -> None:
+def refuse_unknown_mass(machine: Machine, what: str) -> None:
+    """Refuse what needs masses where the machine has none.
+
+    Args:
+        machine: as its file has it.
+        what: needs them, as people wrote it.
+
+    Raises:
+        InputError: says what to give.
+    """
     masses = moving_masses(machine, respond(machine).configuration)
-    if all(part.mass is None for part in masses):
+    tool, drives = machine.tables["tool"], machine.tables["drives"]
+    turning = [tool.payload, drives.rotor_inertia, *tool.inertia, *tool.payload_inertia]
+    vibrates = what != "mass" and any(turning)
+    if all(part.mass is None for part in masses) and not vibrates:
         raise InputError(
-            f'"mass" is not known: the file of {machine.name} does not say what it weighs; give links a cross-section '
-            'with a density or material, or its table [tool] mass = "12 kg".'
+            f'"{what}" is not known: the file of {machine.name} does not say what it weighs; give links a '
+            'cross-section with a density or material, or its table [tool] mass = "12 kg".'
+        )
+
+
+def _refuse_unknown_cut(machine: Machine, names: Sequence[str], varied: Sequence[str]) -> None:
+    """Refuse quantities of a cut of which the file says too little."""
+    across = [name for name in names if QUANTITIES[name].cut]
+    if not across:
+        return
+    table = machine.tables["cutting"]
+    if not any(table.direction) and not any(path.startswith("cutting.direction") for path in varied):
+        raise InputError(
+            f'"{across[0]}" is not known: nothing says the direction across the cut; write direction = [1, 0, 0], say, '
+            f"in the table [cutting] of {machine.name}."
+        )
+    if "stable_width" in across and not table.pressure and "cutting.pressure" not in varied:
+        raise InputError(
+            '"stable_width" is not known: nothing says the cutting force per area of the chip; write pressure = '
+            f'"2000 N/mm**2", say, in the table [cutting] of {machine.name}.'
         )

@@ -24,7 +24,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.grid.grid import grid_question
+from kinetostat.studies.grid.axes import chosen_axes, grid_of
 from kinetostat.studies.guidelines.moves import Move, axes_left_out, designed, moves_at, with_signs
 from kinetostat.studies.guidelines.roles import Roles, equations_of_k, roles_at, roles_over
 from kinetostat.studies.sensitivity import notes, sensitivity
@@ -138,13 +138,12 @@ def guidelines(machine: Machine, ranges: Sequence[str] = (), progress: Progress 
 
 
 def _grid(machine: Machine, ranges: Sequence[str]) -> Points:
-    question = grid_question(machine, ranges, [])
-    for path in question.fields:
-        if not path.startswith("pose."):
+    axes = chosen_axes(machine, ranges)
+    for _, parameter in axes:
+        if not parameter.path.startswith("pose."):
             known = ", ".join(path for path in values(machine) if path.startswith("pose."))
-            raise InputError(f"{path} is not a coordinate of the pose; --over takes {known}.")
-    if question.grid.size > MOST_POSES:
-        raise InputError(
-            f"the grid has {question.grid.size:,} poses; at most {MOST_POSES:,} are allowed: lower a count."
-        )
-    return question.grid
+            raise InputError(f"{parameter.path} is not a coordinate of the pose; --over takes {known}.")
+    grid = grid_of(axes)
+    if grid.size > MOST_POSES:
+        raise InputError(f"the grid has {grid.size:,} poses; at most {MOST_POSES:,} are allowed: lower a count.")
+    return grid

@@ -45,6 +45,7 @@ class Log:
         count: designs so far.
         steps: what is noted about each step.
         repaired: steps that were damaged in their folder and have been computed again.
+        cleaned: whether its history in the folder had lines that were no steps, which have been removed.
         unchecked: whether the folder was begun without checksums.
     """
 
@@ -53,6 +54,7 @@ class Log:
         self._sizes = np.cumsum([problem.space.size, len(problem.objectives), len(problem.constraints), 1])
         self._rows: Array = np.empty((0, self.width))
         self.count = self.repaired = 0
+        self.cleaned = False
         self.unchecked = False
         self.steps: list[dict[str, Any]] = []
 

@@ -177,6 +177,9 @@ def search_into(
                 watch(len(log.steps), method.steps, log.steps[-1].get("best"))
                 if stop():
                     break
+        if study.damaged and not log.repaired:
+            study.keep(log.steps)
+            log.cleaned = True
         return log
 
 

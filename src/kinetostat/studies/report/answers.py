@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -18,12 +19,15 @@ from kinetostat.machine.parameters import Parameter, find, parameters, values
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.ranges import parse_range
 from kinetostat.studies.analysis import Analysis, analyze
+from kinetostat.studies.budget.budget import Budget, budget
 from kinetostat.studies.grid.grid import evaluate_grid
 from kinetostat.studies.guidelines.guidelines import Guidelines, guidelines
+from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.requirements import Verdict, requirements
 from kinetostat.studies.sensitivity import Sensitivity, sensitivity
 from kinetostat.studies.under_load import LoadedState, under_load
+from kinetostat.studies.vibration import Vibration, modes
 
 PROBES = 48
 """Steps to each side in which it is tried how far a coordinate goes."""
@@ -60,6 +64,10 @@ class Answers:
         refused: why there is no answer, by the name of the part.
         requirements: of the machine's file, judged.
         loaded: the machine at rest under its loads, if it is meant so (`machine.loaded`).
+        budget: the error of the tool by the tolerances of the machine's file, if it has some.
+        vibration: natural vibrations, if the file says what the platform or its payload weighs.
+        frequencies: the first natural frequency over the poses of the maps.
+        fit: what measurements have said of the machine as built, if a record of that is given.
     """
 
     machine: Machine
@@ -71,6 +79,10 @@ class Answers:
     refused: dict[str, str] = field(default_factory=dict)
     requirements: tuple[Verdict, ...] = ()
     loaded: LoadedState | None = None
+    budget: Budget | None = None
+    vibration: Vibration | None = None
+    frequencies: xr.Dataset | None = None
+    fit: FitRecord | None = None
 
 
 def gather(
@@ -79,6 +91,7 @@ def gather(
     without: Sequence[str] = (),
     result: Result | None = None,
     progress: Progress = silent,
+    fit: str | Path | None = None,
 ) -> Answers:
     """Answer every question of a report on a machine.
 
@@ -88,14 +101,19 @@ def gather(
         without: what is left out, of `PARTS`; validation is computed elsewhere, by an independent engine.
         result: of a study whose best design the machine is.
         progress: receives how far the work on a report is: five of `STEPS`.
+        fit: record of an identification of the machine, or the folder in which it lies.
 
     Raises:
-        InputError: a bad range, too many, an unknown part, or loads that `under_load` refuses.
+        InputError: a bad range, too many, an unknown part, loads that `under_load` or tolerances that `budget` refuses,
+            or a record that is not one of this machine.
     """
     for part in without:
         choice(part, PARTS, "the part of a report to leave out")
     if len(ranges) > MOST_AXES:
         raise InputError(f"a report maps one coordinate or two, not {len(ranges)}; leave out one --over.")
+    record = read_fit(fit) if fit else None
+    if record:
+        record.check(machine, drawn=False)
     analysis = analyze(machine)
     if analysis.status is not Status.OK:
         return Answers(machine, analysis, result=result)
@@ -104,14 +122,20 @@ def gather(
     if not over:
         refused["maps"] = "No coordinate of the pose can change by itself here, so that there is nothing to map."
     judged, state = requirements(machine), under_load(machine) if machine.loaded else None
+    built = budget(machine) if machine.tolerances else None
+    rings = modes(machine) if machine.tables["tool"].mass or machine.tables["tool"].payload else None
     progress(1, STEPS)
     maps = evaluate_grid(machine, over, list(_diagonal(machine))) if over and "maps" not in without else None
+    first = "loaded_frequency_1" if machine.loaded else "frequency_1"
+    frequencies = evaluate_grid(machine, over, [first]) if maps is not None and rings and rings.modes else None
     progress(2, STEPS)
     ranked = sensitivity(machine) if "sensitivity" not in without else None
     progress(3, STEPS)
     advice = _advice(machine, over) if "guidelines" not in without else None
     progress(5, STEPS)
-    return Answers(machine, analysis, maps, advice, ranked, result, refused, judged, state)
+    return Answers(
+        machine, analysis, maps, advice, ranked, result, refused, judged, state, built, rings, frequencies, record
+    )
 
 
 def _advice(machine: Machine, over: Sequence[str]) -> Guidelines:

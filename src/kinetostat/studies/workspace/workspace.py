@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy import ndimage
 
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import Cells
@@ -193,6 +192,8 @@ def connected_to(region: Mask, seed: tuple[int, ...]) -> Mask:
         region: over a grid of any number of dimensions.
         seed: index of the node; outside the region, nothing is joined to it.
     """
+    from scipy import ndimage  # a third of a second to import, which maps need not wait for
+
     labels, _ = ndimage.label(region)
     return np.asarray((labels == labels[seed]) & region[seed])
 

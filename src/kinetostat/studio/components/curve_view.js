@@ -1,4 +1,4 @@
-// Curves over one number, on logarithmic axes where that shows more; the present value is marked.
+// Curves over one number, on logarithmic axes where that shows more; the present value and others are marked.
 import { colour } from "kinetostat-scene/theme.js";
 import { frame, logTicks, niceTicks, plot, prepare, short } from "kinetostat-studio/plot_axes.js";
 
@@ -6,7 +6,8 @@ const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3], [4, 2], [1, 2]];
 
 export default {
   mixins: [plot],
-  template: `<div class="plot"><canvas role="img" :aria-label="label" @pointermove="hover" @pointerleave="leave"></canvas>
+  emits: ["pick"],
+  template: `<div class="plot"><canvas role="img" :aria-label="label" @pointermove="hover" @pointerleave="leave" @click="pick"></canvas>
       <div class="plot-tip" aria-hidden="true"></div></div>`,
   methods: {
     show(curves) {
@@ -19,9 +20,11 @@ export default {
       const sheet = prepare(this.canvas, this.$el);
       if (!sheet) return;
       const { pen, width, height } = sheet;
-      const { x, lines, label, here, log, signed } = this.curves;
+      const { x, lines, label, here, log, signed, tall, marks } = this.curves;
       const drawable = (value) => value !== null && (signed || value > 0);
-      const box = { left: 0, bottom: height, x: 66, y: 8, width: width - 66 - 62, height: height - 8 - 40 };
+      const right = lines.some((line) => line.name) ? 62 : 14;
+      const top = marks ? 18 : 8;
+      const box = { left: 0, bottom: height, x: 66, y: top, width: width - 66 - right, height: height - top - 40 };
       const known = lines.flatMap((line) => line.values).filter(drawable);
       if (box.width < 20 || box.height < 20) return;
       if (!known.length) {
@@ -30,7 +33,7 @@ export default {
         return;
       }
       let [low, high] = [Math.min(...known), Math.max(...known)];
-      const steep = low > 0 && high / low > 20;
+      const steep = low > 0 && (tall || high / low > 20);
       if (!steep) [low, high] = [low - 0.06 * (high - low || high), high + 0.06 * (high - low || high)];
       const share = (value, a, b, asLog) => (asLog ? Math.log(value / a) / Math.log(b / a) : (value - a) / (b - a));
       this.toX = (value) => box.x + box.width * share(value, x[0], x[x.length - 1], log);
@@ -44,6 +47,7 @@ export default {
         x: across.map((t) => [this.toX(t), short(t)]),
         y: up.map((t) => [this.toY(t), short(t)]),
       }, label);
+      if (marks) this.mark(pen, box, marks);
       if (here && here >= x[0] && here <= x[x.length - 1]) {
         pen.fillStyle = colour("accent");
         pen.fillRect(Math.round(this.toX(here)), box.y, 1.5, box.height);
@@ -66,7 +70,33 @@ export default {
         pen.stroke();
       });
       pen.restore();
-      this.legend(pen, box, lines);
+      this.legend(pen, box, lines.filter((line) => line.name));
+    },
+    // A grey line at each mark with its number above, where there is room for it.
+    mark(pen, box, marks) {
+      const { x } = this.curves;
+      let free = -Infinity;
+      marks.forEach((value, k) => {
+        if (value < x[0] || value > x[x.length - 1]) return;
+        const at = this.toX(value);
+        pen.fillStyle = colour("line-strong");
+        pen.fillRect(Math.round(at), box.y, 1, box.height);
+        const text = String(k + 1);
+        const half = pen.measureText(text).width / 2;
+        if (at - half < free) return;
+        pen.fillStyle = colour("ink-soft");
+        pen.textAlign = "center";
+        pen.textBaseline = "bottom";
+        pen.fillText(text, at, box.y - 3);
+        free = at + half + 3;
+      });
+    },
+    pick(event) {
+      const { marks } = this.curves ?? {};
+      if (!marks?.length || !this.toX) return;
+      const at = event.clientX - this.canvas.getBoundingClientRect().left;
+      const away = marks.map((value) => Math.abs(this.toX(value) - at));
+      this.$emit("pick", away.indexOf(Math.min(...away)));
     },
     legend(pen, box, lines) {
       pen.textAlign = "left";
@@ -91,8 +121,8 @@ export default {
       const at = event.clientX - frame.left;
       const { x, lines, unit } = this.curves;
       const i = x.reduce((best, value, k) => (Math.abs(this.toX(value) - at) < Math.abs(this.toX(x[best]) - at) ? k : best), 0);
-      const rows = lines.map((line) => `${line.name} ${line.values[i] === null ? "–" : short(line.values[i])} ${unit}`);
-      this.tip.textContent = [short(x[i]), ...rows].join("\n");
+      const rows = lines.map((line) => `${line.name} ${line.values[i] === null ? "–" : short(line.values[i])} ${unit}`.trim());
+      this.tip.textContent = [`${short(x[i])} ${this.curves.across ?? ""}`.trim(), ...rows].join("\n");
       this.tip.style.left = `${Math.min(at + 12, frame.width - 140)}px`;
       this.tip.style.top = "18px";
       this.tip.style.display = "block";

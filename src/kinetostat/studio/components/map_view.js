@@ -99,7 +99,7 @@ export default {
       if (this.scale.none) {
         pen.fillStyle = colour("ink");
         pen.textAlign = "center";
-        pen.fillText("no pose can be reached here", box.x + box.width / 2, box.y + box.height / 2);
+        pen.fillText("no pose has an answer here", box.x + box.width / 2, box.y + box.height / 2);
       }
     },
     cross(pen, box) {

@@ -196,7 +196,7 @@ class StudyForm:
         """Offer the other numbers of the machine; loads and limits are not part of a design."""
         taken = {str(table.get("path")) for table in self.draft.variables}
         free = [control for path, control in known.items() if control.slides and path not in taken]
-        offered = {control.path: brief(control) for control in free if control.panel != "Load"}
+        offered = {control.path: brief(control) for control in free if control.panel != "Load" and not control.joined}
         if offered:
             add = choice(offered, "add a variable", self._add_variable, "study-add-variable", searchable=True)
             add.classes("form-more")

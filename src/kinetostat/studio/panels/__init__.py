@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from kinetostat.kinematics.status import Status
 from kinetostat.studio.answers import Report
+from kinetostat.studio.elements import MachineView
 from kinetostat.studio.session import Session
 
 
@@ -15,15 +16,17 @@ class Panel(ABC):
     """A linked view of the analysis, in a tab of its own.
 
     The page makes one of each class, calls `build` once inside the tab, `show` after every new analysis while the
-    tab is in front, and `close` when the browser has left.
+    tab is in front, `leave` when it is no longer in front, and `close` when the browser has left.
 
     Attributes:
         name: text of the tab.
         changed: of the page, to be called where the panel has given the session's machine other numbers.
+        view: the picture of the machine, for panels that draw in it.
     """
 
     name = ""
     changed: Callable[[], None]
+    view: MachineView
 
     @abstractmethod
     def build(self) -> None:
@@ -41,6 +44,9 @@ class Panel(ABC):
     def shows(self, report: Report) -> bool:
         """Whether the panel has something to say about a report; of a machine that only loads hold, few have."""
         return report.analysis.status is Status.OK
+
+    def leave(self) -> None:  # noqa: B027 - most panels show nothing outside their tab
+        """Remove what the panel shows in the picture, because another tab is in front or the pose has no answer."""
 
     def close(self) -> None:  # noqa: B027 - most panels compute nothing, and need no `close`
         """Stop what is being computed; a panel that only shows the report has nothing to stop."""

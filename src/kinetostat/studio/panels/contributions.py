@@ -8,7 +8,7 @@ from nicegui import ui
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.sensitivity import Sensitivity
-from kinetostat.studio.answers import RankingRequest, Report, map_quantities, ranking
+from kinetostat.studio.answers import SINGULARITY, RankingRequest, Report, map_quantities, ranking
 from kinetostat.studio.elements import choice, toggle
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.panels import Panel
@@ -17,6 +17,8 @@ from kinetostat.studio.wording import bars, engineering, paragraph
 
 LEAST = 5e-4
 """Share of the compliance below which a part is left out: it would read 0.0 %."""
+USUAL = "free_stiffness_{}"
+"""Quantity that is ranked until another is chosen, of the last component of the machine."""
 MOST = 24
 """Parameters that are listed."""
 
@@ -82,11 +84,10 @@ class SensitivityPanel(Panel):
 
     def show(self, report: Report, session: Session) -> None:
         self._session = session
-        names = {
-            name: text for name, text in map_quantities(report.analysis.machine).items() if name != "singularity_margin"
-        }
+        offered = map_quantities(report.analysis.machine).items()
+        names = {name: text for name, text in offered if name != SINGULARITY}
         if self.quantity.options != names:
-            kept = self.quantity.value if self.quantity.value in names else list(names)[-1]
+            kept = self.quantity.value if self.quantity.value in names else USUAL.format(report.analysis.components[-1])
             self.quantity.set_options(names, value=kept)
         self._ask()
 
@@ -97,8 +98,8 @@ class SensitivityPanel(Panel):
         if self._session is not None and self.quantity.value:
             self._lane.ask(RankingRequest(self._session.machine, str(self.quantity.value)))
 
-    def _draw(self, _request: RankingRequest, answer: Sensitivity) -> None:
-        self.bars.set_content(ranking_text(answer))
+    def _draw(self, _request: RankingRequest, answer: Sensitivity | str) -> None:
+        self.bars.set_content(paragraph(answer) if isinstance(answer, str) else ranking_text(answer))
 
 
 def ranking_text(answer: Sensitivity) -> str:

@@ -12,14 +12,17 @@ from kinetostat.studies.setting import pose_of
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.report.content import Report
 from kinetostat.views.report.design import guideline_section, sensitivity_section
+from kinetostat.views.report.identification import identification_section
 from kinetostat.views.report.machine import data_section, machine_section, portrait
 from kinetostat.views.report.pictures import shown
 from kinetostat.views.report.provenance import Origin, method_section, record_section, validation_section
 from kinetostat.views.report.stiffness import load_section, stiffness_section, workspace_section
 from kinetostat.views.report.study import study_section
 from kinetostat.views.report.summary import summary_section
+from kinetostat.views.report.tolerances import tolerances_section
 from kinetostat.views.report.typesetting import typeset
 from kinetostat.views.report.under_load import loaded_section
+from kinetostat.views.report.vibration import vibration_section
 
 
 def report_of(
@@ -40,7 +43,7 @@ def report_of(
     analysis, result = answers.analysis, answers.result
     if analysis.status is not Status.OK:
         raise ValueError("a report needs a pose whose status is OK")
-    pictures = shown(analysis)
+    pictures = shown(analysis, answers.vibration if live else None)
     engine = () if isinstance(validation, str) else (validation.engine, validation.version)
     sections = [
         summary_section(answers, validation, portrait(analysis, pictures, live)),
@@ -50,6 +53,9 @@ def report_of(
         stiffness_section(analysis),
         load_section(analysis, pictures),
         *([loaded_section(answers.loaded, analysis)] if answers.loaded else []),
+        *([vibration_section(answers.vibration, answers.frequencies)] if answers.vibration else []),
+        *([tolerances_section(answers.budget)] if answers.budget else []),
+        *([identification_section(answers.fit, answers.machine)] if answers.fit else []),
         workspace_section(answers),
         guideline_section(answers),
         sensitivity_section(answers.sensitivity),

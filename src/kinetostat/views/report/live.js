@@ -13,7 +13,7 @@
 
   const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  const { modules, looks, scene, overlays } = JSON.parse(await new Response(stream).text());
+  const { modules, looks, scene, overlays, swings } = JSON.parse(await new Response(stream).text());
   const address = (text) => URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
   const imports = Object.fromEntries(Object.entries(modules).map(([name, text]) => [name, address(text)]));
   const map = document.createElement("script");
@@ -30,15 +30,22 @@
   };
   createApp({
     components: { MachineView },
-    template: `<machine-view ref="view" :label="label" :hidden="hidden" :looks="looks"></machine-view>
+    template: `<machine-view ref="view" :label="label" :hidden="hidden" :looks="looks"
+        @swinging="moving = $event"></machine-view>
       <div class="live-tools" role="group" aria-label="views and layers">
         <button v-for="view in views" type="button" @click="$refs.view.look(view)">{{ view }}</button>
         <label v-for="[layer, text] in layers"><input type="checkbox" :checked="!hidden.includes(layer)"
           @change="toggle(layer)">{{ text }}</label>
+        <label v-if="swings.length">vibration <select v-model="swing" @change="start"><option :value="null">none</option>
+          <option v-for="one in swings" :value="one">{{ one.name }}</option></select></label>
+        <button v-if="swing" type="button" @click="$refs.view.sway(!moving)">{{ moving ? "pause" : "play" }}</button>
       </div>`,
     data: () => ({
       label: stage.dataset.label,
       looks,
+      swings: Object.freeze(swings),
+      swing: null,
+      moving: false,
       hidden: ["ellipsoids", "directions"],
       views: ["iso", "front", "side", "top"],
       layers: Object.entries(words).filter(([layer]) => there.has(layer)),
@@ -55,6 +62,9 @@
         const hidden = new Set(this.hidden);
         if (!hidden.delete(layer)) hidden.add(layer);
         this.hidden = [...hidden];
+      },
+      start() {
+        this.$refs.view.swing(this.swing ? this.swing.solids : []);
       },
     },
   }).mount(stage);

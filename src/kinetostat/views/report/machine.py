@@ -31,6 +31,8 @@ def portrait(analysis: Analysis, pictures: Shown, live: bool) -> Figure:
         caption += WITHOUT.format(adding("report"))
     if turning and pictures.factor is not None:
         caption += f" Deflections are drawn {pictures.factor:,.6g} times as large as they are."
+    if turning and pictures.swings:
+        caption += " Modes of vibration swing as far as can be seen; their sizes say nothing."
     return Figure(caption, pictures.portrait(), SHARE, pictures.data if turning else None)
 
 

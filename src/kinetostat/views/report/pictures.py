@@ -17,11 +17,12 @@ from matplotlib.figure import Figure as Drawing
 
 from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.vibration import Vibration
 from kinetostat.views.figures import as_svg
 from kinetostat.views.picture import picture
 from kinetostat.views.report.content import Figure
 from kinetostat.views.scene import browser
-from kinetostat.views.scene.analysis_overlays import overlays_of
+from kinetostat.views.scene.analysis_overlays import overlays_of, swing_data
 from kinetostat.views.scene.machine_scene import machine_scene
 from kinetostat.views.scene.proportions import proportions_of
 from kinetostat.views.scene.solids import Scene, Solid, as_data, looks_data, solid_data
@@ -35,6 +36,8 @@ FULL = 7.4
 LOADED = ("load", "deflection")
 """Layers of a loaded machine."""
 SCRIPT = Path(__file__).with_name("live.js")
+SWINGS = 6
+"""Modes whose shapes swing on a page."""
 WITHOUT = " To get a machine that you can turn with the mouse, run this before you make the report: {}."
 """Sentence of a page that cannot show the scene, because the renderer's libraries are not installed."""
 
@@ -47,11 +50,13 @@ class Shown:
         scene: the machine.
         overlays: compliance ellipsoids, load and deflected shape.
         factor: by which deflections are exaggerated; None without a load.
+        swings: name of each mode of vibration, and its solids at both ends of their swing as plain data.
     """
 
     scene: Scene
     overlays: tuple[Solid, ...]
     factor: float | None
+    swings: tuple[tuple[str, list[dict[str, Any]]], ...] = ()
 
     @property
     def data(self) -> dict[str, Any]:
@@ -59,6 +64,7 @@ class Shown:
         return {
             "scene": {**as_data(self.scene), "fit": True},
             "overlays": [solid_data(solid) for solid in self.overlays],
+            "swings": [{"name": name, "solids": solids} for name, solids in self.swings],
         }
 
     def portrait(self) -> bytes:
@@ -71,13 +77,18 @@ class Shown:
         return picture(replace(self.scene, solids=(*self.scene.solids, *loaded)), SIZE)
 
 
-def shown(analysis: Analysis) -> Shown:
-    """Build the solids of an analysed machine with its overlays."""
+def shown(analysis: Analysis, vibration: Vibration | None = None) -> Shown:
+    """Build the solids of an analysed machine with its overlays, and the swings of its modes where these are known."""
     machine = analysis.machine
     configuration = respond(machine).configuration
     sizes = proportions_of(machine, configuration)
     overlays, factor = overlays_of(analysis, sizes)
-    return Shown(machine_scene(machine, configuration, sizes), tuple(overlays), factor)
+    swings = [
+        (f"mode {number}, {machine.display.show(mode.frequency, 'Hz')}", solids)
+        for number, mode in enumerate(vibration.modes[:SWINGS] if vibration else (), 1)
+        if mode.shape is not None and (solids := swing_data(machine, configuration, sizes, mode.shape))
+    ]
+    return Shown(machine_scene(machine, configuration, sizes), tuple(overlays), factor, tuple(swings))
 
 
 def drawn(drawing: Drawing, caption: str) -> Figure:

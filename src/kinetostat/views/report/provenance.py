@@ -11,7 +11,7 @@ from importlib.metadata import version
 from kinetostat.studies.paper.printed import CITATION
 from kinetostat.tolerances import AGREED
 from kinetostat.validation.comparison import Validation
-from kinetostat.views.comparison_tables import diagonal_table, difference_table, trial_table
+from kinetostat.views.comparison_tables import diagonal_table, difference_table, frequency_table, trial_table
 from kinetostat.views.report.content import Block, Formula, Listing, Paragraph, Section, Table
 from kinetostat.views.report.typesetting import printed, typeset
 
@@ -79,9 +79,12 @@ def verdict(validation: Validation | str) -> str:
     if isinstance(validation, str):
         return validation
     agree = "agrees" if validation.difference <= AGREED else "DIFFERS"
+    worst = f"compliances differ by {max(validation.differences.values()):.1e} (relative, worst block)"
+    if validation.frequencies:
+        worst += f", natural frequencies by {validation.frequency_difference:.1e}"
     return (
-        f"{validation.engine.capitalize()} {validation.version}, an independent engine, {agree}: compliances differ by "
-        f"{validation.difference:.1e} (relative, worst block); {AGREED:g} is allowed."
+        f"{validation.engine.capitalize()} {validation.version}, an independent engine, {agree}: {worst}; "
+        f"{AGREED:g} is allowed."
     )
 
 
@@ -99,6 +102,8 @@ def validation_section(validation: Validation | str) -> Section:
         printed(diagonal_table(validation), "The diagonal of the compliance, side by side."),
         printed(difference_table(validation), "Relative difference by block, and how exact the engine itself is."),
     ]
+    if validation.frequencies:
+        blocks.append(printed(frequency_table(validation), "Natural frequencies without loads, side by side."))
     if len(validation.trials) > 1:
         blocks.append(printed(trial_table(validation), "How the engine converges to its result."))
     return Section(title, tuple(blocks))

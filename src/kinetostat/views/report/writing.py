@@ -15,8 +15,9 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
-from kinetostat.studies import under_load
+from kinetostat.studies import under_load, vibration
 from kinetostat.studies.analysis import as_json
+from kinetostat.studies.budget import data as budget_data
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.result_data import message
 from kinetostat.studies.report.answers import STEPS, Answers, gather
@@ -41,6 +42,7 @@ class Wanted:
         engine: for the validation; None for the first that is installed.
         author, date: for the title block; None for none.
         loaded: whether the machine is to be shown under its loads, whatever its file says.
+        fit: record of an identification of the machine, or its folder.
     """
 
     ranges: Sequence[str] = ()
@@ -49,12 +51,13 @@ class Wanted:
     author: str | None = None
     date: str | None = None
     loaded: bool = False
+    fit: str | Path | None = None
 
     def options(self) -> list[str]:
         """Words of the command line that give the same options."""
-        single = (("--engine", self.engine), ("--author", self.author), ("--date", self.date))
+        single = (("--engine", self.engine), ("--author", self.author), ("--date", self.date), ("--fit", self.fit))
         pairs = [("--over", self.ranges), ("--without", self.without)]
-        pairs += [(name, [value]) for name, value in single if value]
+        pairs += [(name, [str(value)]) for name, value in single if value]
         words = [word for name, values in pairs for value in values for word in (name, value)]
         return ["--loaded", *words] if self.loaded else words
 
@@ -69,6 +72,7 @@ def report(
     engine: str | None = None,
     author: str | None = None,
     date: str | None = None,
+    fit: str | Path | None = None,
     progress: Progress = silent,
 ) -> Path:
     """Write a report for a design review into one file: on a machine, or on a study and its best design.
@@ -80,6 +84,7 @@ def report(
         without: parts to leave out because they take time: maps, guidelines, sensitivity, validation.
         engine: for the validation, exudyn or pynite; None for the first that is installed.
         author, date: for the title block. Without a date, the same input gives the same bytes.
+        fit: record of an identification of the machine (fit.json), or the folder in which it lies.
         progress: called with the number of steps done and of all steps.
 
     Returns:
@@ -89,12 +94,12 @@ def report(
         InputError: the pose has no answer, no design meets the constraints, a range or part is not valid, the file is
             neither .html nor .pdf or cannot be written, or a library is missing.
     """
-    place, wanted = report_path(path), Wanted(ranges, without, engine, author, date)
+    place, wanted = report_path(path), Wanted(ranges, without, engine, author, date, fit=fit)
     result = about if isinstance(about, Result) else None
     if result is not None and not result.solved:
         raise InputError(message(result))
     machine = about.machine if isinstance(about, Result) else about
-    answers = gather(machine, ranges, without, result, progress)
+    answers = gather(machine, ranges, without, result, progress, fit)
     if answers.analysis.status is not Status.OK:
         raise InputError(answers.analysis.message)
     inputs = texts_of(result.problem) if result else (("machine.toml", as_file(machine)),)
@@ -136,7 +141,11 @@ def write_report(
     """
     command = shlex.join(["kinetostat", "report", *subject, *wanted.options(), "-o", path.name])
     loaded = {} if answers.loaded is None else {"under_load": under_load.as_json(answers.loaded)}
-    results = json.dumps(as_json(answers.analysis) | loaded, ensure_ascii=False, allow_nan=False, indent=1)
+    built = {} if answers.budget is None else {"budget": budget_data.as_json(answers.budget)}
+    rings = {} if answers.vibration is None else {"vibration": vibration.as_json(answers.vibration)}
+    results = json.dumps(
+        as_json(answers.analysis) | loaded | built | rings, ensure_ascii=False, allow_nan=False, indent=1
+    )
     origin = Origin(command, inputs, as_file(answers.machine), results)
     about = {name: text for name, text in (("Author", wanted.author), ("Date", wanted.date)) if text}
     page = path.suffix == ".html"

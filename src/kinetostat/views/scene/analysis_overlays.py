@@ -6,14 +6,15 @@ The symbols themselves are drawn in `overlays`; here the machine's answer is tur
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.screw import COMPONENTS, Twist, Wrench
 from kinetostat.algebra.vector import IDENTITY, Displacement, Vector, rotation_along
-from kinetostat.kinetostatics.deflected import DeflectedLink, deflected_links
+from kinetostat.kinetostatics.deflected import Deflection, deflected_links
 from kinetostat.kinetostatics.indices import Principal
 from kinetostat.kinetostatics.loading import deflection
-from kinetostat.kinetostatics.response import respond
+from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.under_load import LoadedState
@@ -23,7 +24,7 @@ from kinetostat.views.scene.anatomy import anatomy
 from kinetostat.views.scene.leg_solids import joint_radius
 from kinetostat.views.scene.machine_scene import plates, tool_solids
 from kinetostat.views.scene.proportions import Proportions
-from kinetostat.views.scene.solids import Solid, Swept, unit
+from kinetostat.views.scene.solids import Solid, Swept, solid_data, unit
 
 SHOWN_DEFLECTION = 0.09
 """Greatest displacement of an exaggerated shape as a share of the machine's diagonal."""
@@ -31,21 +32,6 @@ GHOST_WIDTH = 0.7
 """Radius of a deflected link, in radii of its leg."""
 GHOST_POINTS = 12
 """Points along a deflected link."""
-
-
-@dataclass(frozen=True)
-class Deflection:
-    """Small motions of a loaded machine.
-
-    Attributes:
-        load: at the tool point, base axes, N·m and N.
-        motion: of the tool point, rad and m.
-        links: deflected links of the legs.
-    """
-
-    load: Wrench
-    motion: Twist
-    links: tuple[DeflectedLink, ...]
 
 
 def overlays_of(
@@ -86,28 +72,29 @@ def loaded_overlays(
     """
     if not state.displacement:
         return [], None
-    configuration, moved = respond(state.machine).configuration, motions_of(state)
-    chosen = factor or exaggeration_of(state, moved, sizes.diagonal)
-    return deflection_overlays(state.machine, configuration, sizes, moved, chosen)
+    response = respond(state.machine)
+    moved = motions_of(state, response)
+    chosen = factor or exaggeration_of(response, moved, sizes.diagonal)
+    return deflection_overlays(state.machine, response.configuration, sizes, moved, chosen)
 
 
-def motions_of(state: LoadedState) -> Deflection:
-    """The motions of a machine from its unloaded pose to its rest."""
+def motions_of(state: LoadedState, response: Response) -> Deflection:
+    """The motions of a machine from its unloaded pose, of which the response is, to its rest."""
     by_name = dict(zip(state.components, state.displacement, strict=True))
     turned, moved = ([by_name.get(name, 0.0) for name in COMPONENTS[part]] for part in (slice(3), slice(3, 6)))
-    return Deflection(state.machine.load, Twist(Vector(*turned), Vector(*moved)), state.links)
+    return Deflection(response.load, Twist(Vector(*turned), Vector(*moved)), state.links)
 
 
-def exaggeration_of(state: LoadedState, moved: Deflection, diagonal: float) -> float:
+def exaggeration_of(response: Response, moved: Deflection, diagonal: float) -> float:
     """A round factor, at least 1, that makes the motions of a loaded machine visible.
 
     Args:
-        state, moved: of the machine.
-        diagonal: of it, m.
+        response: of the machine at its unloaded pose.
+        moved: from there.
+        diagonal: of the machine, m.
     """
-    configuration = respond(state.machine).configuration
-    point = state.machine.tool_point(configuration.platform)
-    reach = max(((leg.path[-1] - point).norm() for leg in configuration.legs if leg.path), default=0.0)
+    legs, point = response.configuration.legs, response.reference
+    reach = max(((leg.path[-1] - point).norm() for leg in legs if leg.path), default=0.0)
     return max(1.0, _exaggeration(moved, float(reach), diagonal))
 
 
@@ -139,18 +126,71 @@ def deflection_overlays(
         moved: its small motions.
         factor: of exaggeration; None to choose a round one.
     """
-    point = machine.tool_point(configuration.platform)
-    loads = overlays.load_solids(moved.load, point, sizes)
-    numbers = [*moved.motion.components(), *(c for link in moved.links for c in link.end_motion.components())]
-    if not all(math.isfinite(c) for c in numbers):
+    loads = overlays.load_solids(moved.load, machine.tool_point(configuration.platform), sizes)
+    if not _finite(moved):
         return loads, 1.0
-    legs = [anatomy(leg) for leg in configuration.legs]
+    moving = _moving(machine, configuration, sizes)
+    chosen = factor or _exaggeration(moved, moving.reach, sizes.diagonal)
+    return [*loads, *_ghost(moved, moving, chosen)], chosen
+
+
+def swing_data(
+    machine: Machine, configuration: Configuration, sizes: Proportions, moved: Deflection
+) -> list[dict[str, Any]]:
+    """Both ends of a swing as plain data, so that a browser needs nothing else to move the machine between them.
+
+    Each solid is in the middle of its swing, as `solid_data` has it, with `ends`: how far every point of its path
+    moves to one end, or its two extreme places. It swings as far as a deflected shape is drawn. Nothing is drawn of
+    motions that are infinite or zero.
+
+    Args:
+        machine, configuration, sizes: as for `machine_scene`.
+        moved: small motions, of any size.
+    """
+    moving = _moving(machine, configuration, sizes)
+    largest = _largest(moved, moving.reach)
+    if not 0.0 < largest < math.inf:
+        return []
+    factor = SHOWN_DEFLECTION * sizes.diagonal / largest
+    solids = []
+    for there, middle, back in zip(*(_ghost(moved, moving, end) for end in (factor, 0.0, -factor)), strict=True):
+        drawn, first, last = (solid_data(solid) for solid in (middle, there, back))
+        ends = [first["place"], last["place"]]
+        if isinstance(there.shape, Swept) and isinstance(middle.shape, Swept):
+            pairs = zip(there.shape.path, middle.shape.path, strict=True)
+            ends = [[a - b for a, b in zip(*pair, strict=True)] for pair in pairs]
+        solids.append({**drawn, "ends": ends})
+    return solids
+
+
+@dataclass(frozen=True)
+class _Moving:
+    """What is drawn of a machine that moves a little.
+
+    Attributes:
+        body: platform and tool.
+        point: the tool point.
+        reach: of the platform from there, m.
+        radii: of the links by leg, m.
+    """
+
+    body: Sequence[Solid]
+    point: Vector
+    reach: float
+    radii: Mapping[str, float]
+
+
+def _moving(machine: Machine, configuration: Configuration, sizes: Proportions) -> _Moving:
+    point, legs = machine.tool_point(configuration.platform), [anatomy(leg) for leg in configuration.legs]
     _, platform = plates(configuration, legs, sizes.leg)
-    radii = {leg.leg: joint_radius(leg, sizes) for leg in legs}
-    reach = max((joint - point).norm() for joint in platform.joints)
-    chosen = factor or _exaggeration(moved, reach, sizes.diagonal)
     body = [*platform.solids(), *tool_solids(machine, configuration, platform, sizes.leg)]
-    return [*loads, *_ghost(moved, body, point, chosen, radii)], chosen
+    reach = max((joint - point).norm() for joint in platform.joints)
+    return _Moving(body, point, float(reach), {leg.leg: joint_radius(leg, sizes) for leg in legs})
+
+
+def _finite(moved: Deflection) -> bool:
+    numbers = [*moved.motion.components(), *(c for link in moved.links for c in link.end_motion.components())]
+    return all(math.isfinite(c) for c in numbers)
 
 
 def _exaggeration(moved: Deflection, reach: float, diagonal: float) -> float:
@@ -161,9 +201,7 @@ def _exaggeration(moved: Deflection, reach: float, diagonal: float) -> float:
         reach: of the platform from the tool point, m.
         diagonal: of the machine, m.
     """
-    links = [motion.translational.norm() for link in moved.links for motion in (link.start_motion, link.end_motion)]
-    platform = moved.motion.translational.norm() + moved.motion.rotational.norm() * reach
-    largest = max([*links, platform])
+    largest = _largest(moved, reach)
     if not 0.0 < largest < math.inf:
         return 1.0
     wanted = SHOWN_DEFLECTION * diagonal / largest
@@ -172,17 +210,21 @@ def _exaggeration(moved: Deflection, reach: float, diagonal: float) -> float:
     return max((step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted * 1.0001), default=power)
 
 
-def _ghost(
-    moved: Deflection, platform: Sequence[Solid], point: Vector, factor: float, radii: Mapping[str, float]
-) -> list[Solid]:
+def _largest(moved: Deflection, reach: float) -> float:
+    """The greatest displacement of all ends of links and of the platform, m."""
+    links = [motion.translational.norm() for link in moved.links for motion in (link.start_motion, link.end_motion)]
+    return max([*links, moved.motion.translational.norm() + moved.motion.rotational.norm() * reach])
+
+
+def _ghost(moved: Deflection, moving: _Moving, factor: float) -> list[Solid]:
     """The deflected machine: its links as bent wires, and its platform at its displaced place."""
     wires = []
     for n, link in enumerate(moved.links):
         points = [link.point(i / GHOST_POINTS, factor) for i in range(GHOST_POINTS + 1)]
-        path = tuple((p.x, p.y, p.z) for p in points)
-        wires.append(Solid(f"ghost/link {n}", Swept(path, GHOST_WIDTH * radii[link.leg]), "ghost", layer="deflection"))
-    motion = exaggerated(moved.motion, point, factor)
-    body = [s.moved(motion, name=f"ghost/{s.name}", material="ghost", layer="deflection") for s in platform]
+        path, radius = tuple((p.x, p.y, p.z) for p in points), GHOST_WIDTH * moving.radii[link.leg]
+        wires.append(Solid(f"ghost/link {n}", Swept(path, radius), "ghost", layer="deflection"))
+    motion = exaggerated(moved.motion, moving.point, factor)
+    body = [s.moved(motion, name=f"ghost/{s.name}", material="ghost", layer="deflection") for s in moving.body]
     return [*wires, *body]
 
 
@@ -190,5 +232,5 @@ def exaggerated(motion: Twist, point: Vector, factor: float) -> Displacement:
     """A small motion of a body at a point, times a factor, as a rigid displacement of the body."""
     angle = motion.rotational.norm() * factor
     axis = unit(motion.rotational)
-    turn = rotation_along(axis, cos(angle), sin(angle)) if angle > NO_TURN else IDENTITY
+    turn = rotation_along(axis, cos(angle), sin(angle)) if abs(angle) > NO_TURN else IDENTITY
     return Displacement(turn, point + motion.translational * factor - turn.apply(point))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 RENDERER = Path(__file__).parent
 """Folder of its modules, which import each other as "kinetostat-scene/..."."""
-OURS = ("handles.js", "machine_view.js", "solid_geometry.js", "theme.js")
+OURS = ("handles.js", "machine_view.js", "solid_geometry.js", "swing.js", "theme.js")
 BROUGHT = {"nicegui-scene": "elements/scene/dist/index.js", "vue": "static/vue.esm-browser.prod.js"}
 """three.js with its controls, and Vue, as files of the package nicegui, by the name under which they are imported."""
 

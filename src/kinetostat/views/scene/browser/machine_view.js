@@ -2,6 +2,7 @@
 import { CSS2DObject, CSS2DRenderer, OrbitControls, THREE } from "nicegui-scene";
 import { Handles } from "kinetostat-scene/handles.js";
 import { geometryOf } from "kinetostat-scene/solid_geometry.js";
+import { Swing } from "kinetostat-scene/swing.js";
 import { isDark, onTheme } from "kinetostat-scene/theme.js";
 
 const THEMES = {
@@ -31,7 +32,7 @@ export default {
   template: `<div class="machine-view"><canvas tabindex="0" role="img" :aria-label="label"
       @keydown="turn"></canvas><div class="machine-labels"></div></div>`,
   props: { label: String, hidden: Array, looks: Object },
-  emits: ["pull", "settle"],
+  emits: ["pull", "settle", "swinging"],
   mounted() {
     const canvas = this.$el.querySelector("canvas");
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawsInSoftware(), alpha: false });
@@ -77,6 +78,7 @@ export default {
     }
     this.geometries = new Map();
     this.groups = {};
+    this.mode = new Swing(this.world);
     this.light();
     this.theme();
     this.themes = onTheme(() => this.theme());
@@ -87,6 +89,7 @@ export default {
   },
   beforeUnmount() {
     clearTimeout(this.resting);
+    this.swings = false;
     this.listening.abort();
     this.observer.disconnect();
     this.themes.disconnect();
@@ -215,6 +218,31 @@ export default {
     ghost(solids) {
       this.put("ghost", solids, []);
       this.draw();
+    },
+    // A shape that swings over the machine, none to end it. Nothing moves by itself for who wants less motion.
+    swing(solids, moving) {
+      this.mode.put(solids, this.materials.ghost);
+      this.hide();
+      const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+      this.sway(solids.length > 0 && (moving ?? !still));
+      this.draw();
+    },
+    sway(moving) {
+      const began = moving && !this.swings;
+      this.swings = moving;
+      this.$el.dataset.swings = this.mode.shown ? String(moving) : "";
+      this.$emit("swinging", moving);
+      if (began) requestAnimationFrame(this.onward);
+      if (!moving) this.mode.pause();
+    },
+    onward(time) {
+      if (!this.swings) return;
+      if (!this.drawing) {
+        this.mode.step(time);
+        this.$el.dataset.share = this.mode.share.toFixed(4);
+        this.draw();
+      }
+      requestAnimationFrame(this.onward);
     },
     put(name, solids, labels) {
       const group = (this.groups[name] ??= { root: new THREE.Group(), meshes: new Map() });
@@ -376,7 +404,8 @@ export default {
       this.handles.root.visible = !hidden.has(HANDLES);
       for (const group of Object.values(this.groups)) {
         for (const object of [...group.meshes.values(), ...group.labels]) {
-          object.visible = !hidden.has(object.userData.layer);
+          const { layer } = object.userData;
+          object.visible = !hidden.has(layer) && !(layer === "deflection" && this.mode.shown);
         }
       }
       this.renderer.shadowMap.needsUpdate = true;

@@ -1,0 +1,192 @@
+"""The machine with its errors as geometry: every leg placed as built, for files and drawings.
+
+Where all legs reach the drawn home place of the platform, the machine as built stands there and its actuators are
+commanded otherwise; otherwise actuators stand as drawn, and the platform is where it then is. In the base frame.
+
+Source: theory (45).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinetostat.accuracy.closing import Errors, Place, followed, placed, scaled
+from kinetostat.accuracy.model import ErrorModel, error_model
+from kinetostat.accuracy.rows import Row
+from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
+from kinetostat.equilibrium.motion import Array, Motions, exponential, logarithm, still
+from kinetostat.kinematics.closing import pose_of
+from kinetostat.machine.leg import Element, Joint, Leg, Spring
+from kinetostat.machine.link import Parallelogram
+from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.parameters import POSE
+from kinetostat.spec.errors import InputError
+from kinetostat.tolerances import SEEN_BY_LEG
+
+REACHED = 1e-9
+"""Gap of a leg at the drawn home place, rad or in units of the machine's length, with which it counts as reached."""
+
+
+@dataclass(frozen=True)
+class AsBuilt:
+    """A machine as built at its home place.
+
+    Attributes:
+        configuration: with every leg where it is.
+        commands: by actuator, the coordinate that is to be commanded there, m or rad.
+        coordinates: by actuator, where it really stands.
+    """
+
+    configuration: Configuration
+    commands: dict[str, float]
+    coordinates: dict[str, float]
+
+
+def as_built(machine: Machine, errors: Array, model: ErrorModel | None = None) -> AsBuilt:
+    """Place a machine with its errors.
+
+    Args:
+        machine: as drawn.
+        errors: SI, in the order of its `ErrorModel` [errors].
+        model: its errors at its home place (`model_at_home`), where they are known already.
+
+    Raises:
+        InputError: its legs hold the platform more than they need to, so that those of a machine with errors do not
+            close without being bent.
+    """
+    model = model_at_home(machine) if model is None else model
+    if model.overconstrained:
+        raise InputError(
+            f"{machine.name} is overconstrained: with these errors its legs close only by being bent, which no file of "
+            "rigid links can say; use the record of the fit instead."
+        )
+    values = np.asarray(errors, dtype=float)
+    actuators = np.array([error.group in ("zeros", "gains") for error in model.errors])
+    links = model.inserted(np.where(actuators, 0.0, values))
+    rows = model.rows
+    coordinates = [followed(row, still(1), rows.length, e) for row, e in zip(rows.legs, links, strict=True)]
+    gaps = [_gap(row, q, e, rows.length) for row, q, e in zip(rows.legs, coordinates, links, strict=True)]
+    platform = still(1)
+    if max(gaps) > REACHED:
+        platform, coordinates = _driven(model, values, links)
+    places = [placed(row, q, e) for row, q, e in zip(rows.legs, coordinates, links, strict=True)]
+    parts = zip(rows.configuration.legs, rows.legs, places, links, strict=True)
+    legs = [_leg(leg, row, place, link) for leg, row, place, link in parts]
+    softer = {e.path: 1.0 + v for e, v in zip(model.errors, values, strict=True) if e.group == "compliances"}
+    legs = [replace(leg, chain=tuple(_softer(leg, part, softer) for part in leg.chain)) for leg in legs]
+    configuration = replace(
+        rows.configuration, platform=_displacement(platform) @ rows.configuration.platform, legs=tuple(legs)
+    )
+    return AsBuilt(configuration, *_commands(model, values, coordinates))
+
+
+def model_at_home(machine: Machine) -> ErrorModel:
+    """The errors of a machine at its home place: that of a family's file, or the home pose of one leg by leg."""
+    return error_model(machine, _home(machine), 1, np.zeros(6))
+
+
+def _home(machine: Machine) -> dict[str, Array]:
+    """The pose at the home place: that of a family's file, or the home pose of a machine leg by leg."""
+    if machine.family.chains is None:
+        return {}
+    chains = machine.chains()
+    home = pose_of(chains.home)
+    return {f"{POSE}{name}": np.array([float(home[name])]) for name in chains.pose}
+
+
+def _gap(row: Row, coordinates: Array, errors: dict[int, Array], length: float) -> float:
+    """How far a leg is from the home place, rad or in units of the length."""
+    return float(np.abs(scaled(logarithm(placed(row, coordinates, errors).end), length)).max())
+
+
+def _driven(model: ErrorModel, values: Array, links: Errors) -> tuple[Motions, list[Array]]:
+    """Where the platform is with actuators as drawn, and where all joints then are, actuators with their errors."""
+    state = model.closed_with(values)
+    coordinates = [
+        followed(row, state.platform, model.rows.length, errors)
+        for row, errors in zip(model.rows.legs, links, strict=True)
+    ]
+    return state.platform, coordinates
+
+
+def _displacement(motion: Motions) -> Displacement:
+    columns = [Vector(*column) for column in motion.rotation[0].T.tolist()]
+    return Displacement(Rotation(*columns), Vector(*motion.translation[0].tolist()))
+
+
+def _leg(leg: Leg, row: Row, place: Place, errors: dict[int, Array]) -> Leg:
+    """A leg with every element displaced by what carries it."""
+    chain: list[Element] = []
+    for element, behind in zip(leg.chain, row.carried, strict=True):
+        joint = isinstance(element, Parallelogram) or element.freedoms or _moving(element, behind, row)
+        motion = _displacement(_carrying(place, errors, behind) if joint else place.before[behind])
+        moved = element.displaced(motion)
+        if isinstance(moved, Parallelogram) and isinstance(element, Parallelogram):
+            far = _displacement(_carrying(place, errors, behind + 1)).apply(element.far)
+            moved = replace(moved, far=far, kept=None)
+        if isinstance(moved, Joint) and isinstance(element, Joint) and chain and behind not in errors:
+            moved = _same_centre(leg.chain[len(chain) - 1], chain[-1], element, moved)
+        chain.append(moved)
+    return replace(leg, chain=tuple(chain), lines=(), idle=leg.idle or _idle(chain))
+
+
+def _idle(chain: list[Element]) -> tuple[int, ...]:
+    """The passive freedoms that follow from those before them, such as the spin of a strut between two balls."""
+    joints = [joint for element in chain for joint in element.freedoms]
+    if not joints:
+        return ()
+    points = [joint.point for joint in joints if joint.point is not None]
+    length = max([float((point - points[0]).norm()) for point in points], default=0.0) or 1.0
+    about = points[0] if points else ZERO
+    twists = np.array([joint.twist(about).components() for joint in joints], dtype=float) / [1, 1, 1, *[length] * 3]
+    basis: list[Array] = []
+    idle = []
+    for number, twist in enumerate(twists):
+        rest = twist - sum((way * (way @ twist) for way in basis), np.zeros(6))
+        if np.linalg.norm(rest) < SEEN_BY_LEG * np.linalg.norm(twist):
+            idle.append(number)
+        else:
+            basis.append(rest / np.linalg.norm(rest))
+    return tuple(idle)
+
+
+def _same_centre(drawn: Element, before: Element, element: Joint, moved: Joint) -> Joint:
+    """A joint about the very point of the one before it, if both have one point in the drawing: round-off apart."""
+    if not (isinstance(drawn, Joint) and isinstance(before, Joint)) or element.point is None:
+        return moved
+    return replace(moved, point=before.point) if drawn.point == element.point else moved
+
+
+def _moving(element: Element, behind: int, row: Row) -> bool:
+    """Whether a spring is a motion of the row."""
+    return isinstance(element, Spring) and element.actuated and behind < len(row.twists)
+
+
+def _carrying(place: Place, errors: dict[int, Array], behind: int) -> Motions:
+    before = place.before[behind]
+    return before @ exponential(errors[behind]) if behind in errors else before
+
+
+def _softer(leg: Leg, element: Element, softer: dict[str, float]) -> Element:
+    """A spring with its compliance as built; elements of several springs stay as they are drawn."""
+    if not isinstance(element, Spring):
+        return element
+    names = (element.of, element.name)
+    paths = [f"legs.{leg.name}.{name.removeprefix(f'{leg.name} ').replace('.', ' ')}.compliance" for name in names]
+    factor = next((softer[path] for path in paths if path in softer), 1.0)
+    return replace(element, stiffness=element.stiffness / factor)
+
+
+def _commands(model: ErrorModel, values: Array, coordinates: list[Array]) -> tuple[dict[str, float], dict[str, float]]:
+    """What is to be commanded there, and where actuators really stand, by "leg joint"."""
+    known = {error.path: value for error, value in zip(model.errors, values, strict=True)}
+    commands, stands = {}, {}
+    for row, joints in zip(model.rows.legs, coordinates, strict=True):
+        for unit in (unit for unit in row.units if unit.drive):
+            drive, path = unit.drive, f"legs.{row.name}.{unit.name}"
+            if drive is not None:
+                stand = drive.home + drive.sense * float(joints[0, drive.coordinate])
+                name = f"{row.name} {unit.name}"
+                stands[name] = stand
+                commands[name] = (stand - known.get(f"{path}.zero", 0.0)) / (1.0 + known.get(f"{path}.gain", 0.0))
+    return commands, stands

@@ -1,0 +1,316 @@
+"""The numbers of a leg that may be wrong, by its form: where joints lie on their links, zeros and gains of actuators.
+
+An error displaces everything behind some motion of the leg by a small screw motion: in front of a joint it moves or
+tilts the joint on its link, behind the last one the platform on the leg. What a passive joint takes up by its own
+freedom is left out, and so is what no motion of the leg can tell from the errors that are listed before it. A strut
+between two balls keeps both centres and its zero, a leg in general 4 numbers for each revolute, 2 for each slide and 6
+for its end.
+
+Source: theory (45) and (49).
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinetostat.accuracy.closing import Place, free_screws, moved_to, placed, scaled
+from kinetostat.accuracy.rows import Row, Rows, Unit
+from kinetostat.algebra.vector import AXES, ZERO, Vector
+from kinetostat.equilibrium.motion import Array
+from kinetostat.machine.leg import Joint
+from kinetostat.machine.link import Parallelogram
+from kinetostat.tolerances import NO_LINK, PARALLEL_AXES, SEEN_BY_LEG
+
+SAMPLES, TURN, TRAVEL = 40, 0.35, 0.15
+"""How many random places of a leg tell its errors apart, and how far its joints go there: rad, and shares of the
+machine's length."""
+
+ZEROS, BASE, PLATFORM, LENGTHS, LINKS, TILTS, OFFSETS = range(7)
+"""The order in which errors are listed where only some of them can be told apart."""
+
+
+@dataclass(frozen=True)
+class MachineError:
+    """A number of the machine as built that may differ from the drawn one.
+
+    Attributes:
+        path: "legs.leg 1.base joint.x", "legs.leg 1.actuator.zero"; or the field of a family that many legs share.
+        kind: of its quantity: "length", "angle" or "ratio".
+        group: "geometry", "zeros", "gains", "clearances", "compliances" or "shared".
+        words: for people, "position of the base joint of leg 1 on the base along x".
+        leg: name of its leg; empty of what legs share.
+    """
+
+    path: str
+    kind: str
+    group: str
+    words: str
+    leg: str
+
+
+@dataclass(frozen=True, eq=False)
+class Insertion:
+    """A small screw motion that an error puts into a leg.
+
+    Attributes:
+        leg: number of the leg.
+        behind: how many of its motions stand before it.
+        twist: per unit of the error, in home place [6].
+        factor: what it is multiplied by at coordinates of the leg [n x coordinates]: [n]; None for 1.
+    """
+
+    leg: int
+    behind: int
+    twist: Array
+    factor: Callable[[Array], Array] | None = None
+
+    def amount(self, coordinates: Array) -> Array:
+        """What its twist is multiplied by [n], at coordinates of the leg [n x coordinates]."""
+        return np.ones(len(coordinates)) if self.factor is None else self.factor(coordinates)
+
+
+Source = tuple[MachineError, tuple[Insertion, ...]]
+"""An error and what it puts into the legs."""
+
+
+def errors_of(rows: Rows) -> list[Source]:
+    """List the errors of all legs that their own motions can tell apart, leg by leg.
+
+    Args:
+        rows: the machine at its home place.
+    """
+    sources: list[Source] = []
+    for number, row in enumerate(rows.legs):
+        every = [source for _, source in sorted(_candidates(number, row, rows), key=lambda entry: entry[0])]
+        sources += _distinct(row, rows, every)
+        sources += _felt(row, rows, list(_clearances(number, row)))
+    return sources
+
+
+def places_of(row: Row, rows: Rows) -> Array:
+    """Random coordinates of a leg around its home place [samples x coordinates], the same ones each time."""
+    units = np.where(row.slides, TRAVEL * rows.length, TURN)
+    return np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, row.size)) * units
+
+
+def carried_by(row: Row, rows: Rows, at: Place, tool: Array) -> Array:
+    """A basis of the wrenches that a leg carries at random places, as many as where its joints are least dependent.
+
+    Args:
+        row, rows: the leg and its machine.
+        at: where it is.
+        tool: points at which they are given, m [n x 3]; their moments are over the length [n x 6 x m].
+    """
+    basis, sizes, _ = np.linalg.svd(free_screws(row, rows, at, tool))
+    rank = int((sizes > SEEN_BY_LEG * sizes.max(axis=1, initial=1e-300)[:, None]).sum(axis=1).max(initial=0))
+    return np.asarray(basis[:, :, rank:])
+
+
+def effects(row: Row, rows: Rows, sources: Sequence[Source], coordinates: Array) -> Array:
+    """The work of the leg's wrenches on its errors at given coordinates [samples * wrenches x errors]."""
+    at = placed(row, coordinates, {})
+    tool = at.end.point(np.broadcast_to(rows.point, (len(coordinates), 3)))
+    wrenches = carried_by(row, rows, at, tool)
+    columns = []
+    for _, insertions in sources:
+        ends = sum(
+            at.before[i.behind].twist(np.broadcast_to(i.twist, (len(tool), 6))) * i.amount(coordinates)[:, None]
+            for i in insertions
+        )
+        moved = scaled(moved_to(np.asarray(ends), tool), rows.length)
+        columns.append(np.einsum("nim,ni->nm", wrenches, moved).ravel())
+    return np.stack(columns, axis=1) if columns else np.zeros((0, 0))
+
+
+def _distinct(row: Row, rows: Rows, sources: Sequence[Source]) -> list[Source]:
+    """Those whose effects do not follow from the effects of those before them, in the order of the leg."""
+    columns = effects(row, rows, sources, places_of(row, rows))
+    basis: list[Array] = []
+    kept = []
+    for number, column in enumerate(columns.T):
+        size = float(np.linalg.norm(column))
+        rest = column
+        for _ in range(2):
+            rest = rest - sum((direction * (direction @ rest) for direction in basis), np.zeros_like(rest))
+        left = float(np.linalg.norm(rest))
+        if size > SEEN_BY_LEG / rows.length and left > SEEN_BY_LEG * size:
+            basis.append(rest / left)
+            kept.append(sources[number])
+    return sorted(kept, key=lambda source: source[1][0].behind)
+
+
+def _felt(row: Row, rows: Rows, sources: Sequence[Source]) -> list[Source]:
+    """Those that move the platform somewhere."""
+    sizes = np.linalg.norm(effects(row, rows, sources, places_of(row, rows)), axis=0) if sources else []
+    return [source for source, size in zip(sources, sizes, strict=True) if size > SEEN_BY_LEG / rows.length]
+
+
+def _candidates(number: int, row: Row, rows: Rows) -> Iterator[tuple[int, Source]]:
+    """Every error that may count, each with its rank in the order of listing."""
+    before: Vector | None = None
+    for place, unit in enumerate(row.units):
+        named = _Named(number, row.name, unit)
+        if unit.drive:
+            yield from named.drive(row)
+        point = unit.point or before or ZERO
+        if place == 0 or unit.point is None or before is None:
+            rank = BASE if place == 0 else LINKS
+            where = "on the base" if place == 0 else "on its link"
+            yield from ((rank, named.shift(name, axis, where)) for name, axis in _ways(None))
+        elif (unit.point - before).norm() > NO_LINK * rows.length:
+            along = (unit.point - before) * (1.0 / (unit.point - before).norm())
+            yield LENGTHS, named.length(along, row.units[place - 1].name)
+            yield from ((LINKS, named.shift(name, axis, "on its link")) for name, axis in _ways(along))
+        elif unit.kind != "ball":
+            yield from ((OFFSETS, named.shift(name, axis, "on its link")) for name, axis in _ways(None))
+        if unit.kind != "ball":
+            yield from ((TILTS, named.tilt(name, axis, point)) for name, axis in _ways(_tilting(unit)))
+        if unit.kind == "universal":
+            yield from ((OFFSETS, source) for source in named.between_axes(point))
+        if unit.bars:
+            yield from ((LENGTHS, source) for source in named.bars(unit.bars, row.coordinate[unit.first]))
+        before = unit.point or before
+    axes = [Vector(*column) for column in rows.rotation.T.tolist()]
+    named, end = _Named(number, row.name, row.units[-1]), len(row.twists)
+    for name, axis in zip("xyz", axes, strict=True):
+        yield PLATFORM, named.shift(f"platform.{name}", axis, "on the platform", end)
+        yield TILTS, named.tilt(f"platform.r{name}", axis, before or Vector(*rows.point.tolist()), end)
+
+
+def _clearances(number: int, row: Row) -> Iterator[Source]:
+    """Free motions in the passive joints of a leg, along each direction in which they hold."""
+    for unit in row.units:
+        if unit.drive or unit.bars:
+            continue
+        named = _Named(number, row.name, unit)
+        for name, axis in _ways(unit.axes[0] if unit.kind == "slide" else None):
+            yield named.clearance(name, axis)
+
+
+def _tilting(unit: Unit) -> Vector | None:
+    return unit.axes[0] if unit.bars is None else None
+
+
+def _ways(axis: Vector | None) -> list[tuple[str, Vector]]:
+    """Base axes and their names; or two directions across an axis: base axes where these are, else u, level, and v."""
+    if axis is None:
+        return list(zip("xyz", AXES, strict=True))
+    level = [pair for pair in zip("xyz", AXES, strict=True) if abs(pair[1].dot(axis)) < PARALLEL_AXES]
+    if len(level) == 2:
+        return level
+    across = AXES[2].cross(axis)
+    u = across * (1.0 / across.norm())
+    return [("u", u), ("v", axis.cross(u))]
+
+
+def _direction(axis: Vector) -> str:
+    for name, base in zip("xyz", AXES, strict=True):
+        if abs(axis.dot(base)) > 1.0 - PARALLEL_AXES:
+            return name
+    return "(" + ", ".join(f"{float(c) + 0.0:.2f}" for c in axis.components()) + ")"
+
+
+def _slide(axis: Vector) -> Array:
+    return np.array(Joint(axis).twist(ZERO).components(), dtype=float)
+
+
+def _turn(axis: Vector, point: Vector) -> Array:
+    return np.array(Joint(axis, point).twist(ZERO).components(), dtype=float)
+
+
+@dataclass(frozen=True)
+class _Named:
+    """Makes the errors of one joint."""
+
+    number: int
+    leg: str
+    unit: Unit
+
+    @property
+    def title(self) -> str:
+        """The joint with its leg."""
+        return f"{self.unit.name} of {self._of}"
+
+    @property
+    def _of(self) -> str:
+        return self.leg if "leg" in self.leg else f'leg "{self.leg}"'
+
+    def shift(self, name: str, axis: Vector, where: str, behind: int | None = None) -> Source:
+        """A joint that lies elsewhere on its link, or the platform elsewhere on the last one."""
+        words = f"position of the {self.title} {where} along {_direction(axis)}"
+        # A joint that lies further along the platform leaves the platform so much behind.
+        return self._source(name, "length", words, _slide(axis if behind is None else -axis), behind)
+
+    def length(self, along: Vector, before: str) -> Source:
+        """A link that is longer."""
+        words = f"length of {self._of} from its {before} to its {self.unit.name}"
+        return self._source("length", "length", words, _slide(along))
+
+    def tilt(self, name: str, axis: Vector, point: Vector, behind: int | None = None) -> Source:
+        """A joint whose axes are turned on the link before it, or the platform on the last joint."""
+        what = "near side of the" if self.unit.bars is not None else "axis of the"
+        if behind is not None:
+            words = f"direction of the {self.title} on the platform about {_direction(axis)}"
+            return self._source(name, "angle", words, -_turn(axis, point), behind)
+        words = f"direction of the {what} {self.title} about {_direction(axis)}"
+        return self._source(f"r{name}", "angle", words, _turn(axis, point))
+
+    def between_axes(self, point: Vector) -> Iterator[Source]:
+        """A universal joint whose axes are not perpendicular or do not meet."""
+        normal = self.unit.axes[0].cross(self.unit.axes[1])
+        normal, behind = normal * (1.0 / normal.norm()), self.unit.first + 1
+        words = f"angle between the axes of the {self.title}"
+        yield self._source("skew", "angle", words, _turn(normal, point), behind)
+        words = f"distance between the axes of the {self.title}"
+        yield self._source("offset", "length", words, _slide(normal), behind)
+
+    def bars(self, bars: Parallelogram, coordinate: int) -> Iterator[Source]:
+        """Bars that are both longer, or longer on one side than on the other."""
+        along, span = bars.along, float((bars.far - bars.near).norm())
+        level, upright = float(bars.side.dot(along)), float(bars.normal.dot(bars.side.cross(along)))
+
+        def spread(coordinates: Array) -> Array:
+            angle = coordinates[:, coordinate] / span
+            return np.asarray(1.0 / (upright * np.cos(angle) + level * np.sin(angle)))
+
+        behind = self.unit.first + 1
+        words = f"length of both bars of the {self.title}"
+        yield self._source("length", "length", words, _slide(along), behind)
+        words = f"length of the bar of the {self.title} at +side less that at -side"
+        twist = _turn(bars.normal, bars.far) / float(bars.width)
+        yield self._source("difference", "length", words, twist, behind, spread)
+
+    def drive(self, row: Row) -> Iterator[tuple[int, Source]]:
+        """Zero and gain of an actuator."""
+        drive = self.unit.drive
+        if drive is None:
+            return
+        at, home, sense = drive.coordinate, drive.home, drive.sense
+
+        def travel(coordinates: Array) -> Array:
+            return np.asarray(home + sense * coordinates[:, at])
+
+        twist = row.twists[self.unit.first] * drive.sense
+        kind = "length" if drive.slides else "angle"
+        yield ZEROS, self._source("zero", kind, f"zero of the {self.title}", twist, group="zeros")
+        words = f"gain of the {self.title}"
+        yield ZEROS, self._source("gain", "ratio", words, twist, factor=travel, group="gains")
+
+    def clearance(self, name: str, axis: Vector) -> Source:
+        """A joint that is free to move a little where it should hold."""
+        words = f"clearance of the {self.title} along {_direction(axis)}"
+        return self._source(f"clearance.{name}", "length", words, _slide(axis), group="clearances")
+
+    def _source(
+        self,
+        name: str,
+        kind: str,
+        words: str,
+        twist: Array,
+        behind: int | None = None,
+        factor: Callable[[Array], Array] | None = None,
+        group: str = "geometry",
+    ) -> Source:
+        error = MachineError(f"legs.{self.leg}.{self.unit.name}.{name}", kind, group, words, self.leg)
+        return error, (Insertion(self.number, self.unit.first if behind is None else behind, twist, factor),)

@@ -1,0 +1,358 @@
+"""The machine as built at many poses: how the tool moves by small errors of its numbers, to first order and exactly.
+
+Actuators stand where the drawn machine has them at the pose, as a controller commands them that knows the drawing only.
+The model holds for families and machines leg by leg alike, spatial and planar ones. Where legs are redundant they share
+a misfit with the least energy of their springs, or by least squares where all of them are rigid.
+
+Source: theory (45) to (49); compliances, theory (10).
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.accuracy.closing import Errors, State, closed, followed, freed, holding, moved_to, placed, scaled
+from kinetostat.accuracy.errors import Insertion, MachineError, Source, carried_by, errors_of, places_of
+from kinetostat.accuracy.rows import Row, Rows, rows_of
+from kinetostat.accuracy.shared import shared_errors
+from kinetostat.equilibrium.motion import Array, Motions, cross, each_twist
+from kinetostat.kinematics.closing import stacked
+from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinematics.forward import stand
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import POSE, with_values
+from kinetostat.spec.errors import InputError
+from kinetostat.tolerances import ONE_PLACEMENT
+
+Codes = npt.NDArray[np.int64]
+PLACED = (Status.OK, Status.JOINT_LIMIT)
+"""Statuses at which errors have a meaning."""
+
+
+@dataclass(frozen=True)
+class Flexible:
+    """How a spring moves the tool at n poses.
+
+    Attributes:
+        twist: of the tool per unit of its deformation, at the tool point, base axes, SI [n x 6].
+        compliance: of it, m/N or rad/(N·m) [n].
+    """
+
+    twist: Array
+    compliance: Array
+
+    def moved(self, wrenches: Array) -> Array:
+        """The twist of the tool by its deformation under wrenches at the tool point [n x 6], SI [n x 6]."""
+        load = np.einsum("ni,ni->n", self.twist, wrenches)
+        return np.asarray(self.twist * (self.compliance * load)[:, None])
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorModel:
+    """A machine with small errors at n poses.
+
+    Attributes:
+        machine: as drawn.
+        errors: every number that may be wrong.
+        status: `Status` codes of the drawn machine at the poses [n]; results are NaN where it has no place.
+        tool: the tool point of the drawn machine, base frame, m [n x 3].
+        turned: the axes of its platform as columns, base frame [n x 3 x 3].
+        actuators: where its actuators stand, m or rad [n x actuators].
+        load: the wrench at the tool point under which compliances count, base axes, N·m and N [n x 6].
+        rows: its legs at the home place.
+        sources: what its errors put into the legs, in their order; compliances, the last errors, put nothing there.
+    """
+
+    machine: Machine
+    errors: tuple[MachineError, ...]
+    status: Codes
+    tool: Array
+    turned: Array
+    actuators: Array
+    load: Array
+    rows: Rows
+    sources: tuple[Source, ...]
+    _flexible: tuple[Flexible, ...]
+    _drawn: State
+    _tool_home: Array
+    _carried: tuple[int, ...]
+    _soft: tuple[Array, ...]
+    _latest: dict[bytes, State] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.status)
+
+    @property
+    def length(self) -> float:
+        """The machine's characteristic length, m."""
+        return self.rows.length
+
+    @property
+    def overconstrained(self) -> bool:
+        """Whether the legs carry more wrenches than the platform needs, so that they share a misfit."""
+        return sum(self._carried) + len(self.rows.absent) > 6
+
+    def inserted(self, values: Array) -> Errors:
+        """The screw motions that errors [errors] put into each leg at the poses."""
+        return self._errors(self._each(values))
+
+    def closed_with(self, values: Array) -> State:
+        """Where all legs are with errors [errors], theory (48)."""
+        return self._closed(np.asarray(values, dtype=float))
+
+    def taken(self, rows: npt.NDArray[np.int64]) -> "ErrorModel":
+        """The model at some of its poses [rows]."""
+        drawn = State(
+            Motions(self._drawn.platform.rotation[rows], self._drawn.platform.translation[rows]),
+            tuple(q[rows] for q in self._drawn.coordinates),
+            self._drawn.settled[rows],
+        )
+        flexible = tuple(Flexible(f.twist[rows], f.compliance[rows]) for f in self._flexible)
+        parts = {name: getattr(self, name)[rows] for name in ("status", "tool", "turned", "actuators", "load")}
+        soft = tuple(s[rows] for s in self._soft)
+        return replace(self, _drawn=drawn, _flexible=flexible, _soft=soft, _latest={}, **parts)
+
+    def rates(self, rows: npt.NDArray[np.int64] | None = None, values: Array | None = None) -> Array:
+        """How the tool moves per unit of each error, actuators held, theory (46).
+
+        Args:
+            rows: numbers of the poses; all if None.
+            values: errors [errors] at which the rates are taken; none if None.
+
+        Returns:
+            Twists of the tool point, rotation first, base axes, rad and m per SI unit of the error [n x 6 x errors];
+            NaN where the machine has no place.
+        """
+        if rows is not None:
+            return self.taken(rows).rates(values=values)
+        if values is None:
+            return self._rates_at(self._drawn, [{} for _ in self.rows.legs])
+        return self._rates_at(self._closed(values), self.inserted(values))
+
+    def displaced(self, values: Array) -> tuple[Array, Codes]:
+        """Where the tool comes to with errors of any size, theory (48); compliances add to first order.
+
+        Args:
+            values: of the errors, SI [errors], or others at each pose [n x errors].
+
+        Returns:
+            Rotation vectors of the platform and displacements of the tool point from the drawn machine, base axes, rad
+            and m [n x 6], and `Status` codes [n]; NaN where the legs do not close.
+        """
+        return self._moved(self._closed(values), self._each(values))
+
+    def linearised(self, values: Array, wanted: Collection[int]) -> tuple[Array, Array]:
+        """What `displaced` and `rates` give at errors [errors], in one go [n x 6], [n x 6 x errors].
+
+        Args:
+            values: of the errors, SI.
+            wanted: errors whose rates are needed; the other rates are 0.
+        """
+        state = self._closed(values)
+        return self._moved(state, self._each(values))[0], self._rates_at(state, self.inserted(values), wanted)
+
+    def _moved(self, state: State, each: Array) -> tuple[Array, Codes]:
+        motion = state.platform @ self._drawn.platform.inverse()
+        moved = motion.amounts()
+        moved[:, 3:] = self._tool_at(state.platform) - self.tool
+        for number, spring in enumerate(self._flexible, len(self.sources)):
+            moved = moved + spring.moved(self.load) * each[:, number, None]
+        status = np.where(np.isin(self.status, PLACED) & ~state.settled, int(Status.NOT_CONVERGED), self.status)
+        return np.where(np.isin(status, PLACED)[:, None], moved, np.nan), status
+
+    def compliance(self, wrenches: Array) -> Array:
+        """How the tool deflects under wrenches per relative error of each spring's compliance [n x 6 x springs].
+
+        Args:
+            wrenches: at the tool point, base axes, N·m and N [n x 6]; the sum over all springs is the deflection.
+        """
+        parts = [spring.moved(wrenches) for spring in self._flexible]
+        return np.stack(parts, axis=2) if parts else np.zeros((len(self), 6, 0))
+
+    def _each(self, values: Array) -> Array:
+        return np.broadcast_to(np.asarray(values, dtype=float), (len(self), len(self.errors)))
+
+    def _tool_at(self, platform: Motions) -> Array:
+        return platform.point(np.broadcast_to(self._tool_home, (len(self), 3)))
+
+    def _errors(self, each: Array) -> Errors:
+        """The screw motions that errors [n x errors] put into the legs."""
+        errors: Errors = [{} for _ in self.rows.legs]
+        for number, (_, insertions) in enumerate(self.sources):
+            if not each[:, number].any():
+                continue
+            for i in insertions:
+                amount = each[:, number] * i.amount(self._drawn.coordinates[i.leg])
+                before = errors[i.leg].get(i.behind, np.zeros((len(self), 6)))
+                errors[i.leg][i.behind] = before + amount[:, None] * i.twist
+        return errors
+
+    def _closed(self, values: Array) -> State:
+        """Where all legs are with errors; those of the last values are kept, because a fit asks for them again."""
+        key = np.asarray(values, dtype=float).tobytes()
+        if key not in self._latest:
+            errors = self.inserted(values)
+            with np.errstate(all="ignore"):
+                state = closed(self.rows, self._drawn, errors, self._tool_home, self._carried, self._soft)
+            self._latest.clear()
+            self._latest[key] = state
+        return self._latest[key]
+
+    def _rates_at(self, state: State, errors: Errors, wanted: Collection[int] | None = None) -> Array:
+        tool, length, legs = self._tool_at(state.platform), self.rows.length, self.rows.legs
+        together: dict[tuple[int, int], list[tuple[int, Insertion]]] = {}
+        for number, (_, insertions) in enumerate(self.sources):
+            for i in insertions if wanted is None or number in wanted else ():
+                together.setdefault((i.leg, i.behind), []).append((number, i))
+        with np.errstate(all="ignore"):
+            places = [placed(row, q, e) for row, q, e in zip(legs, state.coordinates, errors, strict=True)]
+            hold = holding(self.rows, freed(self.rows, places, tool), tool, self._carried, self._soft)
+            result = np.zeros((len(self), 6, len(self.errors)))
+            for (leg, behind), entries in together.items():
+                twists = _beside(np.array([i.twist for _, i in entries]), errors[leg].get(behind), len(self))
+                amounts = np.stack([i.amount(self._drawn.coordinates[leg]) for _, i in entries], axis=1)
+                place = places[leg].before[behind]
+                ends = moved_to(each_twist([place] * len(entries), twists), tool) * amounts[:, :, None]
+                moved = np.swapaxes(hold.twist(leg, scaled(ends, length)), 1, 2)
+                for column, (number, _) in enumerate(entries):
+                    result[:, :, number] += moved[:, :, column]
+        result[:, 3:] *= length
+        result[:, :, len(self.sources) :] = self.compliance(self.load)
+        sound = np.isin(self.status, PLACED) & state.settled
+        return np.where(sound[:, None, None], result, np.nan)
+
+
+def _beside(twists: Array, error: Array | None, count: int) -> Array:
+    """The screws by which exp(e) moves on the left per unit of twists [k x 6] added to e [n x 6], small [n x k x 6]."""
+    every = np.broadcast_to(twists, (count, *twists.shape))
+    if error is None:
+        return every
+    once = _bracket(error, every)
+    return np.asarray(every + once / 2.0 + _bracket(error, once) / 6.0)
+
+
+def _bracket(first: Array, second: Array) -> Array:
+    """The brackets of a screw [n x 6] with others [n x k x 6]."""
+    each = np.broadcast_to(first[:, None], second.shape)
+    turning = cross(each[..., :3], second[..., :3])
+    return np.concatenate(
+        [turning, cross(each[..., :3], second[..., 3:]) + cross(each[..., 3:], second[..., :3])], axis=2
+    )
+
+
+def error_model(
+    machine: Machine, columns: Mapping[str, Array], count: int, load: npt.ArrayLike | None = None
+) -> ErrorModel:
+    """State the errors of a machine at n poses.
+
+    Args:
+        machine: as drawn.
+        columns: coordinates of the pose that vary, by leaf path ("pose.x"), SI [n].
+        count: n.
+        load: wrench at the tool point under which compliances count, base axes, N·m and N [6] or [n x 6]; that of the
+            machine's file if None.
+
+    Raises:
+        InputError: a column is not a coordinate of the pose, or the machine has no place at its home place.
+    """
+    others = [path for path in columns if not path.startswith(POSE)]
+    if others:
+        raise InputError(f'"{others[0]}" is not a coordinate of the pose of {machine.name}; errors are of one machine.')
+    posed = with_values(machine, columns) if columns else machine
+    joints = solve_joints(posed) if machine.family.chains else None
+    with np.errstate(all="ignore"):  # poses without a place
+        response, stands = respond(posed, joints), stand(posed, joints)
+    status = np.array(np.broadcast_to(np.asarray(response.status), (count,)), dtype=np.int64)
+    rows = rows_of(machine)
+    if not all(np.isfinite(twist).all() for row in rows.legs for twist in row.twists):
+        raise InputError(f"{machine.name} cannot be placed at its pose; change [pose] until `kinetostat check` is ok.")
+    platform, turned = _displacement(rows, response, count)
+    with np.errstate(all="ignore"):
+        coordinates = tuple(followed(row, platform, rows.length) for row in rows.legs)
+    actuators = stacked([a.coordinate for a in stands], count)
+    _check(rows, coordinates, actuators, status)
+    sources = [*errors_of(rows), *shared_errors(machine, rows)]
+    flexible, names = _flexible(response, count)
+    offset = np.array(machine.tables["tool"].offset, dtype=float)
+    tool_home = rows.point + rows.rotation @ offset
+    if response.configuration.plane is not None:
+        tool_home = np.where([1, 1, 0], tool_home, rows.point)
+    carried = tuple(_carried(row, rows) for row in rows.legs)
+    given = stacked(response.load.components(), count) if load is None else np.broadcast_to(load, (count, 6))
+    return ErrorModel(
+        machine,
+        (*(error for error, _ in sources), *names),
+        status,
+        platform.point(np.broadcast_to(tool_home, (count, 3))),
+        turned,
+        actuators,
+        np.asarray(given, dtype=float),
+        rows,
+        tuple(sources),
+        flexible,
+        State(platform, coordinates, np.ones(count, dtype=bool)),
+        tool_home,
+        carried,
+        _soft(response, rows, count),
+    )
+
+
+def _displacement(rows: Rows, response: Response, count: int) -> tuple[Motions, Array]:
+    """How the platform is displaced from its home place, and its axes as columns [n x 3 x 3]."""
+    placement = response.configuration.platform
+    axes = (placement.rotation.x, placement.rotation.y, placement.rotation.z)
+    turned = np.stack([stacked(axis.components(), count) for axis in axes], axis=2)
+    rotation = turned @ rows.rotation.T
+    point = stacked(placement.translation.components(), count)
+    return Motions(rotation, point - np.einsum("nij,j->ni", rotation, rows.point)), turned
+
+
+def _check(rows: Rows, coordinates: Sequence[Array], actuators: Array, status: Codes) -> None:
+    """Mark poses at which a leg that is followed from the home place has its actuator elsewhere than the machine."""
+    for row, joints in zip(rows.legs, coordinates, strict=True):
+        for drive in (unit.drive for unit in row.units if unit.drive):
+            off = actuators[:, drive.number] - drive.home - drive.sense * joints[:, drive.coordinate]
+            off = off / rows.length if drive.slides else np.arctan2(np.sin(off), np.cos(off))
+            elsewhere = ~(np.abs(off) < ONE_PLACEMENT) & np.isin(status, PLACED)
+            status[elsewhere] = int(Status.NOT_CONVERGED)
+
+
+def _carried(row: Row, rows: Rows) -> int:
+    """How many wrenches a leg carries: six less what moves freely, wherever it is."""
+    coordinates = places_of(row, rows)
+    return carried_by(row, rows, placed(row, coordinates, {}), np.zeros((len(coordinates), 3))).shape[2]
+
+
+def _soft(response: Response, rows: Rows, count: int) -> tuple[Array, ...]:
+    """The compliance of the springs of each leg at the tool, in units of the length [n x 6 x 6]."""
+    result = []
+    for leg in response.legs:
+        soft = np.zeros((count, 6, 6))
+        for twist, compliance in zip(leg.elastic, leg.compliance, strict=True):
+            size = stacked([compliance], count)
+            screw = scaled(stacked(twist.components(), count), rows.length)
+            soft += np.where(np.isfinite(size), size, 0.0)[:, :, None] * screw[:, :, None] * screw[:, None]
+        result.append(soft)
+    return tuple(result)
+
+
+def _flexible(response: Response, count: int) -> tuple[tuple[Flexible, ...], list[MachineError]]:
+    """The springs that deflect, and the relative error of the compliance of each."""
+    flexible, names = [], []
+    of_legs = [(leg.name, spring) for leg in response.configuration.legs for spring in leg.springs]
+    for (leg, spring), twist, compliance in zip(
+        of_legs, response.statics.flexibility, response.statics.compliance, strict=True
+    ):
+        size = stacked([compliance], count)[:, 0]
+        if not (np.isfinite(size).all() and (size > 0.0).any()):
+            continue
+        alone = sum(other.of == spring.of for _, other in of_legs) == 1
+        part = (spring.of if alone else spring.name).removeprefix(f"{leg} ").replace(".", " ")
+        words = f"compliance of the {part} of {leg}, relative"
+        flexible.append(Flexible(stacked(twist.components(), count), size))
+        names.append(MachineError(f"legs.{leg}.{part}.compliance", "ratio", "compliances", words, leg))
+    return tuple(flexible), names

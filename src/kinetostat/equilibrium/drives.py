@@ -1,0 +1,76 @@
+"""What drives and joints add to the coordinates of a leg: inertia of rotors through their transmission, and friction.
+
+A rotor turns against the spring of its actuator, which stands for drive and transmission: while the machine vibrates,
+the deflection of that spring is the rotor's motion. A linear actuator with the lead l turns its rotor by 2 pi / l per
+metre, a rotary one by its ratio; inertia and friction of the rotor count with the square of that.
+
+Source: theory (57). Units are those of `mechanism`.
+"""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
+from kinetostat.equilibrium.chains import Chain, Units
+from kinetostat.equilibrium.motion import Array
+from kinetostat.machine.leg import Spring
+from kinetostat.spec.errors import InputError
+
+
+def with_drives(leg: Chain, units: Units, drives: Any, damping: Any) -> Chain:
+    """Add what rotors and friction do to the coordinates of a leg.
+
+    Args:
+        leg: without it.
+        units: in which it is counted.
+        drives, damping: the tables of these names.
+
+    Raises:
+        InputError: rotors have an inertia or friction, but nothing says how far they turn.
+    """
+    given = [drives.rotor_inertia, drives.rotor_damping, damping.hinges, damping.slides]
+    if all(is_zero(number) for number in given):
+        return leg
+    rotors, dampers = np.array(leg.rotors), np.array(leg.dampers)
+    if units.count is None:
+        rotors, dampers = rotors.astype(object), dampers.astype(object)
+    for coordinate, spring in enumerate(leg.springs):
+        if spring is None:
+            dampers[:, coordinate] = _friction(leg, coordinate, units, damping)
+        elif spring.actuated:
+            turns = _turns(spring, drives)
+            square = turns * turns
+            for amounts, number in ((rotors, drives.rotor_inertia), (dampers, drives.rotor_damping)):
+                if not is_zero(number):
+                    amounts[:, coordinate] = units.inertia(square * number, spring.joint.point is not None)
+    return replace(leg, rotors=rotors, dampers=dampers)
+
+
+def _turns(spring: Spring, drives: Any) -> Scalar:
+    """By how many radians the rotor of an actuator turns per metre or radian of the actuator."""
+    slides = spring.joint.point is None
+    given = drives.lead if slides else drives.ratio
+    if is_zero(given) and not (is_zero(drives.rotor_inertia) and is_zero(drives.rotor_damping)):
+        field, example, kind = ("lead", '"10 mm"', "linear") if slides else ("ratio", "50", "rotary")
+        raise InputError(
+            f"drives.{field} is 0, but drives.rotor_inertia or drives.rotor_damping is given and the actuators are "
+            f"{kind}: nothing says how far a rotor turns; write {field} = {example} in the table [drives]."
+        )
+    return reciprocal(given) * (2.0 * math.pi) if slides else given
+
+
+def _friction(leg: Chain, coordinate: int, units: Units, damping: Any) -> Array:
+    """Friction of a passive coordinate; the bars of a parallelogram turn about both of their ends."""
+    result = units.nothing
+    for motion, follows in enumerate(leg.coordinate):
+        if follows != coordinate:
+            continue
+        turning = leg.twists[:, motion, :3]
+        if all(is_zero(part) for part in turning.flat):
+            result = result + units.inertia(damping.slides, turns=False)
+        else:
+            result = result + units.inertia(damping.hinges, turns=True) * (turning * turning).sum(axis=1)
+    return result

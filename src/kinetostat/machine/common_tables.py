@@ -1,0 +1,164 @@
+"""Tables that any machine file may have: the tool, drives, damping and loads; limits have `limits`."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
+
+from kinetostat.machine.limits import Limits
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.fields import Quantity, table
+
+
+@table
+class Tool:
+    """Table [tool], in any machine file: where on the platform loads act and motions are given."""
+
+    offset: Annotated[
+        tuple[float, float, float],
+        Quantity(
+            "length",
+            "tool point T from P in platform axes: x, y, z; K, C and the load are given at T",
+            count=3,
+            apart=True,
+        ),
+    ] = (0.0, 0.0, 0.0)
+    mass: Annotated[float, Quantity("mass", "of the platform and the tool together; 0: not counted")] = 0.0
+    centre_of_mass: Annotated[
+        tuple[float, float, float],
+        Quantity("length", "centre of that mass from P in platform axes: x, y, z", count=3, apart=True),
+    ] = (0.0, 0.0, 0.0)
+    payload: Annotated[float, Quantity("mass", "mass of what the tool carries; 0: nothing")] = 0.0
+    payload_centre: Annotated[
+        tuple[float, float, float],
+        Quantity("length", "centre of the payload from the tool point T in platform axes", count=3, apart=True),
+    ] = (0.0, 0.0, 0.0)
+    inertia: Annotated[
+        tuple[float, float, float, float, float, float],
+        Quantity("inertia", "of `mass` about its centre, platform axes: xx, yy, zz, xy, xz, yz", count=6, apart=True),
+    ] = (0.0,) * 6
+    payload_inertia: Annotated[
+        tuple[float, float, float, float, float, float],
+        Quantity("inertia", "of the payload about its centre, the same way", count=6, apart=True),
+    ] = (0.0,) * 6
+
+
+@table
+class Drives:
+    """Table [drives], in any machine file: what turns in the actuators, behind the springs of their stiffness."""
+
+    rotor_inertia: Annotated[
+        float, Quantity("moment of inertia", "of the rotor of each actuator with all that turns with it")
+    ] = 0.0
+    lead: Annotated[float, Quantity("length", "travel of a linear actuator per turn of its rotor")] = 0.0
+    ratio: Annotated[float, Quantity("ratio", "turns of the rotor per turn of a rotary actuator")] = 0.0
+    rotor_damping: Annotated[float, Quantity("torsional damping", "viscous friction that each rotor meets")] = 0.0
+
+
+@table
+class Damping:
+    """Table [damping], in any machine file: what takes energy out of vibrations."""
+
+    ratio: Annotated[float, Quantity("ratio", "damping ratio of every mode, added to all other damping")] = 0.0
+    per_mass: Annotated[float, Quantity("rate", "Rayleigh damping in proportion to mass")] = 0.0
+    per_stiffness: Annotated[float, Quantity("duration", "Rayleigh damping in proportion to stiffness")] = 0.0
+    hinges: Annotated[float, Quantity("torsional damping", "viscous friction of each passive joint that turns")] = 0.0
+    slides: Annotated[float, Quantity("linear damping", "viscous friction of each passive joint that slides")] = 0.0
+
+
+Moment = Annotated[tuple[float, float, float], Quantity("moment", "moment about x, y, z", count=3, apart=True)]
+Force = Annotated[tuple[float, float, float], Quantity("force", "force along x, y, z", count=3, apart=True)]
+
+
+@table
+class Cutting:
+    """Table [cutting], in any machine file: what the tool does to a workpiece, for the cut that stays stable."""
+
+    pressure: Annotated[float, Quantity("cutting pressure", "cutting force per area of the chip")] = 0.0
+    direction: Annotated[
+        tuple[float, float, float],
+        Quantity("direction", "across the cut, in which a vibration changes the chip; base axes", count=3, apart=True),
+    ] = (0.0, 0.0, 0.0)
+
+
+@table
+class Load:
+    """Table [load], in any machine file: a wrench on the platform at the tool point, and gravity; base axes."""
+
+    moment: Moment = (0.0, 0.0, 0.0)
+    force: Force = (0.0, 0.0, 0.0)
+    gravity: Annotated[
+        tuple[float, float, float],
+        Quantity("acceleration", "along x, y, z: pulls at all masses of a loaded machine", count=3, apart=True),
+    ] = (0.0, 0.0, 0.0)
+    gravity_angle: Annotated[float, Quantity("angle", "by which gravity is turned about gravity_axis")] = 0.0
+    gravity_axis: Annotated[
+        tuple[float, float, float], Quantity("direction", "axis of that turn, of any length", count=3, apart=True)
+    ] = (1.0, 0.0, 0.0)
+    min_tension: Annotated[
+        float, Quantity("force", "least load of what only pulls or pushes; chooses preloads", unset=math.inf)
+    ] = math.inf
+    max_tension: Annotated[float, Quantity("force", "greatest load of them", unset=math.inf)] = math.inf
+
+
+@table
+class NamedLoad:
+    """Table [load.NAME], in any machine file: another wrench on the platform, at a point of it; base axes."""
+
+    point: Annotated[
+        tuple[float, float, float],
+        Quantity("length", "where it acts: from P, in platform axes: x, y, z", count=3, apart=True),
+    ] = (0.0, 0.0, 0.0)
+    moment: Moment = (0.0, 0.0, 0.0)
+    force: Force = (0.0, 0.0, 0.0)
+
+
+STATES = {"free": False, "loaded": True}
+"""What `state` of the table [load] may be, and whether the machine is then shown at rest under its loads."""
+
+COMMON = {"tool": Tool, "drives": Drives, "damping": Damping, "cutting": Cutting, "load": Load, "limits": Limits}
+OF_VIBRATIONS = ("tool.inertia", "tool.payload_inertia", "drives.", "damping.", "cutting.")
+"""How the fields begin on which nothing depends but vibrations."""
+ROUND_OFF_OF_TENSOR = 1e-4
+"""Share of its size by which a tensor may miss what bodies have: files give a few digits."""
+
+
+def check_inertia(tables: Mapping[str, Any], origin: str) -> None:
+    """Refuse an inertia tensor that no body has, and that of a link without a mass.
+
+    Args:
+        tables: of a machine, by dotted name.
+        origin: names the machine in messages.
+
+    Raises:
+        InputError: names the field.
+    """
+    for path, numbers in tables.items():
+        for name in ("inertia", "payload_inertia"):
+            given = getattr(numbers, name, None)
+            if given is None:
+                continue
+            shown = f'"{origin}": {path}.{name} is {", ".join(f"{entry:g}" for entry in given)} kg·m²'
+            if not is_tensor_of_body(given):
+                raise InputError(
+                    f"{shown}, which no body has: about any axis it must not be negative, nor more than about two axes "
+                    "across it together; check the signs and the order xx, yy, zz, xy, xz, yz."
+                )
+            if path != "tool" and any(given) and not numbers.mass:
+                raise InputError(f"{shown}, but {path}.mass is 0; give the link its mass, or leave its inertia out.")
+
+
+def is_tensor_of_body(tensor: Sequence[float]) -> bool:
+    """Whether some body has this inertia: xx, yy, zz, xy, xz, yz about its centre of mass, kg·m².
+
+    With half its trace h, the matrix h 1 - I is the sum of m x x^T over a body, which no direction makes negative: its
+    pivots are positive, when what files round off is added to its diagonal.
+    """
+    xx, yy, zz, xy, xz, yz = tensor
+    half = 0.5 * (xx + yy + zz) + ROUND_OFF_OF_TENSOR * max(abs(entry) for entry in tensor)
+    if half == 0.0:
+        return True
+    first = half - xx
+    if first <= 0.0:
+        return False
+    second, beside = half - yy - xy * xy / first, yz + xy * xz / first
+    return second > 0.0 and half - zz - xz * xz / first - beside * beside / second > 0.0

@@ -1,0 +1,270 @@
+"""Table [tolerances] of machine files: how far numbers of the machine may be from the drawing. Nothing is evaluated.
+
+Which numbers a line is about depends on the machine, and is looked up in `studies.budget.sources`.
+"""
+
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from kinetostat.spec.document import Document, setting_value, toml_key
+from kinetostat.spec.errors import PRINTABLE, InputError, several, shorten
+from kinetostat.spec.tolerance_classes import GRADES, within_class, within_grade
+from kinetostat.units import UnitError, parse
+
+TABLE = "tolerances"
+MOST_LINES = 200
+MOST_VALUES = 3
+"""Values of a line: one for each kind of number."""
+LONGEST = 120
+"""Characters of a name or a value."""
+SIGMAS = 3.0
+"""Standard deviations that a plus-minus stands for, where a number is normally distributed."""
+UNIFORM, NORMAL = "uniform", "normal"
+LARGEST = {"length": 1.0, "angle": 0.5, "ratio": 0.5}
+"""The largest tolerance of each kind, SI: beyond it errors are not small, and nothing here would hold."""
+COSTS = (1e-6, 1e6)
+KEYS = ("tolerance", "cost")
+HOW = (
+    'write for example joints = "0.05 mm" (plus and minus), ["0.05 mm", "0.02 deg"] (lengths and angles), "sigma '
+    '0.02 mm" (a standard deviation), "0.05 mm normal" (three of them), "IT7 at 300 mm" or "ISO 2768-m at 300 mm" '
+    "(a class)"
+)
+
+_SIGNS = re.compile(r"^(?:±|\+\s*/?\s*-)\s*")
+_GRADE = re.compile(r"(?:ISO\s*286[\s:-]*)?IT\s*(\d{1,2})", re.IGNORECASE)
+_CLASS = re.compile(r"(?:ISO\s*)?2768\s*-?\s*([fmcv])[HKL]?", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How far a number may be from its nominal value.
+
+    Attributes:
+        text: as it was written.
+        kind: "length", "angle" or "ratio"; empty of a class of a standard.
+        limit: plus and minus, SI: three standard deviations of a normal distribution; 0 of a class.
+        spread: "uniform" or "normal", between or about the limits.
+        grade: of ISO 286-1; 0 if it is not written so.
+        standard_class: of ISO 2768-1: f, m, c or v; empty if it is not written so.
+        size: nominal size that was written with a class, m; 0 if none was.
+    """
+
+    text: str
+    kind: str
+    limit: float
+    spread: str
+    grade: int = 0
+    standard_class: str = ""
+    size: float = 0.0
+
+    def fits(self, kind: str) -> bool:
+        """Whether it can be the tolerance of a number of a kind."""
+        if self.standard_class:
+            return kind in ("length", "angle")
+        return kind == ("length" if self.grade else self.kind)
+
+    def within(self, kind: str, size: float) -> float:
+        """The plus and minus of a number, SI.
+
+        Args:
+            kind: of the number, "length", "angle" or "ratio".
+            size: its nominal size, m; 0 if it has none.
+
+        Raises:
+            InputError: a class of a standard needs a nominal size, or has no value for it.
+        """
+        nominal = self.size or size
+        if not (self.grade or self.standard_class):
+            return self.limit
+        if not nominal:
+            raise InputError(f'"{self.text}" depends on a nominal size; write it, for example "{self.text} at 300 mm".')
+        if self.grade:
+            return within_grade(self.grade, nominal)
+        return within_class(self.standard_class, nominal, kind)
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A line of the table: what it is about, how far those numbers may be off, what it costs to make them so.
+
+    Attributes:
+        about: a group, or a path in which * stands for anything.
+        deviations: one for each kind of number.
+        cost: of making each of its numbers as written, compared with those of other lines.
+    """
+
+    about: str
+    deviations: tuple[Deviation, ...]
+    cost: float = 1.0
+
+    @property
+    def text(self) -> str:
+        """Its values as written, by commas."""
+        return ", ".join(deviation.text for deviation in self.deviations)
+
+    def of(self, kind: str) -> Deviation | None:
+        """What it says about numbers of a kind; None if nothing."""
+        return next((deviation for deviation in self.deviations if deviation.fits(kind)), None)
+
+
+Tolerances = dict[str, Tolerance]
+"""By what they are about, in the order of the file: of two that are about the same number, the later one holds."""
+
+
+def take_tolerances(document: Document, settings: Sequence[str], origin: str) -> tuple[Document, list[str], Tolerances]:
+    """Part a machine file into all that is not a tolerance and its tolerances, with their overrides.
+
+    Args:
+        document: what was written.
+        settings: overrides "path=value"; what follows "tolerances." is what a tolerance is about, dots included. Lines
+            that they give come after those of the file.
+        origin: name of the file, for messages.
+
+    Returns:
+        The document and the settings without tolerances, and the tolerances.
+
+    Raises:
+        InputError: names the line, its value, what is allowed, and how to write it.
+    """
+    meant = [text for text in several(settings) if re.match(rf"\s*{TABLE}\s*[.=]", text)]
+    others = [text for text in several(settings) if text not in meant]
+    tolerances = read_tolerances(document.get(TABLE, {}), f'"{origin}": ')
+    for setting in meant:
+        path, equals, value = setting.partition("=")
+        if not equals:
+            raise InputError(f'{shorten(setting)} must be {TABLE}.WHAT=VALUE, e.g. {TABLE}.joints="0.05 mm".')
+        _, dot, about = path.partition(".")
+        line = {about.strip().strip("\"'"): setting_value(value.strip())} if dot else setting_value(value.strip())
+        tolerances = joined(tolerances, read_tolerances(line))
+    return {key: value for key, value in document.items() if key != TABLE}, others, tolerances
+
+
+def joined(tolerances: Mapping[str, Tolerance], further: Mapping[str, Tolerance]) -> Tolerances:
+    """Tolerances with further ones after them, which hold where both are about the same number."""
+    return {**{about: line for about, line in tolerances.items() if about not in further}, **further}
+
+
+def read_tolerances(written: object, origin: str = "") -> Tolerances:
+    """Read the table [tolerances].
+
+    Args:
+        written: values by what they are about; tables in it are parts of a path.
+        origin: before the message: the name of the file.
+
+    Raises:
+        InputError: names the line, its value, what is allowed, and how to write it.
+    """
+    if not isinstance(written, Mapping):
+        raise InputError(f"{origin}{TABLE} is {shorten(written)}; it must be a table: {HOW}.")
+    lines = list(_lines(written))
+    if len(lines) > MOST_LINES:
+        raise InputError(f"{origin}{TABLE} has {len(lines)} lines; at most {MOST_LINES} are allowed.")
+    return {about: _tolerance(about, value, f"{origin}{TABLE}.{about}") for about, value in lines}
+
+
+def _lines(table: Mapping[Any, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """The lines of a table, and of tables in it: `geometry.base_radius` need not stand in quotes."""
+    for key, value in table.items():
+        about = f"{before}{key}"
+        if isinstance(value, Mapping) and not {*KEYS} & value.keys():
+            yield from _lines(value, f"{about}.")
+        else:
+            yield about, value
+
+
+def _tolerance(about: str, value: object, place: str) -> Tolerance:
+    if not about.strip() or len(about) > LONGEST or not re.match(PRINTABLE, about):
+        raise InputError(f"{shorten(place)} cannot be looked up; give a group or a path, at most {LONGEST} letters.")
+    table = value if isinstance(value, Mapping) else {"tolerance": value}
+    if unknown := [key for key in table if key not in KEYS]:
+        raise InputError(f"{place} has no field {shorten(unknown[0])}; it may have {' and '.join(KEYS)}.")
+    entries = table.get("tolerance")
+    texts = entries if isinstance(entries, list | tuple) else [entries]
+    if not 0 < len(texts) <= MOST_VALUES:
+        raise InputError(f"{place} has {len(texts)} values; give 1 to {MOST_VALUES}: {HOW}.")
+    deviations = tuple(_deviation(text, place) for text in texts)
+    for kind in LARGEST:
+        if sum(deviation.fits(kind) for deviation in deviations) > 1:
+            raise InputError(f"{place} has two tolerances of the kind {kind} ({shorten(entries)}); give one of them.")
+    cost = table.get("cost", 1.0)
+    if isinstance(cost, bool) or not isinstance(cost, int | float) or not COSTS[0] <= cost <= COSTS[1]:
+        raise InputError(f"{place}.cost is {shorten(cost)}; give a number from {COSTS[0]:g} to {COSTS[1]:g}, e.g. 2.")
+    return Tolerance(about, deviations, float(cost))
+
+
+def _deviation(written: object, place: str) -> Deviation:
+    """Read one value: a plus-minus, a standard deviation, or a class of a standard."""
+    if not isinstance(written, str) or len(written) > LONGEST:
+        raise InputError(f"{place} is {shorten(written)}; a tolerance is a text with a unit or a class: {HOW}.")
+    text = " ".join(written.split())
+    words, spread = text, UNIFORM
+    for name in (UNIFORM, NORMAL):
+        if words.lower().endswith(f" {name}"):
+            words, spread = words[: -len(name) - 1], name
+    name, at, size = words.partition(" at ")
+    grade, general = _GRADE.fullmatch(name.strip()), _CLASS.fullmatch(name.strip())
+    if grade or general:
+        nominal = _size(size, place) if at else 0.0
+        number = int(grade[1]) if grade else 0
+        if grade and number not in GRADES:
+            raise InputError(f"{place} is {shorten(written)}; grades IT{min(GRADES)} to IT{max(GRADES)} are known.")
+        return Deviation(text, "", 0.0, spread, number, general[1].lower() if general else "", nominal)
+    factor = 1.0
+    if words.lower().startswith("sigma "):
+        words, factor, spread = words[len("sigma ") :], SIGMAS, NORMAL
+    kind, limit = _amount(_SIGNS.sub("", words), written, place)
+    return Deviation(text, kind, factor * limit, spread)
+
+
+def _size(text: str, place: str) -> float:
+    try:
+        size = parse(text.strip(), "length")
+    except UnitError as error:
+        raise InputError(f"{place}: the nominal size is {shorten(text)}: {error}.") from None
+    if not 0.0 < size <= 1e3:
+        raise InputError(f'{place}: the nominal size is {shorten(text)}; give a length, e.g. "300 mm".')
+    return size
+
+
+def _amount(text: str, written: object, place: str) -> tuple[str, float]:
+    """The kind and the SI value of a number with its unit, whose unit alone says the kind."""
+    for kind, largest in LARGEST.items():
+        try:
+            value = parse(text, kind) if re.search(r"[^\d\s.eE+-]", text) else math.nan
+        except UnitError:
+            continue
+        if not 0.0 <= value <= largest:
+            break
+        return kind, value
+    raise InputError(
+        f"{place} is {shorten(written)}, which is not a tolerance from 0 to 1 m, 0.5 rad or 50 %, with its unit; {HOW}."
+    )
+
+
+def tolerances_schema() -> dict[str, Any]:
+    """The JSON Schema of the table."""
+    text: dict[str, Any] = {"type": "string", "examples": ["0.05 mm", "sigma 0.02 mm", "IT7 at 300 mm", "20 um/m"]}
+    value = {"anyOf": [text, {"type": "array", "items": text, "minItems": 1, "maxItems": MOST_VALUES}]}
+    cost = {"type": "number", "minimum": COSTS[0], "maximum": COSTS[1], "description": "relative cost of making it so"}
+    table = {"type": "object", "properties": {"tolerance": value, "cost": cost}, "required": ["tolerance"]}
+    return {
+        "type": "object",
+        "description": "how far numbers may be from the drawing, by group (joints, zeros, gains, ...) or path",
+        "additionalProperties": {"anyOf": [*value["anyOf"], table, {"type": "object"}]},
+    }
+
+
+def tolerance_lines(tolerances: Mapping[str, Tolerance]) -> Iterator[str]:
+    """The lines of the table as TOML that reads back as the same tolerances; none without a tolerance."""
+    if not tolerances:
+        return
+    yield from ("", f"[{TABLE}]")
+    for about, line in tolerances.items():
+        texts = [deviation.text for deviation in line.deviations]
+        value = json.dumps(texts if len(texts) > 1 else texts[0], ensure_ascii=False)
+        whole = value if line.cost == 1.0 else f"{{ tolerance = {value}, cost = {line.cost!r} }}"
+        yield f"{toml_key(about)} = {whole}"

@@ -1,0 +1,155 @@
+"""Tolerances of least cost for a wanted error: which lines of [tolerances] to tighten, and which to loosen.
+
+Making a number costs its cost over its tolerance, in units of what its tolerance is now: half of the tolerance costs
+twice as much. All numbers of a line change together, by one factor.
+
+Source: theory (54).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from kinetostat.equilibrium.motion import Array
+from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.budget.inputs import Inputs
+from kinetostat.studies.budget.spread import Measures
+from kinetostat.studies.budget.toleranced import Toleranced
+
+MOST_POSES = 40
+"""Poses that decide an allocation together: each is added because it exceeds the wanted error."""
+KEPT = 1e-9
+"""Share of the wanted error by which a pose may exceed it: round-off of the search."""
+
+
+@dataclass(frozen=True, eq=False)
+class Allocation(Immutable):
+    """Tolerances of least cost.
+
+    Attributes:
+        measure: what is kept, "position" or "along".
+        by: "rss" or "worst".
+        wanted: the error that is kept, m.
+        present: that of the present tolerances, m: at the pose where it is largest.
+        lines: what each line is about.
+        factors: by which the tolerances of each line change; infinite where they have no effect.
+        costs: of each line as it is now; with a factor f it is costs / f.
+        cost, before: sums of costs with the new and the present tolerances.
+        evenly: cost of the same error if all tolerances change by one factor.
+    """
+
+    measure: str
+    by: str
+    wanted: float
+    present: float
+    lines: tuple[str, ...]
+    factors: Array
+    costs: Array
+    cost: float
+    before: float
+    evenly: float
+
+
+def reach_of(inputs: Inputs, measures: Measures, measure: str) -> dict[str, Array]:
+    """How far the limits of each part move the tool by themselves, m [n x parts], for both ways to add them up.
+
+    A joint that a load presses counts with its whole clearance.
+    """
+    rows = measures.applied(inputs.columns)[:, measures.places(measure)]
+    squares = (rows**2).sum(axis=1) * np.where(inputs.pressed[inputs.owner], 4.0, 1.0)
+    parts = np.zeros((len(rows), len(inputs.parts)))
+    np.add.at(parts.T, inputs.owner, squares.T)
+    farthest = np.zeros_like(parts)
+    for number, pressed in enumerate(inputs.pressed):
+        block = rows[:, :, inputs.owner == number] * (2.0 if pressed else 1.0)
+        farthest[:, number] = np.linalg.norm(block, ord=2, axis=(1, 2))
+    return {"rss": parts, "worst": farthest}
+
+
+def allocated(
+    parts: Sequence[Toleranced], reach: Sequence[Mapping[str, Array]], wanted: float, by: str, measure: str
+) -> Allocation:
+    """Find the factors of all lines that keep an error at least cost, theory (54).
+
+    Args:
+        parts: what has a tolerance.
+        reach: see `reach_of`, of all poses together.
+        wanted: error, m.
+        by: "rss", the root of the sum of squares, or "worst", the sum of all.
+        measure: which error it is.
+    """
+    lines = list(dict.fromkeys(part.line for part in parts))
+    owner = np.array([lines.index(part.line) for part in parts])
+    each = np.concatenate([table[by] for table in reach])
+    power = 2 if by == "rss" else 1
+    weights = np.zeros((len(each), len(lines)))
+    np.add.at(weights.T, owner, each.T)
+    weights = weights / wanted**power
+    costs = np.bincount(owner, [part.cost for part in parts], len(lines)).astype(float)
+    moves = weights.max(axis=0) > 0.0
+    present = float(weights.sum(axis=1).max())
+    factors = np.full(len(lines), np.inf)
+    if moves.any():
+        factors[moves] = _least_cost(weights[:, moves], costs[moves], power)
+    even = present ** (-1.0 / power) if present else np.inf
+    return Allocation(
+        measure,
+        by,
+        wanted,
+        wanted * present ** (1.0 / power),
+        tuple(lines),
+        factors,
+        costs,
+        float((costs / factors).sum()),
+        float(costs.sum()),
+        float(costs.sum() / even),
+    )
+
+
+def _least_cost(weights: Array, costs: Array, power: int) -> Array:
+    """The factors f of least sum of costs / f with sum of weights f^power at most 1 at each pose [lines].
+
+    Poses are taken in as they exceed the error: most of them decide nothing.
+    """
+    chosen = [int(weights.sum(axis=1).argmax())]
+    for _ in range(MOST_POSES):
+        factors = _closed_form(weights[chosen[0]], costs, power)
+        if len(chosen) > 1 or not np.isfinite(factors).all():
+            factors = _searched(weights[chosen], costs, power)
+        errors = weights @ factors**power
+        farthest = int(errors.argmax())
+        if errors[farthest] <= 1.0 + KEPT or farthest in chosen:
+            break
+        chosen.append(farthest)
+    return np.asarray(factors * min(1.0, float(errors.max()) ** (-1.0 / power)))
+
+
+def _closed_form(weights: Array, costs: Array, power: int) -> Array:
+    """The factors at a single pose, by a multiplier of Lagrange; infinite where a line has no effect there."""
+    with np.errstate(divide="ignore"):
+        shape = np.where(weights > 0.0, (costs / weights) ** (1.0 / (power + 1.0)), np.inf)
+    known = weights > 0.0
+    return np.asarray(shape * float((weights[known] * shape[known] ** power).sum()) ** (-1.0 / power))
+
+
+def _searched(weights: Array, costs: Array, power: int) -> Array:
+    """The factors at several poses: a convex problem in their logarithms."""
+
+    def cost(logarithms: Array) -> tuple[float, Array]:
+        parts = costs * np.exp(-logarithms)
+        return float(parts.sum() / costs.sum()), -parts / costs.sum()
+
+    def room(logarithms: Array) -> Array:
+        return np.asarray(-np.log(weights @ np.exp(power * logarithms)))
+
+    def slope(logarithms: Array) -> Array:
+        amounts = weights * np.exp(power * logarithms)
+        return np.asarray(-power * amounts / amounts.sum(axis=1, keepdims=True))
+
+    start = np.full(len(costs), -np.log(weights.sum(axis=1).max()) / power)
+    limits = {"type": "ineq", "fun": room, "jac": slope}
+    options = {"maxiter": 500, "ftol": 1e-14}
+    solved = minimize(cost, start, jac=True, method="SLSQP", constraints=limits, options=options)
+    return np.asarray(np.exp(solved.x))

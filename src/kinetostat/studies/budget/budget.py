@@ -1,0 +1,435 @@
+"""The error of the tool that the tolerances of a machine allow: at its pose, at poses of a list, or over a grid.
+
+Actuators stand where the drawn machine has them. To first order the error is a matrix times the errors of the machine,
+so that a million machines take a second; the equations of the machine can be solved exactly for fewer of them.
+
+Source: theory (50)-(54).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.accuracy.model import ErrorModel, error_model
+from kinetostat.display import number, with_unit
+from kinetostat.engine.batch import Progress, silent
+from kinetostat.equilibrium.motion import Array
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import POSE, values
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError, choice, shorten
+from kinetostat.spec.immutable import Immutable
+from kinetostat.spec.tolerance_table import Tolerance, joined, read_tolerances
+from kinetostat.studies.budget.allocation import Allocation, allocated, reach_of
+from kinetostat.studies.budget.inputs import Inputs, inputs_of
+from kinetostat.studies.budget.measures import PARASITIC, measures_of
+from kinetostat.studies.budget.spread import SHARE, Measures, Spread, shares, spread_of, squares_of
+from kinetostat.studies.budget.toleranced import Toleranced, toleranced
+from kinetostat.studies.evaluation.columns import PoseColumns
+from kinetostat.studies.evaluation.given_poses import given_poses
+from kinetostat.studies.grid.grid import GridQuestion, grid_question
+from kinetostat.studies.indices import unit_direction
+from kinetostat.units import UnitError, parse
+
+SAMPLES, FEW_SAMPLES = 1 << 17, 1 << 12
+"""Machines that are drawn if nobody says how many: at a single pose, and at each of many."""
+MOST_SAMPLES = 1 << 21
+MOST_EXACT = 1 << 17
+POSES_AT_ONCE = 128
+"""Poses whose machines are drawn together."""
+MOST_AT_ONCE = 1 << 20
+"""Products of poses and machines that are kept at once: each has a dozen numbers."""
+MOST_POSES = 200_000
+EXACT_AT_ONCE = 1024
+"""Machines that are solved exactly together."""
+BY = ("rss", "worst")
+STATISTICS = ("mean", "rms", "rss", "usual", "worst")
+KEYS = ("line", "leg", "group", "path")
+NOTHING = 1e-9
+"""Share of an error below which a part of it is round-off."""
+DIGITS = 3
+"""Of errors of the tool: percentiles of drawn machines have no more."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExactSample(Immutable):
+    """Machines whose equations were solved exactly, at the pose of the machine.
+
+    Attributes:
+        machines: how many.
+        failed: how many of them cannot be assembled with their actuators there.
+        rms: root of the mean square of each measure [measures].
+        usual: what 95 % of them keep within [measures].
+        difference: the largest difference of a measure from its first order [measures].
+    """
+
+    machines: int
+    failed: int
+    rms: Array
+    usual: Array
+    difference: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Budget(Immutable):
+    """The error of the tool at n poses, and what it is made of.
+
+    Attributes:
+        machine: as drawn.
+        tolerances: lines that hold, in order.
+        parts: what has a tolerance.
+        pressed: paths of joints that the load presses to one end of their clearance.
+        poses: of the list; None for another source of poses.
+        question: the grid; None if the poses are not those of a grid.
+        status: `Status` codes [n].
+        measures: names: components of the twist of the tool (rx ry rz x y z), "along", "rotation", "position", and
+            "parasitic ..." of a machine with fewer freedoms.
+        units: "rad" or "m" of each measure.
+        spread: sizes of each [n x measures]; NaN where the status is not OK.
+        shares: share of each part in the variance of each measure, all poses together [measures x parts].
+        freedoms: how many independent motions the actuators give the platform.
+        parasitic: components of the twist that no actuator moves.
+        samples: how many machines were drawn.
+        exact: machines solved exactly, if they were asked for.
+        allocation: tolerances of least cost, if they were asked for.
+        message: what is the case, in sentences.
+    """
+
+    machine: Machine
+    tolerances: tuple[Tolerance, ...]
+    parts: tuple[Toleranced, ...]
+    pressed: tuple[str, ...]
+    poses: PoseColumns | None
+    question: GridQuestion | None
+    status: npt.NDArray[np.int64]
+    measures: tuple[str, ...]
+    units: tuple[str, ...]
+    spread: Spread
+    shares: Array
+    freedoms: int
+    parasitic: tuple[str, ...]
+    samples: int
+    exact: ExactSample | None
+    allocation: Allocation | None
+    message: str
+
+    def __repr__(self) -> str:
+        return f"<Budget of {self.machine.name!r}: {len(self.parts)} tolerances, {len(self.status)} poses>"
+
+    @property
+    def settled(self) -> npt.NDArray[np.bool_]:
+        """At which poses there is a result [n]."""
+        return np.asarray(self.status == Status.OK)
+
+    @property
+    def leading(self) -> str:
+        """The measure that contributions are ranked by: along the direction that was asked for, else the position."""
+        return "along" if "along" in self.measures else "position"
+
+    @property
+    def worst_pose(self) -> int:
+        """Number of the pose, from 0, at which the usual error of the leading measure is largest."""
+        return int(np.nanargmax(self.spread.usual[:, self.measures.index(self.leading)]))
+
+    @checked
+    def size(self, statistic: str, measure: str) -> Array:
+        """One statistic of a measure at each pose, SI [n].
+
+        Args:
+            statistic: "mean" (of the average machine), "rms" (root mean square), "rss" (root of the sum of squares of
+                what the limits do one by one), "usual" (what 95 % of all machines keep within) or "worst".
+            measure: one of `measures`.
+
+        Raises:
+            InputError: there is no such statistic or measure.
+        """
+        sizes = getattr(self.spread, choice(statistic, STATISTICS, "statistic"))
+        return np.asarray(sizes[:, self.measures.index(choice(measure, self.measures, "measure"))])
+
+    @checked
+    def shares_by(self, key: str, measure: str = "") -> dict[str, float]:
+        """Shares in the variance of a measure, the largest first; they add up to 1.
+
+        Args:
+            key: "line", "leg", "group" or "path" of the parts.
+            measure: one of `measures`; the leading one if empty.
+
+        Raises:
+            InputError: there is no such key or measure.
+        """
+        choice(key, KEYS, "key")
+        row = self.shares[self.measures.index(choice(measure or self.leading, self.measures, "measure"))]
+        sums: dict[str, float] = {}
+        for part, share in zip(self.parts, row.tolist(), strict=True):
+            name = getattr(part, key) or "shared by all legs"
+            sums[name] = sums.get(name, 0.0) + share
+        # Shares that are equal but for round-off stay in the order of the machine.
+        return dict(sorted(sums.items(), key=lambda item: -round(item[1], 9)))
+
+
+@checked
+def budget(
+    machine: Machine,
+    poses: Any = None,
+    ranges: Sequence[str] = (),
+    tolerances: Mapping[str, Any] | None = None,
+    along: Sequence[float] = (),
+    samples: int = 0,
+    exact: int = 0,
+    allocate: float | str | None = None,
+    by: str = "rss",
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Budget:
+    """Compute the error of the tool that tolerances allow, what it is made of, and which tolerances would cost least.
+
+    Machines are drawn at random within their tolerances; actuators stand where the drawn machine has them. The error is
+    that of the tool point and of the platform's orientation, to first order in the tolerances.
+
+    Args:
+        machine: as drawn, with the tolerances of its file; its pose is the one that counts, if no poses are given.
+        poses: a DataFrame, a dictionary of columns, an array, a dataset or the path of a CSV file, as for `evaluate`.
+        ranges: instead of poses, a grid: one axis each, "x=-2 cm:2 cm:11", coordinates of the pose only.
+        tolerances: further lines as in the table [tolerances], after those of the file: {"joints": "0.05 mm"}.
+        along: a direction, base axes, of any length: the error of the tool point along it is a further measure.
+        samples: machines that are drawn for percentiles, rounded up to a power of 2; 0 for 131072 at a single pose and
+            4096 at each of many.
+        exact: machines whose equations are solved exactly, at the pose of the machine.
+        allocate: wanted error of the tool point (or along the direction), m or text with a unit: gives the tolerances
+            of least cost that keep it.
+        by: what must keep it: "rss", the root of the sum of squares, or "worst", the worst case.
+        seed: of the random machines.
+        progress: receives how far the work is.
+
+    Raises:
+        InputError: no tolerances, a line that is about nothing or has no size, a bad argument, poses that cannot be
+            read or of which none has a place.
+    """
+    _check(poses, ranges, samples, exact, by, seed)
+    lines = joined(machine.tolerances, read_tolerances({} if tolerances is None else tolerances))
+    question = grid_question(machine, ranges, ["singularity_margin"]) if ranges else None
+    columns = None if poses is None else given_poses(machine, poses)
+    leaves, count = _points(question, columns)
+    if count > MOST_POSES:
+        raise InputError(f"there are {count:,} poses; at most {MOST_POSES:,} are computed: lower their number.")
+    direction = np.array(unit_direction(along, "along")) if len(along) else None
+    work = _Work(machine, lines, direction, _power(samples or (SAMPLES if count == 1 else FEW_SAMPLES)), seed)
+    status = np.full(count, int(Status.OUT_OF_REACH), dtype=np.int64)
+    step = max(1, min(POSES_AT_ONCE, MOST_AT_ONCE // work.samples))
+    for start in range(0, count, step):
+        rows = slice(start, min(start + step, count))
+        status[rows] = work.add({path: column[rows] for path, column in leaves.items()}, rows.stop - start)
+        progress(rows.stop, count)
+    return _answer(work, status, question, columns, exact, allocate, by)
+
+
+def _check(poses: Any, ranges: Sequence[str], samples: int, exact: int, by: str, seed: int) -> None:
+    if poses is not None and ranges:
+        raise InputError("the poses come from a list or from ranges, not from both; leave one of them out.")
+    if (poses is not None or ranges) and exact:
+        raise InputError("exact machines are solved at the pose of the machine; leave the poses out, or exact.")
+    for name, value, most in (("samples", samples, MOST_SAMPLES), ("exact", exact, MOST_EXACT)):
+        if not 0 <= value <= most:
+            raise InputError(f"{name} is {shorten(value)}; give a whole number of machines from 1 to {most:,}.")
+    if seed < 0:
+        raise InputError(f"seed is {seed}; give a whole number from 0.")
+    choice(by, BY, "by")
+
+
+def _power(count: int) -> int:
+    """The next power of 2: so many Sobol points are even."""
+    return 1 << max(0, count - 1).bit_length()
+
+
+def _points(question: GridQuestion | None, columns: PoseColumns | None) -> tuple[Mapping[str, Array], int]:
+    if question is not None:
+        return question.grid.columns(0, question.grid.size), question.grid.size
+    return ({}, 1) if columns is None else (columns.leaves, columns.count)
+
+
+class _Work:
+    """Adds up the answer, some poses at a time; every pose has the same machines."""
+
+    def __init__(
+        self, machine: Machine, lines: Mapping[str, Tolerance], along: Array | None, samples: int, seed: int
+    ) -> None:
+        self.machine, self.lines, self.along, self.samples, self.seed = machine, lines, along, samples, seed
+        self.parts: tuple[Toleranced, ...] = ()
+        self.pressed: npt.NDArray[np.bool_] | None = None
+        self.measures: Measures | None = None
+        self.inputs: Inputs | None = None
+        self.freedoms, self.parasitic = 0, tuple[str, ...]()
+        self.spreads: list[tuple[npt.NDArray[np.bool_], Spread | None]] = []
+        self.reach: list[dict[str, Array]] = []
+        self.largest: Array | float = -np.inf
+        self.squares: Array | float = 0.0
+
+    def add(self, columns: Mapping[str, Array], count: int) -> npt.NDArray[np.int64]:
+        """Add some poses; return their `Status` codes."""
+        model = error_model(self.machine, columns, count)
+        if not self.parts:
+            self.parts = toleranced(self.machine, model.errors, self.lines)
+        settled = np.asarray(model.status == Status.OK)
+        spread = self._spread(model.taken(np.flatnonzero(settled))) if settled.any() else None
+        self.spreads.append((settled, spread))
+        return model.status
+
+    def _spread(self, model: ErrorModel) -> Spread:
+        rates = model.rates()
+        length = float(self.machine.configure((0.0,) * _joints(self.machine)).length)
+        inputs = inputs_of(self.parts, rates, model.load, length, self.pressed)
+        zeros = [place for place, error in enumerate(model.errors) if error.group == "zeros"]
+        names = self.machine.family.component_names
+        measures, self.freedoms, self.parasitic = measures_of(rates[:, :, zeros], names, self.along, length)
+        self.pressed = inputs.pressed
+        if self.inputs is None:
+            self.inputs, self.measures = inputs, measures
+        spread, largest = spread_of(inputs, measures, inputs.machines(self.samples, self.seed))
+        self.largest = np.maximum(self.largest, largest)
+        self.squares = self.squares + squares_of(inputs, measures)
+        self.reach.append(reach_of(inputs, measures, "position" if self.along is None else "along"))
+        return spread
+
+
+def _joints(machine: Machine) -> int:
+    """How many joint coordinates its family is placed by."""
+    return machine.chains().size if machine.family.chains else 0
+
+
+def _answer(
+    work: _Work,
+    status: npt.NDArray[np.int64],
+    question: GridQuestion | None,
+    columns: PoseColumns | None,
+    exact: int,
+    allocate: float | str | None,
+    by: str,
+) -> Budget:
+    inputs, measures = work.inputs, work.measures
+    if inputs is None or measures is None:
+        first = Status(int(status[0]))
+        where = "the pose" if len(status) == 1 else "all poses"
+        raise InputError(
+            f"{work.machine.name} has no result at {where} ({first.word.replace('_', ' ')}): {first.sentence}"
+        )
+    answer = Budget(
+        work.machine,
+        tuple(work.lines.values()),
+        work.parts,
+        tuple(part.path for part, pressed in zip(work.parts, inputs.pressed, strict=True) if pressed),
+        columns,
+        question,
+        status,
+        measures.names,
+        tuple(measures.units[name] for name in measures.names),
+        _whole(work, len(measures.names)),
+        shares(np.asarray(work.squares)),
+        work.freedoms,
+        work.parasitic,
+        work.samples,
+        _exact(work, inputs, measures, _power(exact)) if exact else None,
+        None,
+        "",
+    )
+    if allocate is not None:
+        allocation = allocated(work.parts, work.reach, _length(allocate), by, answer.leading)
+        answer = replace(answer, allocation=allocation)
+    return replace(answer, message=_message(answer))
+
+
+def _length(text: float | str) -> float:
+    try:
+        value = parse(text, "length")
+    except UnitError as error:
+        raise InputError(f"allocate, the wanted error, is {shorten(text)}: {error}.") from None
+    if not value > 0.0:
+        raise InputError(f'allocate, the wanted error, is {shorten(text)}; it must be greater than 0: "0.05 mm".')
+    return value
+
+
+def _whole(work: _Work, size: int) -> Spread:
+    """The spreads of all slabs of poses as one, NaN where there is no result."""
+    parts: dict[str, list[Array]] = {name: [] for name in ("mean", "rms", "rss", "worst", "usual")}
+    for settled, spread in work.spreads:
+        for name, tables in parts.items():
+            table = np.full((len(settled), size), np.nan)
+            if spread is not None:
+                table[settled] = getattr(spread, name)
+            tables.append(table)
+    everywhere = np.percentile(np.asarray(work.largest), SHARE, axis=0)
+    return Spread(**{name: np.concatenate(tables) for name, tables in parts.items()}, everywhere=everywhere)
+
+
+def _exact(work: _Work, inputs: Inputs, measures: Measures, count: int) -> ExactSample:
+    """Solve machines exactly at the pose of the machine."""
+    path = next(path for path in values(work.machine) if path.startswith(POSE))
+    here = float(values(work.machine)[path])
+    sizes, first = [], []
+    model: ErrorModel | None = None
+    for slab in inputs.machines(count, work.seed):
+        for start in range(0, len(slab), EXACT_AT_ONCE):
+            drawn = slab[start : start + EXACT_AT_ONCE]
+            if model is None or len(model) != len(drawn):
+                model = error_model(work.machine, {path: np.full(len(drawn), here)}, len(drawn))
+            moved, _ = model.displaced(inputs.drawn + drawn @ inputs.errors.T)
+            linear = inputs.shift[0] + drawn @ inputs.columns[0].T
+            sizes.append(measures.sizes(measures.applied(moved[None].swapaxes(1, 2))[0].T))
+            first.append(measures.sizes(measures.applied(linear[None].swapaxes(1, 2))[0].T))
+    solved, linear = np.concatenate(sizes), np.concatenate(first)
+    closed = np.isfinite(solved).all(axis=1)
+    if not closed.any():
+        raise InputError(
+            f"{work.machine.name}: none of the {count:,} machines can be assembled with its actuators there; make the "
+            "tolerances smaller."
+        )
+    solved, linear = solved[closed], linear[closed]
+    return ExactSample(
+        count,
+        int((~closed).sum()),
+        np.sqrt((solved**2).mean(axis=0)),
+        np.percentile(solved, SHARE, axis=0),
+        np.abs(solved - linear).max(axis=0),
+    )
+
+
+def _message(answer: Budget) -> str:
+    leading = answer.leading
+    pose = answer.worst_pose
+    usual, worst = (float(answer.size(name, leading)[pose]) for name in ("usual", "worst"))
+    where = "along the direction" if leading == "along" else "at the tool point"
+    many = "" if len(answer.status) == 1 else f" at the worst of {int(answer.settled.sum())} poses"
+    size, most = (_shown(answer, value, "m") for value in (usual, worst))
+    first = f"95 % of all machines are off by at most {size} {where}{many} (worst case {most})."
+    if not worst:
+        return f"The tolerances do not move the tool {where}."
+    ranked = [f"{name} ({100.0 * share:.0f} %)" for name, share in answer.shares_by("line").items() if share > 0.005]
+    sentences = [first, f"The variance comes from {', '.join(ranked[:4])}."]
+    if answer.freedoms < len(answer.machine.family.components):
+        sentences.append(_uncorrected(answer, pose))
+    if answer.pressed:
+        sentences.append(f"The load presses {len(answer.pressed)} joints to one end of their clearance.")
+    return " ".join(sentences)
+
+
+def _uncorrected(answer: Budget, pose: int) -> str:
+    """Say which part of the error no correction of the actuators takes away."""
+    parts = []
+    for measure, words in (("rotation", "turns by up to"), ("rz", "turns by up to"), ("position", "moves by up to")):
+        name = f"{PARASITIC}{measure}"
+        if name in answer.measures and not (measure == "rz" and f"{PARASITIC}rotation" in answer.measures):
+            size = float(answer.size("usual", name)[pose])
+            if size > NOTHING * float(answer.size("usual", name.removeprefix(PARASITIC))[pose]):
+                parts.append(f"{words} {_shown(answer, size, answer.units[answer.measures.index(name)])}")
+    what = f"no actuator moves {' '.join(answer.parasitic)}" if answer.parasitic else "no actuator corrects all of it"
+    left = f", and by parasitic motions the platform {' and '.join(parts)} (95 %)" if parts else ""
+    return f"The machine has {answer.freedoms} freedoms: {what}{left}."
+
+
+def _shown(answer: Budget, value: float, unit: str) -> str:
+    """A small motion in as many digits as percentiles of drawn machines have."""
+    scale = answer.machine.display.deflection(unit)
+    return with_unit(number(value * scale.factor, digits=DIGITS), scale.unit)

@@ -1,0 +1,273 @@
+"""Measured poses, distances and deflections of a machine from a CSV file: every value is checked, nothing is fitted.
+
+A line of names, then a line for each pose. Columns named like coordinates of the pose or actuators say what was
+commanded; `measured.x` and so on what was measured, `deflection.x` what a wrench moved, `sigma.x` how surely.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.kinematics.forward import assembly_modes, system_of
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import POSE
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.fields import Quantity, quantities
+from kinetostat.studies.evaluation.columns import Column, read_columns
+from kinetostat.studies.evaluation.pose_file import columns_of
+from kinetostat.units import UnitError
+
+Array = npt.NDArray[np.float64]
+
+POSITION, TURNED, EULER = ("x", "y", "z"), ("rx", "ry", "rz"), ("roll", "pitch", "yaw")
+MEASURED = {
+    **dict.fromkeys((*POSITION, "distance"), "length"),
+    **dict.fromkeys((*TURNED, *EULER), "angle"),
+}
+"""What can be measured of a pose, and the kinds of these quantities: position of the target, its rotation vector or its
+roll, pitch and yaw, and its distance from a fixed point."""
+MOVED = {**dict.fromkeys(POSITION, "length"), **dict.fromkeys(TURNED, "angle")}
+"""What can be measured of a deflection."""
+WRENCH = {f"moment.{name}": "moment" for name in POSITION} | {f"force.{name}": "force" for name in POSITION}
+GROUPS: dict[str, Mapping[str, str]] = {
+    "measured": MEASURED,
+    "deflection": MOVED,
+    "from": dict.fromkeys(POSITION, "length"),
+    "sigma": {**MEASURED, **{f"deflection.{name}": kind for name, kind in MOVED.items()}},
+}
+"""Columns by the word before their first dot, with the kinds of their quantities."""
+HALF_TURN = np.pi * (1.0 + 1e-9)
+MOST_POSES = 10_000
+"""Poses that are fitted at once."""
+FAR = 0.5
+"""Share of the machine's length by which a measured position may differ from the commanded one in a known frame."""
+
+
+@dataclass(frozen=True)
+class Sigmas:
+    """Standard deviations of measured values where the file gives none.
+
+    Attributes:
+        length: m.
+        angle: rad.
+        known: whether they were given; if not, only their ratio counts.
+    """
+
+    length: float
+    angle: float
+    known: bool = True
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """What was commanded and measured at n poses; NaN where a cell is empty.
+
+    Attributes:
+        path: of the file.
+        lines: numbers of its lines [n].
+        pose: commanded coordinates by leaf path, SI [n].
+        values: measured ones by name, "x", "distance", "deflection.x", SI [n].
+        sigma: their standard deviations, SI [n].
+        wrenches: on the tool, base axes, N·m and N [n x 6].
+        origins: from which distances are measured, m [n x 3].
+        known: whether the standard deviations are known, not only their ratios.
+    """
+
+    path: str
+    lines: tuple[int, ...]
+    pose: Mapping[str, Array]
+    values: Mapping[str, Array]
+    sigma: Mapping[str, Array]
+    wrenches: Array
+    origins: Array
+    known: bool = True
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    @property
+    def count(self) -> int:
+        """How many values have been measured."""
+        return int(sum(np.isfinite(values).sum() for values in self.values.values()))
+
+    @property
+    def loaded(self) -> bool:
+        """Whether any wrench acts."""
+        return bool(self.wrenches.any())
+
+    def refused(self, row: int, what: str) -> InputError:
+        """What is wrong with a pose, with file and line."""
+        return InputError(f'"{self.path}", line {self.lines[row]}: {what}')
+
+
+def read_measurements(machine: Machine, path: Path, sigmas: Sigmas) -> Measurements:
+    """Read measurements from a CSV file.
+
+    Args:
+        machine: that was measured.
+        path: of the file.
+        sigmas: standard deviations where the file has no column for them.
+
+    Raises:
+        InputError: the file cannot be read, a column is unknown or missing, or a value is of the wrong kind or beyond
+            what it can be; the message names file, line and column.
+    """
+    columns, lines = columns_of(path, MOST_POSES)
+
+    def where(name: str, row: int) -> str:
+        return f"line {lines[row]}, column {name}"
+
+    try:
+        sorted_columns = _sorted(columns)
+        commanded = sorted_columns.pop("", [])
+        driven = sorted_columns.pop("actuator", [])
+        pose = dict(read_columns(machine, commanded, where).leaves) if commanded else {}
+        others = [leaf for leaf in pose if not leaf.startswith(POSE)]
+        if others:
+            raise InputError(
+                f"{others[0]} is not a coordinate of the pose; a machine that was measured has one geometry."
+            )
+        if driven:
+            if pose:
+                raise InputError("both poses and actuators are commanded; leave the columns of the ones or others out.")
+            pose = _from_actuators(machine, driven, where)
+        if not pose:
+            names = ", ".join(name.removeprefix(POSE) for name in _pose_names(machine))
+            raise InputError(f"no column says what was commanded; add columns of the pose ({names}) or actuator.NAME.")
+        numbers = {
+            group: {_inner(column): _numbers(column, GROUPS[group], where) for column in entries}
+            for group, entries in sorted_columns.items()
+            if group in GROUPS
+        }
+        wrench = {
+            column.name: _numbers(column, WRENCH, where, column.name) for column in sorted_columns.get("wrench", [])
+        }
+        return _measurements(str(path), lines, pose, numbers, wrench, sigmas)
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if text.startswith('"') else f'"{path}": {text}') from None
+
+
+def _sorted(columns: Sequence[Column]) -> dict[str, list[Column]]:
+    """The columns by what they are about."""
+    result: dict[str, list[Column]] = {}
+    for column in columns:
+        head, _, rest = column.name.partition(".")
+        group = head if rest and head in (*GROUPS, "actuator") else "wrench" if column.name in WRENCH else ""
+        if group in GROUPS and rest not in GROUPS[group]:
+            allowed = ", ".join(f"{group}.{name}" for name in GROUPS[group])
+            raise InputError(f"there is no column {column.name}; choose from {allowed}.")
+        result.setdefault(group, []).append(column)
+    return result
+
+
+def _inner(column: Column) -> str:
+    return column.name.partition(".")[2]
+
+
+def _pose_names(machine: Machine) -> list[str]:
+    return list(quantities(machine.family.tables["pose"]))
+
+
+def _numbers(column: Column, kinds: Mapping[str, str], where: Callable[[str, int], str], name: str = "") -> Array:
+    """A column of measured values, SI, NaN where a cell is empty."""
+    kind, result = kinds[name or _inner(column)], np.full(len(column.entries), np.nan)
+    bounds = Quantity(kind, "", positive=column.name.startswith("sigma"))
+    for row, entry in enumerate(column.entries):
+        text = str(entry).strip()
+        if not text:
+            continue
+        try:
+            plain = (column.unit and text[-1].isdecimal()) or text.endswith(".")
+            result[row] = bounds.number(f"{text} {column.unit}" if plain else text)
+        except UnitError as error:
+            raise InputError(f"{where(column.name, row)} is {shorten(text)}: {error}.") from None
+        if kind == "angle" and not column.name.startswith("sigma") and abs(result[row]) > HALF_TURN:
+            raise InputError(
+                f"{where(column.name, row)} is {np.degrees(result[row]):.6g} deg, more than half a turn, which no "
+                "orientation has; check the unit in the head of the column."
+            )
+    return result
+
+
+def _measurements(
+    path: str,
+    lines: Sequence[int],
+    pose: Mapping[str, Array],
+    numbers: Mapping[str, Mapping[str, Array]],
+    wrench: Mapping[str, Array],
+    sigmas: Sigmas,
+) -> Measurements:
+    count = len(lines)
+    values = dict(numbers.get("measured", {}))
+    values |= {f"deflection.{name}": entries for name, entries in numbers.get("deflection", {}).items()}
+    if not values:
+        raise InputError(
+            "no column says what was measured; add columns such as measured.x [mm], measured.rx [deg], "
+            "measured.distance [mm] or deflection.z [um]."
+        )
+    if set(TURNED) & values.keys() and set(EULER) & values.keys():
+        raise InputError(
+            "orientations are given both as rx, ry, rz and as roll, pitch, yaw; keep the ones or the others."
+        )
+    origins = np.stack([numbers.get("from", {}).get(name, np.full(count, np.nan)) for name in POSITION], axis=1)
+    wrenches = np.stack([np.nan_to_num(wrench.get(name, np.zeros(count))) for name in WRENCH], axis=1)
+    result = Measurements(
+        path,
+        tuple(lines),
+        pose,
+        values,
+        _sigma(values, numbers.get("sigma", {}), sigmas),
+        wrenches,
+        origins,
+        sigmas.known or _all_sure(values, numbers.get("sigma", {})),
+    )
+    for name, entries in values.items():
+        rows = np.flatnonzero(np.isfinite(entries))
+        if name == "distance" and not np.isfinite(origins[rows]).all():
+            row = int(rows[~np.isfinite(origins[rows]).all(axis=1)][0])
+            raise result.refused(row, "a distance is measured, but not from where; add from.x, from.y and from.z [mm].")
+        if name.startswith("deflection") and not wrenches[rows].any(axis=1).all():
+            row = int(rows[~wrenches[rows].any(axis=1)][0])
+            raise result.refused(row, "a deflection is measured without a load; add columns such as force.z [N].")
+    return result
+
+
+def _all_sure(values: Mapping[str, Array], given: Mapping[str, Array]) -> bool:
+    """Whether the file says of every measured value how sure it is."""
+    return all(name in given and np.isfinite(given[name][np.isfinite(v)]).all() for name, v in values.items())
+
+
+def _sigma(values: Mapping[str, Array], given: Mapping[str, Array], sigmas: Sigmas) -> dict[str, Array]:
+    """Standard deviations of all measured values, from the file or from the defaults."""
+    result = {}
+    for name, entries in values.items():
+        kind = GROUPS["sigma"][name]
+        usual = np.full(len(entries), sigmas.length if kind == "length" else sigmas.angle)
+        stated = given.get(name, usual)
+        result[name] = np.where(np.isnan(stated), usual, stated)
+    return result
+
+
+def _from_actuators(machine: Machine, columns: Sequence[Column], where: Callable[[str, int], str]) -> dict[str, Array]:
+    """The poses of the drawn machine at given coordinates of its actuators, one after the other."""
+    system = system_of(machine)
+    goals = np.tile([float(actuator.coordinate) for actuator in system.actuators], (len(columns[0].entries), 1))
+    names = {key: n for n, a in enumerate(system.actuators) for key in (a.name, a.leg)}
+    for column in columns:
+        name = _inner(column)
+        if name not in names:
+            known = ", ".join(f"actuator.{actuator.leg}" for actuator in system.actuators)
+            raise InputError(f"there is no column {column.name}; choose from {known}.")
+        kind = system.actuators[names[name]].kind
+        goals[:, names[name]] = _numbers(column, {name: kind}, where)
+    poses = []
+    for row, goal in enumerate(goals):
+        modes = assembly_modes(system, goal, 0, 0.0) if np.isfinite(goal).all() else []
+        if not modes:
+            raise InputError(f"{where('actuator', row)}: the drawn machine has no pose with these coordinates nearby.")
+        poses.append(modes[0].pose)
+    return {f"{POSE}{name}": np.array([pose[name] for pose in poses]) for name in poses[0]}

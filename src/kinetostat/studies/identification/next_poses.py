@@ -1,0 +1,161 @@
+"""Which poses to measure next: those that make the uncertain combinations of unknowns surest (D-optimal designs).
+
+The determinant of the information grows by poses that are chosen one after the other, and then exchanged as long as
+that helps (V. Fedorov, 1972). Candidates lie at random within limits of the pose.
+
+Source: theory (67) and (68).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinetostat.accuracy.model import PLACED, error_model
+from kinetostat.equilibrium.motion import Array
+from kinetostat.machine.machine import Machine
+from kinetostat.studies.identification.fit import Fit
+from kinetostat.studies.identification.measurements import Measurements
+from kinetostat.studies.identification.observed import Observed, observed
+
+CANDIDATES = 400
+MOST_PROPOSED = 100
+EXCHANGES = 5
+"""Rounds of exchanges at most."""
+NEARBY = 0.1
+"""How far on either side of what was measured first poses go at least: a tenth of the machine's length, or 0.1 rad."""
+
+
+@dataclass(frozen=True)
+class NextPoses:
+    """Poses that should be measured next.
+
+    Attributes:
+        poses: coordinates by leaf path, SI [k].
+        sharper: by which factor they make the intervals of the unknowns shorter, as a geometric mean.
+        random: the factor of as many poses at random.
+    """
+
+    poses: Mapping[str, Array]
+    sharper: float
+    random: float
+
+
+def next_poses(machine: Machine, seen: Observed, fit: Fit, sizes: Array, count: int) -> NextPoses | None:
+    """Choose poses within those that have been measured; None where no candidate can be placed.
+
+    Args:
+        machine: that is measured.
+        seen: its measurements beside the model.
+        fit: to them.
+        sizes: plausible size of each unknown, SI [unknowns].
+        count: how many poses are wanted.
+    """
+    limits = {path: (values.min(), values.max()) for path, values in seen.data.pose.items()}
+    rng = np.random.default_rng(0)
+    there = _candidates(machine, seen, limits, rng)
+    rows = len(there.data)
+    if rows < count:
+        return None
+    _, rates = there.linearised(fit.values)
+    basis = fit.ways[:, : fit.rank]
+    blocks = (rates * sizes @ basis).reshape(rows, -1, fit.rank)
+    start = np.diag(fit.seen[: fit.rank] ** 2)
+    chosen = chosen_poses(blocks, start, count)
+    gain, usual = (_gain(blocks[which], start) for which in (chosen, rng.permutation(rows)[:count]))
+    return NextPoses({path: values[chosen] for path, values in there.data.pose.items()}, gain, usual)
+
+
+def first_poses(machine: Machine, seen: Observed, sizes: Array, count: int) -> Mapping[str, Array]:
+    """Choose poses to add where there are too few for a fit: about those that are there, and at least somewhat apart.
+
+    Args:
+        machine: that is measured.
+        seen: its few measurements beside the model.
+        sizes: plausible size of each unknown, SI [unknowns].
+        count: how many poses are wanted.
+
+    Returns:
+        Coordinates by leaf path, SI [count at most].
+    """
+    limits = {}
+    for path, values in seen.data.pose.items():
+        least = NEARBY * (seen.model.length if unit_of(path) == "m" else 1.0)
+        middle, half = 0.5 * (values.max() + values.min()), 0.5 * (values.max() - values.min())
+        limits[path] = (middle - max(half, least), middle + max(half, least))
+    there = _candidates(machine, seen, limits, np.random.default_rng(0))
+    _, known = seen.linearised(np.zeros(len(sizes)))
+    _, rates = there.linearised(np.zeros(len(sizes)))
+    blocks = (rates * sizes).reshape(len(there.data), -1, len(sizes))
+    start = (known * sizes).T @ (known * sizes)
+    chosen = chosen_poses(blocks, start, min(count, len(blocks)))
+    return {path: values[chosen] for path, values in there.data.pose.items()}
+
+
+def unit_of(path: str) -> str:
+    """The SI unit of a coordinate of the pose."""
+    return "m" if path.removeprefix("pose.") in ("x", "y", "z", "length") else "rad"
+
+
+def _candidates(
+    machine: Machine, seen: Observed, limits: Mapping[str, tuple[float, float]], rng: np.random.Generator
+) -> Observed:
+    """Poses at random within limits that the machine reaches, as if the same had been measured there."""
+    poses = {path: rng.uniform(low, high, CANDIDATES) for path, (low, high) in limits.items()}
+    whole = error_model(machine, poses, CANDIDATES, np.zeros(6))
+    rows = np.flatnonzero(np.isin(whole.status, PLACED))
+    poses = {path: values[rows] for path, values in poses.items()}
+    return observed(whole.taken(rows), _like(seen.data, poses, len(rows)), seen.unknowns, seen.frame)
+
+
+def _like(data: Measurements, pose: Mapping[str, Array], count: int) -> Measurements:
+    """Measurements of the same sort at other poses; what they say does not count."""
+    typical = {name: np.full(count, float(np.median(sigma))) for name, sigma in data.sigma.items()}
+    loads = data.wrenches[np.flatnonzero(data.wrenches.any(axis=1))[:1]]
+    wrench = np.broadcast_to(loads[0] if len(loads) else np.zeros(6), (count, 6))
+    origins = np.broadcast_to(np.nan_to_num(np.nanmedian(np.nan_to_num(data.origins), axis=0)), (count, 3))
+    values = {name: np.zeros(count) for name in data.values}
+    return Measurements(data.path, tuple(range(count)), pose, values, typical, wrench, origins, data.known)
+
+
+def chosen_poses(blocks: Array, start: Array, count: int) -> list[int]:
+    """Choose poses whose information has the greatest determinant together with what is known, theory (67).
+
+    Args:
+        blocks: rates of the values measured at each pose, in standard deviations [poses x values x unknowns].
+        start: the information so far [unknowns x unknowns].
+        count: how many.
+    """
+    chosen: list[int] = []
+    information = start + np.eye(len(start)) * 1e-9 * max(float(np.trace(start)), 1.0)
+    for _ in range(count):
+        best = int(np.argmax(_growth(blocks, information, chosen)))
+        chosen.append(best)
+        information = information + blocks[best].T @ blocks[best]
+    for _ in range(EXCHANGES):
+        changed = False
+        for place in range(count):
+            rest = information - blocks[chosen[place]].T @ blocks[chosen[place]]
+            others = [number for n, number in enumerate(chosen) if n != place]
+            best = int(np.argmax(_growth(blocks, rest, others)))
+            changed = changed or best != chosen[place]
+            chosen[place] = best
+            information = rest + blocks[best].T @ blocks[best]
+        if not changed:
+            break
+    return chosen
+
+
+def _growth(blocks: Array, information: Array, taken: list[int]) -> Array:
+    """By how much each pose makes the logarithm of the determinant grow [poses]; nothing of those that are taken."""
+    spread = blocks @ np.linalg.solve(information, np.swapaxes(blocks, 1, 2))
+    growth = np.linalg.slogdet(np.eye(blocks.shape[1]) + spread)[1]
+    growth[taken] = -np.inf
+    return np.asarray(growth)
+
+
+def _gain(blocks: Array, start: Array) -> float:
+    """The factor by which intervals become shorter, as a geometric mean, theory (68)."""
+    flat = blocks.reshape(-1, blocks.shape[2])
+    before, after = (float(np.linalg.slogdet(information)[1]) for information in (start, start + flat.T @ flat))
+    return float(np.exp((after - before) / (2.0 * len(start))))

@@ -1,0 +1,282 @@
+"""What a machine with errors would be measured as, and how that changes with every unknown: theory (64).
+
+Unknowns are errors of the machine, and where wanted the place of the measuring frame in the base frame and that of the
+target on the platform. Residuals are in standard deviations.
+
+Source: theory (64); exact places and rates are those of theory (46) and (48).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.accuracy.errors import MachineError
+from kinetostat.accuracy.model import PLACED, ErrorModel
+from kinetostat.equilibrium.motion import Array, Motions, cross, exponential, logarithm
+from kinetostat.kinematics.status import Status
+from kinetostat.studies.identification.measurements import EULER, FAR, POSITION, TURNED, Measurements
+
+STEP = 1e-5
+"""Of central differences of angles by small rotations, rad: what they leave out is its square."""
+FRAME = tuple(f"frame.{name}" for name in (*TURNED, *POSITION))
+TARGET = tuple(f"target.{name}" for name in (*TURNED, *POSITION))
+"""Unknown places of the measuring frame in the base frame, and of the target from the tool point in platform axes."""
+PLACES = {"frame": "place of the measuring frame in the base frame", "target": "place of the target on the platform"}
+
+
+def place_unknown(path: str) -> MachineError:
+    """An unknown of the measuring frame or the target, described as errors are."""
+    what, name = path.split(".")
+    turns = name in TURNED
+    words = f"{PLACES[what]}, {'turn about' if turns else 'shift along'} {name[-1]}"
+    return MachineError(path, "angle" if turns else "length", what, words, "")
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """Measurements beside the model that is to explain them.
+
+    Attributes:
+        model: the machine at the commanded poses.
+        data: what was measured there.
+        unknowns: what is to be found, in order.
+        chosen: the place of each in the errors of the model; -1 of the frame's and the target's.
+        frame: where the measuring frame is taken to be at first.
+        names: of the measured value in each row of the residuals [rows].
+        pose: to which pose each row belongs [rows].
+        sigma: standard deviation of each row [rows].
+        value: that was measured [rows].
+    """
+
+    model: ErrorModel
+    data: Measurements
+    unknowns: tuple[MachineError, ...]
+    chosen: npt.NDArray[np.int64]
+    frame: Motions
+    names: tuple[str, ...]
+    pose: npt.NDArray[np.int64]
+    sigma: Array
+    value: Array
+
+    def residuals(self, values: Array) -> Array:
+        """What was measured less what the unknowns predict, over the standard deviations [rows]."""
+        predicted, _ = self._predict(values, False)
+        return self._over_sigma(predicted)
+
+    def linearised(self, values: Array) -> tuple[Array, Array]:
+        """The residuals, and how each falls per unit of each unknown [rows x unknowns]."""
+        predicted, rates = self._predict(values, True)
+        return self._over_sigma(predicted), rates / self.sigma[:, None]
+
+    def _over_sigma(self, predicted: Array) -> Array:
+        off = self.value - predicted
+        turns = np.isin(self.names, (*TURNED, *EULER))
+        off = np.where(turns, np.arctan2(np.sin(off), np.cos(off)), off)
+        return np.asarray(np.where(np.isfinite(off), off, FAR / self.sigma.min()) / self.sigma)
+
+    def _of(self, values: Array, paths: Sequence[str]) -> Array:
+        known = {unknown.path: value for unknown, value in zip(self.unknowns, values, strict=True)}
+        return np.array([known.get(path, 0.0) for path in paths])
+
+    def errors(self, values: Array) -> Array:
+        """The errors of the whole model [errors] that unknowns [unknowns] stand for."""
+        result = np.zeros(len(self.model.errors))
+        of_machine = self.chosen >= 0
+        result[self.chosen[of_machine]] = values[of_machine]
+        return result
+
+    def twists(self, whole: Array) -> Array:
+        """How the tool moves per unit of each unknown, base axes, from the rates of all errors; 0 by frame and target.
+
+        Args:
+            whole: rates of all errors of the model [n x 6 x errors].
+        """
+        return np.where(self.chosen >= 0, whole[:, :, np.maximum(self.chosen, 0)], 0.0)
+
+    def _predict(self, values: Array, with_rates: bool) -> tuple[Array, Array]:
+        model, errors = self.model, self.errors(values)
+        moved, whole = (
+            model.linearised(errors, set(self.chosen.tolist()))
+            if with_rates
+            else (model.displaced(errors)[0], np.zeros(0))
+        )
+        soft = model.compliance(self.data.wrenches)
+        grown = 1.0 + errors[len(errors) - soft.shape[2] :]
+        deflected = soft @ grown
+        moved = moved + deflected
+        turned = exponential(np.concatenate([moved[:, :3], 0.0 * moved[:, :3]], axis=1)).rotation @ model.turned
+        tool = model.tool + moved[:, 3:]
+        frame, target = self._of(values, FRAME), self._of(values, TARGET)
+        arm = np.einsum("nij,j->ni", turned, target[3:])
+        shift = exponential(frame[None] * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
+        axes, origin = (shift.rotation @ self.frame.rotation)[0], self.frame.translation[0] + frame[3:]
+        on_target = exponential(target[None] * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])).rotation[0]
+        seen = Motions(np.swapaxes(axes[None], 1, 2) @ turned @ on_target, (tool + arm - origin) @ axes)
+        predicted = self._values(seen, deflected)
+        if not with_rates:
+            return predicted, np.zeros((0, 0))
+        rates = self._place_rates(self.twists(whole), turned, tool + arm - origin, arm, axes, target, frame)
+        return predicted, self._rates(seen, rates, soft)
+
+    def _place_rates(
+        self, twists: Array, turned: Array, at: Array, arm: Array, axes: Array, target: Array, frame: Array
+    ) -> Array:
+        """How the target turns and moves in the measuring frame per unit of each unknown [n x 6 x unknowns]."""
+        soft = self.model.compliance(self.data.wrenches)
+        first = len(self.model.errors) - soft.shape[2]
+        for number, place in enumerate(self.chosen):
+            if place >= first:
+                twists[:, :, number] = soft[:, :, place - first]
+        turning, moving = twists[:, :3], twists[:, 3:]
+        moving = moving + np.swapaxes(cross(np.swapaxes(turning, 1, 2), arm[:, None]), 1, 2)
+        unit = np.eye(3)
+        paths = [unknown.path for unknown in self.unknowns]
+        for name, path in zip((*TURNED, *POSITION), FRAME, strict=True):
+            if path in paths:
+                axis = unit["xyz".index(name[-1])]
+                if name in TURNED:
+                    way = exponential(np.array([[*frame[:3], *axis]])).translation[0]
+                    turning[:, :, paths.index(path)] = -way
+                    moving[:, :, paths.index(path)] = -np.cross(way, at)
+                else:
+                    moving[:, :, paths.index(path)] = -axis
+        for name, path in zip((*TURNED, *POSITION), TARGET, strict=True):
+            if path in paths:
+                axis = unit["xyz".index(name[-1])]
+                if name in TURNED:
+                    way = exponential(np.array([[*target[:3], *axis]])).translation[0]
+                    turning[:, :, paths.index(path)] = turned @ way
+                else:
+                    moving[:, :, paths.index(path)] = turned @ axis
+        back = axes.T
+        return np.concatenate([back @ turning, back @ moving], axis=1)
+
+    def _values(self, seen: Motions, deflected: Array) -> Array:
+        angles = _angles(seen.rotation)
+        away = np.linalg.norm(seen.translation - self.data.origins, axis=1)
+        columns = {name: seen.translation[:, i] for i, name in enumerate(POSITION)}
+        columns |= {name: angles[:, i] for i, name in enumerate((*TURNED, *EULER))} | {"distance": away}
+        columns |= {f"deflection.{name}": deflected[:, i] for i, name in enumerate((*TURNED, *POSITION))}
+        return np.array([columns[name][row] for name, row in zip(self.names, self.pose, strict=True)])
+
+    def _rates(self, seen: Motions, rates: Array, soft: Array) -> Array:
+        """Rates of every measured value [rows x unknowns]."""
+        wanted = {*self.names}
+        columns: dict[str, Array] = {name: rates[:, 3 + i] for i, name in enumerate(POSITION)}
+        if wanted & {*TURNED, *EULER}:
+            by_turn = _angle_rates(seen.rotation) @ rates[:, :3]
+            columns |= {name: by_turn[:, i] for i, name in enumerate((*TURNED, *EULER))}
+        if "distance" in wanted:
+            way = seen.translation - self.data.origins
+            way = way / np.linalg.norm(way, axis=1)[:, None]
+            columns["distance"] = np.einsum("ni,niu->nu", way, rates[:, 3:])
+        if any(name.startswith("deflection") for name in wanted):
+            first = len(self.model.errors) - soft.shape[2]
+            by_spring = np.zeros((len(soft), 6, len(self.unknowns)))
+            for number, place in enumerate(self.chosen):
+                if place >= first:
+                    by_spring[:, :, number] = soft[:, :, place - first]
+            columns |= {f"deflection.{name}": by_spring[:, i] for i, name in enumerate((*TURNED, *POSITION))}
+        return np.stack([columns[name][row] for name, row in zip(self.names, self.pose, strict=True)])
+
+
+def _angles(rotation: Array) -> Array:
+    """Rotation vectors, and roll, pitch and yaw [n x 6]."""
+    vectors = logarithm(Motions(rotation, np.zeros(rotation.shape[:2])))[:, :3]
+    level = np.hypot(rotation[:, 0, 0], rotation[:, 1, 0])
+    roll = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
+    pitch = np.arctan2(-rotation[:, 2, 0], level)
+    yaw = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    return np.column_stack([vectors, roll, pitch, yaw])
+
+
+def _angle_rates(rotation: Array) -> Array:
+    """How these angles change by small rotations about the axes of the frame [n x 6 x 3]."""
+    columns = []
+    for axis in np.eye(3):
+        ends = [
+            _angles(exponential(np.array([[*(sign * STEP * axis), 0.0, 0.0, 0.0]])).rotation @ rotation)
+            for sign in (1.0, -1.0)
+        ]
+        off = ends[0] - ends[1]
+        columns.append(np.arctan2(np.sin(off), np.cos(off)) / (2.0 * STEP))
+    return np.stack(columns, axis=2)
+
+
+def observed(
+    model: ErrorModel, data: Measurements, unknowns: Sequence[MachineError], frame: Motions | None = None
+) -> Observed:
+    """Put measurements beside the model.
+
+    Args:
+        model: of the machine at the commanded poses.
+        data: at the same poses.
+        unknowns: to be found.
+        frame: where the measuring frame is taken to be at first; found from the measurements if None.
+
+    Raises:
+        InputError: the drawn machine has no place at a commanded pose, or measured positions lie far from it although
+            the measuring frame is the base frame.
+    """
+    elsewhere = np.flatnonzero(~np.isin(model.status, PLACED))
+    if elsewhere.size:
+        row = int(elsewhere[0])
+        sentence = Status(int(model.status[row])).sentence
+        raise data.refused(row, f"the drawn machine is not at the commanded pose. {sentence} Check units and angles.")
+    paths = [error.path for error in model.errors]
+    chosen = np.array([paths.index(u.path) if u.path in paths else -1 for u in unknowns], dtype=np.int64)
+    pairs = [(n, row) for n, values in data.values.items() for row in np.flatnonzero(np.isfinite(values)).tolist()]
+    pairs.sort(key=lambda pair: pair[1])
+    if frame is None:
+        free = any(unknown.group == "frame" for unknown in unknowns)
+        frame = _frame(model, data) if free else still_frame()
+        if not free:
+            _check_far(model, data)
+    return Observed(
+        model,
+        data,
+        tuple(unknowns),
+        chosen,
+        frame,
+        tuple(name for name, _ in pairs),
+        np.array([row for _, row in pairs], dtype=np.int64),
+        np.array([data.sigma[name][row] for name, row in pairs]),
+        np.array([data.values[name][row] for name, row in pairs]),
+    )
+
+
+def still_frame() -> Motions:
+    """The base frame itself."""
+    return Motions(np.eye(3)[None], np.zeros((1, 3)))
+
+
+def _frame(model: ErrorModel, data: Measurements) -> Motions:
+    """The place of the measuring frame with which the drawn machine comes nearest to positions (W. Kabsch, 1976)."""
+    if not all(name in data.values for name in POSITION):
+        return still_frame()
+    seen = np.stack([data.values[name] for name in POSITION], axis=1)
+    rows = np.isfinite(seen).all(axis=1)
+    if rows.sum() < 3:
+        return still_frame()
+    start, end = seen[rows], model.tool[rows]
+    spread = (start - start.mean(axis=0)).T @ (end - end.mean(axis=0))
+    left, _, right = np.linalg.svd(spread)
+    hand = np.diag([1.0, 1.0, np.sign(np.linalg.det(right.T @ left.T))])
+    turn = right.T @ hand @ left.T
+    return Motions(turn[None], (end.mean(axis=0) - turn @ start.mean(axis=0))[None])
+
+
+def _check_far(model: ErrorModel, data: Measurements) -> None:
+    length = model.length
+    for i, name in enumerate(POSITION):
+        off = np.abs(data.values.get(name, model.tool[:, i]) - model.tool[:, i])
+        if np.isfinite(off).any() and np.nanmedian(off) > FAR * length:
+            row = int(np.nanargmax(off))
+            raise data.refused(
+                row,
+                f"measured.{name} is {1e3 * data.values[name][row]:.6g} mm where the drawn machine has its tool at "
+                f"{1e3 * model.tool[row, i]:.6g} mm, and most others are as far away; check the unit in the head of "
+                "the column, or say that the measuring frame is unknown (--frame).",
+            )

@@ -1,0 +1,151 @@
+"""The record of a fit, as `kinetostat identify -o FOLDER` leaves it, read again: for reports and comparisons.
+
+Nothing is fitted here, and nothing of the file is trusted before its form has been checked.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinetostat.equilibrium.motion import Array
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.errors import InputError
+
+RECORD = "fit.json"
+PICTURES = ("residuals", "correlations", "poses")
+PNG = b"\x89PNG\r\n\x1a\n"
+LARGEST = 1 << 28
+"""Bytes of a record or a picture."""
+GIVE = "give the folder, or the fit.json in it, that `kinetostat identify -o FOLDER` has written."
+
+
+@dataclass(frozen=True)
+class FittedNumber:
+    """An unknown of a fit: its path and group, what it is, and its value with half of the 95 % interval, SI."""
+
+    path: str
+    group: str
+    words: str
+    unit: str
+    value: float
+    half: float
+
+
+@dataclass(frozen=True)
+class FitRecord:
+    """What a fit has left on the disk.
+
+    Attributes:
+        path: of the record.
+        machine, family: of the drawn machine; the family is empty in records of earlier versions.
+        data: path of the measurements.
+        poses, values: how many were measured.
+        unknowns: what was found.
+        covariance: of the unknowns, SI [unknowns x unknowns].
+        rank: how many combinations of them are seen.
+        scatter: of the residuals, in standard deviations.
+        known: whether the standard deviations of the measurements were known.
+        residuals: root mean square of lengths (m) and angles (rad), as drawn, as identified, and of poses left out.
+        outliers: line of the file, name, and residual in standard deviations.
+        unseen: a sentence, and how far the combination moves the tool, in all and inside the machine, m.
+        pictures: PNG by name, as far as they lie beside the record.
+    """
+
+    path: str
+    machine: str
+    family: str
+    data: str
+    poses: int
+    values: int
+    unknowns: tuple[FittedNumber, ...]
+    covariance: Array
+    rank: int
+    scatter: float
+    known: bool
+    residuals: tuple[Mapping[str, float], ...]
+    outliers: tuple[tuple[int, str, float], ...]
+    unseen: tuple[tuple[str, float, float], ...]
+    pictures: Mapping[str, bytes]
+
+    def check(self, machine: Machine, drawn: bool = True) -> None:
+        """Refuse a machine that was not fitted.
+
+        Args:
+            machine: to compare with.
+            drawn: whether it must be the drawn machine, not the one that the fit has written.
+
+        Raises:
+            InputError: it has another name or is of another family.
+        """
+        if self.machine != machine.name:
+            raise InputError(f'"{self.path}" is the fit of {self.machine}, not of {machine.name}; give that machine.')
+        if drawn and self.family not in ("", machine.family.name):
+            raise InputError(
+                f'"{self.path}" is the fit of a machine of the family {self.family}, and {machine.name} is of '
+                f"{machine.family.name}; give the machine as drawn, not the file that the fit has written."
+            )
+
+
+def read_fit(path: str | Path) -> FitRecord:
+    """Read the record of a fit and the pictures beside it.
+
+    Args:
+        path: of the record, or of the folder in which it lies.
+
+    Raises:
+        InputError: it cannot be read, or is not the record of a fit.
+    """
+    place = Path(path)
+    place = place / RECORD if place.is_dir() else place
+    try:
+        record = json.loads(_bytes(place))
+        pictures = {name: place.with_name(f"{name}.png") for name in PICTURES}
+        return _checked(str(place), record, {n: _bytes(p) for n, p in pictures.items() if p.is_file()})
+    except OSError as error:
+        raise InputError(f'"{place}" cannot be read: {error.strerror}; {GIVE}') from None
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
+        raise InputError(f'"{place}" is not the record of a fit; {GIVE}') from None
+
+
+def _bytes(path: Path) -> bytes:
+    with path.open("rb") as stream:
+        return stream.read(LARGEST)
+
+
+def _checked(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecord:
+    unknowns = tuple(
+        FittedNumber(
+            str(u["path"]), str(u["group"]), str(u.get("words", "")), str(u.get("unit", "1")), float(u["value"]),
+            float("inf") if u.get("half_interval_95") is None else float(u["half_interval_95"]),
+        )
+        for u in record["unknowns"]
+    )  # fmt: skip
+    covariance = np.array(record["covariance"], dtype=float)
+    if not unknowns or covariance.shape != (len(unknowns), len(unknowns)) or not np.isfinite(covariance).all():
+        raise ValueError("no covariance of the unknowns")
+    if not np.isfinite([unknown.value for unknown in unknowns]).all():
+        raise ValueError("a value that is not finite")
+    return FitRecord(
+        path,
+        str(record["machine"]),
+        str(record.get("family", "")),
+        str(record.get("data", "")),
+        int(record.get("poses", 0)),
+        int(record.get("values", 0)),
+        unknowns,
+        covariance,
+        int(record.get("rank", len(unknowns))),
+        float(record.get("scatter", 1.0)),
+        bool(record.get("sigma_known", True)),
+        tuple(
+            {str(kind): float(size) for kind, size in record.get(name, {}).items()}
+            for name in ("before", "after", "left_out")
+        ),
+        tuple((int(o["line"]), str(o["value"]), float(o["sigmas"])) for o in record.get("outliers", [])),
+        tuple((str(u["words"]), float(u["tool"]), float(u["inside"])) for u in record.get("unseen", [])),
+        {name: data for name, data in pictures.items() if data.startswith(PNG)},
+    )

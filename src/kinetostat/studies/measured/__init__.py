@@ -1,0 +1,1 @@
+"""A measured stiffness beside the computed one, with the uncertainties of both."""

@@ -1,0 +1,270 @@
+"""A measured stiffness beside the computed one: what lies between them, and whether their uncertainties explain it.
+
+Source: theory (69) to (72); ASME V&V 20-2009, *Standard for Verification and Validation in Computational Fluid Dynamics
+and Heat Transfer*, sections 1 and 6.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.special import chdtrc
+
+from kinetostat.accuracy.model import PLACED, ErrorModel, error_model
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.equilibrium.motion import Array
+from kinetostat.kinematics.closing import stacked
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import with_values
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.measured.stiffness_file import MeasuredEntry, MeasuredStiffness, read_stiffness
+from kinetostat.studies.measured.uncertain import Uncertain, compliance_changes, dyads_of, uncertain_of
+from kinetostat.studies.plain_data import as_answer
+
+COVER = 2.0
+"""Standard uncertainties that an interval reaches: about 95 % of normal values lie within."""
+LIKELY = 0.05
+"""Probability below which so much disagreement is not put down to chance."""
+LEAST = 1e-4
+"""Probability below which no number is given."""
+RIGID = 1e-12
+"""Share of the largest compliance, with lengths in units of the machine's, below which a direction counts as rigid."""
+
+
+@dataclass(frozen=True)
+class MeasuredRow:
+    """A measured number beside the computed one, all SI.
+
+    Attributes:
+        entry: what was measured.
+        predicted: the computed number.
+        u_num, u_input, u_data: standard uncertainties of the computation, of the machine's numbers and of the
+            measurement.
+    """
+
+    entry: MeasuredEntry
+    predicted: float
+    u_num: float
+    u_input: float
+    u_data: float
+
+    @property
+    def error(self) -> float:
+        """What the computed number is more than the measured one."""
+        return self.predicted - self.entry.value
+
+    @property
+    def u_val(self) -> float:
+        """Standard uncertainty of this difference, theory (69)."""
+        return float(np.sqrt(self.u_num**2 + self.u_input**2 + self.u_data**2))
+
+    @property
+    def explained(self) -> bool:
+        """Whether the uncertainties explain the difference: it is at most twice theirs."""
+        return abs(self.error) <= COVER * self.u_val
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Between what sizes the error of the model lies, SI; the lower one is 0 where uncertainties explain it."""
+        least = max(abs(self.error) - COVER * self.u_val, 0.0)
+        return least, abs(self.error) + COVER * self.u_val
+
+
+@dataclass(frozen=True)
+class MeasuredComparison:
+    """A machine beside its measured stiffness.
+
+    Attributes:
+        machine: that was measured.
+        path: of the file.
+        rows: in the order of the file.
+        chi_square: the sum of squared differences over their uncertainties, correlations counted, theory (72).
+        probability: of at least as much where the model has no error.
+        source: where uncertainties of the machine's numbers are from; empty where there are none.
+        left_out: paths of uncertain numbers that do not count.
+    """
+
+    machine: Machine
+    path: str
+    rows: tuple[MeasuredRow, ...]
+    chi_square: float
+    probability: float
+    source: str
+    left_out: tuple[str, ...]
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the uncertainties explain all differences together."""
+        return self.probability >= LIKELY
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """What the variances of the differences are made of on average: shares that add up to 1."""
+        parts = np.array([[row.u_num, row.u_input, row.u_data] for row in self.rows]) ** 2
+        means = (parts / parts.sum(axis=1, keepdims=True)).mean(axis=0)
+        return dict(zip(("numerics", "inputs", "measurement"), means.tolist(), strict=True))
+
+    @property
+    def message(self) -> str:
+        """The verdict in words."""
+        inside, count = sum(row.explained for row in self.rows), len(self.rows)
+        likely = f"{100.0 * self.probability:.2g} %" if self.probability > LEAST else "below 0.01 %"
+        text = (
+            f"{self.machine.name}: {inside} of {count} measured numbers lie within twice the uncertainty of the "
+            f"comparison. Together they are {'as' if self.agrees else 'not as'} near to the computed ones as "
+            f"uncertainties allow (chi-square {self.chi_square:.3g} for {count}, probability "
+            f"{likely})"
+        )
+        if not self.agrees:
+            return f"{text}: the model is wrong there, or the uncertainties are too small."
+        worst = max(row.bounds[1] / max(abs(row.entry.value), abs(row.predicted), 1e-300) for row in self._diagonal)
+        return f"{text}: no error of the model is seen. One of up to {100.0 * worst:.2g} % would not be seen."
+
+    @property
+    def _diagonal(self) -> Sequence[MeasuredRow]:
+        """Rows whose value says how large a number is; all where there are none."""
+        rows = [row for row in self.rows if row.entry.parts[0] != "deflection" and len(set(row.entry.parts[1:])) == 1]
+        return rows or self.rows
+
+
+@checked
+def validate_measured(
+    machine: Machine, data: str | Path, *, fit: str | Path | None = None, sigma: str = "", sigma_angle: str = ""
+) -> MeasuredComparison:
+    """Compare the stiffness of a machine at its tool point with a measured one, theory (69) to (72).
+
+    Args:
+        machine: at the pose at which it was measured, with [tolerances] that say how sure its numbers are.
+        data: path of a CSV file; its columns are described in docs/validation.md.
+        fit: path of the fit.json of `kinetostat identify`, whose values and covariance then count.
+        sigma: standard deviation of what has none in the file: a share ("3 %"), or of deflections a length.
+        sigma_angle: the same of deflections that are angles.
+
+    Raises:
+        InputError: a file has a mistake, the machine has no place at a pose, or it is rigid where a stiffness is asked.
+    """
+    measured = read_stiffness(machine, Path(data), sigma, sigma_angle)
+    pose = dict(measured.deflections.pose) if measured.deflections else {}
+    count = len(measured.deflections) if measured.deflections else 1
+    model = error_model(machine, pose, count, np.zeros(6))
+    bad = np.flatnonzero(~np.isin(model.status, PLACED))
+    if bad.size:
+        sentence = Status(int(model.status[bad[0]])).sentence
+        line = f"line {measured.deflections.lines[bad[0]]}: " if measured.deflections else ""
+        raise InputError(f'"{data}", {line}the drawn machine is not at the measured pose. {sentence}')
+    response = respond(with_values(machine, pose) if pose else machine)
+    computed = stacked([entry for row in response.compliance.rows() for entry in row], count).reshape(-1, 6, 6)
+    uncertain = uncertain_of(machine, model, Path(fit) if fit else None)
+    return _compared(machine, model, measured, computed, uncertain)
+
+
+def _compared(
+    machine: Machine, model: ErrorModel, measured: MeasuredStiffness, computed: Array, uncertain: Uncertain
+) -> MeasuredComparison:
+    dyads = dyads_of(model)
+    changes, left_out = compliance_changes(model, uncertain, dyads)
+    compliance = computed + changes @ uncertain.values
+    loads = measured.deflections.wrenches if measured.deflections else np.zeros((1, 6))
+    parts = [
+        _Entry(entry, compliance[entry.row], loads[entry.row], machine.family.components, model.length)
+        for entry in measured.entries
+    ]
+    rates = np.array([part.changes(changes[part.entry.row]) for part in parts]).reshape(len(parts), -1)
+    numeric = np.array([part.changes((computed - dyads.sum(axis=3))[part.entry.row, :, :, None])[0] for part in parts])
+    inputs = rates @ uncertain.covariance @ rates.T
+    spread = np.array([part.entry.sigma for part in parts])
+    rows = tuple(
+        MeasuredRow(part.entry, part.value, abs(float(off)), float(np.sqrt(max(size, 0.0))), part.entry.sigma)
+        for part, off, size in zip(parts, numeric, np.diag(inputs), strict=True)
+    )
+    error = np.array([row.error for row in rows]) / spread
+    whole = (inputs + np.diag(numeric**2 + spread**2)) / np.outer(spread, spread)
+    distance = float(error @ np.linalg.solve(whole, error))
+    likely = float(chdtrc(len(rows), distance))
+    return MeasuredComparison(machine, measured.path, rows, distance, likely, uncertain.source, left_out)
+
+
+class _Entry:
+    """A measured entry as a function of the compliance [6 x 6] at its pose."""
+
+    def __init__(
+        self, entry: MeasuredEntry, compliance: Array, load: Array, components: Sequence[int], length: float
+    ) -> None:
+        self.entry, self.load = entry, load
+        self.matrix, self.i, self.j = entry.parts
+        self.compliance = compliance
+        self.stiffness = np.zeros((6, 6))
+        if self.matrix == "stiffness":
+            places = np.ix_(list(components), list(components))
+            units = np.array([length if c < 3 else 1.0 for c in components])
+            scaled = compliance[places] * np.outer(units, units)
+            if np.linalg.svd(scaled)[1][-1] <= RIGID * np.abs(scaled).max():
+                raise InputError(
+                    f"{entry.name} is measured in line {entry.line}, but the model is rigid in some direction, so that "
+                    "K has no end; give its springs stiffnesses, or compare entries of C (compliance_z)."
+                )
+            self.stiffness[places] = np.linalg.inv(scaled) * np.outer(units, units)
+        elif self.matrix == "free_stiffness" and not compliance[self.i, self.i] > 0.0:
+            raise InputError(
+                f"{entry.name} is measured in line {entry.line}, but the model is rigid along "
+                f"{COMPONENTS[self.i]}; give its springs stiffnesses, or leave the line out."
+            )
+
+    @property
+    def value(self) -> float:
+        """The computed number."""
+        if self.matrix == "deflection":
+            return float(self.compliance[self.i] @ self.load)
+        if self.matrix == "stiffness":
+            return float(self.stiffness[self.i, self.j])
+        entry = float(self.compliance[self.i, self.j])
+        return entry if self.matrix == "compliance" else 1.0 / entry
+
+    def changes(self, changes: Array) -> Array:
+        """Of the number by changes of the compliance [6 x 6 x p], to first order [p], theory (71)."""
+        if self.matrix == "deflection":
+            return np.asarray(self.load @ changes[self.i])
+        if self.matrix == "stiffness":
+            return np.asarray(-np.einsum("a,abp,b->p", self.stiffness[self.i], changes, self.stiffness[:, self.j]))
+        entry = changes[self.i, self.j]
+        return np.asarray(entry if self.matrix == "compliance" else -entry / self.compliance[self.i, self.i] ** 2)
+
+
+def as_json(answer: MeasuredComparison) -> dict[str, Any]:
+    """The comparison as plain data, SI."""
+    return as_answer(
+        {
+            "machine": answer.machine.name,
+            "data": answer.path,
+            "verdict": answer.message,
+            "agrees": answer.agrees,
+            "chi_square": answer.chi_square,
+            "probability": answer.probability,
+            "coverage_factor": COVER,
+            "uncertainty_from": answer.source,
+            "left_out": list(answer.left_out),
+            "shares": answer.shares,
+            "entries": [
+                {
+                    "name": row.entry.name,
+                    "line": row.entry.line,
+                    "unit": row.entry.unit,
+                    "measured": row.entry.value,
+                    "predicted": row.predicted,
+                    "error": row.error,
+                    "u_num": row.u_num,
+                    "u_input": row.u_input,
+                    "u_data": row.u_data,
+                    "u_val": row.u_val,
+                    "explained": row.explained,
+                    "model_error_between": list(row.bounds),
+                }
+                for row in answer.rows
+            ],
+        }
+    )

@@ -1,0 +1,386 @@
+"""Where a machine rings, which parts do it, and how its tool feels a varying force: the natural vibrations at its pose.
+
+The equations are in `vibration`; the command is `modes`.
+"""
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kinetostat.algebra.screw import COMPONENTS, Twist, Wrench
+from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.equilibrium.balance import Balance, balance, free_state
+from kinetostat.equilibrium.mechanism import mechanism_of
+from kinetostat.equilibrium.motion import Array
+from kinetostat.equilibrium.numbers import loaded_mechanism
+from kinetostat.equilibrium.shape import loaded_links
+from kinetostat.equilibrium.solving import at_rest, with_share
+from kinetostat.equilibrium.tangent import stability, starts_of
+from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.deflected import Deflection
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.mass import moving_masses
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.grid.quantities import refuse_unknown_mass
+from kinetostat.studies.indices import unit_direction
+from kinetostat.studies.plain_data import as_answer
+from kinetostat.studies.refusal import why_not
+from kinetostat.vibration.modes import Modes
+from kinetostat.vibration.modes import modes as solved_modes
+from kinetostat.vibration.receptance import (
+    ASSUMED_RATIO,
+    Complex,
+    Damper,
+    Softest,
+    along,
+    damper,
+    least_real_part,
+    receptance,
+)
+from kinetostat.vibration.shares import effective_masses, kinetic_shares, strain_shares
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+HELD_BY_LOADS = (Status.SINGULAR, Status.JOINT_LIMIT)
+"""Statuses without loads that a machine at rest under its loads may have."""
+SMALL = 1e-6
+"""Size of the motion by which shapes are read off the exact motions of the links, rad or in machine lengths."""
+MOST_SHOWN = 12
+"""Modes that are shown; higher ones add to the response all the same."""
+DRAWN = 6
+"""Modes of which shapes are drawn, and about which responses are."""
+POINTS = 1500
+"""Frequencies of a curve, besides those about the modes."""
+NEAR = 200
+"""Frequencies about each mode."""
+WIDE = 6.0
+"""How far they lie about it, in multiples of its frequency and damping ratio."""
+BELOW, ABOVE = 0.2, 1.6
+"""Range of the curves as multiples of the lowest and of the highest frequency that is drawn."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A natural vibration.
+
+    Attributes:
+        frequency: Hz.
+        ratio: its damping ratio.
+        tool: twist of the tool point, base axes, in motions whose mass is 1 kg: components of the machine, rad and m
+            per root of a kg·m².
+        direction: name of the component in which the tool moves most, turns counted at the machine's length.
+        modal_mass: of that component, kg or kg·m²: what would ring there alone, with `modal_stiffness`.
+        modal_stiffness: N/m or N·m/rad.
+        effective_mass: share of all moving mass that answers when the base shakes along x, y, z.
+        strain: share of the strain energy of each spring, and of the loads, by name; they add up to 1.
+        kinetic: share of the kinetic energy of each part by name; they add up to 1.
+        shape: small motions of the tool and of the ends of all links, of any size, for drawings.
+    """
+
+    frequency: float
+    ratio: float
+    tool: tuple[float, ...]
+    direction: str
+    modal_mass: float
+    modal_stiffness: float
+    effective_mass: tuple[float, float, float]
+    strain: Mapping[str, float]
+    kinetic: Mapping[str, float]
+    shape: Deflection | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Vibration(Immutable):
+    """The natural vibrations of a machine at its pose.
+
+    Attributes:
+        machine: with its masses.
+        status: of the pose.
+        message: what is the case, in a sentence or two.
+        components: names of the components of twists: rx ry rz x y z, or rz x y.
+        loaded: whether the machine vibrates about its state under load.
+        modes: from the lowest frequency; none where the pose has no answer.
+        moving_mass: of all that moves, kg.
+        uncounted: names of the parts whose mass nothing says.
+        assumed: whether the damping ratio is `ASSUMED_RATIO` because the file says nothing about damping.
+        solution: all modes as they were solved for, with those without mass; None where there are none.
+        damping: of them.
+    """
+
+    machine: Machine
+    status: Status
+    message: str
+    components: tuple[str, ...]
+    loaded: bool = False
+    modes: tuple[Mode, ...] = ()
+    moving_mass: float = 0.0
+    uncounted: tuple[str, ...] = ()
+    assumed: bool = False
+    solution: Modes | None = None
+    damping: Damper | None = None
+
+    def __repr__(self) -> str:
+        return f"<Vibration of {self.machine.name!r}: {self.status.word}, {len(self.modes)} modes>"
+
+    @checked
+    def receptance(self, frequencies: Sequence[float]) -> Complex:
+        """Motion of the tool per unit of a varying wrench on it [frequencies x 6 x 6], rad and m per N·m and N.
+
+        Args:
+            frequencies: Hz.
+
+        Raises:
+            InputError: the pose has no answer.
+        """
+        solution, damping = self._solution()
+        return receptance(solution, damping, np.asarray(frequencies, dtype=float))
+
+    @checked
+    def along(self, direction: Sequence[float], frequencies: Sequence[float]) -> Complex:
+        """The receptance of the tool point along a direction, m/N [frequencies].
+
+        Args:
+            direction: three numbers of any size, base axes.
+            frequencies: Hz.
+
+        Raises:
+            InputError: the pose has no answer, or the direction is zero.
+        """
+        return along(self.receptance(frequencies), np.array(unit_direction(direction, "direction")))
+
+    @checked
+    def softest(self, direction: Sequence[float]) -> Softest:
+        """Where the real part of the receptance along a direction is least: what limits the width of a cut.
+
+        Args:
+            direction: three numbers of any size, base axes.
+
+        Raises:
+            InputError: the pose has no answer, or the direction is zero.
+        """
+        solution, damping = self._solution()
+        return least_real_part(solution, damping, np.array(unit_direction(direction, "direction")))
+
+    def _solution(self) -> tuple[Modes, Damper]:
+        if self.solution is None or self.damping is None:
+            raise InputError(f"{self.machine.name} has no vibrations at this pose: {self.message}")
+        return self.solution, self.damping
+
+
+@checked
+def modes(machine: Machine) -> Vibration:
+    """Find the natural vibrations of a machine at its pose, about its state under load where `machine.loaded` is set.
+
+    Args:
+        machine: with its pose; its masses are those of [tool], of its links and of its drives.
+
+    Raises:
+        InputError: nothing says a mass, or rotors have an inertia and nothing says how far they turn.
+    """
+    refuse_unknown_mass(machine, "modes")
+    joints = solve_joints(machine) if machine.family.chains else None
+    response = respond(machine, joints)
+    names, status = machine.family.component_names, Status(int(response.status))
+    if status is not Status.OK and not (machine.loaded and status in HELD_BY_LOADS):
+        return Vibration(machine, status, why_not(machine, response, []), names)
+    if machine.loaded:
+        mechanism, balanced = loaded_mechanism(machine, response, joints)
+        rest = at_rest(mechanism)
+        if not (balanced[0] and rest.settled[0] and stability(rest.balance).stable):
+            message = f"{machine.name} comes to no stable rest under its loads; `kinetostat analyze --loaded` says why."
+            return Vibration(machine, Status.NO_REST, message, names, loaded=True)
+        equations = rest.balance
+    else:
+        mechanism = with_share(mechanism_of(machine, response, joints), 0.0)
+        equations = balance(mechanism, free_state(mechanism))
+    solution = solved_modes(equations)
+    if solution is None:
+        return Vibration(machine, Status.OK, "All that could move is rigid, so that nothing rings.", names)
+    return _vibration(machine, response, equations, solution)
+
+
+def _vibration(machine: Machine, response: Response, equations: Balance, solution: Modes) -> Vibration:
+    table = machine.tables["damping"]
+    friction = equations.mechanism.legs and any(leg.dampers.any() for leg in equations.mechanism.legs)
+    assumed = not (friction or table.ratio or table.per_mass or table.per_stiffness)
+    ratio = ASSUMED_RATIO if assumed else table.ratio
+    damping = damper(equations, solution, ratio, table.per_mass, table.per_stiffness)
+    masses = moving_masses(machine, response.configuration)
+    known = [float(part.mass) for part in masses if part.mass is not None] + [machine.tables["tool"].payload]
+    uncounted = tuple(part.name for part in masses if part.mass is None)
+    shown = tuple(_modes(machine, response, equations, solution, damping))
+    return Vibration(
+        machine, Status.OK, _message(machine, shown), machine.family.component_names, machine.loaded, shown, sum(known),
+        uncounted, assumed, solution, damping,
+    )  # fmt: skip
+
+
+def _message(machine: Machine, shown: Sequence[Mode]) -> str:
+    if not shown:
+        return "Nothing that has mass can move."
+    first = shown[0]
+    part, share = max(first.strain.items(), key=lambda item: item[1])
+    way = f"turns about {first.direction[1:]}" if len(first.direction) == 2 else f"moves along {first.direction}"
+    return (
+        f"It rings first at {machine.display.show(first.frequency, 'Hz')}: the tool {way}, and the largest share of "
+        f"the strain energy, {100.0 * share:.0f} %, is in {part}."
+    )
+
+
+def _modes(machine: Machine, response: Response, equations: Balance, solution: Modes, damping: Damper) -> list[Mode]:
+    shown = slice(0, min(solution.ringing, MOST_SHOWN))
+    strains, kinetics = strain_shares(equations, solution.shapes[:, shown]), kinetic_shares(equations, solution)
+    parts, length = list(machine.family.components), float(response.configuration.length)
+    effective = effective_masses(equations, solution)
+    result = []
+    for k in range(solution.ringing)[shown]:
+        omega = 1.0 / math.sqrt(solution.squares[k])
+        twist = solution.tool[:, k] * omega  # of a modal mass of 1 kg
+        sizes = np.abs(twist) * np.array([length] * 3 + [1.0] * 3)
+        largest = max(parts, key=lambda part: sizes[part])
+        mass = float(1.0 / twist[largest] ** 2) if twist[largest] else math.inf
+        result.append(
+            Mode(
+                float(solution.frequencies[k]),
+                float(damping.ratios(solution)[k]),
+                tuple(float(value) for value in twist[parts]),
+                _names(machine)[largest],
+                mass,
+                mass * omega**2,
+                effective[k],
+                {name: float(shares[k]) for name, shares in strains.items()},
+                {name: float(shares[k]) for name, shares in kinetics.items()},
+                _shape(response, equations, solution, k),
+            )
+        )
+    return result
+
+
+def _names(machine: Machine) -> dict[int, str]:
+    """Names of the components that a machine has, by their place in rx ry rz x y z."""
+    return dict(zip(machine.family.components, machine.family.component_names, strict=True))
+
+
+def _shape(response: Response, equations: Balance, solution: Modes, number: int) -> Deflection:
+    """The small motions of tool and links in a mode."""
+    starts, shape, state = starts_of(equations), solution.shapes[:, number], equations.state
+    amount = SMALL / max(float(np.abs(shape).max()), 1e-300)
+    moved = tuple(
+        coordinates + amount * shape[None, first:last]
+        for coordinates, (first, last) in zip(state.coordinates, pairwise(starts), strict=True)
+    )
+    there = replace(equations, state=replace(state, coordinates=moved))
+    legs, origin = response.configuration.legs, response.reference
+    both = [loaded_links(balanced, legs, origin) for balanced in (equations, there)]
+    joule = float(equations.mechanism.force[0] * equations.mechanism.length[0])
+    tool = (solution.tool[:, number] * amount * math.sqrt(joule)).tolist()
+    return Deflection(
+        Wrench(ZERO, ZERO),
+        Twist(Vector(*tool[:3]), Vector(*tool[3:])),
+        tuple(
+            replace(
+                link,
+                start_motion=link.start_motion - before.start_motion,
+                end_motion=link.end_motion - before.end_motion,
+            )
+            for before, link in zip(*both, strict=True)
+        ),
+    )
+
+
+def frequency_range(
+    answer: Vibration, lowest: float | None = None, highest: float | None = None, points: int = POINTS, near: int = NEAR
+) -> Array:
+    """Frequencies for curves, close together near the modes, Hz.
+
+    Args:
+        answer: with its modes.
+        lowest, highest: ends of the range, Hz; about the first six modes if None.
+        points: over the whole range.
+        near: about each of these modes, besides.
+    """
+    shown = answer.modes[:DRAWN]
+    ends = (lowest or BELOW * shown[0].frequency, highest or ABOVE * shown[-1].frequency)
+    about = [m.frequency * (1.0 + max(m.ratio, 1e-4) * np.linspace(-WIDE, WIDE, near)) for m in shown]
+    every = np.concatenate([np.geomspace(*ends, points), *about])
+    return np.unique(every[(every >= ends[0]) & (every <= ends[1])])
+
+
+def as_csv(answer: Vibration) -> str:
+    """The modes as CSV, SI, a row each: frequency, damping ratio, motion of the tool, masses."""
+    rows = io.StringIO(newline="")
+    writer = csv.writer(rows, lineterminator="\n")
+    masses = ["modal_mass", "modal_stiffness", *(f"effective_mass_{axis}" for axis in "xyz")]
+    writer.writerow(["mode", "frequency_hz", "damping_ratio", *answer.components, "direction", *masses])
+    for number, mode in enumerate(answer.modes, 1):
+        numbers = [mode.modal_mass, mode.modal_stiffness, *mode.effective_mass]
+        writer.writerow([number, mode.frequency, mode.ratio, *mode.tool, mode.direction, *numbers])
+    return rows.getvalue()
+
+
+def response_dataset(answer: Vibration, frequencies: Array) -> "xr.Dataset":
+    """The receptance of the tool over frequency as a dataset, SI: real and imaginary parts [frequency x row x column].
+
+    Args:
+        answer: of a pose that has one.
+        frequencies: Hz.
+    """
+    import xarray as xr  # takes long to load
+
+    values, names = answer.receptance(frequencies.tolist()), [*answer.components]
+    parts = [COMPONENTS.index(name) for name in names]
+    values = values[:, parts][:, :, parts]
+    dims = ("frequency", "moved", "loaded")
+    return xr.Dataset(
+        {
+            "receptance_real": (
+                dims,
+                values.real,
+                {"long_name": "real part, rad and m per N·m and N"},
+            ),
+            "receptance_imaginary": (dims, values.imag, {"long_name": "imaginary part, the same units"}),
+        },
+        {"frequency": ("frequency", frequencies, {"units": "Hz"}), "moved": names, "loaded": names},
+        {"machine": answer.machine.name, "reference": answer.machine.reference},
+    )
+
+
+def as_json(answer: Vibration) -> dict[str, Any]:
+    """The vibrations as plain data, SI."""
+    return as_answer(
+        {
+            "name": answer.machine.name,
+            "status": answer.status.word,
+            "message": answer.message,
+            "loaded": answer.loaded,
+            "components": list(answer.components),
+            "moving_mass": answer.moving_mass,
+            "without_known_mass": list(answer.uncounted),
+            "damping_assumed": answer.assumed,
+            "modes": [
+                {
+                    "frequency": mode.frequency,
+                    "damping_ratio": mode.ratio,
+                    "tool": dict(zip(answer.components, mode.tool, strict=True)),
+                    "direction": mode.direction,
+                    "modal_mass": mode.modal_mass,
+                    "modal_stiffness": mode.modal_stiffness,
+                    "effective_mass": dict(zip("xyz", mode.effective_mass, strict=True)),
+                    "strain_energy": dict(mode.strain),
+                    "kinetic_energy": dict(mode.kinetic),
+                }
+                for mode in answer.modes
+            ],
+        }
+    )

@@ -1,0 +1,288 @@
+"""Where the machine rings: its modes as a table, the chosen one as a swing in the picture, and the tool's response.
+
+Modes, receptance and swing are computed by `ringing`; here they are chosen and written.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from nicegui import ui
+from nicegui.events import GenericEventArguments
+
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.engine.points import Array
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.vibration import Mode
+from kinetostat.studio.answers import Report, finite, weighs
+from kinetostat.studio.controls import STEPS
+from kinetostat.studio.elements import CurveView, DesignTable, QuantityRow, choice, icon_button, toggle
+from kinetostat.studio.lanes import Lane
+from kinetostat.studio.panels import Panel
+from kinetostat.studio.ringing import Ringing, SwingRequest, ringing, swing
+from kinetostat.studio.session import Session
+from kinetostat.studio.wording import bars, heading, paragraph, shown
+from kinetostat.vibration.receptance import Complex
+from kinetostat.views.analysis_tables import entry_unit
+from kinetostat.views.vibration_tables import LEAST_SHARE, MOST_PARTS, damping_of, masses_of, percent
+
+MODES, RESPONSE = "Modes", "Response"
+CUT = "the cut"
+"""Name of the direction across the cut, in the place of a component."""
+HEADS = ["frequency", "tool", "modal mass", "most strain energy", "most kinetic energy"]
+MASS = "tool.mass"
+NO_MASS = "Nothing says what this machine weighs, and so its natural frequencies are not known."
+GIVE = (
+    "Give the mass of platform and tool here, and the modes follow at once. Inertia, links, drives and damping are in "
+    "the panel Mass on the left."
+)
+COUPLED = 1e-9
+"""Share of the direct responses below which a response between two components is round-off."""
+LARGEST_MASS = 1e300
+"""In the place of an infinite modal mass, kg: a browser has no infinity."""
+DIGITS = 5
+"""Significant digits of a point of a curve."""
+
+
+class VibrationPanel(Panel):
+    """Modes and response of the tool; the chosen mode swings in the picture as long as the panel is in front."""
+
+    name = "Vibration"
+
+    def build(self) -> None:
+        self._report: Report | None = None
+        self._session: Session | None = None
+        self._ringing: Ringing | None = None
+        self._chosen, self._name = 0, ""
+        self._front = self._is_moving = False
+        self._moving: bool | None = None  # what was asked for by the button; None as the browser prefers
+        self._modes, self._swings = Lane(ringing, self._deliver), Lane(swing, self._swing)
+        self.view.on("swinging", self._swinging)
+        self.about = ui.html("", sanitize=False).mark("vibration-about")
+        self.mass = QuantityRow("mass of platform and tool", GIVE, STEPS, slides=False).mark("vibration-mass")
+        self.mass.on("write", self._weigh)
+        with ui.element("div").classes("vibration") as self.content:
+            with ui.row().classes("panel-tools"):
+                self.kind = toggle([MODES, RESPONSE], MODES, self._turn, "vibration-kind")
+                ui.space()
+                self.swinging = ui.label("").classes("note").mark("vibration-mode")
+                self.play = icon_button("pause", "Play or pause the mode", self._toggle, "vibration-play")
+            with ui.element("div").classes("vibration-part") as self.modes:
+                self.table = DesignTable("natural vibrations; a row shows its mode", "show mode").mark(
+                    "vibration-table"
+                )
+                self.table.on("pick", self._pick)
+                self.energies = ui.html("", sanitize=False).mark("vibration-energies")
+            with ui.element("div").classes("vibration-part") as self.response:
+                with ui.row().classes("panel-tools"):
+                    self.moved = choice({}, "motion of the tool", self._draw, "vibration-moved")
+                    self.pushed = choice({}, "under a load", self._draw, "vibration-pushed")
+                self.none = ui.label("").classes("note").mark("vibration-uncoupled")
+                self.size = CurveView("size of the tool's response over the frequency").mark("vibration-size")
+                self.phase = CurveView("phase of the tool's response over the frequency").mark("vibration-phase")
+                for curve in (self.size, self.phase):
+                    curve.on("pick", self._pick)
+        self._turn()
+
+    def shows(self, report: Report) -> bool:
+        return report.answered
+
+    def show(self, report: Report, session: Session) -> None:
+        self._report, self._session, self._front = report, session, True
+        self._modes.ask(session.machine)
+
+    def leave(self) -> None:
+        self._front = False
+        self.view.run_method("swing", [], False)
+
+    def close(self) -> None:
+        self._modes.close()
+        self._swings.close()
+
+    def _deliver(self, machine: Machine, new: Ringing | str) -> None:
+        """Show new modes; of another machine from the lowest on."""
+        if not self._front:
+            return
+        self._chosen, self._name = self._chosen if machine.name == self._name else 0, machine.name
+        self._ringing = None if isinstance(new, str) or not new.answer.modes else new
+        self.mass.set_visibility(isinstance(new, str) and not weighs(machine))
+        self.content.set_visibility(self._ringing is not None)
+        if self.mass.visible:
+            self._ask_for_mass(machine)
+        elif isinstance(new, str):
+            self.about.set_content(paragraph(new, "lead"))
+        else:
+            self.about.set_content(about(new))
+        if self._ringing is None:
+            self.view.run_method("swing", [], False)
+            return
+        self._chosen = min(self._chosen, len(self._ringing.answer.modes) - 1)
+        self._offer(self._ringing)
+        self._show_mode()
+
+    def _ask_for_mass(self, machine: Machine) -> None:
+        self.about.set_content(paragraph(NO_MASS, "lead") + paragraph(GIVE))
+        if self._session is not None:
+            control = self._session.controls[MASS]
+            self.mass.put(shown(control.parameter.quantity, self._session.value(MASS), machine.display), 0)
+
+    def _weigh(self, event: GenericEventArguments) -> None:
+        if self._session is None:
+            return
+        try:
+            self._session.write(MASS, str(event.args))
+        except InputError as error:
+            self.mass.complain(str(error))
+        else:
+            self.mass.take()
+            self.changed()
+
+    def _offer(self, new: Ringing) -> None:
+        """Offer the components of the machine, and across the cut where the file says where that is."""
+        machine = new.answer.machine
+        names = [*new.answer.components, *([CUT] if any(machine.tables["cutting"].direction) else [])]
+        options, first = {name: spoken(name) for name in names}, new.answer.modes[0].direction
+        for field in (self.moved, self.pushed):
+            if field.options != options:
+                field.set_options(options, value=field.value if field.value in options else first)
+
+    def _turn(self) -> None:
+        """Bring the modes or the response to the front."""
+        self.modes.set_visibility(self.kind.value == MODES)
+        self.response.set_visibility(self.kind.value == RESPONSE)
+
+    def _pick(self, event: GenericEventArguments) -> None:
+        if self._ringing is not None:
+            self._chosen = min(int(event.args), len(self._ringing.answer.modes) - 1)
+            self._show_mode()
+
+    def _show_mode(self) -> None:
+        if self._ringing is None or self._report is None:
+            return
+        answer, mode = self._ringing.answer, self._ringing.answer.modes[self._chosen]
+        self.table.put(*mode_rows(self._ringing), None, self._chosen)
+        self.energies.set_content(energies_text(mode, self._chosen + 1, self._report.legs))
+        self.swinging.set_text(f"mode {self._chosen + 1}, {answer.machine.display.show(mode.frequency, 'Hz')}")
+        self._draw()
+        self._swings.ask(SwingRequest(answer, self._chosen, self._report.sizes))
+
+    def _swing(self, request: SwingRequest, solids: list[dict[str, Any]]) -> None:
+        if self._front and self._ringing is not None and request.answer is self._ringing.answer:
+            self.view.run_method("swing", solids, self._moving)
+
+    def _toggle(self) -> None:
+        self._moving = not self._is_moving
+        self.view.run_method("sway", self._moving)
+
+    def _swinging(self, event: GenericEventArguments) -> None:
+        self._is_moving = bool(event.args)
+        self.play.props(f"icon={'pause' if self._is_moving else 'play_arrow'}")
+
+    def _draw(self) -> None:
+        """Draw the entry of the receptance that is chosen."""
+        if self._ringing is None or self._ringing.receptance is None or self._ringing.frequencies is None:
+            return
+        if self.moved.value is None or self.pushed.value is None:
+            return  # both are about to be offered
+        answer, across = self._ringing.answer, self._ringing.frequencies
+        moved, pushed = str(self.moved.value), str(self.pushed.value)
+        ways = [_way(answer.machine, name) for name in (moved, pushed)]
+        curve = _between(ways[0], self._ringing.receptance, ways[1])
+        direct = [np.abs(_between(way, self._ringing.receptance, way)).max() for way in ways]
+        coupled = bool(np.abs(curve).max() > COUPLED * math.sqrt(direct[0] * direct[1]))
+        self.none.set_visibility(not coupled)
+        self.none.set_text(f"A load {spoken(pushed)} does not move the tool {spoken(moved)}.")
+        for view in (self.size, self.phase):
+            view.set_visibility(coupled)
+        unit = entry_unit("compliance", *("x" if name == CUT else name for name in (moved, pushed)))
+        scale = answer.machine.display.scale(unit)
+        marks = [mode.frequency for mode in answer.modes]
+        shared = {"x": _rounded(across), "marks": marks, "here": marks[self._chosen], "log": True, "across": "Hz"}
+        for view, label, unit, values, more in (
+            (self.size, scale.label("size"), scale.unit, np.abs(curve) * scale.factor, {"tall": True}),
+            (self.phase, "phase (deg)", "deg", np.degrees(np.unwrap(np.angle(curve))), {"signed": True}),
+        ):
+            line = {"name": "", "values": _rounded(values)}
+            labels = {"x": "frequency (Hz)", "y": label}
+            view.run_method("show", {**shared, **more, "lines": [line], "label": labels, "unit": unit})
+
+
+def about(new: Ringing) -> str:
+    """Say where the machine rings first and why, what moves, and how it is damped."""
+    answer = new.answer
+    if not answer.modes:
+        return paragraph(answer.message, "lead")
+    return paragraph(answer.message, "lead") + paragraph(f"{masses_of(answer)} Damping: {damping_of(answer)}")
+
+
+def spoken(name: str) -> str:
+    """Return a component as a direction: "along x", "about x", "across the cut"."""
+    if name == CUT:
+        return f"across {CUT}"
+    return f"about {name[1:]}" if name.startswith("r") else f"along {name}"
+
+
+def mode_rows(new: Ringing) -> tuple[list[str], list[list[float]], list[list[str]]]:
+    """Return the heads of the table of modes, numbers to sort its columns by, and its texts."""
+    modes, display = new.answer.modes, new.answer.machine.display
+    texts = [
+        [
+            display.show(mode.frequency, "Hz"),
+            mode.direction,
+            display.show(mode.modal_mass, "kg·m**2" if mode.direction.startswith("r") else "kg"),
+            _largest(mode.strain),
+            _largest(mode.kinetic),
+        ]
+        for mode in modes
+    ]
+    ranks = [sorted({row[column] for row in texts}).index for column in range(len(HEADS))]
+    values = [
+        [mode.frequency, ranks[1](row[1]), min(mode.modal_mass, LARGEST_MASS), ranks[3](row[3]), ranks[4](row[4])]
+        for mode, row in zip(modes, texts, strict=True)
+    ]
+    return HEADS, values, texts
+
+
+def energies_text(mode: Mode, number: int, legs: Mapping[str, str]) -> str:
+    """Bars of the energies of a mode: what deforms, by spring, and what moves, by part.
+
+    Args:
+        mode: with its shares.
+        number: from 1.
+        legs: legs by the name of a joint or link; the picture lights them with the bar under the pointer.
+    """
+    text = ""
+    for title, shares in ((f"Strain energy of mode {number}", mode.strain), ("Its kinetic energy", mode.kinetic)):
+        ranked = sorted(shares.items(), key=lambda item: -abs(item[1]))
+        rows = [(name, share, f"{percent(share)} %") for name, share in ranked if abs(share) >= LEAST_SHARE]
+        of_leg = {name: leg for name in shares for part, leg in legs.items() if f"{name} ".startswith(f"{part} ")}
+        more = f"{len(rows) - MOST_PARTS} parts with less are omitted."
+        text += heading(title) + bars(title, rows[:MOST_PARTS], of_leg)
+        text += paragraph(more) if len(rows) > MOST_PARTS else ""
+    return text
+
+
+def _largest(shares: Mapping[str, float]) -> str:
+    """Name the part with the largest share, with its percentage."""
+    name, share = max(shares.items(), key=lambda item: item[1])
+    return f"{name}, {100.0 * share:.0f} %"
+
+
+def _way(machine: Machine, name: str) -> Array:
+    """Return a component, or the direction across the cut, as a unit wrench or twist [6]."""
+    if name != CUT:
+        return np.eye(len(COMPONENTS))[COMPONENTS.index(name)]
+    direction = np.array(machine.tables["cutting"].direction)
+    return np.concatenate([np.zeros(3), direction / np.linalg.norm(direction)])
+
+
+def _between(moved: Array, receptance: Complex, pushed: Array) -> Complex:
+    """Return the motion along one unit twist per unit of a wrench [frequencies]."""
+    return np.asarray(np.einsum("i,fij,j->f", moved, receptance, pushed))
+
+
+def _rounded(values: Array) -> list[float | None]:
+    """Return points of a curve in the digits that a plot can show."""
+    return finite(np.array([float(f"{value:.{DIGITS}g}") for value in values]))

@@ -1,0 +1,108 @@
+"""The mass matrix of a mechanism at a state: kinetic energy by the rates of its platform and of its legs' coordinates.
+
+A part moves with the screws of the motions that carry it. A uniform bar is straight between its ends and has the
+kinetic energy of both ends' velocities, so that it needs no coordinates of its own; it does not spin about its axis.
+Arrays have the poses first, or hold scalars of any kind for one pose. Nothing is solved here.
+
+Source: theory (55)-(57). Units are those of `equilibrium.mechanism`; masses are multiplied by the length, so that
+eigenvalues are in 1/s².
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinetostat.algebra.scalar import is_zero
+from kinetostat.equilibrium.balance import Placed
+from kinetostat.equilibrium.chains import Chain, Masses
+from kinetostat.equilibrium.motion import Array, Motions, cross, skew_of
+
+TENSOR_ROWS = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
+"""Where the rows of an inertia tensor are among xx, yy, zz, xy, xz, yz."""
+
+
+@dataclass(frozen=True)
+class PartRates:
+    """How a mass moves by the rates of some coordinates.
+
+    Attributes:
+        moving: velocity of its point [n x 3 x coordinates].
+        turning: angular velocity of its body [n x 3 x coordinates].
+        tensor: inertia about the point where it is [n x 3 x 3]; None where it has none.
+    """
+
+    moving: Array
+    turning: Array
+    tensor: Array | None
+
+
+def tensor_of(masses: Masses, number: int, motion: Motions) -> Array | None:
+    """The inertia of a mass about its point, displaced from the free state [n x 3 x 3]; None where it has none."""
+    entries = masses.inertia[:, number]
+    if all(is_zero(entry) for entry in entries.flat) if entries.dtype == object else not entries.any():
+        return None
+    rows = np.stack([entries[:, list(row)] for row in TENSOR_ROWS], axis=1)
+    return np.asarray(motion.rotation @ rows @ np.swapaxes(motion.rotation, 1, 2))
+
+
+def leg_rates(leg: Chain, placed: Placed) -> list[PartRates]:
+    """How each mass of a leg moves by the rates of the leg's coordinates."""
+    follows = leg.follows(leg.coordinate, leg.size)
+    rates = []
+    for number, carried in enumerate(leg.masses.carried):
+        motion, screws = placed.motions[carried], placed.screws[:, :carried]
+        at = motion.point(leg.masses.point[:, number])
+        moving = cross(screws[..., :3], at[:, None]) + screws[..., 3:]
+        moved, turned = (np.swapaxes(part, 1, 2) @ follows[:carried] for part in (moving, screws[..., :3]))
+        rates.append(PartRates(moved, turned, tensor_of(leg.masses, number, motion)))
+    return rates
+
+
+def platform_rates(masses: Masses, platform: Motions) -> list[PartRates]:
+    """How each mass of the platform moves by its twist, at the origin."""
+    rates = []
+    for number in range(len(masses.carried)):
+        at = platform.point(masses.point[:, number])
+        ones = np.broadcast_to(np.eye(3), (len(at), 3, 3))
+        moving = np.concatenate([-skew_of(at), ones], axis=2)
+        turning = np.concatenate([ones, np.zeros((len(at), 3, 3))], axis=2)
+        rates.append(PartRates(moving, turning, tensor_of(masses, number, platform)))
+    return rates
+
+
+def energies(masses: Masses, rates: Sequence[PartRates], length: Array) -> Iterator[tuple[str, Array]]:
+    """Mass matrices of parts with their names; their sum is that of all [n x coordinates x coordinates]."""
+    for name, part, uncoupled in zip(masses.names, rates, _columns(masses.uncoupled, length), strict=True):
+        matrix = np.swapaxes(part.moving, 1, 2) @ part.moving * uncoupled[:, None, None]
+        if part.tensor is not None:
+            spun = np.swapaxes(part.turning, 1, 2) @ part.tensor @ part.turning
+            matrix = matrix + spun * length[:, None, None]
+        yield name, matrix
+    coupled = (masses.mass - masses.uncoupled) * length[:, None]
+    for first, second in masses.pairs:
+        both = np.swapaxes(rates[first].moving, 1, 2) @ rates[second].moving
+        yield masses.names[first], (both + np.swapaxes(both, 1, 2)) * coupled[:, first, None, None]
+
+
+def _columns(amounts: Array, length: Array) -> Array:
+    return np.swapaxes(amounts * length[:, None], 0, 1)
+
+
+def platform_inertia(masses: Masses, platform: Motions, length: Array) -> Array:
+    """The mass matrix of the platform by its twist, at the origin [n x 6 x 6], from its mass, centre and tensor."""
+    count = len(length)
+    whole, first = np.zeros((count, 3, 3)), np.zeros((count, 3))
+    total = np.zeros(count)
+    if masses.mass.dtype == object or platform.translation.dtype == object:
+        whole, first, total = whole.astype(object), first.astype(object), total.astype(object)
+    for number, uncoupled in enumerate(_columns(masses.uncoupled, length)):
+        at = platform.point(masses.point[:, number])
+        lever = skew_of(at)
+        whole = whole - lever @ lever * uncoupled[:, None, None]
+        first, total = first + at * uncoupled[:, None], total + uncoupled
+        tensor = tensor_of(masses, number, platform)
+        whole = whole if tensor is None else whole + tensor * length[:, None, None]
+    moment = skew_of(first)
+    plain = np.eye(3) * total[:, None, None]
+    return np.concatenate([np.concatenate([whole, moment], axis=2), np.concatenate([-moment, plain], axis=2)], axis=1)

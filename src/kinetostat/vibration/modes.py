@@ -1,0 +1,289 @@
+"""Natural vibrations about a state: frequencies, and how everything moves in each.
+
+All motions that obey the closing of the legs are combinations of a few, Z. In them springs and masses are K and M, and
+K y mu = M y has an answer for each: mu = 1 / omega². A motion without mass has mu = 0, so that it needs no special
+case: it follows the others at once, and adds to the compliance only. Motions y are scaled so that y^T K y = 1, the
+strain energy of each is then one half, and so is its kinetic energy.
+
+Source: theory (58) and (59). Units are those of `equilibrium.mechanism`; mu is in s².
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.equilibrium.balance import Balance, placed_leg
+from kinetostat.equilibrium.motion import Array, skew_of
+from kinetostat.equilibrium.tangent import motions_of, starts_of, within
+from kinetostat.kinetostatics.quantities import MODES
+from kinetostat.tolerances import UNRESISTED
+from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
+
+
+@dataclass(frozen=True)
+class Drive:
+    """How the spring of an actuator deflects.
+
+    Attributes:
+        name: of the actuator.
+        turning: whether it turns, otherwise it slides.
+        motion: in each mode, of the scale of `Modes.tool` [m].
+    """
+
+    name: str
+    turning: bool
+    motion: Array
+
+
+@dataclass(frozen=True)
+class Modes:
+    """The natural vibrations at one pose, from the lowest frequency; motions without mass come last.
+
+    Attributes:
+        squares: 1 / omega² of each, s² [m]; 0 where nothing has mass.
+        shapes: rates of the twist of the platform along its ways, and of all coordinates of the legs, scaled to
+            a strain energy of one half [coordinates x m].
+        tool: twist of the tool point in each, base axes, of the same scale: rad and m per root of a joule [6 x m].
+        drives: actuators that deflect.
+    """
+
+    squares: Array
+    shapes: Array
+    tool: Array
+    drives: tuple[Drive, ...] = ()
+
+    @property
+    def ringing(self) -> int:
+        """How many have mass, and so a frequency."""
+        return int((self.squares > 0.0).sum())
+
+    @property
+    def frequencies(self) -> Array:
+        """Natural frequencies, Hz [ringing]."""
+        return np.asarray(0.5 / np.pi / np.sqrt(self.squares[: self.ringing]))
+
+
+def mass_matrix(equations: Balance) -> Array:
+    """The masses over the ways of the platform and all coordinates of the legs [n x coordinates x coordinates], s²."""
+    mechanism, starts = equations.mechanism, starts_of(equations)
+    ways, length = mechanism.ways, mechanism.length
+    size = ways.shape[1]
+    result = np.zeros((len(length), starts[-1], starts[-1]))
+    result[:, :size, :size] = ways.T @ platform_inertia(mechanism.platform, equations.state.platform, length) @ ways
+    given = np.concatenate([equations.state.amounts, mechanism.growth], axis=1)
+    for number, (leg, (first, last)) in enumerate(zip(mechanism.legs, pairwise(starts), strict=True)):
+        moving = slice(first, last)
+        if leg.masses.carried:
+            placed = placed_leg(leg, equations.state.coordinates[number], given)
+            for _, matrix in energies(leg.masses, leg_rates(leg, placed), length):
+                result[:, moving, moving] += matrix
+        result[:, moving, moving] += _diagonal(leg.rotors * length[:, None])
+    return result
+
+
+def damping_matrix(equations: Balance) -> Array:
+    """Viscous friction of joints and rotors over the same coordinates [n x coordinates x coordinates], s."""
+    mechanism, starts = equations.mechanism, starts_of(equations)
+    result = np.zeros((len(mechanism.length), starts[-1], starts[-1]))
+    for leg, (first, last) in zip(mechanism.legs, pairwise(starts), strict=True):
+        result[:, first:last, first:last] = _diagonal(leg.dampers * mechanism.length[:, None])
+    return result
+
+
+def _diagonal(entries: Array) -> Array:
+    return np.asarray(entries[:, :, None] * np.eye(entries.shape[1]))
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Modes of poses that have as many motions.
+
+    Attributes:
+        rows: of the poses [k].
+        squares: as in `Modes` [k x m].
+        shapes: [k x coordinates x m].
+    """
+
+    rows: npt.NDArray[np.int64]
+    squares: Array
+    shapes: Array
+
+
+def solved(equations: Balance, shaped: bool = True) -> Iterator[Solved]:
+    """Solve for the modes of n states; those at which springs and loads do not hold the machine are left out.
+
+    Args:
+        equations: of the states.
+        shaped: whether shapes are wanted; without them they are empty, and frequencies take half of the time.
+    """
+    elastic, geometric, conditions = motions_of(equations)
+    stiff, mass = elastic + geometric, mass_matrix(equations)
+    left_out, starts = motions_left_out(equations), starts_of(equations)
+    sound = np.isfinite(stiff).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
+    for rows, basis in _allowed(conditions, left_out, starts, np.flatnonzero(sound)):
+        within_stiff, within_mass = (_within(part, rows, basis, starts) for part in (stiff, mass))
+        holds, factors = _factors(within_stiff)
+        if not holds.any():
+            continue
+        ringing = factors @ within_mass[holds] @ np.swapaxes(factors, 1, 2)
+        if shaped:
+            squares, turned = np.linalg.eigh(ringing)
+            combined = np.swapaxes(factors, 1, 2) @ turned[:, :, ::-1]
+            shapes = _spread(combined, [part[holds] for part in basis])
+        else:
+            squares, shapes = np.linalg.eigvalsh(ringing), np.zeros((int(holds.sum()), starts[-1], 0))
+        squares = squares[:, ::-1]
+        squares = np.where(squares > UNRESISTED * squares[:, :1], squares, 0.0)
+        yield Solved(rows[holds], squares, shapes)
+
+
+def _allowed(
+    conditions: Array, left_out: Array, starts: npt.NDArray[np.int64], rows: npt.NDArray[np.int64]
+) -> Iterator[tuple[npt.NDArray[np.int64], list[Array]]]:
+    """Poses with as many motions that obey all conditions, and these leg by leg.
+
+    A leg follows the platform by the least motion of its coordinates, and has motions of its own besides. What a leg
+    cannot follow, the platform does not do.
+
+    Args:
+        conditions, left_out, starts: see `solved`.
+        rows: of the poses at which all is finite.
+
+    Returns:
+        Rows of poses, and what they have: motions of the platform [k x ways x motions], then those of each leg
+        [k x coordinates x motions], of which as many as the platform has come first and follow it.
+    """
+    size = int(starts[0])
+    inverses, owns, missed = [], [], []
+    for leg, (first, last) in enumerate(pairwise(starts)):
+        kept = left_out[rows, first - size : last - size, first:last]
+        kept = kept[:, kept.any(axis=(0, 2))]
+        closing = conditions[rows, size * leg : size * (leg + 1), first:last]
+        left, sizes, right = np.linalg.svd(np.concatenate([closing, kept], axis=1))
+        rank = (sizes > UNRESISTED * sizes[:, :1]).sum(axis=1)
+        acts = np.arange(sizes.shape[1]) < rank[:, None]
+        shrink = np.divide(1.0, sizes, where=acts, out=np.zeros_like(sizes))
+        count = sizes.shape[1]
+        back = left[:, :, :count] * acts[:, None]
+        inverses.append(np.swapaxes(right[:, :count], 1, 2) * shrink[:, None] @ np.swapaxes(back, 1, 2)[:, :, :size])
+        missed.append(np.eye(back.shape[1])[:, :size] - back @ np.swapaxes(back, 1, 2)[:, :, :size])
+        owns.append((rank, right))
+    _, sizes, ways = np.linalg.svd(np.concatenate(missed, axis=1), full_matrices=False)
+    ranks = np.stack([(sizes > UNRESISTED).sum(axis=1), *(rank for rank, _ in owns)], axis=1)
+    for each in np.unique(ranks, axis=0):
+        here = (ranks == each).all(axis=1)
+        platform = np.swapaxes(ways[here, each[0] :], 1, 2)
+        moved = [
+            np.concatenate([inverse[here] @ platform, np.swapaxes(right[here, rank:], 1, 2)], axis=2)
+            for inverse, (_, right), rank in zip(inverses, owns, each[1:], strict=True)
+        ]
+        if any(part.shape[2] for part in moved):
+            yield rows[here], [platform, *moved]
+
+
+def _places(basis: Sequence[Array]) -> Iterator[npt.NDArray[np.int64]]:
+    """Where the motions of the platform, and then of each leg, are among all."""
+    common = basis[0].shape[2]
+    end = common
+    yield np.arange(common)
+    for part in basis[1:]:
+        begin, end = end, end + part.shape[2] - common
+        yield np.concatenate([np.arange(common), np.arange(begin, end)])
+
+
+def _within(matrix: Array, rows: npt.NDArray[np.int64], basis: Sequence[Array], starts: npt.NDArray[np.int64]) -> Array:
+    """The symmetric part of a matrix over all coordinates, which couples none of different legs, over the motions."""
+    places = list(_places(basis))
+    size = 1 + max(place.max(initial=-1) for place in places)
+    result = np.zeros((len(rows), size, size))
+    ends = [0, *starts.tolist()]
+    for part, place, (first, last) in zip(basis, places, pairwise(ends), strict=True):
+        result[:, place[:, None], place] += within(matrix[rows, first:last, first:last], part)
+    return result
+
+
+def _spread(combined: Array, basis: Sequence[Array]) -> Array:
+    """Combinations of motions as motions of all coordinates [k x coordinates x m]."""
+    return np.concatenate(
+        [part @ combined[:, place] for part, place in zip(basis, _places(basis), strict=True)], axis=1
+    )
+
+
+def _factors(stiff: Array) -> tuple[npt.NDArray[np.bool_], Array]:
+    """Whether matrices K are positive definite by a margin [k], and L^-1 of those that are, K = L L^T."""
+    with suppress(np.linalg.LinAlgError):
+        factors = np.linalg.inv(np.linalg.cholesky(stiff))
+        # Both traces are sums of positive eigenvalues, so that their product is at least the ratio of the extremes.
+        if (np.trace(stiff, axis1=1, axis2=2) * (factors**2).sum(axis=(1, 2)) < 1.0 / UNRESISTED).all():
+            return np.ones(len(stiff), dtype=bool), factors
+    least = np.linalg.eigvalsh(stiff)
+    holds = np.asarray(least[:, 0] > UNRESISTED * least[:, -1])
+    return holds, np.linalg.inv(np.linalg.cholesky(stiff[holds]))
+
+
+def motions_left_out(equations: Balance) -> Array:
+    """Conditions on motions that do not exist [n x conditions x coordinates].
+
+    Links do not spin about their own axes, which moves nothing, and nothing leaves the plane of a planar machine.
+    """
+    starts, ways = starts_of(equations), equations.mechanism.ways
+    blocks = np.zeros((len(equations.left), starts[-1] - starts[0], starts[-1]))
+    pairs = zip(equations.mechanism.legs, equations.legs, pairwise(starts), strict=True)
+    for leg, terms, (first, last) in pairs:
+        inside, whole = (np.linalg.norm(part, axis=1) for part in (ways.T @ terms.rates, terms.rates))
+        leaving = (inside <= UNRESISTED * whole)[:, :, None] * np.eye(leg.size)
+        blocks[:, first - starts[0] : last - starts[0], first:last] = np.swapaxes(leg.idle, 1, 2) + leaving
+    return blocks
+
+
+def hertz(squares: Array) -> Array:
+    """Frequencies of 1 / omega² in descending order [n x m]; infinite where nothing has mass."""
+    rings = squares > UNRESISTED * squares[:, :1]
+    return np.where(rings, 0.5 / np.pi / np.sqrt(np.where(rings, squares, 1.0)), np.inf)
+
+
+def frequencies(equations: Balance, count: int = MODES) -> Array:
+    """The lowest natural frequencies of n states, Hz [n x count].
+
+    Infinite where there are fewer modes with mass, NaN where springs and loads do not hold the machine.
+    """
+    result = np.full((len(equations.left), count), np.nan)
+    for part in solved(equations, shaped=False):
+        shown = min(count, part.squares.shape[1])
+        result[part.rows] = np.inf
+        result[part.rows, :shown] = hertz(part.squares[:, :shown])
+    return result
+
+
+def modes(equations: Balance) -> Modes | None:
+    """The natural vibrations at a single pose; None where springs and loads do not hold the machine there."""
+    part = next(solved(equations), None)
+    if part is None:
+        return None
+    shapes = part.shapes[0]
+    return Modes(part.squares[0], shapes, tool_motions(equations) @ shapes, tuple(_drives(equations, shapes)))
+
+
+def _drives(equations: Balance, shapes: Array) -> Iterator[Drive]:
+    mechanism = equations.mechanism
+    length, joule = float(mechanism.length[0]), float(mechanism.force[0] * mechanism.length[0])
+    for leg, first in zip(mechanism.legs, starts_of(equations), strict=False):
+        for place, spring in enumerate(leg.springs, first):
+            if spring is not None and spring.actuated:
+                turning = spring.joint.point is not None
+                yield Drive(spring.of, turning, shapes[place] * (1.0 if turning else length) / np.sqrt(joule))
+
+
+def tool_motions(equations: Balance) -> Array:
+    """Twist of the tool point of one pose per unit of each coordinate, SI, for energies in joules [6 x coordinates]."""
+    mechanism, ways = equations.mechanism, equations.mechanism.ways
+    shift = np.eye(6)
+    shift[3:, :3] = -skew_of(equations.state.platform.translation)[0]
+    joule = float(mechanism.force[0] * mechanism.length[0])
+    result = np.zeros((6, int(starts_of(equations)[-1])))
+    result[:, : ways.shape[1]] = mechanism.twist_units[0][:, None] * (shift @ ways) / np.sqrt(joule)
+    return result

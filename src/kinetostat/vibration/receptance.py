@@ -1,0 +1,162 @@
+"""How the tool moves under a force that varies as a sine: its receptance, and the cut that it makes unstable.
+
+All motions of the modes carry their part, those without mass as springs do; so the receptance at no frequency is the
+compliance.
+
+Source: theory (59) and (60); the limit of a cut, J. Tlusty and M. Polacek (1963). At the tool point, base axes, SI.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.equilibrium.balance import Balance, balance, free_state
+from kinetostat.equilibrium.mechanism import mechanism_of
+from kinetostat.equilibrium.motion import Array
+from kinetostat.equilibrium.solving import with_share
+from kinetostat.kinematics.closing import stacked
+from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.machine import Machine
+from kinetostat.vibration.modes import Modes, damping_matrix, modes
+
+Complex = npt.NDArray[np.complex128]
+
+ASSUMED_RATIO = 0.02
+"""Damping ratio of every mode where a file says nothing about damping: that of many machine tools."""
+TRIED = 200
+"""Frequencies that are tried about each mode, and then about the best of them: that gives 1e-8 of the real part."""
+LEAST_RATIO = 1e-9
+"""Damping ratio below which a peak is as sharp as this one: then it has no least real part that means anything."""
+BANDWIDTHS = 6.0
+"""How far about a mode, in multiples of its half-power bandwidth."""
+
+
+@dataclass(frozen=True)
+class Damper:
+    """What takes energy out of the modes.
+
+    Attributes:
+        friction: of joints and rotors, and Rayleigh's damping, between the modes [m x m], s.
+        ratio: damping ratio that every mode has besides.
+    """
+
+    friction: Array
+    ratio: float
+
+    def ratios(self, modes: Modes) -> Array:
+        """Damping ratio of each mode with mass, all its damping counted, for light damping [ringing]."""
+        count = modes.ringing
+        roots = np.sqrt(modes.squares[:count])
+        return np.asarray(self.ratio + 0.5 * np.diagonal(self.friction)[:count] / roots)
+
+
+def damper(equations: Balance, modes: Modes, ratio: float, per_mass: float, per_stiffness: float) -> Damper:
+    """The damping of the modes of one pose.
+
+    Args:
+        equations: at the state.
+        modes: of it.
+        ratio: damping ratio of every mode.
+        per_mass, per_stiffness: Rayleigh's factors, 1/s and s.
+    """
+    friction = modes.shapes.T @ damping_matrix(equations)[0] @ modes.shapes
+    rayleigh = per_mass * modes.squares + per_stiffness * np.ones_like(modes.squares)
+    return Damper(friction + np.diag(rayleigh), ratio)
+
+
+def receptance(modes: Modes, damping: Damper, frequencies: Array) -> Complex:
+    """Motion of the tool per unit of a varying wrench on it, rad and m per N·m and N [frequencies x 6 x 6].
+
+    Args:
+        modes: at the pose.
+        damping: of them.
+        frequencies: Hz [frequencies].
+    """
+    rates = 2.0 * np.pi * np.asarray(frequencies, dtype=float)[:, None]
+    roots = np.sqrt(modes.squares)
+    diagonal = 1.0 - rates**2 * modes.squares + 2.0j * damping.ratio * rates * roots
+    if not damping.friction.any():
+        return np.asarray(np.einsum("ik,fk,jk->fij", modes.tool, 1.0 / diagonal, modes.tool))
+    whole = 1.0j * rates[:, :, None] * damping.friction + diagonal[:, :, None] * np.eye(len(roots))
+    tools = np.broadcast_to(modes.tool.T, (len(rates), *modes.tool.T.shape))
+    return np.asarray(modes.tool @ np.linalg.solve(whole, tools))
+
+
+def along(receptances: Complex, direction: Array) -> Complex:
+    """The receptance of a point in a direction, m/N [frequencies]: of the force along it, the motion along it.
+
+    Args:
+        receptances: [frequencies x 6 x 6].
+        direction: any length, base axes [3].
+    """
+    unit = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
+    return np.asarray(np.einsum("i,fij,j->f", unit, receptances[:, 3:, 3:], unit))
+
+
+@dataclass(frozen=True)
+class Softest:
+    """Where the real part of a receptance is least.
+
+    Attributes:
+        frequency: Hz.
+        real: the least real part, m/N; it is negative unless nothing rings.
+    """
+
+    frequency: float
+    real: float
+
+    def depth(self, pressure: float) -> float:
+        """Width of cut up to which every spindle speed is stable, m; infinite where nothing rings.
+
+        Args:
+            pressure: cutting force per area of the chip, N/m².
+        """
+        return -0.5 / (pressure * self.real) if self.real < 0.0 and pressure else float("inf")
+
+
+def least_real_part(modes: Modes, damping: Damper, direction: Array) -> Softest:
+    """Find where the receptance along a direction has its least real part: near one of the modes, a little above it."""
+    tried = [np.zeros(1)]
+    spread = np.linspace(-BANDWIDTHS, BANDWIDTHS, TRIED)
+    for frequency, ratio in zip(modes.frequencies, damping.ratios(modes), strict=True):
+        tried.append(frequency * np.abs(1.0 + max(float(ratio), LEAST_RATIO) * spread))
+    coarse = np.unique(np.concatenate(tried))
+    near = _lowest(modes, damping, direction, coarse)
+    fine = np.linspace(coarse[max(near - 1, 0)], coarse[min(near + 1, len(coarse) - 1)], TRIED)
+    lowest = _lowest(modes, damping, direction, fine)
+    part = along(receptance(modes, damping, fine[lowest : lowest + 1]), direction).real
+    return Softest(float(fine[lowest]), float(part[0]))
+
+
+def _lowest(modes: Modes, damping: Damper, direction: Array, frequencies: Array) -> int:
+    return int(np.argmin(along(receptance(modes, damping, frequencies), direction).real))
+
+
+def cut_receptances(machine: Machine, response: Response, count: int) -> Array:
+    """The least real part of the receptance across the cut at n poses, m/N [n]; NaN where nothing holds the machine.
+
+    Poses are taken in turn: a few milliseconds each.
+
+    Args:
+        machine: at n poses, with its tables [cutting] and [damping].
+        response: of it.
+        count: of poses, n.
+    """
+    joints = solve_joints(machine) if machine.family.chains else None
+    mechanism = with_share(mechanism_of(machine, response, joints, count), 0.0)
+    table, result = machine.tables["damping"], np.full(count, np.nan)
+    directions = stacked(machine.tables["cutting"].direction, count)
+    damping = stacked([table.ratio, table.per_mass, table.per_stiffness], count)
+    for row in range(count):
+        here = mechanism.taken(np.array([row]))
+        equations = balance(here, free_state(here))
+        solution = modes(equations)
+        if solution is not None:
+            ratio, per_mass, per_stiffness = damping[row]
+            friction = any(leg.dampers.any() for leg in here.legs)
+            ratio = ratio if friction or damping[row].any() else ASSUMED_RATIO
+            damped = damper(equations, solution, ratio, per_mass, per_stiffness)
+            result[row] = least_real_part(solution, damped, directions[row]).real
+    return result

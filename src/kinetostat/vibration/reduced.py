@@ -1,0 +1,216 @@
+"""Natural frequencies over scalars, a few sums and Jacobi's rotations: what machine code does for many poses.
+
+Where nothing is massive but the platform, its compliance is all that is needed, whatever the legs are. Where links or
+rotors are massive too, the loops of the machine are cut at its rods, as `equilibrium.reduced` does. Machines that allow
+neither are left to `modes`.
+
+Source: theory (63); with the platform alone, (58) with C. Units are those of `equilibrium.mechanism`.
+"""
+
+import math
+import re
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
+from kinetostat.algebra.solve import Row, eliminated
+from kinetostat.algebra.symmetric import eigenvalues
+from kinetostat.equilibrium.balance import balance, free_state, placed_leg
+from kinetostat.equilibrium.mechanism import mechanism_of, platform_weights
+from kinetostat.equilibrium.motion import Array, of_scalars
+from kinetostat.equilibrium.reduced import Cut, Rod, cut, place_of, relative
+from kinetostat.equilibrium.solving import with_share
+from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinetostatics.quantities import MODES
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.mass import PLATFORM, moving_masses
+from kinetostat.tolerances import UNRESISTED
+from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
+from kinetostat.vibration.modes import frequencies, hertz
+
+ALIKE = 1e-9
+"""Share of a frequency's square by which another may differ and still count as equal to it."""
+MAKES_MASSIVE = re.compile(r"linear_density\.|drives\.rotor_inertia|legs\..*\.mass|sections\..*\.density")
+"""Leaf paths that may make links or rotors massive."""
+
+
+def reducible(machine: Machine, varying: Collection[str] = ()) -> bool:
+    """Whether `free_frequencies` takes a machine wherever its varying parameters (leaf paths) are."""
+    joints = solve_joints(machine) if machine.family.chains else None
+    with np.errstate(all="ignore"):
+        response = respond(machine, joints)
+        if platform_alone(machine, varying):
+            return True
+        machine_cut = cut(with_share(mechanism_of(machine, response, joints), 0.0))
+        return machine_cut is not None and not leaves_plane(machine, machine_cut)
+
+
+def leaves_plane(machine: Machine, machine_cut: Cut) -> bool:
+    """Whether springs of a planar machine may deflect out of its plane, which these sums do not keep from moving."""
+    return machine.family.planar and any(spring is not None for spring in machine_cut.carrier.springs)
+
+
+def platform_alone(machine: Machine, varying: Collection[str] = ()) -> bool:
+    """Whether no leg has a mass or a rotor wherever the varying parameters (leaf paths) are."""
+    return light(machine, respond(machine)) and not any(MAKES_MASSIVE.match(path) for path in varying)
+
+
+def light(machine: Machine, response: Response) -> bool:
+    """Whether no leg has a mass or a rotor with inertia, by form."""
+    links = [part for part in moving_masses(machine, response.configuration) if part.name != PLATFORM]
+    return all(link.mass is None for link in links) and is_zero(machine.tables["drives"].rotor_inertia)
+
+
+def free_frequencies(machine: Machine, response: Response, joints: Joints | None, sloped: bool = False) -> list[Scalar]:
+    """The lowest natural frequencies of a machine with relaxed springs, Hz [MODES]; infinite where there are fewer.
+
+    Args:
+        machine: with its masses; numbers of any kind.
+        response: of it.
+        joints: coordinates that close its legs, if it is written leg by leg.
+        sloped: whether derivatives will be taken.
+    """
+    if light(machine, response):
+        return in_order(eigenvalues(platform_matrix(machine, response), sloped))
+    machine_cut = cut(with_share(mechanism_of(machine, response, joints, None), 0.0))
+    if machine_cut is None:
+        raise ValueError("loops that rods do not cut have no frequencies over scalars")
+    return frequencies_at(machine_cut, [0.0] * machine_cut.carrier.size, sloped)
+
+
+def pose_frequencies(machine: Machine, response: Response, count: int) -> Array:
+    """The same of any machine at n poses, by NumPy [n x MODES]; NaN where springs do not hold it.
+
+    Args:
+        machine: at n poses: with columns of them.
+        response: of it.
+        count: of poses, n.
+    """
+    if not light(machine, response):
+        joints = solve_joints(machine) if machine.family.chains else None
+        mechanism = with_share(mechanism_of(machine, response, joints, count), 0.0)
+        return frequencies(balance(mechanism, free_state(mechanism)))
+    entries = [entry for row in platform_matrix(machine, response) for entry in row]
+    size = len(machine.family.components)
+    matrices = of_scalars(entries, count).reshape(count, size, size)
+    result = np.full((count, MODES), np.nan)
+    sound = np.isfinite(matrices).all(axis=(1, 2))
+    result[sound] = np.inf
+    result[sound, :size] = hertz(np.asarray(np.linalg.eigvalsh(matrices[sound])[:, ::-1], dtype=float))
+    return result
+
+
+def platform_matrix(machine: Machine, response: Response) -> list[Row]:
+    """G^T M G with C = G G^T, whose eigenvalues are those of C M, s²; a rigid direction has a column of zeros.
+
+    Args:
+        machine: in which the platform alone is massive.
+        response: of it.
+    """
+    parts, length = machine.family.components, response.configuration.length
+    units = [length if part in range(3) else 1.0 for part in range(6)]  # so that all rows are in m/N and kg
+    inertia = _platform_inertia(machine, response)
+    soft = [[response.compliance.entry(i, j) * units[i] * units[j] for j in parts] for i in parts]
+    heavy = [[inertia[i][j] * (1.0 / (units[i] * units[j])) for j in parts] for i in parts]
+    factor = np.array(_root(soft), dtype=object)
+    return (factor.T @ np.array(heavy, dtype=object) @ factor).tolist()
+
+
+def _platform_inertia(machine: Machine, response: Response) -> list[Row]:
+    """The mass matrix of platform and payload by a twist of the tool point, base axes, SI [6][6]."""
+    result: list[Row] = [[0.0 for _ in range(6)] for _ in range(6)]
+    for weight in platform_weights(machine, response):
+        x, y, z = (weight.point - response.reference).components()
+        mass, (xx, yy, zz, xy, xz, yz) = weight.mass, weight.inertia
+        turning = [
+            [xx + mass * (y * y + z * z), xy - mass * (x * y), xz - mass * (x * z)],
+            [xy - mass * (x * y), yy + mass * (x * x + z * z), yz - mass * (y * z)],
+            [xz - mass * (x * z), yz - mass * (y * z), zz + mass * (x * x + y * y)],
+        ]
+        lever = [[0.0, -(mass * z), mass * y], [mass * z, 0.0, -(mass * x)], [-(mass * y), mass * x, 0.0]]
+        for i in range(3):
+            result[3 + i][3 + i] = result[3 + i][3 + i] + mass
+            for j in range(3):
+                result[i][j] = result[i][j] + turning[i][j]
+                result[i][3 + j] = result[i][3 + j] + lever[i][j]
+                result[3 + j][i] = result[3 + j][i] + lever[i][j]
+    return result
+
+
+def _root(rows: Sequence[Sequence[Scalar]]) -> list[Row]:
+    """The lower triangle G with G G^T = A of a matrix that may be semidefinite, by Cholesky's factorisation."""
+    size = range(len(rows))
+    left: list[Row] = [list(row) for row in rows]
+    result: list[Row] = [[0.0 for _ in size] for _ in size]
+    for k in size:
+        pivot = left[k][k]
+        good = pivot > UNRESISTED * abs(rows[k][k])
+        root = sqrt(where(good, pivot, 1.0))
+        result[k][k] = where(good, root, 0.0)
+        for i in range(k + 1, len(rows)):
+            result[i][k] = where(good, left[i][k] / root, 0.0)
+            for j in range(k + 1, i + 1):
+                left[i][j] = left[i][j] - result[i][k] * result[j][k]
+    return result
+
+
+def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list[Scalar]:
+    """The lowest natural frequencies at some coordinates of the carrier, Hz [MODES].
+
+    Args:
+        machine: whose loops are cut.
+        coordinates: at which it is at rest.
+        sloped: whether derivatives will be taken.
+    """
+    place, mechanism = place_of(machine, coordinates), machine.mechanism
+    amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
+    placed = placed_leg(machine.carrier, of_scalars(coordinates), amounts)
+    length, twists = mechanism.length, place.terms.rates[0]
+    inertia = platform_inertia(mechanism.platform, place.platform, length)[0]
+    for rod in machine.rods:
+        if not is_zero(rod.rotor):
+            inertia = inertia + _along(rod, place.platform.point(rod.far)) * (rod.rotor * length[0])
+    mass = twists.T @ inertia @ twists
+    for _, matrix in energies(machine.carrier.masses, leg_rates(machine.carrier, placed), length):
+        mass = mass + matrix[0]
+    mass = mass + np.diag(machine.carrier.rotors[0] * length[0])
+    stiff = 0.5 * (place.rates + place.rates.T)
+    return in_order(eigenvalues(relative(eliminated(stiff.tolist()), mass), sloped))
+
+
+def _along(rod: Rod, far: Array) -> Array:
+    """The dyad of a rod's unit line: the square of its rate of stretching by a twist of the platform [6 x 6]."""
+    span = (far - rod.near)[0]
+    size = sqrt(total([part * part for part in span]))
+    unit = np.array([part * (1.0 / size) for part in span], dtype=object)
+    moment = np.cross(far[0], unit)
+    line = np.concatenate([moment, unit])
+    return np.asarray(np.outer(line, line))
+
+
+def in_order(modes: Sequence[Scalar]) -> list[Scalar]:
+    """The lowest frequencies of modes, Hz [MODES], from their 1 / omega², s²; equal ones share their mean."""
+    squares, size = [*modes], len(modes)
+    for first in range(size):  # exchange neighbours until the largest come first
+        for k in range(first % 2, size - 1, 2):
+            swap = squares[k] < squares[k + 1]
+            squares[k], squares[k + 1] = (
+                where(swap, squares[k + 1], squares[k]),
+                where(swap, squares[k], squares[k + 1]),
+            )
+    shown = squares[:MODES]
+    means = [_mean_of_equals(squares, square) for square in shown] + [0.0] * (MODES - len(shown))
+    return [_frequency(mean, squares[0]) for mean in means]
+
+
+def _mean_of_equals(squares: Sequence[Scalar], square: Scalar) -> Scalar:
+    near = [abs(other - square) <= ALIKE * abs(square) for other in squares]
+    sums = total([where(equal, other, 0.0) for equal, other in zip(near, squares, strict=True)])
+    return sums / total([where(equal, 1.0, 0.0) for equal in near])
+
+
+def _frequency(square: Scalar, largest: Scalar) -> Scalar:
+    rings = square > UNRESISTED * largest
+    return where(rings, 0.5 / math.pi / sqrt(where(rings, square, 1.0)), math.inf)

@@ -1,0 +1,146 @@
+"""Natural frequencies over scalars from modes that are known: what derivatives need where nothing shorter is exact.
+
+A mode is a stationary point of its mu = 1 / omega² over all motions that obey the closing of the legs. So a change of
+the machine changes mu as if the mode and the forces that close the legs stayed as they are: no eigenvalue problem is
+differentiated, and any machine will do. Solving for the modes is `modes`' business; here they are columns of numbers.
+
+Source: theory (58) and what follows (63). Units are those of `equilibrium.mechanism`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.algebra.scalar import Scalar, total
+from kinetostat.equilibrium.balance import Balance, balance, free_state, placed_leg
+from kinetostat.equilibrium.chains import Masses
+from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
+from kinetostat.equilibrium.motion import Array, of_scalars, still
+from kinetostat.equilibrium.solving import with_share
+from kinetostat.equilibrium.tangent import motions_of, starts_of
+from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.machine import Machine
+from kinetostat.tolerances import UNRESISTED
+from kinetostat.vibration.inertia import PartRates, energies, leg_rates, platform_rates
+from kinetostat.vibration.modes import mass_matrix, motions_left_out, solved
+
+EQUALS = 5
+"""Modes beyond the last one that is wanted, among which equal ones are looked for."""
+
+
+def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
+    """The lowest modes of a machine with relaxed springs at n poses, as columns for `squares_of_modes`, each [n].
+
+    Args:
+        machine: at n poses: with columns of them.
+        count: of poses, n.
+        most: how many modes; those that a pose does not have are zero.
+
+    Returns:
+        The unit of force, then for each mode its 1 / omega², its motion of all coordinates, and the forces that close
+        the legs. NaN where springs do not hold the machine, or where a link has an inertia about an axis about which it
+        is free to spin.
+    """
+    joints = solve_joints(machine) if machine.family.chains else None
+    mechanism = with_share(mechanism_of(machine, respond(machine, joints), joints, count), 0.0)
+    equations = balance(mechanism, free_state(mechanism))
+    elastic, geometric, conditions = motions_of(equations)
+    stiff, mass, closing = elastic + geometric, mass_matrix(equations), conditions.shape[1]
+    held_still = np.concatenate([conditions, motions_left_out(equations)], axis=1)
+    columns = np.full((count, most, 1 + stiff.shape[1] + closing), np.nan)
+    for part in solved(equations):
+        shown = min(most, part.squares.shape[1])
+        squares, shapes = part.squares[:, :shown], part.shapes[:, :, :shown]
+        left = stiff[part.rows] @ shapes * squares[:, None] - mass[part.rows] @ shapes
+        forces = np.linalg.pinv(np.swapaxes(held_still[part.rows], 1, 2), rcond=UNRESISTED) @ left
+        rows = np.concatenate([squares[:, None], shapes, forces[:, :closing]], axis=1)
+        columns[part.rows] = 0.0
+        columns[part.rows, :shown] = np.swapaxes(rows, 1, 2)
+        columns[part.rows[_spins(equations, part.rows, left)]] = np.nan
+    return [mechanism.force, *np.ascontiguousarray(columns.reshape(count, -1).T)]
+
+
+def _spins(equations: Balance, rows: npt.NDArray[np.int64], forces: Array) -> npt.NDArray[np.bool_]:
+    """Whether forces on the coordinates [k x coordinates x m] would turn links that are kept from spinning [k]."""
+    pairs = zip(equations.mechanism.legs, pairwise(starts_of(equations)), strict=True)
+    turning = [np.swapaxes(leg.idle[rows], 1, 2) @ forces[:, first:last] for leg, (first, last) in pairs]
+    sizes = np.max([np.abs(part).max(axis=(1, 2), initial=0.0) for part in turning], axis=0)
+    return np.asarray(sizes > UNRESISTED * np.abs(forces).max(axis=(1, 2)))
+
+
+@dataclass(frozen=True)
+class Vibrating:
+    """A machine with relaxed springs whose modes are known, over scalars.
+
+    Attributes:
+        mechanism: of it.
+        most: how many modes are known.
+    """
+
+    mechanism: Mechanism
+    most: int
+
+    @property
+    def sizes(self) -> list[int]:
+        """How many coordinates the platform has, and each leg."""
+        return [self.mechanism.ways.shape[1], *(leg.size for leg in self.mechanism.legs)]
+
+    @property
+    def columns(self) -> int:
+        """How many columns `mode_columns` makes of it."""
+        return 1 + self.most * (1 + sum(self.sizes) + self.sizes[0] * len(self.mechanism.legs))
+
+    def squares(self, columns: Sequence[Scalar]) -> list[Scalar]:
+        """1 / omega² of each mode, s² [most]: exact, as their derivatives by the machine's parameters are.
+
+        Args:
+            columns: that `mode_columns` makes.
+        """
+        unit, *rest = columns
+        size = len(rest) // self.most
+        ratio = self.mechanism.force[0] / unit
+        return [self._square(rest[k * size : (k + 1) * size], ratio) for k in range(self.most)]
+
+    def _square(self, columns: Sequence[Scalar], ratio: Scalar) -> Scalar:
+        """mu + phi^T M phi - mu phi^T K phi + 2 forces . what opens the legs: all but mu add up to 0."""
+        mechanism, remaining = self.mechanism, iter(columns)
+        square = next(remaining)
+        twist, *moved = [of_scalars([next(remaining) for _ in range(size)])[0] for size in self.sizes]
+        forces = [mechanism.ways @ [next(remaining) for _ in range(self.sizes[0])] for _ in mechanism.legs]
+        platform = mechanism.ways @ twist
+        kinetic = _energy(mechanism.platform, platform_rates(mechanism.platform, still(1)), platform, mechanism.length)
+        strain, open_by = 0.0, 0.0
+        amounts = np.zeros((1, len(mechanism.actuators) + mechanism.growth.shape[1]))
+        for leg, motion, force in zip(mechanism.legs, moved, forces, strict=True):
+            placed = placed_leg(leg, np.zeros((1, leg.size)).astype(object), amounts.astype(object))
+            kinetic = kinetic + _energy(leg.masses, leg_rates(leg, placed), motion, mechanism.length)
+            kinetic = kinetic + mechanism.length[0] * total(list(leg.rotors[0] * motion * motion))
+            strain = strain + total(list(leg.stiffness[0] * motion * motion))
+            ends = placed.screws[0].T @ (leg.follows(leg.coordinate, leg.size) @ motion)
+            open_by = open_by + total(list(force * (ends - platform)))
+        return square + ratio * (kinetic - square * strain) + 2.0 * open_by
+
+
+def _energy(masses: Masses, rates: Sequence[PartRates], motion: Array, length: Array) -> Scalar:
+    """Twice the kinetic energy of some masses in a motion of their coordinates."""
+    moving = [
+        replace(part, moving=(part.moving @ motion)[..., None], turning=(part.turning @ motion)[..., None])
+        for part in rates
+    ]
+    return total([matrix[0, 0, 0] for _, matrix in energies(masses, moving, length)])
+
+
+def vibrating(machine: Machine, response: Response, joints: Joints | None, most: int) -> Vibrating:
+    """A machine with numbers of any kind, whose modes will be known.
+
+    Args:
+        machine: with its masses.
+        response: of it.
+        joints: coordinates that close its legs, if it is written leg by leg.
+        most: how many modes.
+    """
+    return Vibrating(with_share(mechanism_of(machine, response, joints, None), 0.0), most)

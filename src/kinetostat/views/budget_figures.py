@@ -1,0 +1,82 @@
+"""Figures of an error budget: bars of what contributes, and the error over a path, a sweep or a map."""
+
+from functools import partial
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from kinetostat.studies.budget.budget import Budget
+from kinetostat.studies.budget.data import as_dataset
+from kinetostat.studies.setting import setting_of
+from kinetostat.views.budget_tables import ranked_by
+from kinetostat.views.figures import COLOURS, STYLE, Drawings, contour_maps, curves, fix_layout, note_setting, set_title
+
+MOST_BARS = 15
+"""Single tolerances that have bars."""
+BAR = 0.8
+"""Height of all bars of a row together."""
+
+
+def budget_figures(budget: Budget) -> Drawings:
+    """Give the functions that draw a budget: contributions, and the error over the poses if there are many."""
+    drawings: Drawings = {"contributions": partial(contributions_figure, budget)} if budget.shares.any() else {}
+    dims = 1 if budget.question is None else len(budget.question.dims)
+    if len(budget.status) > 1 and dims <= 2:
+        drawings["map" if dims == 2 else "curves"] = partial(_over_poses, budget)
+    return drawings
+
+
+def _over_poses(budget: Budget) -> Figure:
+    dataset, measures, title = as_dataset(budget), ranked_by(budget), f"{budget.machine.name}: error of the tool"
+    if len(dataset["status"].dims) == 2:
+        # Percentiles of drawn machines have noise, of which a map would draw contours.
+        return contour_maps(dataset, [f"rms_{name}" for name in measures], title)
+    names = [f"{statistic}_{name}" for name in measures for statistic in ("rms", "usual", "worst")]
+    return curves(dataset, names, title)
+
+
+def contributions_figure(budget: Budget) -> Figure:
+    """Draw what the variance of the error is made of: by line of [tolerances], by leg, by single tolerance."""
+    names = ranked_by(budget)
+    rows = budget.shares[[budget.measures.index(name) for name in names]]
+    order = np.argsort(-rows[0], kind="stable")[:MOST_BARS]
+    panels = {
+        "lines of [tolerances]": _sums(budget, "line", names),
+        "legs": _sums(budget, "leg", names),
+        "largest single tolerances": {budget.parts[i].words: rows[:, i].tolist() for i in order},
+    }
+    heights = [len(bars) + 0.6 for bars in panels.values()]
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(6.4, 1.4 + 0.24 * sum(heights)), layout="constrained")
+        axes = figure.subplots(len(panels), 1, height_ratios=heights, squeeze=False)[:, 0]
+        for panel, (title, bars) in zip(axes, panels.items(), strict=True):
+            _bars(panel, title, bars, names)
+        axes[-1].set_xlabel("share of the variance (%)")
+        if len(names) > 1:
+            axes[-1].legend(loc="lower right")
+        set_title(figure, f"{budget.machine.name}: what the error of the tool is made of")
+        many = f"{len(budget.status):,} poses together" if len(budget.status) > 1 else setting_of(budget.machine)
+        note_setting(figure, many)
+        fix_layout(figure)
+    return figure
+
+
+def _sums(budget: Budget, key: str, names: list[str]) -> dict[str, list[float]]:
+    sums = [budget.shares_by(key, name) for name in names]
+    return {label: [each[label] for each in sums] for label in sums[0]}
+
+
+def _bars(panel: Axes, title: str, bars: dict[str, list[float]], names: list[str]) -> None:
+    places, height = np.arange(len(bars)), BAR / len(names)
+    for number, (name, colour) in enumerate(zip(names, COLOURS, strict=False)):
+        widths = [100.0 * shares[number] for shares in bars.values()]
+        panel.barh(places + (number - 0.5 * (len(names) - 1)) * height, widths, 0.92 * height, color=colour, label=name)
+    panel.set_yticks(places, list(bars))
+    panel.set_ylim(len(bars) - 0.4, -0.6)
+    panel.set_title(title, loc="left")
+    panel.set_axisbelow(True)
+    panel.grid(visible=False, axis="y")
+    panel.tick_params(axis="y", length=0)
+    panel.margins(x=0.02)

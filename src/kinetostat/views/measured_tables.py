@@ -1,0 +1,90 @@
+"""A measured stiffness beside the computed one, as a table and sentences on a terminal. Nothing is computed here."""
+
+from rich.console import Console
+
+from kinetostat.display import Display, Scale, number
+from kinetostat.studies.measured.comparison import COVER, MeasuredComparison, MeasuredRow
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.tables import text_table
+
+WORDS = {"numerics": "the computation", "inputs": "the numbers of the machine", "measurement": "the measurement"}
+EXACT = 1e-9
+"""Share of a number below which its uncertainty is round-off."""
+
+
+def print_measured(console: Console, answer: MeasuredComparison) -> None:
+    """Print the verdict, every measured number beside the computed one, and what the uncertainty is made of."""
+    console.print(answer.message, highlight=False)
+    console.print(measured_table(answer))
+    for sentence in measured_notes(answer):
+        console.print(sentence, highlight=False)
+
+
+def measured_table(answer: MeasuredComparison) -> FittedTable:
+    """Every measured number with its standard uncertainty, the computed one, and what lies between them."""
+    table = text_table(
+        "Measured and computed, at the tool point, base axes (± one standard uncertainty)",
+        "line", "entry", "measured", "computed", "difference", "verdict",
+    )  # fmt: skip
+    display = answer.machine.display
+    for row in answer.rows:
+        table.add_row(
+            str(row.entry.line),
+            row.entry.name,
+            _with_sure(row, display, row.entry.value, row.u_data),
+            _with_sure(row, display, row.predicted, (row.u_input**2 + row.u_num**2) ** 0.5),
+            _with_sure(row, display, row.error, row.u_val),
+            verdict_of(row, display),
+        )
+    return table
+
+
+def _with_sure(row: MeasuredRow, display: Display, value: float, sure: float) -> str:
+    """A value with its standard uncertainty and their unit, "95.1 ± 2.1 N/µm"."""
+    scale = _scale(row, display)
+    value = value if abs(value) > EXACT * sure else 0.0
+    if sure <= EXACT * abs(value):
+        return f"{number(value * scale.factor)} {scale.unit}"
+    return f"{number(value * scale.factor)} ± {number(sure * scale.factor, digits=2)} {scale.unit}"
+
+
+def _scale(row: MeasuredRow, display: Display) -> Scale:
+    """The unit of a row: small ones for deflections."""
+    unit = row.entry.unit
+    return display.deflection(unit) if unit in ("m", "rad") else display.scale(unit)
+
+
+def verdict_of(row: MeasuredRow, display: Display) -> str:
+    """What a row says of the model, in words: theory (70)."""
+    if row.explained:
+        return "explained by uncertainties"
+    low, high = row.bounds
+    size = abs(row.entry.value)
+    if size <= COVER * row.u_data:
+        scale = _scale(row, display)
+        ends = f"{number(low * scale.factor, digits=2)} to {number(high * scale.factor, digits=2)} {scale.unit}"
+        return f"the model is off by {ends}"
+    stiff = "stiffness" in row.entry.name
+    more = (abs(row.predicted) > size) == stiff
+    ends = f"{number(100.0 * low / size, digits=2)} to {number(100.0 * high / size, digits=2)} %"
+    return f"the model is too {'stiff' if more else 'compliant'} by {ends}"
+
+
+def measured_notes(answer: MeasuredComparison) -> list[str]:
+    """What the uncertainty is made of, and what does not count in it."""
+    parts = sorted(answer.shares.items(), key=lambda part: -part[1])
+    text = ", ".join(f"{number(100.0 * share, digits=2)} % {WORDS[name]}" for name, share in parts if share > 5e-4)
+    notes = [f"The variance of the differences is made of: {text}."]
+    if not answer.source:
+        notes.append(
+            "The machine's numbers count as exact, because nothing says how sure they are: give --tolerance "
+            '"compliances=sigma 10 %", lines under [tolerances], or --fit fit.json.'
+        )
+    else:
+        notes.append(f"How sure the machine's numbers are is from {answer.source}.")
+    if answer.left_out:
+        notes.append(
+            f"{len(answer.left_out)} errors of geometry do not count: they do where one pose is compared, at which the "
+            "legs of a machine as built close without being bent."
+        )
+    return notes
