@@ -162,11 +162,14 @@ def as_svg(figure: Figure) -> str:
 
 
 def fix_layout(figure: Figure) -> None:
-    """Lay out once, not again for each file format."""
+    """Lay out once, not again for each file format, and without drawing anything for it."""
     FigureCanvasAgg(figure)  # without it, each size of a text would be measured by a renderer of its own
     letter(figure)
-    figure.draw_without_rendering()
+    if layout := figure.get_layout_engine():
+        layout.execute(figure)
     figure.set_layout_engine("none")
+    for panel in figure.axes:
+        panel.apply_aspect()
 
 
 def set_title(figure: Figure, title: str) -> None:

@@ -86,7 +86,9 @@ def _draw_cells(panel: Axes, cells: npt.NDArray[np.float64], colours: str, label
         if np.isfinite(value):
             dark = abs(float(scale(value)) - 0.5) > 0.5 * DARK
             text = f"{value:.2g}" if abs(value) >= NEGLIGIBLE else "0"
-            panel.text(column, row, text, ha="center", va="center", fontsize=6, color="white" if dark else "black")
+            colour = "white" if dark else "black"
+            cell = panel.text(column, row, text, ha="center", va="center", fontsize=6, color=colour)
+            cell.set_in_layout(False)  # it is inside of the panel
     ends = [(cells < -most).any(), (cells > most).any()]
     extend = ("neither", "min", "max", "both")[int(ends[0]) + 2 * int(ends[1])]
     bar = panel.figure.colorbar(image, ax=panel, pad=0.02, extend=extend)
