@@ -5,7 +5,9 @@ first one it meets. CI runs the property tests with `--hypothesis-profile=fresh`
 time; `--hypothesis-profile=explore` looks long for new counter-examples, and for the least of them.
 """
 
+import gc
 import os
+import re
 import sysconfig
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before anything loads NumPy
@@ -48,6 +50,8 @@ os.environ.pop("UV_RUN_RECURSION_DEPTH", None)
 os.environ["PATH"] = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", os.defpath)])
 """Messages quote commands as they are typed in the shell: in tests `kinetostat` is on the path, as in the docs."""
 
+gc.disable()  # until all tests are collected; see `pytest_collection_finish`
+
 QUIET = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large]
 """Poses are filtered by singularity margin and each costs a statics solve; neither is a fault of a test."""
 
@@ -71,12 +75,41 @@ def pytest_addoption(parser):
     )
 
 
+BY_FILE = {stem: marker for marker, stems in MARKERS.items() for stem in stems}
+MARKED = re.compile(rf"mark\.(?:slow|{'|'.join(MARKERS)})\b")
+"""How a file that is not slow as a whole marks those of its tests that are."""
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Leave out, before it is imported, a file of which `-m "not slow"` or `-m slow` would choose no test.
+
+    Every process of the tests imports every file, and JAX, engines and the studio with them: that takes longer than
+    many a test. A file that is named on the command line is always read.
+    """
+    wanted = {"not slow": False, "slow": True}.get(config.option.markexpr)
+    is_named = any(collection_path.name in argument for argument in config.args)
+    if wanted is None or is_named or not collection_path.name.startswith("test_"):
+        return None
+    if collection_path.stem in BY_FILE:
+        return True if not wanted else None
+    return True if wanted and not MARKED.search(collection_path.read_text("utf-8")) else None
+
+
+def pytest_collection_finish():
+    """Collect garbage from now on, and only of what tests leave behind.
+
+    Thousands of tests and all libraries stay until the end; to look through them again and again takes a third of the
+    collection, and many seconds later on.
+    """
+    gc.freeze()
+    gc.enable()
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """Mark the tests of each slow file, before `-m` chooses among them."""
-    by_file = {stem: marker for marker, stems in MARKERS.items() for stem in stems}
     for item in items:
-        if item.path.stem in by_file:
-            item.add_marker(by_file[item.path.stem])
+        if item.path.stem in BY_FILE:
+            item.add_marker(BY_FILE[item.path.stem])
         if not MARKERS.keys().isdisjoint(item.keywords):
             item.add_marker("slow")

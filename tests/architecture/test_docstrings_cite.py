@@ -2,12 +2,13 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
 from source import modules, wrong_in
 from test_docstrings import public
-from test_docstrings_tell import FORMULAS, functions, signature
+from test_docstrings_tell import formulas, functions, signature
 
 THEORY = (Path(__file__).parents[2] / "docs" / "theory.md").read_text("utf-8")
 EQUATIONS = {int(number) for number in re.findall(r"\\tag\{(\d+)\}", THEORY)}
@@ -44,7 +45,9 @@ def docstrings(module):
     return [ast.get_docstring(tree) or "", *(ast.get_docstring(node) or "" for _, node in public(module))]
 
 
-EVERY = [text for module in modules() for text in docstrings(module)]
+@cache
+def every_docstring():
+    return [text for module in modules() for text in docstrings(module)]
 
 
 def test_the_reader_of_citations_sees_them():
@@ -55,13 +58,13 @@ def test_the_reader_of_citations_sees_them():
 
 
 def test_what_is_cited_is_there():
-    assert cited(EVERY, EQUATION) <= EQUATIONS
-    assert cited(EVERY, SECTION) <= SECTIONS
-    assert cited(EVERY, PAPER) <= PRINTED
+    assert cited(every_docstring(), EQUATION) <= EQUATIONS
+    assert cited(every_docstring(), SECTION) <= SECTIONS
+    assert cited(every_docstring(), PAPER) <= PRINTED
 
 
 def test_every_equation_of_the_theory_is_where_it_is_computed():
-    assert EQUATIONS - cited(EVERY, EQUATION) == set()
+    assert EQUATIONS - cited(every_docstring(), EQUATION) == set()
     assert sorted(EQUATIONS) == list(range(1, len(EQUATIONS) + 1))
 
 
@@ -71,7 +74,7 @@ def test_formulas_have_a_source():
             re.search(r"\bSources?: |\btheory ", text) for text in docstrings(module)
         )
 
-    assert not [module for module in sorted(set(FORMULAS) - VOCABULARY) if unsourced(module)]
+    assert not [module for module in sorted(set(formulas()) - VOCABULARY) if unsourced(module)]
 
 
 def test_points_and_screws_have_a_frame():

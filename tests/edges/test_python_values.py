@@ -35,25 +35,31 @@ MACHINES = ("hexapod", "tripteron", "zhang-gosselin-4dof", "planar-3rpr")
 SERIES = 'stiffness.actuator=["ball screw 200 N/um", "nut 300 N/um"]'
 
 
+SMALL = ["optimizer.population=8", "optimizer.generations=2"]
+ANSWERS = {
+    "analysis": lambda: analyze(load("zhang-gosselin-4dof", ['load.force=["0 N","0 N","-500 N"]'])),
+    "analysis out of reach": lambda: analyze(out_of_reach()),
+    "sensitivity": lambda: sensitivity(load("zhang-gosselin-4dof")),
+    "sensitivity out of reach": lambda: sensitivity(out_of_reach()),
+    "guidelines": lambda: guidelines(load("zhang-gosselin-4dof"), OVER[0]),
+    "assembly modes": lambda: forward(load("planar-3rpr"), starts=5),
+    "comparison": lambda: compare({"one": load("zhang-gosselin-4dof"), "other": load("tripteron")}),
+    "workspace": lambda: workspace(load("hexapod"), OVER, "stiffness_z > 1 N/um"),
+    "verdicts": lambda: requirements(
+        build(f'{bundled()["hexapod"]}\n[requirements.stiff]\ndemand = "stiffness_z > 1 N/um"\n')
+    ),
+    "problem": lambda: load_problem("zhang-gosselin-2002", SMALL),
+    "result": lambda: optimize(load_problem("zhang-gosselin-2002", SMALL)),
+}
+
+
+def out_of_reach():
+    return load("delta", ["pose.z=-30 m"])
+
+
 @cache
-def answers():
-    machine = load("zhang-gosselin-4dof", ['load.force=["0 N","0 N","-500 N"]'])
-    demanding = build(f'{bundled()["hexapod"]}\n[requirements.stiff]\ndemand = "stiffness_z > 1 N/um"\n')
-    small = ["optimizer.population=8", "optimizer.generations=2"]
-    out_of_reach = load("delta", ["pose.z=-30 m"])
-    return {
-        "analysis": analyze(machine),
-        "analysis out of reach": analyze(out_of_reach),
-        "sensitivity": sensitivity(machine),
-        "sensitivity out of reach": sensitivity(out_of_reach),
-        "guidelines": guidelines(machine, OVER[0]),
-        "assembly modes": forward(load("planar-3rpr"), starts=5),
-        "comparison": compare({"one": machine, "other": load("tripteron")}),
-        "workspace": workspace(load("hexapod"), OVER, "stiffness_z > 1 N/um"),
-        "verdicts": requirements(demanding),
-        "problem": load_problem("zhang-gosselin-2002", small),
-        "result": optimize(load_problem("zhang-gosselin-2002", small)),
-    }
+def answer_of(name):
+    return ANSWERS[name]()
 
 
 def pickled(value):
@@ -76,13 +82,13 @@ def test_a_machine_with_parts_in_a_row_survives_pickling():
     assert pickled(machine) == machine != load("hexapod")
 
 
-@pytest.mark.parametrize("name", answers())
+@pytest.mark.parametrize("name", ANSWERS)
 def test_an_answer_survives_pickling(name):
-    answer = answers()[name]
+    answer = answer_of(name)
     again = pickled(answer)
     assert again == answer
     assert hash(again) == hash(answer)
-    assert again != answers()["problem" if name == "result" else "result"]
+    assert again != answer_of("problem" if name == "result" else "result")
 
 
 def test_datasets_survive_pickling():
@@ -118,9 +124,9 @@ def changeable(value, where, seen):
             yield from changeable(getattr(value, field.name), f"{where}.{field.name}", seen)
 
 
-@pytest.mark.parametrize("name", answers())
+@pytest.mark.parametrize("name", ANSWERS)
 def test_nothing_in_an_answer_can_be_changed(name):
-    assert not list(changeable(answers()[name], name, {}))
+    assert not list(changeable(answer_of(name), name, {}))
 
 
 def test_what_belongs_to_the_program_cannot_be_changed():
