@@ -6,7 +6,7 @@ its file. A row of `ROWS` says where one may vary more widely. Stiffnesses need 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from math import radians
 
 import pytest
@@ -193,6 +193,7 @@ CONTRASTING = decades(1, 11)
 """Stiffnesses as different as a soft servo and a link that is all but rigid."""
 
 
+@cache  # a strategy is checked anew each time it is made, which takes longer than the drawing of a number
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:
     """Lengths and angles, dense at the ends and at 0; what is nearly 0 is 0, to keep squares far from underflow."""
     return st.floats(low, high).map(lambda c: c if abs(c) > TINY else min(max(0.0, low), high))
@@ -208,7 +209,11 @@ def machines(draw: st.DrawFn, case: Case, stiffness: st.SearchStrategy[float] = 
 
 def is_regular(machine: Machine) -> bool:
     """Whether the pose can be reached and is not near a singularity."""
-    response = respond(machine)
+    return answers_regularly(respond(machine))
+
+
+def answers_regularly(response: Response) -> bool:
+    """Whether a machine that answers so can reach its pose and is not near a singularity."""
     return response.status == Status.OK and response.singularity_margin > REGULAR
 
 
@@ -218,8 +223,8 @@ def regular_machines(case: Case, stiffness: st.SearchStrategy[float] = MODERATE)
 
 
 def regular(case: Case, stiffness: st.SearchStrategy[float] = MODERATE) -> st.SearchStrategy[Response]:
-    """What they answer."""
-    return regular_machines(case, stiffness).map(respond)
+    """What they answer: each is asked once."""
+    return machines(case, stiffness).map(respond).filter(answers_regularly)
 
 
 def written(name: str, point: Sequence[float], pose: Mapping[str, float], planar: bool = True) -> str:

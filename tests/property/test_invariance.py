@@ -183,13 +183,14 @@ def test_the_units_of_length_and_of_force(case, metre, newton, data):
 
 
 @every_machine
-@pytest.mark.parametrize("metre", [1e-12, 1e-6, 1e-3, 1e3, 1e6, 1e12])
 @pytest.mark.parametrize("end", [0.0, math.inf], ids=["free", "rigid"])
-def test_what_is_rigid_or_free_does_not_depend_on_units(case, end, metre):
+def test_what_is_rigid_or_free_does_not_depend_on_units(case, end):
     """At the reference design, spring by spring: no threshold compares metres with radians (DESIGN section 1)."""
     for path in stiffness_paths(case.machine):
         machine = with_values(case.machine, {path: end})
-        here, there = respond(machine), respond(in_other_units(machine, metre, 1.0))
-        assert here.status == there.status, path
-        for ours, theirs in zip(matrices(here), matrices(there), strict=True):
-            assert np.array_equal(np.isfinite(ours), np.isfinite(theirs)), path
+        here = respond(machine)
+        for metre in (1e-12, 1e-6, 1e-3, 1e3, 1e6, 1e12):
+            there = respond(in_other_units(machine, metre, 1.0))
+            assert here.status == there.status, (path, metre)
+            for ours, theirs in zip(matrices(here), matrices(there), strict=True):
+                assert np.array_equal(np.isfinite(ours), np.isfinite(theirs)), (path, metre)
