@@ -67,6 +67,9 @@ PURE_TRANSLATION = 1e-9
 SEEN_BY_LEG = 1e-7
 """Share of the largest singular value of a leg's freedoms, and of the effect of an error, below which it is round-off:
 at random places of a leg nothing is nearly dependent without being so by form."""
+NEARLY_DEPENDENT = 1e-4
+"""Share of the largest pivot of a leg's freedoms below which steps are taken by singular values: squares of the
+freedoms, which are faster, keep eight digits of a step above it, and the next step brings the others."""
 DEPENDENT = 1e-6
 """Singular value of unit screws below which they are dependent: half of the digits are lost in a square root."""
 NEGLIGIBLE_COMPONENT = 1e-9

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from kinetostat.accuracy.errors import Insertion, effects, errors_of, places_of
+from kinetostat.accuracy.errors import Insertion, effects, errors_of
 from kinetostat.accuracy.model import error_model
-from kinetostat.accuracy.rows import rows_of
+from kinetostat.accuracy.rows import places_of, rows_of
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics.forward import assembly_modes, system_of
 from kinetostat.kinematics.status import Status
@@ -95,7 +95,7 @@ def test_no_error_of_a_leg_is_missing_and_none_is_there_twice(case):
         everywhere += [s for s in mine if s[0].path.endswith(("difference", "gain"))]
         unit = []
         for sources in (everywhere, mine):
-            columns = effects(row, rows, sources, places_of(row, rows))
+            columns = effects(row, rows, sources, places_of(row, rows.length))
             sizes = np.linalg.norm(columns, axis=0)
             unit.append((columns / sizes)[:, sizes > 1e-9])
         basis, triangle = np.linalg.qr(unit[1])

@@ -13,6 +13,7 @@ from kinetostat.studies.identification.identification import identified, identif
 from kinetostat.studies.identification.measurements import POSITION, TURNED, Measurements
 from kinetostat.studies.identification.next_poses import chosen_poses, first_poses
 from kinetostat.studies.identification.observed import FRAME, TARGET, observed, place_unknown
+from kinetostat.studies.identification.unseen import sparse
 from machines import load_without_limits
 from synthetic_measurements import posed
 
@@ -224,3 +225,15 @@ def test_poses_chosen_beat_poses_at_random_by_the_factor_that_is_foretold():
     foretold = np.exp((information[0] - information[1]) / (2 * unknown))
     assert measured_factor == pytest.approx(foretold, rel=0.02)
     assert foretold > 1.3
+
+
+def test_combinations_that_are_not_seen_are_named_alike_whatever_basis_round_off_gives():
+    rng = np.random.default_rng(3)
+    ways = np.linalg.qr(rng.normal(size=(9, 3)))[0]
+    ways[:3], ways[3:6] = ways[6:], -ways[6:]  # three legs that are alike
+    ways = np.linalg.qr(ways)[0]
+    turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    first, second = sparse(ways), sparse(ways @ turned)
+    assert first == pytest.approx(second, abs=1e-12)
+    assert np.linalg.matrix_rank(np.hstack([first, ways]), 1e-9) == 3
+    assert sorted((np.abs(first - 1.0) < 1e-12).argmax(axis=0).tolist()) == [0, 1, 2]

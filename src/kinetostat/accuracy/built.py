@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinetostat.accuracy.closing import Errors, Place, followed, placed, scaled
+from kinetostat.accuracy.closing import Errors, Place, followed, placed
 from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.accuracy.rows import Row
+from kinetostat.accuracy.screws import scaled
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
 from kinetostat.equilibrium.motion import Array, Motions, exponential, logarithm, still
 from kinetostat.kinematics.closing import pose_of

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from kinetostat.accuracy.rows import Row, Rows
-from kinetostat.equilibrium.motion import Array, Motions, cross, each_along, exponential, logarithm, still
+from kinetostat.accuracy.rows import Row, Rows, places_of
+from kinetostat.accuracy.screws import Mask, Screws, independent, moved_to, scaled
+from kinetostat.equilibrium.motion import Array, Motions, cross, each_about, exponential, logarithm, still
 
 SETTLED = 1e-8
 """Motion of the last step of Newton's method, rad or in units of the machine's length: the next one would be about its
@@ -27,14 +27,12 @@ MOST_STEPS = 40
 """Of Newton's method: errors are small, so that a few steps suffice where there is a solution."""
 STAGES = 8
 """Steps on the way from the home place to a pose."""
-SEEN = 1e-7
-"""Least ratio of a singular value of joint screws to the largest one, with lengths in units of the machine's."""
 SOFTEST_SHARE = 1e-9
 """Share of the mean compliance of the legs that a leg without any is given where legs must share a misfit."""
 
-Mask = npt.NDArray[np.bool_]
 Errors = list[dict[int, Array]]
-"""For each leg, by the number of motions before it, the small screw motion of an error in home place [n x 6]."""
+"""For each leg, by the number of motions before it, the small screw motion of an error in home place [n x 6]; [1 x 6]
+where it is the same at all poses."""
 
 
 @dataclass(frozen=True)
@@ -60,17 +58,16 @@ def placed(row: Row, coordinates: Array, errors: dict[int, Array]) -> Place:
         coordinates: of its joints, rad or m [n x coordinates].
         errors: displacements that stand behind a number of motions [n x 6].
     """
-    count = len(coordinates)
+    count, twists = len(coordinates), np.array(row.twists).reshape(-1, 6)
     motion, before, screws = still(count), [], np.zeros((count, 6, row.size))
-    twists = np.broadcast_to(np.array(row.twists).reshape(-1, 6), (count, len(row.twists), 6))
-    steps = each_along(twists, coordinates[:, row.coordinate])
+    steps = each_about(twists, coordinates[:, row.coordinate])
     for number, (step, which) in enumerate(zip(steps, row.coordinate, strict=True)):
         before.append(motion)
         motion = _with(motion, errors.get(number))
-        screws[:, :, which] += motion.twist(twists[:, number])
+        screws[:, :, which] += motion.twist(twists[number, None])
         motion = motion @ step
     before.append(motion)
-    return Place(tuple(before), _with(motion, errors.get(len(row.twists))), screws)
+    return Place(tuple(before), _with(motion, errors.get(len(twists))), screws)
 
 
 def _with(motion: Motions, error: Array | None) -> Motions:
@@ -85,6 +82,7 @@ def followed(row: Row, target: Motions, length: float, errors: dict[int, Array] 
     whole = logarithm(target)
     coordinates = np.zeros((len(whole), row.size))
     units = np.where(row.slides, length, 1.0)
+    chosen = independent(scaled(placed(row, places_of(row, length), {}).screws, length, axis=1))
     far = float(np.abs(scaled(whole, length)).max(initial=0.0, where=np.isfinite(whole)))
     stages = min(max(int(np.ceil(far / STAGE)), 1), STAGES)
     for stage in range(1, stages + 1):
@@ -93,54 +91,11 @@ def followed(row: Row, target: Motions, length: float, errors: dict[int, Array] 
             at = placed(row, coordinates, errors or {})
             gap = scaled(logarithm(goal @ at.end.inverse()), length)
             rates = scaled(at.screws, length, axis=1) * units
-            step = _screws(rates).steps(gap) * units
+            step = Screws(rates, chosen).steps(gap) * units
             coordinates = coordinates + step
             if np.abs(step / units).max(initial=0.0) < (SETTLED if stage == stages else NEAR):
                 break
     return coordinates
-
-
-def scaled(twists: Array, length: float, axis: int = -1) -> Array:
-    """Twists with their translations in units of a length; `axis` has their six components."""
-    units = np.array([1.0, 1.0, 1.0] + [1.0 / length] * 3)
-    shape = [1] * twists.ndim
-    shape[axis] = 6
-    return twists * units.reshape(shape)
-
-
-@dataclass(frozen=True)
-class Screws:
-    """What moves freely in a leg at n places, by its singular values.
-
-    Attributes:
-        left, right: orthonormal bases of twists [n x 6 x 6] and of coordinates [n x k x coordinates].
-        inverse: of the singular values [n x k], 0 of those that are round-off.
-    """
-
-    left: Array
-    right: Array
-    inverse: Array
-
-    def steps(self, twists: Array) -> Array:
-        """The least steps that come nearest to twists [n x 6] in units of the length [n x coordinates]."""
-        along = np.einsum("nik,ni->nk", self.left[:, :, : self.inverse.shape[1]], twists) * self.inverse
-        return np.asarray(np.einsum("nkq,nk->nq", self.right[:, : self.inverse.shape[1]], along))
-
-
-def _screws(rates: Array) -> Screws:
-    """Decompose screws [n x 6 x coordinates]; NaN where they are not finite."""
-    finite: Mask = np.asarray(np.isfinite(rates).all(axis=(1, 2)))
-    left, sizes, right = np.linalg.svd(np.where(finite[:, None, None], rates, 0.0))
-    small = sizes <= SEEN * sizes.max(axis=1, initial=1e-300)[:, None]
-    inverse = np.where(small, 0.0, 1.0 / np.where(small, 1.0, sizes))
-    return Screws(np.where(finite[:, None, None], left, np.nan), right, inverse)
-
-
-def moved_to(twists: Array, point: Array) -> Array:
-    """Twists given at the base origin [n x ... x 6], at points [n x 3]."""
-    turning, moving = twists[..., :3], twists[..., 3:]
-    at = point.reshape(len(point), *([1] * (twists.ndim - 2)), 3)
-    return np.concatenate([turning, moving + cross(turning, np.broadcast_to(at, moving.shape))], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -160,6 +115,18 @@ class Holding:
         """The tool's twists for displacements of the end of a leg [n x k x 6], both at the tool and over the length."""
         work = misfits @ self.wrenches[number]
         return np.asarray(work @ np.swapaxes(self.shares[number], 1, 2))
+
+    def at_origin(self, number: int, tool: Array, length: float) -> Array:
+        """The wrenches of a leg, moments about the base origin over forces: work per rad and per m [n x 6 x m].
+
+        Args:
+            number: of the leg.
+            tool: the tool point, m [n x 3].
+            length: that moments are over, m.
+        """
+        basis = np.swapaxes(self.wrenches[number], 1, 2)
+        forces = basis[..., 3:] / length
+        return np.swapaxes(np.concatenate([basis[..., :3] + cross(tool[:, None], forces), forces], axis=2), 1, 2)
 
 
 def free_screws(row: Row, rows: Rows, at: Place, tool: Array) -> Array:
@@ -184,27 +151,27 @@ def _units(row: Row, length: float) -> Array:
     return np.array([length if row.slides[place] else 1.0 for place in row.free])
 
 
-def freed(rows: Rows, places: Sequence[Place], tool: Array) -> list[Screws]:
-    """What moves freely in each leg at its place, at tool points [n x 3]."""
-    return [_screws(free_screws(row, rows, at, tool)) for row, at in zip(rows.legs, places, strict=True)]
+def freed(rows: Rows, places: Sequence[Place], tool: Array, chosen: Sequence[tuple[int, ...]]) -> list[Screws]:
+    """What moves freely in each leg at its place, at tool points [n x 3]; `chosen` as of `Screws`."""
+    every = zip(rows.legs, places, chosen, strict=True)
+    return [Screws(free_screws(row, rows, at, tool), which) for row, at, which in every]
 
 
-def holding(rows: Rows, free: Sequence[Screws], tool: Array, carried: Sequence[int], soft: Sequence[Array]) -> Holding:
+def holding(rows: Rows, free: Sequence[Screws], tool: Array, soft: Sequence[Array]) -> Holding:
     """Find what the legs carry and how they share a misfit, theory (46) and (47).
 
     Args:
         rows: the machine.
         free: what moves freely in its legs.
         tool: the tool point, m [n x 3].
-        carried: how many wrenches each leg carries.
         soft: compliance of each leg without its passive joints at the tool, in the length's units [n x 6 x 6].
     """
-    wrenches = [screws.left[:, :, 6 - size :] for screws, size in zip(free, carried, strict=True)]
+    wrenches = [screws.wrenches for screws in free]
     guide = _guide(rows, tool)
     every = np.concatenate([*wrenches, guide], axis=2)
     sharing = _inverse(np.swapaxes(every, 1, 2)) if every.shape[2] == 6 else _by_energy(every, wrenches, soft)
-    ends = np.cumsum([w.shape[2] for w in wrenches])[:-1]
-    return Holding(tuple(wrenches), tuple(np.split(sharing[:, :, : sum(carried)], ends, axis=2)))
+    ends = np.cumsum([w.shape[2] for w in wrenches])
+    return Holding(tuple(wrenches), tuple(np.split(sharing, ends, axis=2)[:-1]))
 
 
 def _guide(rows: Rows, tool: Array) -> Array:
@@ -260,7 +227,12 @@ class State:
 
 
 def closed(
-    rows: Rows, start: State, errors: Errors, tool_home: Array, carried: Sequence[int], soft: Sequence[Array]
+    rows: Rows,
+    start: State,
+    errors: Errors,
+    tool_home: Array,
+    chosen: Sequence[tuple[int, ...]],
+    soft: Sequence[Array],
 ) -> State:
     """Close the legs with their errors while their actuators stand still: Newton's method, theory (48).
 
@@ -269,15 +241,16 @@ def closed(
         start: joint coordinates, with the actuators where they stand, and the platform nearby.
         errors: of each leg.
         tool_home: the tool point at the home place, m [3].
-        carried, soft: see `holding`.
+        chosen: see `freed`.
+        soft: see `holding`.
     """
     platform, coordinates, length = start.platform, list(start.coordinates), rows.length
     settled = np.zeros(len(platform.translation), dtype=bool)
     for _ in range(MOST_STEPS):
         places = [placed(row, q, e) for row, q, e in zip(rows.legs, coordinates, errors, strict=True)]
         tool = platform.point(np.broadcast_to(tool_home, (len(settled), 3)))
-        free = freed(rows, places, tool)
-        hold = holding(rows, free, tool, carried, soft)
+        free = freed(rows, places, tool, chosen)
+        hold = holding(rows, free, tool, soft)
         gaps = [scaled(moved_to(logarithm(at.end @ platform.inverse()), tool), length) for at in places]
         twist = sum((hold.twist(i, gap[:, None])[:, 0] for i, gap in enumerate(gaps)), np.zeros((len(settled), 6)))
         largest = np.abs(twist).max(axis=1)

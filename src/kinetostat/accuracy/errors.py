@@ -14,17 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinetostat.accuracy.closing import Place, free_screws, moved_to, placed, scaled
-from kinetostat.accuracy.rows import Row, Rows, Unit
+from kinetostat.accuracy.closing import free_screws, placed
+from kinetostat.accuracy.rows import Row, Rows, Unit, places_of
+from kinetostat.accuracy.screws import Screws, independent, moved_to, scaled
 from kinetostat.algebra.vector import AXES, ZERO, Vector
 from kinetostat.equilibrium.motion import Array
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.link import Parallelogram
 from kinetostat.tolerances import NO_LINK, PARALLEL_AXES, SEEN_BY_LEG
-
-SAMPLES, TURN, TRAVEL = 40, 0.35, 0.15
-"""How many random places of a leg tell its errors apart, and how far its joints go there: rad, and shares of the
-machine's length."""
 
 ZEROS, BASE, PLATFORM, LENGTHS, LINKS, TILTS, OFFSETS = range(7)
 """The order in which errors are listed where only some of them can be told apart."""
@@ -88,30 +85,12 @@ def errors_of(rows: Rows) -> list[Source]:
     return sources
 
 
-def places_of(row: Row, rows: Rows) -> Array:
-    """Random coordinates of a leg around its home place [samples x coordinates], the same ones each time."""
-    units = np.where(row.slides, TRAVEL * rows.length, TURN)
-    return np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, row.size)) * units
-
-
-def carried_by(row: Row, rows: Rows, at: Place, tool: Array) -> Array:
-    """A basis of the wrenches that a leg carries at random places, as many as where its joints are least dependent.
-
-    Args:
-        row, rows: the leg and its machine.
-        at: where it is.
-        tool: points at which they are given, m [n x 3]; their moments are over the length [n x 6 x m].
-    """
-    basis, sizes, _ = np.linalg.svd(free_screws(row, rows, at, tool))
-    rank = int((sizes > SEEN_BY_LEG * sizes.max(axis=1, initial=1e-300)[:, None]).sum(axis=1).max(initial=0))
-    return np.asarray(basis[:, :, rank:])
-
-
 def effects(row: Row, rows: Rows, sources: Sequence[Source], coordinates: Array) -> Array:
-    """The work of the leg's wrenches on its errors at given coordinates [samples * wrenches x errors]."""
+    """The work of the leg's wrenches on its errors at random coordinates [samples * wrenches x errors]."""
     at = placed(row, coordinates, {})
     tool = at.end.point(np.broadcast_to(rows.point, (len(coordinates), 3)))
-    wrenches = carried_by(row, rows, at, tool)
+    screws = free_screws(row, rows, at, tool)
+    wrenches = Screws(screws, independent(screws)).wrenches
     columns = []
     for _, insertions in sources:
         ends = sum(
@@ -125,7 +104,7 @@ def effects(row: Row, rows: Rows, sources: Sequence[Source], coordinates: Array)
 
 def _distinct(row: Row, rows: Rows, sources: Sequence[Source]) -> list[Source]:
     """Those whose effects do not follow from the effects of those before them, in the order of the leg."""
-    columns = effects(row, rows, sources, places_of(row, rows))
+    columns = effects(row, rows, sources, places_of(row, rows.length))
     basis: list[Array] = []
     kept = []
     for number, column in enumerate(columns.T):
@@ -142,7 +121,7 @@ def _distinct(row: Row, rows: Rows, sources: Sequence[Source]) -> list[Source]:
 
 def _felt(row: Row, rows: Rows, sources: Sequence[Source]) -> list[Source]:
     """Those that move the platform somewhere."""
-    sizes = np.linalg.norm(effects(row, rows, sources, places_of(row, rows)), axis=0) if sources else []
+    sizes = np.linalg.norm(effects(row, rows, sources, places_of(row, rows.length)), axis=0) if sources else []
     return [source for source, size in zip(sources, sizes, strict=True) if size > SEEN_BY_LEG / rows.length]
 
 

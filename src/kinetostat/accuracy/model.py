@@ -13,11 +13,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.accuracy.closing import Errors, State, closed, followed, freed, holding, moved_to, placed, scaled
-from kinetostat.accuracy.errors import Insertion, MachineError, Source, carried_by, errors_of, places_of
-from kinetostat.accuracy.rows import Row, Rows, rows_of
+from kinetostat.accuracy.closing import Errors, State, closed, followed, free_screws, freed, holding, placed
+from kinetostat.accuracy.errors import Insertion, MachineError, Source, errors_of
+from kinetostat.accuracy.rows import Row, Rows, places_of, rows_of
+from kinetostat.accuracy.screws import independent, scaled
 from kinetostat.accuracy.shared import shared_errors
-from kinetostat.equilibrium.motion import Array, Motions, cross, each_twist
+from kinetostat.equilibrium.motion import Array, Motions, cross
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.forward import stand
@@ -79,7 +80,7 @@ class ErrorModel:
     _flexible: tuple[Flexible, ...]
     _drawn: State
     _tool_home: Array
-    _carried: tuple[int, ...]
+    _chosen: tuple[tuple[int, ...], ...]
     _soft: tuple[Array, ...]
     _latest: dict[bytes, State] = field(default_factory=dict)
 
@@ -94,11 +95,25 @@ class ErrorModel:
     @property
     def overconstrained(self) -> bool:
         """Whether the legs carry more wrenches than the platform needs, so that they share a misfit."""
-        return sum(self._carried) + len(self.rows.absent) > 6
+        return sum(6 - len(chosen) for chosen in self._chosen) + len(self.rows.absent) > 6
 
     def inserted(self, values: Array) -> Errors:
-        """The screw motions that errors [errors] put into each leg at the poses."""
-        return self._errors(self._each(values))
+        """The screw motions that errors put into each leg at the poses, one for all of them where they agree.
+
+        Args:
+            values: SI [errors], or others at each pose [n x errors].
+        """
+        errors: Errors = [{} for _ in self.rows.legs]
+        each = np.atleast_2d(np.asarray(values, dtype=float))
+        for number, (_, insertions) in enumerate(self.sources):
+            if not each[:, number].any():
+                continue
+            for i in insertions:
+                amount = each[:, number]
+                if i.factor is not None:
+                    amount = amount * i.amount(self._drawn.coordinates[i.leg])
+                errors[i.leg][i.behind] = errors[i.leg].get(i.behind, np.zeros((1, 6))) + amount[:, None] * i.twist
+        return errors
 
     def closed_with(self, values: Array) -> State:
         """Where all legs are with errors [errors], theory (48)."""
@@ -179,25 +194,13 @@ class ErrorModel:
     def _tool_at(self, platform: Motions) -> Array:
         return platform.point(np.broadcast_to(self._tool_home, (len(self), 3)))
 
-    def _errors(self, each: Array) -> Errors:
-        """The screw motions that errors [n x errors] put into the legs."""
-        errors: Errors = [{} for _ in self.rows.legs]
-        for number, (_, insertions) in enumerate(self.sources):
-            if not each[:, number].any():
-                continue
-            for i in insertions:
-                amount = each[:, number] * i.amount(self._drawn.coordinates[i.leg])
-                before = errors[i.leg].get(i.behind, np.zeros((len(self), 6)))
-                errors[i.leg][i.behind] = before + amount[:, None] * i.twist
-        return errors
-
     def _closed(self, values: Array) -> State:
         """Where all legs are with errors; those of the last values are kept, because a fit asks for them again."""
         key = np.asarray(values, dtype=float).tobytes()
         if key not in self._latest:
             errors = self.inserted(values)
             with np.errstate(all="ignore"):
-                state = closed(self.rows, self._drawn, errors, self._tool_home, self._carried, self._soft)
+                state = closed(self.rows, self._drawn, errors, self._tool_home, self._chosen, self._soft)
             self._latest.clear()
             self._latest[key] = state
         return self._latest[key]
@@ -210,14 +213,14 @@ class ErrorModel:
                 together.setdefault((i.leg, i.behind), []).append((number, i))
         with np.errstate(all="ignore"):
             places = [placed(row, q, e) for row, q, e in zip(legs, state.coordinates, errors, strict=True)]
-            hold = holding(self.rows, freed(self.rows, places, tool), tool, self._carried, self._soft)
+            hold = holding(self.rows, freed(self.rows, places, tool, self._chosen), tool, self._soft)
             result = np.zeros((len(self), 6, len(self.errors)))
             for (leg, behind), entries in together.items():
-                twists = _beside(np.array([i.twist for _, i in entries]), errors[leg].get(behind), len(self))
+                felt = _brought_back(hold.at_origin(leg, tool, length), places[leg].before[behind])
+                felt = _beside(felt, errors[leg].get(behind))
                 amounts = np.stack([i.amount(self._drawn.coordinates[leg]) for _, i in entries], axis=1)
-                place = places[leg].before[behind]
-                ends = moved_to(each_twist([place] * len(entries), twists), tool) * amounts[:, :, None]
-                moved = np.swapaxes(hold.twist(leg, scaled(ends, length)), 1, 2)
+                work = np.swapaxes(felt, 1, 2) @ np.array([i.twist for _, i in entries]).T * amounts[:, None]
+                moved = hold.shares[leg] @ work
                 for column, (number, _) in enumerate(entries):
                     result[:, :, number] += moved[:, :, column]
         result[:, 3:] *= length
@@ -226,22 +229,30 @@ class ErrorModel:
         return np.where(sound[:, None, None], result, np.nan)
 
 
-def _beside(twists: Array, error: Array | None, count: int) -> Array:
-    """The screws by which exp(e) moves on the left per unit of twists [k x 6] added to e [n x 6], small [n x k x 6]."""
-    every = np.broadcast_to(twists, (count, *twists.shape))
+def _brought_back(wrenches: Array, place: Motions) -> Array:
+    """What wrenches at the base origin [n x 6 x m] do on screws fixed in a body: the transposed adjoint."""
+    moments, forces = np.swapaxes(wrenches[:, :3], 1, 2), np.swapaxes(wrenches[:, 3:], 1, 2)
+    moments = moments + cross(forces, place.translation[:, None])
+    return np.concatenate([np.swapaxes(part @ place.rotation, 1, 2) for part in (moments, forces)], axis=1)
+
+
+def _beside(wrenches: Array, error: Array | None) -> Array:
+    """What wrenches [n x 6 x m] do on the screws by which exp(e) moves on the left per unit added to e [n x 6], small.
+
+    With B the transposed bracket of e it is 1 + B / 2 + B^2 / 6.
+    """
     if error is None:
-        return every
-    once = _bracket(error, every)
-    return np.asarray(every + once / 2.0 + _bracket(error, once) / 6.0)
+        return wrenches
+    once = _bracket(error, wrenches)
+    return np.asarray(wrenches + once / 2.0 + _bracket(error, once) / 6.0)
 
 
-def _bracket(first: Array, second: Array) -> Array:
-    """The brackets of a screw [n x 6] with others [n x k x 6]."""
-    each = np.broadcast_to(first[:, None], second.shape)
-    turning = cross(each[..., :3], second[..., :3])
-    return np.concatenate(
-        [turning, cross(each[..., :3], second[..., 3:]) + cross(each[..., 3:], second[..., :3])], axis=2
-    )
+def _bracket(screw: Array, wrenches: Array) -> Array:
+    """What wrenches [n x 6 x m] do on the brackets of a screw [n x 6] with others."""
+    moments, forces = np.swapaxes(wrenches[:, :3], 1, 2), np.swapaxes(wrenches[:, 3:], 1, 2)
+    turning, moving = screw[:, None, :3], screw[:, None, 3:]
+    parts = cross(moments, turning) + cross(forces, moving), cross(forces, turning)
+    return np.concatenate([np.swapaxes(part, 1, 2) for part in parts], axis=1)
 
 
 def error_model(
@@ -281,7 +292,7 @@ def error_model(
     tool_home = rows.point + rows.rotation @ offset
     if response.configuration.plane is not None:
         tool_home = np.where([1, 1, 0], tool_home, rows.point)
-    carried = tuple(_carried(row, rows) for row in rows.legs)
+    chosen = tuple(_independent(row, rows) for row in rows.legs)
     given = stacked(response.load.components(), count) if load is None else np.broadcast_to(load, (count, 6))
     return ErrorModel(
         machine,
@@ -296,7 +307,7 @@ def error_model(
         flexible,
         State(platform, coordinates, np.ones(count, dtype=bool)),
         tool_home,
-        carried,
+        chosen,
         _soft(response, rows, count),
     )
 
@@ -321,10 +332,10 @@ def _check(rows: Rows, coordinates: Sequence[Array], actuators: Array, status: C
             status[elsewhere] = int(Status.NOT_CONVERGED)
 
 
-def _carried(row: Row, rows: Rows) -> int:
-    """How many wrenches a leg carries: six less what moves freely, wherever it is."""
-    coordinates = places_of(row, rows)
-    return carried_by(row, rows, placed(row, coordinates, {}), np.zeros((len(coordinates), 3))).shape[2]
+def _independent(row: Row, rows: Rows) -> tuple[int, ...]:
+    """Which of the free screws of a leg are independent, wherever it is; it carries six wrenches less these."""
+    coordinates = places_of(row, rows.length)
+    return independent(free_screws(row, rows, placed(row, coordinates, {}), np.zeros((len(coordinates), 3))))
 
 
 def _soft(response: Response, rows: Rows, count: int) -> tuple[Array, ...]:

@@ -21,6 +21,9 @@ from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Configuration, Machine
 
+SAMPLES, TURN, TRAVEL = 40, 0.35, 0.15
+"""How many random places of a leg tell what depends on what by form, and how far its joints go there: rad, and shares
+of the machine's length."""
 CENTRES = {2: "universal", 3: "ball"}
 """What revolutes in a row through one point are called, by how many they are."""
 
@@ -151,6 +154,17 @@ class Rows:
     point: Array
     length: float
     absent: Array
+
+
+def places_of(row: Row, length: float) -> Array:
+    """Random coordinates of a leg around its home place [samples x coordinates], the same ones each time.
+
+    Args:
+        row: the leg.
+        length: of the machine, m.
+    """
+    units = np.where(row.slides, TRAVEL * length, TURN)
+    return np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, row.size)) * units
 
 
 def rows_of(machine: Machine) -> Rows:

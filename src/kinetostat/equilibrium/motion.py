@@ -107,6 +107,30 @@ def each_along(twists: Array, amounts: Array) -> list[Motions]:
     return [Motions(rotation[:, k], translation[:, k]) for k in range(motions)]
 
 
+def each_about(twists: Array, amounts: Array) -> list[Motions]:
+    """The displacements by screw motions that are the same at all poses [m x 6], by amounts [n x m]: m of them.
+
+    With K the cross product with the unit axis and t the angle, rotations are 1 + sin t K + (1 - cos t) K^2: fixed
+    matrices times two numbers of each pose, in a quarter of the time of exponentials.
+
+    Source: Murray, Li and Sastry (1994), equations 2.14 and 2.36.
+    """
+    size = np.linalg.norm(twists[:, :3], axis=1)
+    unit = np.where(size > 0.0, size, 1.0)[:, None]
+    across = skew_of(twists[:, :3] / unit)
+    twice = across @ across
+    aside, back = (np.einsum("mij,mj->mi", part, twists[:, 3:] / unit) for part in (across, twice))
+    # What 1, the amount, sin t and 1 - cos t are multiplied by: nine numbers of the rotation and three of the shift.
+    parts = np.zeros((len(twists), 4, 12))
+    parts[:, 0, :9] = np.eye(3).ravel()
+    parts[:, 1, 9:] = twists[:, 3:] + back * unit
+    parts[:, 2] = np.concatenate([across.reshape(-1, 9), -back], axis=1)
+    parts[:, 3] = np.concatenate([twice.reshape(-1, 9), aside], axis=1)
+    angle = amounts.T * size[:, None]
+    terms = np.stack([np.ones_like(angle), amounts.T, np.sin(angle), 2.0 * np.sin(0.5 * angle) ** 2], axis=2)
+    return [Motions(each[:, :9].reshape(-1, 3, 3), each[:, 9:]) for each in terms @ parts]
+
+
 def each_twist(motions: Sequence[Motions], twists: Array) -> Array:
     """Where screws fixed in m bodies [n x m x 6] go, each with its own [n x m x 6]."""
     if twists.dtype == object or any(motion.rotation.dtype == object for motion in motions):

@@ -13,7 +13,6 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import stdtrit
 
 from kinetostat.equilibrium.motion import Array
 from kinetostat.spec.errors import InputError
@@ -29,6 +28,8 @@ ROUNDS = 12
 """Of setting outliers aside: they change no more before that."""
 UNSEEN = 1e-6
 """Share of the best seen combination of unknowns below which one is not seen at all: round-off is 1e-9."""
+SURELY = 1.959963984540054
+"""Half of the 95 % interval of a normal value over its standard deviation."""
 FOLDS = 5
 REWEIGHTS, REWEIGHTED = 50, 1e-3
 """How often values are weighted by their residuals at most, and the change, in standard deviations, that ends it."""
@@ -223,11 +224,18 @@ def _judged(
     basis = ways[:rank].T / seen[:rank]
     spread = 1.0 if wishes.known else scatter
     covariance = spread**2 * basis @ basis.T * np.outer(wishes.sizes, wishes.sizes)
-    factor = float(stdtrit(1e9 if wishes.known else freedom, 0.975))
+    factor = SURELY if wishes.known else _quantile(freedom)
     mixed = np.linalg.norm(ways[rank:], axis=0) > np.sqrt(UNSEEN) if rank < len(ways) else np.zeros(len(values), bool)
     sure = np.where(mixed, np.inf, factor * np.sqrt(np.maximum(np.diag(covariance), 0.0)))
     predicted = _left_out(after, rates, kept, groups, _prior(wishes))
     return Fit(values, covariance, sure, kept, before, after, rates, scatter, seen, ways.T, rank, predicted)
+
+
+def _quantile(freedom: int) -> float:
+    """Half of the 95 % interval over the standard deviation, where that is estimated: Student's t."""
+    from scipy.special import stdtrit  # a quarter of a second to import: only where nobody knows standard deviations
+
+    return float(stdtrit(freedom, 0.975))
 
 
 def _left_out(after: Array, rates: Array, kept: Mask, groups: npt.NDArray[np.int64], prior: Array) -> Array:

@@ -12,7 +12,8 @@ from itertools import product
 
 import numpy as np
 
-from kinetostat.accuracy.errors import Insertion, MachineError, effects, places_of
+from kinetostat.accuracy.errors import Insertion, MachineError, effects
+from kinetostat.accuracy.rows import places_of
 from kinetostat.equilibrium.motion import Array, cross
 from kinetostat.studies.identification.fit import Fit
 from kinetostat.studies.identification.observed import FRAME, TARGET, Observed
@@ -28,6 +29,8 @@ SAME_EFFECT = 1e-5
 NO_ERROR = MachineError("", "", "", "", "")
 ROUND_OFF = 1e-7
 """Share of a motion of the tool below which what is left of it is round-off."""
+SAME_SHARE = 1e-6
+"""Relative difference below which two unknowns take part in combinations alike."""
 SMALL = 0.05
 """Share of the largest part of a combination below which a part is not named."""
 WAYS = [("turn", "about", axis) for axis in "xyz"] + [("shift", "along", axis) for axis in "xyz"]
@@ -70,7 +73,7 @@ def unseen_of(observed: Observed, fit: Fit, sizes: Array) -> list[Unseen]:
             result.append(_judged(words, candidate, observed, twists, sizes))
     rest = basis - _projected(basis, named)
     left, strength, _ = np.linalg.svd(rest, full_matrices=False)
-    ways = _sparse(left[:, strength > 0.5]).T
+    ways = sparse(left[:, strength > 0.5]).T
     return result + [_judged(_sentence(way, observed), way, observed, twists, sizes) for way in ways]
 
 
@@ -87,16 +90,18 @@ def _projected(ways: Array, named: list[Array]) -> Array:
     return np.asarray(basis @ (basis.T @ ways))
 
 
-def _sparse(ways: Array) -> Array:
-    """The same span with each column 1 where all others are 0, at the strongest places."""
-    rows = ways.T.copy()
-    for number in range(len(rows)):
-        place = int(np.argmax(np.abs(rows[number])))
-        rows[number] /= rows[number, place]
-        for other in range(len(rows)):
-            if other != number:
-                rows[other] -= rows[other, place] * rows[number]
-    return rows.T
+def sparse(ways: Array) -> Array:
+    """The same span with each column 1 where all others are 0: at the unknowns that take most part in it.
+
+    Unknowns that do so alike, as those of equal legs, are taken in their order, so that round-off decides nothing.
+    """
+    rest, places = ways.copy(), []
+    for _ in range(ways.shape[1]):
+        sizes = np.linalg.norm(rest, axis=1)
+        places.append(int(np.argmax(sizes > (1.0 - SAME_SHARE) * sizes.max())))
+        way = rest[places[-1]] / sizes[places[-1]]
+        rest = rest - np.outer(rest @ way, way)
+    return np.asarray(ways @ np.linalg.inv(ways[places]))
 
 
 def _common(observed: Observed, sizes: Array, basis: Array) -> Iterator[tuple[str, Array]]:
@@ -158,7 +163,7 @@ def _of_leg(observed: Observed, leg: int, twist: Array, at_end: bool) -> Array |
     """The unknowns of a leg that do what a motion of its whole beginning or end does; None if they cannot, SI."""
     rows, sources = observed.model.rows, observed.model.sources
     row, result = rows.legs[leg], np.zeros(len(observed.chosen))
-    places = places_of(row, rows)
+    places = places_of(row, rows.length)
     motion = (NO_ERROR, (Insertion(leg, len(row.twists) if at_end else 0, twist),))
     goal = effects(row, rows, [motion], places)[:, 0]
     if np.abs(goal).max(initial=0.0) < SEEN_BY_LEG / rows.length:
