@@ -211,6 +211,9 @@ ROUND_OFF_OF_COMPLEMENT = 1e-12
 """The same share after the subtraction in a Schur complement, which loses two more digits."""
 EQUAL_STIFFNESSES = 1e-9
 """Relative difference of principal stiffnesses below which they are equal, and their directions are arbitrary."""
+EQUAL_FREQUENCIES = 1e-6
+"""Relative difference of natural frequencies below which their modes are told together: a loaded state is not found to
+the last digit, and no measurement could part such modes."""
 AT_RIGHT_ANGLES = 1e-9
 """Cosine below which a direction is at right angles to a principal one. Without it, a direction that is rigid or free
 would decide the stiffness along all others."""

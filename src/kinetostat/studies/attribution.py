@@ -6,6 +6,7 @@ The formulas are in `kinetostatics.assembly`; tables and bars of the contributio
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.kinetostatics.assembly import Statics, compliance_shares, stiffness_shares
@@ -75,6 +76,15 @@ def by_part(attribution: Sequence[Contribution]) -> dict[str, list[Contribution]
 
 EQUAL_SHARES = 9
 """Decimals in which shares are compared, so that equal parts keep their order."""
+MOST_NAMED = 3
+"""Parts that are named as those that contribute most."""
+NAMED = 0.05
+"""Share from which a part is named."""
+MOST_OF_IT = 0.6
+"""Share that the named parts must have together; otherwise kinds of parts are named."""
+
+Shares: TypeAlias = tuple[tuple[str, float], ...]
+"""Names of parts and their shares, the greatest share first."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +100,8 @@ class Softest:
 
     stiffness: float
     directions: tuple[tuple[float, ...], ...]
-    shares: tuple[tuple[str, float], ...]
-    kinds: tuple[tuple[str, float], ...] = ()
+    shares: Shares
+    kinds: Shares = ()
 
 
 def softest(block: PrincipalStiffness, name: str, springs: Sequence[Spring], statics: Statics) -> Softest | None:
@@ -116,20 +126,50 @@ def softest(block: PrincipalStiffness, name: str, springs: Sequence[Spring], sta
     if least == 0.0:
         return Softest(least, alike, ())
     rows = ROTATIONS if name == "rotation" else TRANSLATIONS
-    parts: dict[str, float] = {}
-    kinds: dict[str, dict[str, float]] = {}
+    amounts: dict[str, float] = {}
     for spring, share in zip(springs, compliance_shares(statics), strict=True):
         amount = sum(float(share.entry(i, j)) * way[i % 3] * way[j % 3] for way in alike for i in rows for j in rows)
         # The compliance in each of these directions is 1 / least, so this is the spring's share of their sum.
-        parts[spring.of] = parts.get(spring.of, 0.0) + amount * least / len(alike)
-        kinds.setdefault(spring.kind, {})[spring.of] = 0.0
+        amounts[spring.name] = amount * least / len(alike)
+    return Softest(least, alike, *parts_and_kinds(springs, amounts))
+
+
+def parts_and_kinds(springs: Sequence[Spring], shares: Mapping[str, float]) -> tuple[Shares, Shares]:
+    """Add up shares of springs by part, and by kind of part, such as "actuator ×6".
+
+    Args:
+        springs: of the machine.
+        shares: by the name of a spring; a name that is not a spring's is a part and a kind of its own.
+    """
+    parts: dict[str, float] = {}
+    kinds: dict[str, dict[str, float]] = {}
+    known = {spring.name: spring for spring in springs}
+    for name, share in shares.items():
+        part, kind = (known[name].of, known[name].kind) if name in known else (name, name)
+        parts[part] = parts.get(part, 0.0) + share
+        kinds.setdefault(kind, {})[part] = 0.0
     together = {
         f"{kind} ×{len(members)}" if len(members) > 1 else next(iter(members)): sum(parts[part] for part in members)
         for kind, members in kinds.items()
     }
-    return Softest(least, alike, _ranked(parts), _ranked(together))
+    return _ranked(parts), _ranked(together)
 
 
-def _ranked(shares: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
+def _ranked(shares: Mapping[str, float]) -> Shares:
     """Sort shares, the greatest first; equal shares keep their order."""
     return tuple(sorted(shares.items(), key=lambda item: -round(item[1], EQUAL_SHARES)))
+
+
+def largest_contributors(parts: Shares, kinds: Shares) -> str:
+    """Name the parts that contribute most, in percent; where many parts share, the kinds of parts.
+
+    Args:
+        parts: each part and its share.
+        kinds: the same for all parts of one kind together.
+
+    Returns:
+        Nothing where no share is large enough to be named.
+    """
+    shares = parts if sum(share for _, share in parts[:MOST_NAMED]) >= MOST_OF_IT else kinds
+    named = [(name, 100.0 * share) for name, share in shares[:MOST_NAMED] if share >= NAMED]
+    return ", ".join(f"{name} {percent:.0f}\N{NO-BREAK SPACE}%" for name, percent in named)

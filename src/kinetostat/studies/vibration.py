@@ -27,14 +27,17 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.deflected import Deflection
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import springs as springs_of
 from kinetostat.machine.mass import moving_masses
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.attribution import largest_contributors, parts_and_kinds
 from kinetostat.studies.grid.quantities import refuse_unknown_mass
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.refusal import why_not
+from kinetostat.tolerances import EQUAL_FREQUENCIES
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.modes import modes as solved_modes
 from kinetostat.vibration.receptance import (
@@ -84,6 +87,7 @@ class Mode:
         modal_stiffness: N/m or N·m/rad.
         effective_mass: share of all moving mass that answers when the base shakes along x, y, z.
         strain: share of the strain energy of each spring, and of the loads, by name; they add up to 1.
+        kinds: the same for all springs of one kind together, such as "actuator ×6", the greatest share first.
         kinetic: share of the kinetic energy of each part by name; they add up to 1.
         shape: small motions of the tool and of the ends of all links, of any size, for drawings.
     """
@@ -96,6 +100,7 @@ class Mode:
     modal_stiffness: float
     effective_mass: tuple[float, float, float]
     strain: Mapping[str, float]
+    kinds: Mapping[str, float]
     kinetic: Mapping[str, float]
     shape: Deflection | None = None
 
@@ -220,29 +225,43 @@ def _vibration(machine: Machine, response: Response, equations: Balance, solutio
     known = [float(part.mass) for part in masses if part.mass is not None] + [machine.tables["tool"].payload]
     uncounted = tuple(part.name for part in masses if part.mass is None)
     shown = tuple(_modes(machine, response, equations, solution, damping))
+    message, names = _message(machine, response, shown), machine.family.component_names
     return Vibration(
-        machine, Status.OK, _message(machine, shown), machine.family.component_names, machine.loaded, shown, sum(known),
-        uncounted, assumed, solution, damping,
-    )  # fmt: skip
+        machine, Status.OK, message, names, machine.loaded, shown, sum(known), uncounted, assumed, solution, damping
+    )
 
 
-def _message(machine: Machine, shown: Sequence[Mode]) -> str:
+def _message(machine: Machine, response: Response, shown: Sequence[Mode]) -> str:
+    """Say where the machine rings first, how the tool moves there, and which springs deform.
+
+    Modes of equal frequency are told together: which motions of their plane are shown is arbitrary, their sum is not.
+    """
     if not shown:
         return "Nothing that has mass can move."
-    first = shown[0]
-    part, share = max(first.strain.items(), key=lambda item: item[1])
-    way = f"turns about {first.direction[1:]}" if len(first.direction) == 2 else f"moves along {first.direction}"
-    return (
-        f"It rings first at {machine.display.show(first.frequency, 'Hz')}: the tool {way}, and the largest share of "
-        f"the strain energy, {100.0 * share:.0f} %, is in {part}."
-    )
+    lowest = shown[0].frequency
+    first = [mode for mode in shown if math.isclose(mode.frequency, lowest, rel_tol=EQUAL_FREQUENCIES)]
+    together = {name: sum(mode.strain[name] for mode in first) / len(first) for name in shown[0].strain}
+    springs = largest_contributors(*parts_and_kinds(springs_of(response.configuration), together))
+    ways = _motions([mode.direction for mode in first])
+    in_modes = f", in {len(first)} modes" if len(first) > 1 else ""
+    text = f"It rings first at {machine.display.show(lowest, 'Hz')}{in_modes}: the tool {ways}."
+    return f"{text} The strain energy is mainly in {springs}." if springs else text
+
+
+def _motions(components: Sequence[str]) -> str:
+    """Components as motions: "moves along x", "turns about x and about y"."""
+    phrases: list[str] = []
+    for name in dict.fromkeys(components):
+        verb, way = ("turns", f"about {name[1:]}") if len(name) == 2 else ("moves", f"along {name}")
+        phrases.append(way if any(text.startswith(verb) for text in phrases) else f"{verb} {way}")
+    return " and ".join(phrases)
 
 
 def _modes(machine: Machine, response: Response, equations: Balance, solution: Modes, damping: Damper) -> list[Mode]:
     shown = slice(0, min(solution.ringing, MOST_SHOWN))
     strains, kinetics = strain_shares(equations, solution.shapes[:, shown]), kinetic_shares(equations, solution)
     parts, length = list(machine.family.components), float(response.configuration.length)
-    effective = effective_masses(equations, solution)
+    effective, springs = effective_masses(equations, solution), springs_of(response.configuration)
     result = []
     for k in range(solution.ringing)[shown]:
         omega = 1.0 / math.sqrt(solution.squares[k])
@@ -250,6 +269,7 @@ def _modes(machine: Machine, response: Response, equations: Balance, solution: M
         sizes = np.abs(twist) * np.array([length] * 3 + [1.0] * 3)
         largest = max(parts, key=lambda part: sizes[part])
         mass = float(1.0 / twist[largest] ** 2) if twist[largest] else math.inf
+        strain = {name: float(shares[k]) for name, shares in strains.items()}
         result.append(
             Mode(
                 float(solution.frequencies[k]),
@@ -259,7 +279,8 @@ def _modes(machine: Machine, response: Response, equations: Balance, solution: M
                 mass,
                 mass * omega**2,
                 effective[k],
-                {name: float(shares[k]) for name, shares in strains.items()},
+                strain,
+                dict(parts_and_kinds(springs, strain)[1]),
                 {name: float(shares[k]) for name, shares in kinetics.items()},
                 _shape(response, equations, solution, k),
             )
@@ -378,6 +399,7 @@ def as_json(answer: Vibration) -> dict[str, Any]:
                     "modal_stiffness": mode.modal_stiffness,
                     "effective_mass": dict(zip("xyz", mode.effective_mass, strict=True)),
                     "strain_energy": dict(mode.strain),
+                    "strain_energy_by_kind": dict(mode.kinds),
                     "kinetic_energy": dict(mode.kinetic),
                 }
                 for mode in answer.modes

@@ -52,6 +52,8 @@ FORMATS: dict[str, Any] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDa
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito: distinct for colour-blind readers and in grey."""
 DASHES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
+MOST_INSIDE = 6
+"""Curves of which the legend stands in the panel; of more it would cover them, and stands beside it."""
 CHARACTERS = 19
 """Of the small line below a figure, per inch."""
 TITLE_CHARACTERS = 12
@@ -159,6 +161,12 @@ def as_svg(figure: Figure) -> str:
     with mpl.rc_context({**STYLE, "svg.fonttype": "path"}):
         figure.savefig(text, format="svg", metadata={"Date": None}, bbox_inches="tight", pad_inches=MARGIN)
     return text.getvalue()[text.getvalue().index("<svg") :]
+
+
+def look_of(place: int) -> dict[str, Any]:
+    """Colour and dash of a curve by its place among others; no two of the first 36 look alike."""
+    turn, colour = divmod(place, len(COLOURS))
+    return {"color": COLOURS[colour], "linestyle": DASHES[(colour + turn) % len(DASHES)]}
 
 
 def fix_layout(figure: Figure) -> None:
@@ -319,11 +327,16 @@ def _curve_panel(panel: Axes, dataset: xr.Dataset, across: str, names: Sequence[
     values = np.concatenate([dataset[name].values for name in names])
     unit = dataset[names[0]].attrs["units"]
     scale = display_of(dataset).fitting(unit, values)
-    for name, colour, dash in zip(names, COLOURS, DASHES, strict=False):
-        panel.plot(x, dataset[name].values * scale.factor, dash, color=colour, label=dataset[name].attrs["symbol"])
+    for place, name in enumerate(names):
+        panel.plot(x, dataset[name].values * scale.factor, label=dataset[name].attrs["symbol"], **look_of(place))
     if logarithmic:
         panel.set(xscale="log", yscale="log" if np.nanmin(values) > 0 else "linear")
-    about = dataset[names[0]].attrs.get("long_name") or spoken(group_of(names) or names[0])
+    about = dataset[names[0]].attrs.get("long_name") or ", ".join(
+        spoken(group) for group in dict.fromkeys(group_of([name]) or name for name in names)
+    )
     panel.set(xlabel=x_label, ylabel=scale.label(about))
     panel.margins(x=0.0)
-    panel.legend(loc="best")
+    if len(names) > MOST_INSIDE:
+        panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    else:
+        panel.legend(loc="best")

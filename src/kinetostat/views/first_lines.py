@@ -10,16 +10,10 @@ from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.kinematics.mobility import Mobility
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.attribution import Softest
+from kinetostat.studies.attribution import Softest, largest_contributors
 from kinetostat.studies.loads import LoadCase
 from kinetostat.studies.setting import pose_of
 
-MOST_NAMED = 3
-"""Parts that are named as what makes a direction soft."""
-NAMED = 0.05
-"""Share of the compliance from which a part is named."""
-MOST_OF_IT = 0.6
-"""Share that the named parts must have together; otherwise kinds of parts are named."""
 BLOCKS = (("translation", "along", "N/m"), ("rotation", "about", "N·m/rad"))
 
 
@@ -87,12 +81,8 @@ def _vector(way: Sequence[float]) -> str:
 
 
 def _mainly(direction: Softest) -> str:
-    """Name the parts that contribute most; where many parts share the compliance, the kinds of parts."""
-    alone = sum(share for _, share in direction.shares[:MOST_NAMED])
-    shares = direction.shares if alone >= MOST_OF_IT else direction.kinds
-    largest = [(name, 100.0 * share) for name, share in shares[:MOST_NAMED] if share >= NAMED]
-    named = [f"{name} {percent:.0f}\N{NO-BREAK SPACE}%" for name, percent in largest]
-    return f", mainly from {', '.join(named)}" if named else ""
+    named = largest_contributors(direction.shares, direction.kinds)
+    return f", mainly from {named}" if named else ""
 
 
 def _loaded(analysis: Analysis, load: LoadCase) -> str:

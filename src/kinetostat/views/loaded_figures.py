@@ -16,7 +16,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.under_load import LoadedState, load_curve
 from kinetostat.views.drawing import flat, loop, views_of
-from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout, look_of, note_setting, set_title
 from kinetostat.views.loaded_tables import leg_loads
 from kinetostat.views.scene.analysis_overlays import exaggerated, exaggeration_of, motions_of
 from kinetostat.views.scene.proportions import proportions_of
@@ -169,8 +169,7 @@ def drawn_larger(factor: float) -> str:
 
 def _curves(panel: Axes, share: Array, curves: dict[str, Array], label: str) -> None:
     for place, (name, values) in enumerate(curves.items()):
-        dash = DASHES[place % len(DASHES)]
-        panel.plot(share, values, color=COLOURS[place % len(COLOURS)], linestyle=dash, label=name)
+        panel.plot(share, values, label=name, **look_of(place))
     panel.axvline(100.0, color="#999999", linewidth=0.8)
     panel.set_ylabel(label)
     panel.margins(x=0.0)

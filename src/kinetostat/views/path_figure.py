@@ -11,7 +11,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.studies.evaluation.evaluation import PoseAnswers
 from kinetostat.studies.setting import setting_of
-from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.figures import STYLE, fix_layout, look_of, note_setting, set_title
 
 ABSENT = "#dddddd"
 """Behind poses that have no result."""
@@ -54,9 +54,9 @@ def _panel(panel: Axes, answers: PoseAnswers, curves: dict[str, Array], label: s
     numbers = np.arange(1, answers.poses.count + 1)
     _shade(panel, np.flatnonzero(answers.status != Status.OK) + 1)
     marker = "." if len(numbers) <= FEW else ""
-    for (name, values), colour, dash in zip(curves.items(), COLOURS, DASHES, strict=False):
+    for place, (name, values) in enumerate(curves.items()):
         finite = np.where(np.isfinite(values), values, np.nan)
-        panel.plot(numbers, finite, linestyle=dash, marker=marker, color=colour, label=name)
+        panel.plot(numbers, finite, marker=marker, label=name, **look_of(place))
     panel.set_ylabel(label)
     panel.margins(x=0.0)
     panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

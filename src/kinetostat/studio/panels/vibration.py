@@ -26,7 +26,7 @@ from kinetostat.studio.session import Session
 from kinetostat.studio.wording import bars, heading, paragraph, shown
 from kinetostat.vibration.receptance import Complex
 from kinetostat.views.analysis_tables import entry_unit
-from kinetostat.views.vibration_tables import LEAST_SHARE, MOST_PARTS, damping_of, masses_of, percent
+from kinetostat.views.vibration_tables import LEAST_SHARE, MOST_PARTS, cut_by_table, damping_of, masses_of, percent
 
 MODES, RESPONSE = "Modes", "Response"
 CUT = "the cut"
@@ -214,7 +214,8 @@ def about(new: Ringing) -> str:
     answer = new.answer
     if not answer.modes:
         return paragraph(answer.message, "lead")
-    return paragraph(answer.message, "lead") + paragraph(f"{masses_of(answer)} Damping: {damping_of(answer)}")
+    more = f"{masses_of(answer)} Damping: {damping_of(answer)} {cut_by_table(answer)}"
+    return paragraph(answer.message, "lead") + paragraph(more.rstrip())
 
 
 def spoken(name: str) -> str:
@@ -232,7 +233,7 @@ def mode_rows(new: Ringing) -> tuple[list[str], list[list[float]], list[list[str
             display.show(mode.frequency, "Hz"),
             mode.direction,
             display.show(mode.modal_mass, "kg·m**2" if mode.direction.startswith("r") else "kg"),
-            _largest(mode.strain),
+            _largest(mode.kinds),
             _largest(mode.kinetic),
         ]
         for mode in modes
@@ -267,7 +268,7 @@ def energies_text(mode: Mode, number: int, legs: Mapping[str, str]) -> str:
 def _largest(shares: Mapping[str, float]) -> str:
     """Name the part with the largest share, with its percentage."""
     name, share = max(shares.items(), key=lambda item: item[1])
-    return f"{name}, {100.0 * share:.0f} %"
+    return f"{name}, {100.0 * share:.0f}\N{NO-BREAK SPACE}%"
 
 
 def _way(machine: Machine, name: str) -> Array:

@@ -11,7 +11,7 @@ from kinetostat.views.report.content import Block, Paragraph, Section
 from kinetostat.views.report.pictures import drawn
 from kinetostat.views.report.typesetting import printed, typeset
 from kinetostat.views.vibration_figures import response_figure, shape_figure
-from kinetostat.views.vibration_tables import damping_of, masses_of, mode_table, share_table
+from kinetostat.views.vibration_tables import cut_by_table, damping_of, masses_of, mode_table, share_table, strain_of
 
 SHAPES = 3
 """Modes of which the shape is drawn."""
@@ -35,14 +35,14 @@ def _blocks(answer: Vibration, frequencies: xr.Dataset | None) -> Iterator[Block
     yield Paragraph(
         typeset(f"{answer.message} {masses_of(answer)} Damping: {damping_of(answer)}"), f"Vibration{about}:"
     )
+    if cut := cut_by_table(answer):
+        yield Paragraph(typeset(cut), "Cutting:")
     caption = (
         "Natural frequencies; the component in which the tool moves most, with the mass and stiffness that would ring "
         "there alone; and the share of all moving mass that answers when the base shakes along each axis."
     )
-    yield printed(mode_table(answer.modes, answer.machine.display), caption)
-    yield printed(
-        share_table("Strain energy (%)", [mode.strain for mode in answer.modes]), "Strain energy by spring, %."
-    )
+    yield printed(mode_table(answer.modes, answer.machine.display, answer.components), caption)
+    yield printed(share_table("Strain energy (%)", strain_of(answer.modes)), "Strain energy by spring, %.")
     yield printed(
         share_table("Kinetic energy (%)", [mode.kinetic for mode in answer.modes]), "Kinetic energy by part, %."
     )

@@ -1,0 +1,68 @@
+"""What is said of vibrations: sentences that no choice of equal modes changes, tables in which nothing is lost."""
+
+import pytest
+
+from kinetostat.machine.changing import changed
+from kinetostat.machine.loading import load
+from kinetostat.studies.grid.grid import evaluate_grid
+from kinetostat.studies.vibration import modes
+from kinetostat.views.figures import curves, look_of
+from kinetostat.views.vibration_tables import MOST_PARTS, cut_by_table, mode_table, share_table, strain_of
+
+LIGHT_LEGS = {"tool.mass": 12.0, "linear_density.legs": 0.5, "drives.rotor_inertia": 2e-5, "drives.lead": 0.01}
+
+
+def columns(table):
+    """The columns of numbers of a table, a dash as 0."""
+    return [[0.0 if cell == "–" else float(cell) for cell in column.cells] for column in table.columns[1:]]
+
+
+def test_energies_in_a_table_add_up_although_no_part_of_small_share_has_a_line():
+    answer = modes(changed(load("hexapod"), LIGHT_LEGS))
+    table = share_table("Kinetic energy (%)", [mode.kinetic for mode in answer.modes])
+    assert table.row_count < len(answer.modes[0].kinetic)  # the legs have no line of their own
+    for column in columns(table):
+        assert sum(column) == pytest.approx(100.0, abs=0.05 * len(column))
+
+
+def test_modes_of_equal_frequency_are_told_together_and_by_the_kind_of_spring():
+    message = modes(changed(load("hexapod"), {"tool.mass": 12.0})).message
+    assert "in 2 modes: the tool moves along x and along y." in message
+    assert message.endswith("mainly in actuator ×6 100\N{NO-BREAK SPACE}%.")
+    alone = modes(changed(load("planar-3rpr"), {"tool.mass": 2.0})).message
+    assert "modes" not in alone
+    assert "leg 2 actuator 51\N{NO-BREAK SPACE}%" in alone
+
+
+def test_springs_that_are_too_many_for_a_table_are_told_by_kind():
+    answer = modes(changed(load("hexapod-hardware"), {"tool.mass": 12.0}))
+    assert len(answer.modes[0].strain) > MOST_PARTS
+    shares = strain_of(answer.modes)
+    assert {*shares[0]} == {*answer.modes[0].kinds}
+    assert "drive screw ×6" in shares[0]
+    for mode in answer.modes:
+        assert sum(mode.kinds.values()) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_planar_machine_does_not_answer_along_z():
+    heads = [
+        [str(column.header) for column in mode_table(answer.modes, answer.machine.display, answer.components).columns]
+        for answer in (modes(changed(load(name), {"tool.mass": 2.0})) for name in ("planar-3rpr", "delta"))
+    ]
+    assert ["z %" in names for names in heads] == [False, True]
+
+
+def test_a_cutting_pressure_without_a_direction_asks_for_one():
+    machine = changed(load("hexapod"), {"tool.mass": 12.0})
+    assert cut_by_table(modes(machine)) == ""
+    pressed = changed(machine, {"cutting.pressure": 2e9})
+    assert "write direction = [1, 0, 0]" in cut_by_table(modes(pressed))
+    assert "Along x " in cut_by_table(modes(changed(pressed, {"cutting.direction.0": 2.0})))
+
+
+def test_a_sweep_draws_every_quantity_each_with_a_look_of_its_own():
+    machine = changed(load("hexapod"), LIGHT_LEGS)
+    names = [f"{kind}_{number}" for kind in ("frequency", "loaded_frequency") for number in range(1, 7)]
+    (panel,) = curves(evaluate_grid(machine, ["z=0.12:0.15:3"], names), names, "").axes
+    assert len(panel.lines) == len(names)
+    assert len({str(look_of(place)) for place in range(36)}) == 36
