@@ -111,5 +111,6 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.path.stem in BY_FILE:
             item.add_marker(BY_FILE[item.path.stem])
-        if not MARKERS.keys().isdisjoint(item.keywords):
+        # Not `item.keywords`: the names of the folders are among them.
+        if any(item.get_closest_marker(marker) for marker in MARKERS):
             item.add_marker("slow")

@@ -117,6 +117,11 @@ USUAL = {
 }
 """SI values of the units that most files use, by SI unit. They are pint's to the last bit, which a test compares; pint
 itself takes longer to import than a thousand poses take to compute, and is only asked about all other units."""
+TURNS_COUNT = ("angle", "rate", "frequency")
+"""Kinds whose angle cannot be left out: 1 Hz is 2 pi rad/s. Others may be written without theirs, a torsional stiffness
+in N*m; but none is written with an angle that it has not: a lead of "10 mm/turn" is not a length of 10 mm / (2 pi)."""
+WITHOUT_ANGLE = {"rate": "1/s"}
+"""How such a kind is written without its angle all the same, and meant as SI has it."""
 RIGID = "rigid"
 """How people write an infinite stiffness."""
 
@@ -134,8 +139,8 @@ PLAIN = (1e-4, 1e6)
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _NAME = r"(?:[A-Za-zµμ°]+|%)(?:\s*(?:\*\*|\^)\s*[1-4]|[²³⁴])?"
 _UNDER = rf"/\s*\({_NAME}(?:\s*[*·]\s*{_NAME})*\)"
-UNIT = re.compile(rf"{_NAME}(?:\s*[*/·]\s*{_NAME}|\s*{_UNDER})*")
-"""How the text of a unit looks, e.g. "N/um"."""
+UNIT = re.compile(rf"(?:1\s*/\s*)?{_NAME}(?:\s*[*/·]\s*{_NAME}|\s*{_UNDER})*")
+"""How the text of a unit looks, e.g. "N/um" or "1/s"."""
 _PLAIN_SIGNS = str.maketrans({"·": "*", "µ": "u", "μ": "u", "²": "**2", "³": "**3", "⁴": "**4"})
 _LONGEST = 64
 
@@ -265,7 +270,7 @@ def _allowed(wanted: Kind) -> str:
     if not wanted.unit:
         return f"a number without a unit, e.g. {wanted.example}"
     rigid = f', or "{RIGID}"' if wanted.stiff else ""
-    article = "an" if wanted.name[0] in "aeiou" else "a"
+    article = "an" if wanted.name[0] in "aeiouE" else "a"
     bare = f"a bare number in {wanted.bare or wanted.unit}"
     return f'{article} {wanted.name} with its unit, e.g. "{wanted.example}"{rigid}, or {bare}'
 
@@ -297,12 +302,15 @@ def _factor(unit: str, wanted: Kind) -> float:
     """SI value of one `unit`."""
     if UNIT.fullmatch(unit) is None:
         raise UnitError(f'"{unit}" is not a unit; write {_allowed(wanted)}')
+    if unit == WITHOUT_ANGLE.get(wanted.name):
+        return 1.0
     if usual := _usual(unit, wanted.unit):
         return usual
     given, target = _in_root_units(unit), _in_root_units(wanted.unit)
     if given is None or target is None:
         raise UnitError(f'the unit "{unit}" is unknown; write {_allowed(wanted)}')
-    turning = wanted.name == "angle"
-    if given.dimensionality != target.dimensionality or (turning and given.units != target.units):
+    angle, in_kind = (dict(quantity.unit_items()).get("radian", 0) for quantity in (given, target))
+    misread = angle != in_kind and (angle or wanted.name in TURNS_COUNT)
+    if given.dimensionality != target.dimensionality or misread:
         raise UnitError(f'"{unit}" is not a unit of {wanted.name}; write {_allowed(wanted)}')
     return float(given.magnitude / target.magnitude)

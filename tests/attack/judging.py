@@ -140,7 +140,7 @@ def wrong_answer(machine: Machine) -> str | None:
             return f"NaN in the {name} of a pose that is ok"
     if all(c == 0.0 for c in analysis.compliance_diagonal) and not analysis.rigid:
         return "a compliance of zeros, and no spring is rigid"
-    shares = [entry.compliance for entry in analysis.attribution if hasattr(entry, "compliance")]
+    shares = [entry.compliance_share for entry in analysis.attribution]
     return (
         "NaN in a share" if any(x is not None and math.isnan(x) for share in shares for x in np.ravel(share)) else None
     )

@@ -7,6 +7,18 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+from hostile import good_texts
+from judging import wrong_answer
+
+from kinetostat.machine.loading import build
+
+
+@pytest.mark.parametrize("text", good_texts("machine"))
+def test_what_is_spoilt_was_good(text):
+    """Otherwise nothing beyond the first refusal is attacked."""
+    assert wrong_answer(build(text, "good.toml")) is None
+
 
 def test_hostile_files_and_command_lines_are_well_answered():
     command = [sys.executable, str(Path(__file__).parent), "--files", "600", "--lines", "150", "--longest", "120"]

@@ -84,3 +84,9 @@ def test_a_direction_is_three_finite_numbers(direction):
 def test_the_command_line_refuses_a_direction_without_end(capsys):
     assert main(["analyze", "delta", "--along", "inf,0,1"]) == 2
     assert "give three finite numbers" in capsys.readouterr().err
+
+
+def test_a_lead_is_none_or_at_least_the_size_of_an_atom():
+    with refused(r"drives\.lead is 1e-13.* at least 1e-12 m"):
+        load("hexapod", "drives.lead=1e-13")
+    assert load("hexapod", "drives.lead=0").tables["drives"].lead == 0.0

@@ -81,6 +81,13 @@ class Odd:
     """Nothing that anybody expects."""
 
 
+class Mute:
+    """What cannot show itself."""
+
+    def __repr__(self):
+        raise RuntimeError
+
+
 MISUSES = [
     ("machine", lambda: load()),
     ("machine", lambda: load(None)),
@@ -315,6 +322,20 @@ MISUSES = [
     ("suffix", lambda: save(ringing(), "a.png")),
     ("suffix", lambda: save(off(), "a.toml")),
     ("path", lambda: save(off(), 3)),
+    ("poses", lambda: budget(H, 10**400, tolerances=JOINTS)),
+    ("null character", lambda: budget(H, "\0.csv", tolerances=JOINTS)),
+    ("null character", lambda: identify(H, "\0.csv")),
+    ("name too long", lambda: report(H, "a.html", fit="a" * 5000)),
+    ("name is too long", lambda: export(HEAVY, "a" * 5000, "modes")),
+    ("ranges", lambda: budget(H, ranges=np.array(1.0))),
+    ("quantities", lambda: evaluate(H, {"x": [0]}, np.array("x"))),
+    ("allocate", lambda: budget(H, allocate=1e308, tolerances=JOINTS)),
+    ("allocate", lambda: budget(H, allocate=5e-324, tolerances=JOINTS)),
+    ("over", lambda: correction_table(H, [])),
+    ("over", lambda: correction_table(H, np.array([]))),
+    (r"frequencies\[1\]", lambda: ringing().receptance([1.0, np.nan])),
+    (r"frequencies\[0\]", lambda: ringing().along((0, 0, 1), [1e300])),
+    ("Mute", lambda: modes(Mute())),
 ]
 
 
@@ -335,6 +356,9 @@ def test_what_may_be_given_in_several_ways_is_taken():
         assert evaluate_grid(H, ranges).identical(whole)
     assert workspace(H, OVER, seed=np.int64(3)) == workspace(H, OVER, seed=3)
     assert A.along(np.array([0, 0, 1])) == A.along((0, 0, 1.0))
+    whole = budget(H, tolerances=JOINTS, along=(100, 100, 100), samples=64, ranges=[])
+    small = np.array([100, 100, 100], dtype=np.int8)  # whose squares do not fit into their kind
+    assert budget(H, tolerances=JOINTS, along=small, samples=np.uint8(64), ranges=np.array([])) == whole
     assert [design.label for design in compare({"a": "hexapod", "b": H}).designs] == ["a", "b"]
     assert compare(machine for machine in (H, H)) == compare([H, H])
 

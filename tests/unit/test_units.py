@@ -42,6 +42,12 @@ GOOD = [
     ("rigid", "linear stiffness", math.inf),
     (" Rigid ", "torsional stiffness", math.inf),
     ("0 N/m", "linear stiffness", 0.0),
+    ("10 N*m", "torsional stiffness", 10.0),
+    ("2 1/s", "rate", 2.0),
+    ("2 deg/s", "rate", math.pi / 90),
+    ("2 1/s", "frequency", 2.0),
+    ("3 kHz", "frequency", 3000.0),
+    ("12e-6 1/K", "thermal expansion", 12e-6),
 ]
 
 
@@ -51,6 +57,7 @@ def test_good_quantities(written, kind, value):
 
 
 FIX = {"length": "12 cm", "angle": "30 deg", "linear stiffness": "20 N/um", "torsional stiffness": "1e7 N*m/rad"}
+FIX |= {"rate": "3 rad/s", "frequency": "120 Hz", "ratio": "20 um/m", "moment": "20 N*m"}
 """The example that a message about each kind must show."""
 
 BAD = [
@@ -97,6 +104,12 @@ BAD = [
     ("3 m/3", "length", '"m/3"'),
     ("3 nan", "length", '"nan"'),
     ("3 inf", "length", '"inf"'),
+    ("3 Hz", "rate", "is not a unit of rate"),
+    ("3 rad/s", "frequency", "is not a unit of frequency"),
+    ("10 mm/turn", "length", "is not a unit of length"),
+    ("3 deg", "ratio", "is not a unit of ratio"),
+    ("3 N*m/deg", "moment", "is not a unit of moment"),
+    ("3 /s", "rate", '"/s" is not a unit'),
 ]
 
 

@@ -18,7 +18,8 @@ from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.mass import located_members
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.vibration import modes
+from kinetostat.studies.grid.grid import evaluate_grid
+from kinetostat.studies.vibration import NOTHING_RINGS, modes
 from kinetostat.vibration.reduced import free_frequencies, reducible
 from machines import with_bodies
 
@@ -179,7 +180,7 @@ def test_a_rod_and_a_disc_are_bodies():
 
 def test_what_cannot_ring_is_said():
     answer = modes(heavy("hexapod", **{"stiffness.actuator": math.inf}))
-    assert (answer.modes, answer.message) == ((), "All that could move is rigid, so that nothing rings.")
+    assert (answer.modes, answer.message) == ((), NOTHING_RINGS)
     assert modes(changed(heavy("hexapod"), {"pose.z": 3.0})).status is Status.JOINT_LIMIT
 
 
@@ -204,3 +205,9 @@ def test_the_cut_of_one_mode_is_that_of_the_textbook():
     assert found["stable_width"][0] == pytest.approx(softest.depth(2e9), rel=1e-9)
     assert found["least_real_receptance"][0] == pytest.approx(softest.real, rel=1e-9)
     assert found["frequency_1"][0] == pytest.approx(answer.modes[0].frequency, rel=1e-9)
+
+
+def test_loaded_frequencies_where_no_pose_has_a_place():
+    answer = evaluate_grid(load("hexapod", ['tool.mass="12 kg"']), ["z=-1 m:-2 m:3"], ["loaded_frequency"])
+    assert (answer["status"] != Status.OK).all()
+    assert np.isnan(answer["loaded_frequency_1"]).all()

@@ -50,11 +50,12 @@ def add_modes_command(commands: "Commands") -> None:
 
 def _modes(options: argparse.Namespace) -> int:
     from kinetostat.spec.errors import InputError
+    from kinetostat.spec.fields import positive
     from kinetostat.studies.vibration import as_json, modes
     from kinetostat.views.vibration_tables import print_vibration
 
     pressure, lowest, highest = (
-        _number(value, kind, option)
+        None if value is None else positive(value, kind, option)
         for value, kind, option in (
             (options.cutting_pressure, "cutting pressure", "--cutting-pressure"),
             (options.lowest, "frequency", "--from"),
@@ -80,22 +81,6 @@ def _modes(options: argparse.Namespace) -> int:
         written,
         message=answer.message,
     )
-
-
-def _number(value: str | None, kind: str, option: str) -> float | None:
-    """The SI value of an option that may be left out; it must be greater than 0."""
-    from kinetostat.spec.errors import InputError
-    from kinetostat.units import KINDS, UnitError, parse
-
-    if value is None:
-        return None
-    try:
-        number = parse(value, kind)
-    except UnitError as error:
-        raise InputError(f"{option} is {value}: {error}.") from None
-    if number <= 0.0:
-        raise InputError(f'{option} is {value}; it must be greater than 0, e.g. "{KINDS[kind].example}".')
-    return number
 
 
 def _written(

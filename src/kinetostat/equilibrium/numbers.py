@@ -144,7 +144,8 @@ def loaded_numbers(
     Returns:
         For each name its values [n] or [n x 6], SI, at the loaded tool point in base axes: "displacement" (rotation
         vector and displacement of the tool), "compliance" (diagonal), "stiffness" (diagonal), "slack" (how many
-        springs), "factor"; NaN where there is no state of rest that is stable. And `Status` codes [n].
+        springs), "factor"; NaN where there is no state of rest that is stable. Those of `further` are left out if no
+        pose has a place. And `Status` codes [n].
 
     Raises:
         InputError: as for `loaded_mechanism`.

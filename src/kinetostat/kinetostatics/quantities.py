@@ -136,7 +136,7 @@ def _extremes() -> list[MapQuantity]:
 
 def _under_load(response: Response, what: str, row: int | None = None) -> Scalar:
     """A number of the loaded state; NaN where it has not been computed."""
-    if response.loaded is None:
+    if response.loaded is None or what not in response.loaded:
         return float("nan")
     values = response.loaded[what]
     return values if row is None else values[row]

@@ -94,7 +94,8 @@ FREE = (Any, object, inspect.Parameter.empty)
 def checked(function: Callable[P, R]) -> Callable[P, R]:
     """Decorate a public function: arguments that are missing, unknown or of another kind are refused by their names.
 
-    Annotations say the kinds. Where one is a sequence, a generator is read into a list. Names of classes in quotes,
+    Annotations say the kinds. Where one is a sequence, generators, arrays and tables of other libraries are read into
+    a list; their numbers become Python's, whose sums neither overflow nor lose digits. Names of classes in quotes,
     `Any` and literal choices are left to the function.
     """
     signature = inspect.signature(function)
@@ -125,20 +126,35 @@ def _unbound(name: str, signature: inspect.Signature, named: Mapping[str, Any], 
 
 
 def _taken(value: Any, parameter: inspect.Parameter) -> Any:
-    """Return an argument, from a generator as a list.
+    """Return an argument, from a generator or an array as a list, and a number as one of Python's.
 
     Raises:
         InputError: it is not of the kind that the annotation says.
     """
     kind, name = parameter.annotation, parameter.name
-    if isinstance(value, Iterator) and any(_is_list(part) for part in _parts(kind)):
-        value = list(value)
+    if any(_is_list(part) for part in _parts(kind)):
+        value = _listed(value)
     misfit = _misfit(value, kind, name)
     if misfit is not None:
         place, wrong = misfit
         optional = ", or leave it out" if value is None and parameter.default is not parameter.empty else ""
         raise InputError(f"{place} is {shorten(wrong)}; give {words_of(parameter)}{optional}.")
-    return value
+    return _plain(value)
+
+
+def _listed(value: Any) -> Any:
+    """Return a generator or an array as a list, lists with plain numbers, and all else as it is."""
+    if isinstance(value, tuple):
+        return tuple(map(_plain, value))
+    array = hasattr(value, "__array__") and not isinstance(value, Mapping) and getattr(value, "ndim", 0) > 0
+    return [_plain(entry) for entry in value] if array or isinstance(value, Iterator | list) else value
+
+
+def _plain(value: Any) -> Any:
+    """Return a number of another library as one of Python's: those of eight bits overflow at 127."""
+    if isinstance(value, bool) or type(value) in (int, float):
+        return value
+    return int(value) if isinstance(value, Integral) else float(value) if isinstance(value, Real) else value
 
 
 def words_of(parameter: inspect.Parameter) -> str:
@@ -191,6 +207,8 @@ def _first(misfits: Iterable[Misfit]) -> Misfit:
 def _is_row(value: object, count: int | None, any_order: bool) -> bool:
     """Return whether a value has entries in an order, and so many of them if a count is given."""
     if not isinstance(value, Iterable) or isinstance(value, str | bytes | Mapping):
+        return False
+    if getattr(value, "shape", None) == ():  # an array of no dimension says that it can be iterated, and cannot
         return False
     return (any_order or not isinstance(value, Set)) and (count is None or len(list(value)) == count)
 

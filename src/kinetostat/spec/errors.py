@@ -32,6 +32,8 @@ def shorten(value: object, longest: int = 60) -> str:
         text = f'"{value}"' if isinstance(value, str) else repr(value)
     except ValueError:  # Python refuses to write integers of thousands of digits
         return "a number of thousands of digits"
+    except Exception:  # an object of somebody else's class, which may not be able to show itself
+        return f"an object of the class {type(value).__name__}"
     return cut(text, longest)
 
 

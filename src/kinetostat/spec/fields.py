@@ -14,7 +14,7 @@ from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints
 from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
-from kinetostat.spec.errors import shorten
+from kinetostat.spec.errors import InputError, shorten
 from kinetostat.units import KINDS, RIGID, UnitError, parse, write, written
 
 LARGEST = {"length": 1e6, "angle": 1e3}
@@ -52,6 +52,7 @@ class Quantity:
         per_leg: whether there is a value for each actuated leg, in their order.
         apart: whether each of them must be written, as components and angles; otherwise one may stand for all.
         most: the largest value that is allowed, SI.
+        least: the least size that is allowed of what is not 0, SI; 0 for that of the kind.
         unset: of a limit, the infinity that stands for "none"; None for a quantity that is not a limit.
     """
 
@@ -61,6 +62,7 @@ class Quantity:
     count: int | None = None
     apart: bool = False
     most: float = math.inf
+    least: float = 0.0
     unset: float | None = None
     per_leg: bool = False
 
@@ -137,8 +139,8 @@ class Quantity:
         if number > self.most:
             most = f"{math.degrees(self.most):g} deg" if self.kind == "angle" else f"{self.most:g} {kind.unit}"
             raise UnitError(f"it must not exceed {most}, {example}")
-        least = SOFTEST if self.stiff else LEAST.get(self.kind, 0.0) if self.positive else 0.0
-        if 0.0 < number < least:
+        least = self.least or (SOFTEST if self.stiff else LEAST.get(self.kind, 0.0) if self.positive else 0.0)
+        if 0.0 < abs(number) < least:
             softest = f"; write 0 for a free element, or {example}" if self.stiff else f", {example}"
             raise UnitError(f"it must be at least {least:g} {kind.unit}, and nothing is below that{softest}")
         largest = LARGEST.get(self.kind, LARGEST_OTHER)
@@ -172,6 +174,23 @@ class Quantity:
         part = {"type": "string", "pattern": r"^\s*[A-Za-z].*\s"}
         row = [{"type": "array", "items": part, "minItems": 1}] if kind.name.endswith("stiffness") else []
         return {"anyOf": [single, many, *row], "description": f"{rule}; one for all, or a list of {self.count}"}
+
+
+def positive(value: object, kind: str, name: str) -> float:
+    """Read an argument or an option that must be greater than 0, and of a size that can be computed with.
+
+    Args:
+        value: a number (SI), or text with a unit.
+        kind: a key of `KINDS`.
+        name: of the argument, for the message.
+
+    Raises:
+        InputError: it is not such a quantity.
+    """
+    try:
+        return Quantity(kind, "", positive=True).number(value)
+    except UnitError as error:
+        raise InputError(f"{name} is {shorten(value)}: {error}.") from None
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,7 @@ def place_of(path: Path) -> Path:
         raise InputError(f'"{path}" is a folder, and a file is to be written; give the file a name of its own.')
     if not stat.S_ISREG(mode):
         raise InputError(f'"{path}" is a device or another special file, which is never replaced; name a plain file.')
-    if not mode & 0o222 or (place.exists() and not os.access(place, os.W_OK)):
+    if not mode & 0o222 or (os.path.exists(place) and not os.access(place, os.W_OK)):
         raise InputError(f'"{path}" may only be read; choose another name, or make it writable (chmod u+w).')
     return place
 
@@ -104,7 +104,8 @@ def replacing(path: Path) -> Iterator[Path]:
 @contextmanager
 def _folders(folder: Path, path: Path) -> Iterator[None]:
     """Make a folder and the missing folders above it; if the block fails, remove those that were made."""
-    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    with writing(path):
+        missing = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         with writing(path):
             folder.mkdir(parents=True, exist_ok=True)

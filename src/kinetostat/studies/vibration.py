@@ -61,6 +61,10 @@ SMALL = 1e-6
 """Size of the motion by which shapes are read off the exact motions of the links, rad or in machine lengths."""
 MOST_SHOWN = 12
 """Modes that are shown; higher ones add to the response all the same."""
+NOTHING_RINGS = (
+    "Nothing rings: all that could move is rigid, or so much stiffer than the softest part that round-off hides that "
+    'one; write "rigid" for springs that are meant to be.'
+)
 DRAWN = 6
 """Modes of which shapes are drawn, and about which responses are."""
 POINTS = 1500
@@ -69,6 +73,8 @@ NEAR = 200
 """Frequencies about each mode."""
 WIDE = 6.0
 """How far they lie about it, in multiples of its frequency and damping ratio."""
+HIGHEST = 1e20
+"""Of frequencies, Hz: its square is still a number."""
 BELOW, ABOVE = 0.2, 1.6
 """Range of the curves as multiples of the lowest and of the highest frequency that is drawn."""
 
@@ -146,10 +152,13 @@ class Vibration(Immutable):
             frequencies: Hz.
 
         Raises:
-            InputError: the pose has no answer.
+            InputError: the pose has no answer, or a frequency is not a number up to `HIGHEST`.
         """
         solution, damping = self._solution()
-        return receptance(solution, damping, np.asarray(frequencies, dtype=float))
+        for place, frequency in enumerate(frequencies):
+            if not abs(frequency) <= HIGHEST:
+                raise InputError(f"frequencies[{place}] is {frequency:g}; give numbers in Hz, up to {HIGHEST:g}.")
+        return receptance(solution, damping, np.asarray(frequencies, dtype=float).reshape(-1))
 
     @checked
     def along(self, direction: Sequence[float], frequencies: Sequence[float]) -> Complex:
@@ -160,7 +169,7 @@ class Vibration(Immutable):
             frequencies: Hz.
 
         Raises:
-            InputError: the pose has no answer, or the direction is zero.
+            InputError: as for `receptance`, or the direction is zero.
         """
         return along(self.receptance(frequencies), np.array(unit_direction(direction, "direction")))
 
@@ -211,7 +220,7 @@ def modes(machine: Machine) -> Vibration:
         equations = balance(mechanism, free_state(mechanism))
     solution = solved_modes(equations)
     if solution is None:
-        return Vibration(machine, Status.OK, "All that could move is rigid, so that nothing rings.", names)
+        return Vibration(machine, Status.OK, NOTHING_RINGS, names)
     return _vibration(machine, response, equations, solution)
 
 

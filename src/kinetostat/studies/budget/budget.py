@@ -22,6 +22,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
+from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.tolerance_table import Tolerance, joined, read_tolerances
 from kinetostat.studies.budget.allocation import Allocation, allocated, reach_of
@@ -33,7 +34,6 @@ from kinetostat.studies.evaluation.columns import PoseColumns
 from kinetostat.studies.evaluation.given_poses import given_poses
 from kinetostat.studies.grid.grid import GridQuestion, grid_question
 from kinetostat.studies.indices import unit_direction
-from kinetostat.units import UnitError, parse
 
 SAMPLES, FEW_SAMPLES = 1 << 17, 1 << 12
 """Machines that are drawn if nobody says how many: at a single pose, and at each of many."""
@@ -336,19 +336,10 @@ def _answer(
         "",
     )
     if allocate is not None:
-        allocation = allocated(work.parts, work.reach, _length(allocate), by, answer.leading)
+        wanted = positive(allocate, "length", "allocate, the wanted error,")
+        allocation = allocated(work.parts, work.reach, wanted, by, answer.leading)
         answer = replace(answer, allocation=allocation)
     return replace(answer, message=_message(answer))
-
-
-def _length(text: float | str) -> float:
-    try:
-        value = parse(text, "length")
-    except UnitError as error:
-        raise InputError(f"allocate, the wanted error, is {shorten(text)}: {error}.") from None
-    if not value > 0.0:
-        raise InputError(f'allocate, the wanted error, is {shorten(text)}; it must be greater than 0: "0.05 mm".')
-    return value
 
 
 def _whole(work: _Work, size: int) -> Spread:

@@ -16,7 +16,8 @@ from kinetostat.equilibrium.motion import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.command import Command, answer_of, refuse_tensions
 from kinetostat.studies.correction.law import Law, shortest_law
@@ -25,7 +26,6 @@ from kinetostat.studies.evaluation.columns import PoseColumns
 from kinetostat.studies.grid.axes import chosen_axes, grid_of
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.tolerances import EXACT_LAW
-from kinetostat.units import UnitError, parse
 
 MOST_POINTS = 200_000
 """Points of a table: an hour or less."""
@@ -101,12 +101,13 @@ def correction_table(
             tensions that are to be chosen.
     """
     refuse_tensions(machine)
-    ranges = [over] if isinstance(over, str) else over
-    pairs = chosen_axes(machine, ranges)
+    pairs = chosen_axes(machine, several(over))
+    if not pairs:
+        raise InputError('over is empty; give an axis of the table, e.g. "gravity_angle=0 deg:90 deg:7".')
     grid = grid_of(pairs)
     if grid.size > MOST_POINTS:
         raise InputError(f"the table has {grid.size:,} points; at most {MOST_POINTS:,} are computed: lower the counts.")
-    wanted = None if tolerance is None else _length(tolerance)
+    wanted = None if tolerance is None else positive(tolerance, "length", "tolerance")
     middles = Grid([Axis(axis.paths, 0.5 * (axis.values[1:] + axis.values[:-1])) for axis in grid.axes])
     # Together, so that a table whose cells have no place is still a table.
     every = middles.columns(0, middles.size)
@@ -114,16 +115,6 @@ def correction_table(
     answers = driven(machine, columns, grid.size + middles.size, progress)
     fields = tuple(parameter for _, parameter in pairs)
     return _judged(machine, fields, grid, middles, answers.parted(grid.size), wanted)
-
-
-def _length(text: float | str) -> float:
-    try:
-        value = parse(text, "length")
-    except UnitError as error:
-        raise InputError(f'tolerance is "{text}": {error}.') from None
-    if not value > 0.0:
-        raise InputError(f'tolerance is "{text}"; give a length greater than 0, e.g. "0.1 um".')
-    return value
 
 
 def _judged(

@@ -69,7 +69,7 @@ def _of_array(machine: Machine, poses: Any) -> list[Column]:
     coordinates = [p.shown for p in parameters(machine.family) if p.path.startswith(POSE)]
     try:
         array = np.asarray(poses, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"poses is {shorten(poses)}; {HOW}.") from None
     if array.ndim != 2 or array.shape[1] != len(coordinates):
         shape = " x ".join(str(size) for size in array.shape) or "a single number"

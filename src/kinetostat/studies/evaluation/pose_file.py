@@ -98,11 +98,14 @@ def _lines(path: Path) -> list[tuple[int, str]]:
     try:
         with path.open("rb") as stream:
             data = stream.read(LARGEST + 1)
-        if len(data) > LARGEST:
-            raise InputError(f'"{path}" is larger than 1 GiB; split it into parts.')
-        text = data.decode("utf-8-sig")
     except OSError as error:
         raise InputError(f'"{path}" cannot be read: {error.strerror}; give a CSV file of poses.') from None
+    except ValueError:
+        raise InputError(f'"{path}" cannot be read: it has a null character; give a CSV file of poses.') from None
+    if len(data) > LARGEST:
+        raise InputError(f'"{path}" is larger than 1 GiB; split it into parts.')
+    try:
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f'"{path}" is not text; give a CSV file of poses, saved as UTF-8.') from None
     lines = enumerate(text.splitlines(), 1)

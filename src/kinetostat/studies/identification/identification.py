@@ -15,7 +15,7 @@ from kinetostat.equilibrium.motion import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several, shorten
-from kinetostat.spec.fields import Quantity
+from kinetostat.spec.fields import Quantity, positive
 from kinetostat.studies.identification.fit import Fit, Tell, Wishes, fitted
 from kinetostat.studies.identification.measurements import EULER, TURNED, Measurements, Sigmas, read_measurements
 from kinetostat.studies.identification.next_poses import (
@@ -135,8 +135,8 @@ def identify(
     if not 0 <= more <= MOST_PROPOSED:
         raise InputError(f"more (--next) is {more}; give a whole number of poses from 0 to {MOST_PROPOSED}.")
     sigmas = Sigmas(
-        _read(sigma, "length", "sigma") if sigma else USUAL_SIGMA,
-        _read(sigma_angle, "angle", "sigma_angle") if sigma_angle else 0.0,
+        positive(sigma, "length", "sigma") if sigma else USUAL_SIGMA,
+        positive(sigma_angle, "angle", "sigma_angle") if sigma_angle else 0.0,
         bool(sigma or sigma_angle),
     )
     if not sigmas.angle:
@@ -261,13 +261,6 @@ def _given(unknowns: Sequence[MachineError], given: Mapping[str, str], what: str
         for n in named:
             result[n] = min(result[n], fitting.get(unknowns[n].kind, np.inf))
     return result
-
-
-def _read(text: str, kind: str, name: str) -> float:
-    try:
-        return Quantity(kind, "", positive=True).number(text)
-    except UnitError as error:
-        raise InputError(f"{name} is {shorten(text)}: {error}.") from None
 
 
 def as_json(answer: Identification) -> dict[str, Any]:

@@ -100,8 +100,8 @@ def read_fit(path: str | Path) -> FitRecord:
         InputError: it cannot be read, or is not the record of a fit.
     """
     place = Path(path)
-    place = place / RECORD if place.is_dir() else place
     try:
+        place = place / RECORD if place.is_dir() else place
         record = json.loads(_bytes(place))
         pictures = {name: place.with_name(f"{name}.png") for name in PICTURES}
         return _checked(str(place), record, {n: _bytes(p) for n, p in pictures.items() if p.is_file()})
