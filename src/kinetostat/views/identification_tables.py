@@ -106,6 +106,16 @@ def _print_next(console: Console, answer: Identification) -> None:
     console.print(table)
     text = (
         f"They make the intervals shorter by a factor of {number(proposed.sharper, digits=3)} on average; as many "
-        f"poses at random by {number(proposed.random, digits=3)}."
+        f"poses at random by {number(proposed.random, digits=3)}. {proposed.within} Candidates: {_ranges(answer)}."
     )
     console.print(text, highlight=False)
+
+
+def _ranges(answer: Identification) -> str:
+    """From where to where candidates went, coordinate by coordinate."""
+    parts = []
+    for path, ends in answer.next.ranges.items() if answer.next else ():
+        scale = answer.machine.display.scale(unit_of(path))
+        low, high = (number(end * scale.factor, digits=3) for end in ends)
+        parts.append(f"{path.removeprefix('pose.')} {low} to {high} {scale.unit}")
+    return ", ".join(parts)

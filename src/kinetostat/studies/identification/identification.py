@@ -298,6 +298,7 @@ def as_json(answer: Identification) -> dict[str, Any]:
                 for each in answer.unseen
             ],
             "next_poses": None if answer.next is None else {"poses": answer.next.poses, "sharper": answer.next.sharper,
-                                                            "random": answer.next.random},
+                                                            "random": answer.next.random,
+                                                            "ranges": answer.next.ranges, "within": answer.next.within},
         }
     )  # fmt: skip

@@ -1,7 +1,8 @@
 """Which poses to measure next: those that make the uncertain combinations of unknowns surest (D-optimal designs).
 
 The determinant of the information grows by poses that are chosen one after the other, and then exchanged as long as
-that helps (V. Fedorov, 1972). Candidates lie at random within limits of the pose.
+that helps (V. Fedorov, 1972). Candidates lie at random within the limits of the machine's file (`admissible`), or where
+it sets none, in the range of what was measured.
 
 Source: theory (67) and (68).
 """
@@ -13,7 +14,10 @@ import numpy as np
 
 from kinetostat.accuracy.model import PLACED, error_model
 from kinetostat.equilibrium.motion import Array
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine
+from kinetostat.studies.identification.admissible import within_limits
 from kinetostat.studies.identification.fit import Fit
 from kinetostat.studies.identification.measurements import Measurements
 from kinetostat.studies.identification.observed import Observed, observed
@@ -25,6 +29,15 @@ EXCHANGES = 5
 NEARBY = 0.1
 """How far on either side of what was measured first poses go at least: a tenth of the machine's length, or 0.1 rad."""
 
+WITHIN_LIMITS = "They were chosen within the [limits] of the machine's file."
+WITHOUT_LIMITS = (
+    "The machine's file sets no [limits]: they were chosen in the range of the measured poses. Set strokes and angles "
+    "of joints to have them chosen wherever the machine may go."
+)
+BEYOND_LIMITS = (
+    "No measured pose keeps the [limits] of the machine's file: they were chosen in the range of the measured poses."
+)
+
 
 @dataclass(frozen=True)
 class NextPoses:
@@ -34,15 +47,19 @@ class NextPoses:
         poses: coordinates by leaf path, SI [k].
         sharper: by which factor they make the intervals of the unknowns shorter, as a geometric mean.
         random: the factor of as many poses at random.
+        ranges: least and greatest value of each coordinate among the candidates, SI.
+        within: where they were looked for, a sentence.
     """
 
     poses: Mapping[str, Array]
     sharper: float
     random: float
+    ranges: Mapping[str, tuple[float, float]]
+    within: str
 
 
 def next_poses(machine: Machine, seen: Observed, fit: Fit, sizes: Array, count: int) -> NextPoses | None:
-    """Choose poses within those that have been measured; None where no candidate can be placed.
+    """Choose poses among candidates; None where too few of these can be placed.
 
     Args:
         machine: that is measured.
@@ -51,9 +68,9 @@ def next_poses(machine: Machine, seen: Observed, fit: Fit, sizes: Array, count: 
         sizes: plausible size of each unknown, SI [unknowns].
         count: how many poses are wanted.
     """
-    limits = {path: (values.min(), values.max()) for path, values in seen.data.pose.items()}
+    spans = {path: (float(values.min()), float(values.max())) for path, values in seen.data.pose.items()}
     rng = np.random.default_rng(0)
-    there = _candidates(machine, seen, limits, rng)
+    there, within = _candidates(machine, seen, spans, rng)
     rows = len(there.data)
     if rows < count:
         return None
@@ -63,11 +80,13 @@ def next_poses(machine: Machine, seen: Observed, fit: Fit, sizes: Array, count: 
     start = np.diag(fit.seen[: fit.rank] ** 2)
     chosen = chosen_poses(blocks, start, count)
     gain, usual = (_gain(blocks[which], start) for which in (chosen, rng.permutation(rows)[:count]))
-    return NextPoses({path: values[chosen] for path, values in there.data.pose.items()}, gain, usual)
+    poses = {path: values[chosen] for path, values in there.data.pose.items()}
+    ranges = {path: (float(values.min()), float(values.max())) for path, values in there.data.pose.items()}
+    return NextPoses(poses, gain, usual, ranges, within)
 
 
 def first_poses(machine: Machine, seen: Observed, sizes: Array, count: int) -> Mapping[str, Array]:
-    """Choose poses to add where there are too few for a fit: about those that are there, and at least somewhat apart.
+    """Choose poses to add where there are too few for a fit: within limits, or about those that are there.
 
     Args:
         machine: that is measured.
@@ -78,12 +97,12 @@ def first_poses(machine: Machine, seen: Observed, sizes: Array, count: int) -> M
     Returns:
         Coordinates by leaf path, SI [count at most].
     """
-    limits = {}
+    spans = {}
     for path, values in seen.data.pose.items():
         least = NEARBY * (seen.model.length if unit_of(path) == "m" else 1.0)
         middle, half = 0.5 * (values.max() + values.min()), 0.5 * (values.max() - values.min())
-        limits[path] = (middle - max(half, least), middle + max(half, least))
-    there = _candidates(machine, seen, limits, np.random.default_rng(0))
+        spans[path] = (middle - max(half, least), middle + max(half, least))
+    there, _ = _candidates(machine, seen, spans, np.random.default_rng(0))
     _, known = seen.linearised(np.zeros(len(sizes)))
     _, rates = there.linearised(np.zeros(len(sizes)))
     blocks = (rates * sizes).reshape(len(there.data), -1, len(sizes))
@@ -98,14 +117,22 @@ def unit_of(path: str) -> str:
 
 
 def _candidates(
-    machine: Machine, seen: Observed, limits: Mapping[str, tuple[float, float]], rng: np.random.Generator
-) -> Observed:
-    """Poses at random within limits that the machine reaches, as if the same had been measured there."""
-    poses = {path: rng.uniform(low, high, CANDIDATES) for path, (low, high) in limits.items()}
+    machine: Machine, seen: Observed, spans: Mapping[str, tuple[float, float]], rng: np.random.Generator
+) -> tuple[Observed, str]:
+    """Poses at random that the machine reaches, as if the same had been measured there, and a sentence about them.
+
+    They keep the limits of its file; without any they lie within spans.
+    """
+    units = {path: seen.model.length if unit_of(path) == "m" else 1.0 for path in spans}
+    poses = within_limits(machine, seen.data.pose, units, CANDIDATES, rng)
+    within = WITHIN_LIMITS
+    if poses is None:
+        poses = {path: rng.uniform(low, high, CANDIDATES) for path, (low, high) in spans.items()}
+        within = BEYOND_LIMITS if limits_set(machine.tables["limits"]) else WITHOUT_LIMITS
     whole = error_model(machine, poses, CANDIDATES, np.zeros(6))
-    rows = np.flatnonzero(np.isin(whole.status, PLACED))
+    rows = np.flatnonzero(np.isin(whole.status, PLACED if within != WITHIN_LIMITS else Status.OK))
     poses = {path: values[rows] for path, values in poses.items()}
-    return observed(whole.taken(rows), _like(seen.data, poses, len(rows)), seen.unknowns, seen.frame)
+    return observed(whole.taken(rows), _like(seen.data, poses, len(rows)), seen.unknowns, seen.frame), within
 
 
 def _like(data: Measurements, pose: Mapping[str, Array], count: int) -> Measurements:
