@@ -18,6 +18,8 @@ DIGITS = (2, 12)
 DASH = "–"
 """Stands where there is no number."""
 INFINITE = "∞"
+MOST_DECIMALS = 6
+"""Decimals with which a number stands beside its uncertainty at most."""
 PLAIN_POWERS = (-3, 5)
 """Numbers are written without a power of ten from 0.001 to 999999."""
 UNIT_OF = {
@@ -174,6 +176,21 @@ def number(value: float | None, endless: str = INFINITE, digits: int = 4) -> str
     if PLAIN_POWERS[0] <= size <= PLAIN_POWERS[1]:
         return _trimmed(f"{value:.{max(digits - 1 - size, 0)}f}")
     return f"{_trimmed(mantissa)}e{size}"
+
+
+def number_and_uncertainty(value: float, uncertainty: float) -> tuple[str, str]:
+    """Return a number and its uncertainty in the same decimals: two significant digits of the uncertainty.
+
+    More digits of the number would say more than is known, such as those of "0.953 ± 0.93" after the second. Where the
+    uncertainty is 0, infinite or far below a millionth, the number has its usual digits.
+    """
+    if not (math.isfinite(value) and math.isfinite(uncertainty) and uncertainty > 0.0):
+        return number(value), number(uncertainty)
+    decimals = 1 - math.floor(math.log10(uncertainty))
+    if decimals > MOST_DECIMALS:
+        return number(value), number(uncertainty, digits=2)
+    shown = max(decimals, 0)
+    return f"{round(value, shown) + 0.0:.{shown}f}", f"{uncertainty:.{shown}f}"
 
 
 def with_unit(text: str, unit: str) -> str:

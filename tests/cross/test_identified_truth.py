@@ -9,8 +9,11 @@ from kinetostat.cli import main
 from kinetostat.equilibrium.motion import exponential
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.machine.loading import build
+from kinetostat.studies.evaluation.given_poses import given_poses
 from kinetostat.studies.identification.identification import identified
 from kinetostat.studies.identification.measurements import POSITION, Measurements
+from kinetostat.studies.identification.next_poses import as_csv
+from kinetostat.views.identification_figures import residual_figure
 from machines import load_without_limits
 from synthetic_measurements import SIGMA, found, measured, posed, truth_of, written
 
@@ -98,6 +101,20 @@ def test_gross_outliers_hardly_move_the_result_and_are_named():
     assert {(name, line - 2) for line, name, _ in robust.outliers} >= wrong
     assert len(robust.outliers) <= len(wrong) + 2
     assert np.sqrt(np.mean(((robust.fit.values - plain.fit.values) / sigma) ** 2)) < 0.5
+    for panel in residual_figure(robust).axes:  # no outlier is lost because it lies beyond the panel
+        low, high = panel.get_ylim()
+        assert all(((line.get_ydata() > low) & (line.get_ydata() < high)).all() for line in panel.lines)
+        assert {line.get_label() for line in panel.lines} in ({*"xyz", "outlier"}, {"rx", "ry", "rz", "outlier"})
+
+
+def test_poses_to_measure_next_are_a_file_that_other_commands_read(tmp_path):
+    machine = load_without_limits("hexapod")
+    model, poses = posed(machine, 30)
+    answer = identified(model, measured(model, poses, 0.0 * truth_of(model)), more=3)
+    (tmp_path / "next.csv").write_text(as_csv(answer.next))
+    read = given_poses(machine, tmp_path / "next.csv")
+    for field, values in zip(read.fields, read.values, strict=True):
+        assert values == pytest.approx(answer.next.poses[f"pose.{field.shown}"], rel=1e-8)
 
 
 def test_the_command_writes_a_machine_that_stands_where_it_was_measured(tmp_path, capsys):
@@ -115,7 +132,7 @@ def test_the_command_writes_a_machine_that_stands_where_it_was_measured(tmp_path
     assert record["rank"] == 42
     assert len(record["next_poses"]["poses"]["pose.x"]) == 3
     names = {path.name for path in folder.iterdir()}
-    assert names == {"machine.toml", "fit.json", "residuals.png", "correlations.png", "poses.png"}
+    assert names == {"machine.toml", "fit.json", "next-poses.csv", "residuals.png", "correlations.png", "poses.png"}
     assert json.loads((folder / "fit.json").read_text())["home"]["commands"]
     assert main(["check", str(folder / "machine.toml")]) == 0
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from kinetostat.display import DASH, ENGINEERING, UNIT_OF, Display, number, read_display
+from kinetostat.display import DASH, ENGINEERING, UNIT_OF, Display, number, number_and_uncertainty, read_display
 from kinetostat.machine.loading import as_toml, build, load
 from kinetostat.studies.analysis import analyze, as_json
 from kinetostat.units import UnitError, measured, parse
@@ -32,6 +32,22 @@ from refusals import refused
 )
 def test_a_number_has_four_digits_and_no_empty_zeros(value, text):
     assert number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "uncertainty", "texts"),
+    [
+        (0.9528, 0.93, ("0.95", "0.93")),
+        (20.1, 0.4, ("20.10", "0.40")),
+        (-56.63, 113.2, ("-57", "113")),
+        (-0.3, 86.0, ("0", "86")),
+        (21.03112, 0.0039, ("21.0311", "0.0039")),
+        (21.05, 0.0, ("21.05", "0")),
+        (3.4, math.inf, ("3.4", "∞")),
+    ],
+)
+def test_a_number_has_no_more_decimals_than_its_uncertainty_lets_it(value, uncertainty, texts):
+    assert number_and_uncertainty(value, uncertainty) == texts
 
 
 @pytest.mark.parametrize(

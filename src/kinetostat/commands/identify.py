@@ -48,7 +48,9 @@ def add_identify_command(commands: "Commands") -> None:
         )  # fmt: skip
     command.add_argument("--no-outliers", action="store_true", help="keep all values: outliers are not set aside")
     command.add_argument("--next", type=int, default=0, metavar="N", help="propose N poses to measure next")
-    takes_figures(command, "the machine as built (TOML), the record of the fit (JSON) and figures")
+    takes_figures(
+        command, "the machine as built (TOML), the record of the fit (JSON), poses to measure next (CSV) and figures"
+    )
     takes_json(command)
 
 
@@ -93,6 +95,7 @@ def _write(options: argparse.Namespace, answer: "Identification") -> list[Path]:
     from kinetostat.exchange.leg_by_leg import built_text
     from kinetostat.spec.errors import InputError
     from kinetostat.studies.identification.identification import as_json
+    from kinetostat.studies.identification.next_poses import as_csv
     from kinetostat.studies.storage import write_json, write_text
     from kinetostat.views.identification_figures import identification_figures
 
@@ -110,4 +113,8 @@ def _write(options: argparse.Namespace, answer: "Identification") -> list[Path]:
         written.append(machine)
     path = options.output / "fit.json"
     write_json(path, record)
-    return [*written, path, *write_figures(options, identification_figures(answer))]
+    written.append(path)
+    if answer.next is not None:
+        written.append(options.output / "next-poses.csv")
+        write_text(written[-1], as_csv(answer.next))
+    return [*written, *write_figures(options, identification_figures(answer))]

@@ -8,10 +8,12 @@ from matplotlib.figure import Figure
 
 from kinetostat.studies.identification.identification import Identification
 from kinetostat.studies.identification.measurements import EULER, TURNED
-from kinetostat.views.figures import COLOURS, STYLE, Drawings
+from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, note_setting, set_title, slim_bar
 
 FEW_NAMES = 60
 """Unknowns whose paths still fit beside a matrix."""
+NAME_SIZE = 6.0
+"""Of the letters of these paths, in points."""
 
 
 def identification_figures(answer: Identification) -> Drawings:
@@ -24,13 +26,17 @@ def identification_figures(answer: Identification) -> Drawings:
 
 
 def residual_figure(answer: Identification) -> Figure:
-    """Residuals of every measured value over the line of the file, as drawn and as identified."""
+    """Residuals of every measured value over the line of the file, as drawn and as identified.
+
+    Each component has a colour. Panels are as high as what was kept asks for; outliers beyond stand at the edge.
+    """
     fit, seen = answer.fit, answer.observed
-    turns = np.array([name.removeprefix("deflection.") in (*TURNED, *EULER) for name in seen.names])
+    names = np.array([name.removeprefix("deflection.") for name in seen.names])
+    turns = np.isin(names, (*TURNED, *EULER))
     parts = [(rows, unit) for rows, unit in ((~turns, "m"), (turns, "rad")) if rows.any()]
     lines = np.array(seen.data.lines)[seen.pose]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.4, 2.3 * len(parts) + 0.4), layout="constrained")
+        figure = Figure(figsize=(6.4, 2.3 * len(parts) + 0.7), layout="constrained")
         panels = figure.subplots(len(parts), 2, squeeze=False, sharex=True)
         for row, (rows, unit) in zip(panels, parts, strict=True):
             scale = answer.machine.display.deflection(unit)
@@ -38,18 +44,23 @@ def residual_figure(answer: Identification) -> Figure:
                 row, (fit.before, fit.after), ("as drawn", "as identified"), strict=True
             ):
                 off = residuals * seen.sigma * scale.factor
-                for kept, colour, marker, label in (
-                    (fit.kept, COLOURS[0], ".", "values"),
-                    (~fit.kept, COLOURS[1], "x", "outliers"),
-                ):
-                    if (rows & kept).any():
-                        panel.plot(lines[rows & kept], off[rows & kept], marker, color=colour, ms=3, label=label)
-                inside = np.abs(off[rows & fit.kept]).max(initial=1e-12)
-                panel.set(title=title, ylim=(-1.3 * inside, 1.3 * inside))
+                for colour, name in zip(COLOURS, dict.fromkeys(names[rows]), strict=False):
+                    of_name = rows & fit.kept & (names == name)
+                    panel.plot(lines[of_name], off[of_name], ".", color=colour, ms=3, label=name)
+                edge = 1.3 * np.abs(off[rows & fit.kept]).max(initial=1e-12)
+                aside = rows & ~fit.kept
+                if aside.any():
+                    shown = np.clip(off[aside], -0.94 * edge, 0.94 * edge)
+                    panel.plot(lines[aside], shown, "x", color="black", ms=4, mew=0.9, label="outlier")
+                panel.set(title=title, ylim=(-edge, edge))
             row[0].set_ylabel(scale.label("residual"))
+            row[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), handletextpad=0.2)
         for panel in panels[-1]:
             panel.set_xlabel("line of the file")
-        panels[0][-1].legend(loc="upper right")
+        set_title(figure, f"{answer.machine.name}: what is left of the measurements")
+        beyond = "outliers stand at the edge of a panel where they lie beyond it" if answer.outliers else ""
+        note_setting(figure, "measured less computed", beyond)
+        fix_layout(figure)
     return figure
 
 
@@ -60,29 +71,34 @@ def correlation_figure(answer: Identification) -> Figure:
     matrix[hidden] = matrix[:, hidden] = np.nan
     size = min(2.5 + 0.14 * len(matrix), 9.0)  # inches
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(size + 2.6, size + 0.4), layout="constrained")
+        figure = Figure(figsize=(size + 2.2, size + 1.6), layout="constrained")
         panel = figure.subplots()
         image = panel.imshow(matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0, interpolation="nearest")
         panel.grid(visible=False)
         if len(matrix) <= FEW_NAMES:
-            names = [unknown.path.removeprefix("legs.") for unknown in answer.unknowns]
-            panel.set_yticks(range(len(names)), names, fontsize=5)
-            panel.set_xticks(range(len(names)), names, fontsize=5, rotation=90)
-        figure.colorbar(image, ax=panel, shrink=0.8, label="correlation")
+            names = [unknown.path.removeprefix("legs.").replace(".", " ") for unknown in answer.unknowns]
+            panel.set_yticks(range(len(names)), names, fontsize=NAME_SIZE)
+            panel.set_xticks(range(len(names)), names, fontsize=NAME_SIZE, rotation=90)
+        slim_bar(figure.colorbar(image, ax=panel, shrink=0.5, pad=0.02, label="correlation"))
+        set_title(figure, f"{answer.machine.name}: numbers that were found together")
+        fix_layout(figure)
     return figure
 
 
 def pose_figure(answer: Identification) -> Figure:
-    """The commanded tool points, from the front and from above, and the poses to be measured next."""
+    """The commanded tool points, from above and from the front, and the poses to be measured next."""
     scale = answer.machine.display.scale("m")
     tool = answer.observed.model.tool * scale.factor
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.4, 3.2), layout="constrained")
-        for panel, (across, up) in zip(figure.subplots(1, 2), ((0, 1), (0, 2)), strict=True):
+        figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+        for panel, (title, across, up) in zip(figure.subplots(1, 2), (("plan", 0, 1), ("front", 0, 2)), strict=True):
             panel.plot(tool[:, across], tool[:, up], ".", color=COLOURS[0], label="measured")
             if answer.next is not None and {"pose.x", "pose.y", "pose.z"} <= answer.next.poses.keys():
                 places = [answer.next.poses[f"pose.{'xyz'[axis]}"] * scale.factor for axis in (across, up)]
-                panel.plot(*places, "o", mfc="none", color=COLOURS[1], label="next (platform point)")
-            panel.set(xlabel=scale.label("xyz"[across]), ylabel=scale.label("xyz"[up]), aspect="equal")
-        panel.legend(loc="best")
+                panel.plot(*places, "o", mfc="none", color=COLOURS[1], label="to be measured next (platform point)")
+            panel.set(title=title, xlabel=scale.label("xyz"[across]), ylabel=scale.label("xyz"[up]), aspect="equal")
+        handles, labels = panel.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+        set_title(figure, f"{answer.machine.name}: commanded places of the tool")
+        fix_layout(figure)
     return figure

@@ -3,7 +3,7 @@
 import numpy as np
 from rich.console import Console
 
-from kinetostat.display import DASH, Scale, number
+from kinetostat.display import Scale, number, number_and_uncertainty
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.identification.identification import Identification
 from kinetostat.studies.identification.next_poses import unit_of
@@ -14,6 +14,7 @@ MOST_OUTLIERS = 12
 MOST_POSES = 40
 NOT_EXPLAINED = 1.5
 """Residuals over their standard deviations from which something else must be said to move the tool."""
+NOT_SEEN = "not seen"
 SI = {"length": "m", "angle": "rad"}
 
 
@@ -28,11 +29,12 @@ def print_identification(console: Console, answer: Identification) -> None:
         if kind in columns[0]:
             table.add_row(name, *(display.show_deflection(column[kind], SI[kind]) for column in columns))
     console.print(table)
-    table = text_table("Identified numbers (± half of the 95 % interval)", "error", "value", "±", "meaning")
-    for unknown, value, sure in zip(answer.unknowns, fit.values, fit.sure, strict=True):
+    table = text_table("Identified numbers (± half of the 95 % interval)", "error", "value", "±", "unit", "meaning")
+    for column in table.columns[1:3]:
+        column.justify = "right"
+    for unknown, value, half in zip(answer.unknowns, fit.values, fit.sure, strict=True):
         scale = scale_of(answer.machine, SI.get(unknown.kind, "1"), unknown.group)
-        half = number(sure * scale.factor, DASH, 2) if np.isfinite(sure) else "not seen"
-        table.add_row(unknown.path, f"{number(value * scale.factor)} {scale.unit}", half, unknown.words)
+        table.add_row(unknown.path, *value_and_half(value, half, scale), scale.unit, unknown.words)
     console.print(table)
     _print_unseen(console, answer)
     _print_outliers(console, answer)
@@ -40,6 +42,13 @@ def print_identification(console: Console, answer: Identification) -> None:
     if not seen.data.known:
         text = "No standard deviations were given: intervals follow from the residuals themselves."
         console.print(text, highlight=False)
+
+
+def value_and_half(value: float, half: float, scale: Scale) -> tuple[str, str]:
+    """An identified number and half of its 95 % interval in a unit, to the digits that are known."""
+    if not np.isfinite(half):
+        return number(value * scale.factor), NOT_SEEN
+    return number_and_uncertainty(value * scale.factor, half * scale.factor)
 
 
 def scale_of(machine: Machine, unit: str, group: str) -> Scale:

@@ -2,7 +2,7 @@
 
 from rich.console import Console
 
-from kinetostat.display import Display, Scale, number
+from kinetostat.display import Display, Scale, number, number_and_uncertainty
 from kinetostat.studies.measured.comparison import COVER, MeasuredComparison, MeasuredRow
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.tables import text_table
@@ -23,9 +23,11 @@ def print_measured(console: Console, answer: MeasuredComparison) -> None:
 def measured_table(answer: MeasuredComparison) -> FittedTable:
     """Every measured number with its standard uncertainty, the computed one, and what lies between them."""
     table = text_table(
-        "Measured and computed, at the tool point, base axes (± one standard uncertainty)",
-        "line", "entry", "measured", "computed", "difference", "verdict",
+        "Measured and computed at the tool point, base axes (± one standard uncertainty)",
+        "line", "entry", "measured", "computed", "difference", "unit", "model",
     )  # fmt: skip
+    for column in table.columns[2:5]:
+        column.justify = "right"
     display = answer.machine.display
     for row in answer.rows:
         table.add_row(
@@ -34,18 +36,18 @@ def measured_table(answer: MeasuredComparison) -> FittedTable:
             _with_sure(row, display, row.entry.value, row.u_data),
             _with_sure(row, display, row.predicted, (row.u_input**2 + row.u_num**2) ** 0.5),
             _with_sure(row, display, row.error, row.u_val),
+            _scale(row, display).unit,
             verdict_of(row, display),
         )
     return table
 
 
 def _with_sure(row: MeasuredRow, display: Display, value: float, sure: float) -> str:
-    """A value with its standard uncertainty and their unit, "95.1 ± 2.1 N/µm"."""
-    scale = _scale(row, display)
-    value = value if abs(value) > EXACT * sure else 0.0
+    """A value with its standard uncertainty in the unit of its row, "95.1 ± 2.1"."""
+    factor = _scale(row, display).factor
     if sure <= EXACT * abs(value):
-        return f"{number(value * scale.factor)} {scale.unit}"
-    return f"{number(value * scale.factor)} ± {number(sure * scale.factor, digits=2)} {scale.unit}"
+        return number(value * factor)
+    return " ± ".join(number_and_uncertainty(value * factor, sure * factor))
 
 
 def _scale(row: MeasuredRow, display: Display) -> Scale:
@@ -55,19 +57,19 @@ def _scale(row: MeasuredRow, display: Display) -> Scale:
 
 
 def verdict_of(row: MeasuredRow, display: Display) -> str:
-    """What a row says of the model, in words: theory (70)."""
+    """What a row says of the model, in words: theory (70); "explained" by the uncertainties, or how far it is off."""
     if row.explained:
-        return "explained by uncertainties"
+        return "explained"
     low, high = row.bounds
     size = abs(row.entry.value)
     if size <= COVER * row.u_data:
         scale = _scale(row, display)
         ends = f"{number(low * scale.factor, digits=2)} to {number(high * scale.factor, digits=2)} {scale.unit}"
-        return f"the model is off by {ends}"
+        return f"off by {ends}"
     stiff = "stiffness" in row.entry.name
     more = (abs(row.predicted) > size) == stiff
-    ends = f"{number(100.0 * low / size, digits=2)} to {number(100.0 * high / size, digits=2)} %"
-    return f"the model is too {'stiff' if more else 'compliant'} by {ends}"
+    ends = f"{number(100.0 * low / size, digits=2)} to {number(100.0 * high / size, digits=2)}\N{NO-BREAK SPACE}%"
+    return f"too {'stiff' if more else 'compliant'} by {ends}"
 
 
 def measured_notes(answer: MeasuredComparison) -> list[str]:

@@ -111,6 +111,14 @@ def first_poses(machine: Machine, seen: Observed, sizes: Array, count: int) -> M
     return {path: values[chosen] for path, values in there.data.pose.items()}
 
 
+def as_csv(proposed: NextPoses) -> str:
+    """The poses as CSV, a row each, as `kinetostat path` and `kinetostat command` read them: "x [m]", "roll [rad]"."""
+    heads = [f"{path.removeprefix('pose.')} [{unit_of(path)}]" for path in proposed.poses]
+    rows = zip(*(values.tolist() for values in proposed.poses.values()), strict=True)
+    lines = [",".join(heads), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
+    return "\n".join(lines) + "\n"
+
+
 def unit_of(path: str) -> str:
     """The SI unit of a coordinate of the pose."""
     return "m" if path.removeprefix("pose.") in ("x", "y", "z", "length") else "rad"

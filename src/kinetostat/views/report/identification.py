@@ -2,12 +2,10 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from kinetostat.display import DASH, Scale, number
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.identification.record import FitRecord
-from kinetostat.views.identification_tables import NOT_EXPLAINED, scale_of
+from kinetostat.views.identification_tables import NOT_EXPLAINED, scale_of, value_and_half
 from kinetostat.views.report.content import Block, Figure, Paragraph, Section, Table
 from kinetostat.views.report.typesetting import typeset
 
@@ -16,7 +14,7 @@ KINDS = {"length": ("positions and distances", "m"), "angle": ("angles", "rad")}
 CAPTIONS = {
     "residuals": "What is left of every measured value, as drawn and as identified.",
     "correlations": "Correlations of the numbers: which ones were found together.",
-    "poses": "The tool points at which was measured, from the front and from above.",
+    "poses": "The tool points at which was measured, from above and from the front.",
 }
 MOST_OUTLIERS = 40
 
@@ -42,17 +40,18 @@ def _blocks(record: FitRecord, machine: Machine) -> Iterator[Block]:
         yield _table("Residuals, root mean square.", ("", *STAGES), rows)
     yield from _pictures(record, "residuals")
     numbers = [
-        (u.path, _shown(u.value, scale), _half(u.half, scale), u.words)
+        (u.path, *map(typeset, value_and_half(u.value, u.half, scale)), scale.unit, u.words)
         for u, scale in ((u, scale_of(machine, u.unit, u.group)) for u in record.unknowns)
     ]
     caption = "Identified numbers, with half of their 95 % intervals."
-    yield Table(caption, ("error", "value", "±", "meaning"), tuple(numbers), (False, True, True, False))
+    heads = ("error", "value", "±", "unit", "meaning")
+    yield Table(caption, heads, tuple(numbers), (False, True, True, False, False))
     yield from _pictures(record, "correlations", "poses")
     if record.unseen:
         scale = machine.display.deflection("m")
         unseen = [(words, _shown(tool, scale), _shown(inside, scale)) for words, tool, inside in record.unseen]
-        heads = ("combination", "moves the tool by", "of that, inside the machine")
-        yield Table("What no measured pose sees.", heads, tuple(unseen), (False, True, True))
+        columns = ("combination", "moves the tool by", "of that, inside the machine")
+        yield Table("What no measured pose sees.", columns, tuple(unseen), (False, True, True))
     if record.outliers:
         ordered = sorted(record.outliers, key=lambda outlier: -abs(outlier[2]))
         caption = f"Values that were set aside, {len(ordered)} in all, those that are farthest off first."
@@ -87,7 +86,3 @@ def _table(caption: str, heads: tuple[str, ...], rows: list[tuple[str, ...]]) ->
 
 def _shown(value: float | None, scale: Scale) -> str:
     return DASH if value is None else typeset(f"{number(value * scale.factor)} {scale.unit}")
-
-
-def _half(size: float, scale: Scale) -> str:
-    return number(size * scale.factor, DASH, 2) if np.isfinite(size) else "not seen"
