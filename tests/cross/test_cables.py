@@ -216,9 +216,9 @@ def test_a_load_beyond_stability_is_said_with_its_share_and_its_motion():
 
 
 def test_a_machine_that_has_snapped_over_says_so():
-    state = under_load(toggle(8.0 * greatest_load(0.05), 0.05))
+    state = under_load(toggle(16.0 * greatest_load(0.02), 0.02))
     assert state.rest is Rest.OK
-    assert "snapped over to another state on the way. It stands up to 0.125 times this load" in state.message
+    assert "snapped over to another state on the way. It stands up to 0.0624 times this load" in state.message
 
 
 def test_a_machine_that_moves_far_without_snapping_over_is_left_alone():

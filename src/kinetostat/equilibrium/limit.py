@@ -15,8 +15,9 @@ from kinetostat.equilibrium.solving import newton, with_share
 from kinetostat.equilibrium.tangent import Stability, stabilities, stability
 from kinetostat.tolerances import AT_REST
 
-RATIO, CANDIDATES = 2.0, 14
-"""Steps of the loads that are tried together: all that is left of them, and each time by this ratio less."""
+RATIO, CANDIDATES, FEW = 2.0, 14, 4
+"""Steps of the loads that are tried together: all that is left of them, and each time by this ratio less; few of them
+where the machine may stand under all."""
 MOST_STEPS = 14
 """Of the loads: a machine that moves very far before it is lost is not followed to the end, which takes seconds."""
 FINE = 1e-3
@@ -28,8 +29,6 @@ BENT = 0.5
 over, or the step is too long."""
 LONGEST = 0.3
 """Motion of the platform in a step, rad or in units of the machine's length."""
-LEAP = 0.1
-"""Motion in the same units from which a state that is found at once may be another one than growing loads lead to."""
 
 
 @dataclass(frozen=True)
@@ -59,18 +58,28 @@ def limit_of(mechanism: Mechanism) -> Limit | None:
         Where it stands last, share 1 if it stands under all of them; None if it stands under no share.
     """
     last = _standing(mechanism, np.zeros(1), None)
+    if last is None:
+        return None
+    whole = _standing(mechanism, _shares(0.0, FEW), last)  # as nearly every machine stands
+    if whole is not None and whole.share == 1.0:
+        return whole
     for _ in range(MOST_STEPS):
-        if last is None or last.share == 1.0:
+        if last.share == 1.0:
             return last
-        shares = last.share + (1.0 - last.share) * RATIO ** -np.arange(CANDIDATES - 1.0, -1.0, -1.0)
-        there = _standing(mechanism, np.append(shares[:-1], 1.0), last)
+        there = _standing(mechanism, _shares(last.share, CANDIDATES), last)
         if there is None:
             return last
         nearly = there.share - last.share < FINE * there.share
         last = there
         if nearly:
             return last
-    return None if last is None else replace(last, least=True)
+    return replace(last, least=True)
+
+
+def _shares(last: float, count: int) -> Array:
+    """So many shares of the loads beyond the last one, up to all of them."""
+    left = RATIO ** -np.arange(count - 1.0, 0.0, -1.0)
+    return np.append(last + (1.0 - last) * left, 1.0)
 
 
 def _standing(mechanism: Mechanism, shares: Array, last: Limit | None) -> Limit | None:

@@ -3,11 +3,9 @@
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.buckling import Strut
-from kinetostat.equilibrium.limit import LEAP, Limit, limit_of
+from kinetostat.equilibrium.limit import Limit, limit_of
 from kinetostat.equilibrium.tangent import Stability
 from kinetostat.kinematics.singularity import describe
 from kinetostat.machine.machine import Machine
@@ -38,11 +36,10 @@ def about_rest(
 
 def _about_stability(equations: Balance, judged: Stability) -> list[str]:
     """That the machine is not stable, or has passed a state in which it was not, and how it gives way there."""
-    mechanism, moved = equations.mechanism, equations.state.platform.amounts()[0]
+    limit = limit_of(equations.mechanism)
     if not judged.stable:
-        stands = how_it_gives_way(limit_of(mechanism))
+        stands = how_it_gives_way(limit)
         return [f"The machine is not stable under this load: the least disturbance moves it away. {stands} {ADVICE}"]
-    limit = limit_of(mechanism) if np.abs(moved).max() > LEAP else None
     if limit is None or limit.share == 1.0 or limit.least:
         return []
     return [f"The machine has snapped over to another state on the way. {how_it_gives_way(limit)}"]
