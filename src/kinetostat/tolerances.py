@@ -84,6 +84,8 @@ NO_LINK = 1e-9
 NO_REACTION = 1e-9
 """Share of the load, moments over the machine's length, below which the reaction of a joint is round-off, so that the
 load does not say to which end it presses the free motion of the joint."""
+NO_EFFECT = 1e-12
+"""Share of what an error does to the tool, rotations times the machine's length, below which a part is round-off."""
 NO_FREEDOM = 1e-7
 """Share of the largest singular value of the rates of all actuators below which they do not move the platform so."""
 

@@ -14,7 +14,7 @@ from kinetostat.exchange.leg_by_leg import legs_of
 from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import values
 from kinetostat.spec.tolerance_table import read_tolerances
-from kinetostat.studies.budget.allocation import allocated
+from kinetostat.studies.budget.allocation import allocated, reach_of
 from kinetostat.studies.budget.data import contributions_csv
 from kinetostat.studies.budget.inputs import inputs_of
 from kinetostat.studies.budget.measures import measures_of
@@ -169,6 +169,62 @@ def test_a_load_presses_a_joint_to_one_end_of_its_clearance():
     assert pressed.errors[:, 0] + pressed.drawn == pytest.approx(1e-3 * along)
     mean, _, _, worst = first_order(pressed, measures())
     assert worst == pytest.approx(2.0 * mean)
+
+
+def test_a_joint_is_free_at_poses_where_the_load_does_not_reach_it():
+    """Each pose has the answer that it has alone, whatever happens to the joints at the others."""
+    rates, parts = np.stack([random_rates(6, seed) for seed in range(3)]), parts_of([0, 1, 2], [3, 4], [5])
+    load = np.array([0.0, 0, 0, 0, 0, -100.0])
+    rates[1, 5, :3] = 1e-14  # at the second pose the load does no work on the first joint, at the third on neither
+    rates[2, 5, :5] = 1e-14
+    whole = inputs_of(parts, rates, np.tile(load, (3, 1)), 1.0)
+    slab = inputs_of(parts, rates[2:], load[None], 1.0, others=True)
+    assert whole.pressed.tolist() == [[True, True, False], [False, True, False], [False, False, False]]
+    assert (whole.owner == slab.owner).all()
+    together = first_order(whole, measures())
+    for pose in range(3):
+        alone = inputs(parts, rates[pose], load)
+        for many, single in zip(together, first_order(alone, measures()), strict=True):
+            assert many[pose] == pytest.approx(single[0], rel=1e-2, abs=1e-12)
+        for by, table in reach_of(whole, measures(), "position").items():
+            assert table[pose] == pytest.approx(reach_of(alone, measures(), "position")[by][0])
+    rows = spread_of(whole, measures(), whole.machines(FEW, 0))[0].rms
+    drawn = np.concatenate(list(whole.machines(FEW, 0)))
+    for pose in range(3):
+        moved = whole.shift[pose] + drawn @ whole.columns[pose].T
+        assert np.sqrt((moved**2).mean(axis=0)) == pytest.approx(rows[pose, :6], rel=0.02)
+
+
+def test_loads_at_named_points_press_joints_together():
+    """The reaction is that of their sum, and of a load that another one balances nothing is left."""
+    lines = {"clearances": "5 um"}
+    point, force = 'load.tip.point=[0, 0, "0.5 m"]', "load.tip.force=[0, 30, -400]"
+    named = budget(load("hexapod", [point, force]), tolerances=lines, samples=64)
+    # The same wrench at the platform point: 0.5 m times 30 N about x.
+    whole = budget(
+        load("hexapod", ["load.force=[0, 30, -400]", "load.moment=[-15, 0, 0]"]), tolerances=lines, samples=64
+    )
+    assert named.pressed == whole.pressed
+    assert named.spread.mean == pytest.approx(whole.spread.mean)
+    assert named.spread.mean.max() > 1e-6
+    balanced = budget(load("hexapod", [point, force, "load.force=[0, -30, 400]", "load.moment=[15, 0, 0]"]),
+                      tolerances=lines, samples=64)  # fmt: skip
+    assert not balanced.pressed
+
+
+def test_a_tripteron_is_pressed_where_its_weight_is_carried():
+    """Each of its three legs carries forces along one axis; a joint of the others is pressed where moments reach it."""
+    machine = load("tripteron", ["load.force=[0, 0, -100]"])
+    many = budget(machine, {"x": ["45 cm", "50 cm", "55 cm"]}, tolerances={"clearances": "5 um"})
+    for number, x in enumerate((0.45, 0.5, 0.55)):
+        alone = budget(machine.with_values({"x": x}), tolerances={"clearances": "5 um"}, samples=many.samples)
+        assert set(alone.pressed) <= set(many.pressed)
+        assert not alone.size("worst", "rotation").any()  # a Tripteron's legs do not turn it, to the last digit
+        assert "parasitic motions" not in alone.message
+        for name, close in (("mean", 1e-6), ("rms", 1e-6), ("worst", 1e-2)):
+            assert getattr(many.spread, name)[number] == pytest.approx(
+                getattr(alone.spread, name)[0], rel=close, abs=1e-12
+            )
 
 
 def test_the_joints_of_a_strut_are_pressed_along_it():

@@ -58,12 +58,12 @@ def reach_of(inputs: Inputs, measures: Measures, measure: str) -> dict[str, Arra
     A joint that a load presses counts with its whole clearance.
     """
     rows = measures.applied(inputs.columns)[:, measures.places(measure)]
-    squares = (rows**2).sum(axis=1) * np.where(inputs.pressed[inputs.owner], 4.0, 1.0)
+    squares = (rows**2).sum(axis=1) * np.where(inputs.pressed[:, inputs.owner], 4.0, 1.0)
     parts = np.zeros((len(rows), len(inputs.parts)))
     np.add.at(parts.T, inputs.owner, squares.T)
     farthest = np.zeros_like(parts)
-    for number, pressed in enumerate(inputs.pressed):
-        block = rows[:, :, inputs.owner == number] * (2.0 if pressed else 1.0)
+    for number, pressed in enumerate(inputs.pressed.T):
+        block = rows[:, :, inputs.owner == number] * np.where(pressed, 2.0, 1.0)[:, None, None]
         farthest[:, number] = np.linalg.norm(block, ord=2, axis=(1, 2))
     return {"rss": parts, "worst": farthest}
 

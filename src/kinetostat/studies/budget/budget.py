@@ -34,6 +34,7 @@ from kinetostat.studies.evaluation.columns import PoseColumns
 from kinetostat.studies.evaluation.given_poses import given_poses
 from kinetostat.studies.grid.grid import GridQuestion, grid_question
 from kinetostat.studies.indices import unit_direction
+from kinetostat.tolerances import NO_EFFECT
 
 SAMPLES, FEW_SAMPLES = 1 << 17, 1 << 12
 """Machines that are drawn if nobody says how many: at a single pose, and at each of many."""
@@ -82,7 +83,8 @@ class Budget(Immutable):
         machine: as drawn.
         tolerances: lines that hold, in order.
         parts: what has a tolerance.
-        pressed: paths of joints that the load presses to one end of their clearance.
+        pressed: paths of joints that the load presses to one end of their clearance, at any pose.
+        sometimes: those of them that it presses at some poses only; elsewhere they are free.
         poses: of the list; None for another source of poses.
         question: the grid; None if the poses are not those of a grid.
         status: `Status` codes [n].
@@ -103,6 +105,7 @@ class Budget(Immutable):
     tolerances: tuple[Tolerance, ...]
     parts: tuple[Toleranced, ...]
     pressed: tuple[str, ...]
+    sometimes: tuple[str, ...]
     poses: PoseColumns | None
     question: GridQuestion | None
     status: npt.NDArray[np.int64]
@@ -217,7 +220,9 @@ def budget(
     if count > MOST_POSES:
         raise InputError(f"there are {count:,} poses; at most {MOST_POSES:,} are computed: lower their number.")
     direction = np.array(unit_direction(along, "along")) if len(along) else None
-    work = _Work(machine, lines, direction, _power(samples or (SAMPLES if count == 1 else FEW_SAMPLES)), seed)
+    work = _Work(
+        machine, lines, direction, _power(samples or (SAMPLES if count == 1 else FEW_SAMPLES)), seed, count > 1
+    )
     status = np.full(count, int(Status.OUT_OF_REACH), dtype=np.int64)
     step = max(1, min(POSES_AT_ONCE, MOST_AT_ONCE // work.samples))
     for start in range(0, count, step):
@@ -255,11 +260,11 @@ class _Work:
     """Adds up the answer, some poses at a time; every pose has the same machines."""
 
     def __init__(
-        self, machine: Machine, lines: Mapping[str, Tolerance], along: Array | None, samples: int, seed: int
+        self, machine: Machine, lines: Mapping[str, Tolerance], along: Array | None, samples: int, seed: int, many: bool
     ) -> None:
         self.machine, self.lines, self.along, self.samples, self.seed = machine, lines, along, samples, seed
         self.parts: tuple[Toleranced, ...] = ()
-        self.pressed: npt.NDArray[np.bool_] | None = None
+        self.many, self.pressed = many, list[npt.NDArray[np.bool_]]()
         self.measures: Measures | None = None
         self.inputs: Inputs | None = None
         self.freedoms, self.parasitic = 0, tuple[str, ...]()
@@ -279,13 +284,13 @@ class _Work:
         return model.status
 
     def _spread(self, model: ErrorModel) -> Spread:
-        rates = model.rates()
         length = float(self.machine.configure((0.0,) * _joints(self.machine)).length)
-        inputs = inputs_of(self.parts, rates, model.load, length, self.pressed)
+        rates = _clean(model.rates(), length)
+        inputs = inputs_of(self.parts, rates, model.load, length, others=self.many and self.machine.pushed)
         zeros = [place for place, error in enumerate(model.errors) if error.group == "zeros"]
         names = self.machine.family.component_names
         measures, self.freedoms, self.parasitic = measures_of(rates[:, :, zeros], names, self.along, length)
-        self.pressed = inputs.pressed
+        self.pressed.append(inputs.pressed)
         if self.inputs is None:
             self.inputs, self.measures = inputs, measures
         spread, largest = spread_of(inputs, measures, inputs.machines(self.samples, self.seed))
@@ -293,6 +298,12 @@ class _Work:
         self.squares = self.squares + squares_of(inputs, measures)
         self.reach.append(reach_of(inputs, measures, "position" if self.along is None else "along"))
         return spread
+
+
+def _clean(rates: Array, length: float) -> Array:
+    """Rates without components that are round-off [n x 6 x errors], so that none of them counts as a motion."""
+    sizes = np.abs(rates * np.array([length] * 3 + [1.0] * 3)[:, None])
+    return np.where(sizes > NO_EFFECT * sizes.max(axis=1, keepdims=True), rates, 0.0)
 
 
 def _joints(machine: Machine) -> int:
@@ -316,11 +327,15 @@ def _answer(
         raise InputError(
             f"{work.machine.name} has no result at {where} ({first.word.replace('_', ' ')}): {first.sentence}"
         )
+    bearing = np.concatenate(work.pressed)
+    at_any = [part.path for number, part in enumerate(work.parts) if bearing[:, number].any()]
+    at_all = [part.path for number, part in enumerate(work.parts) if bearing[:, number].all()]
     answer = Budget(
         work.machine,
         tuple(work.lines.values()),
         work.parts,
-        tuple(part.path for part, pressed in zip(work.parts, inputs.pressed, strict=True) if pressed),
+        tuple(at_any),
+        tuple(path for path in at_any if path not in at_all),
         columns,
         question,
         status,
@@ -402,7 +417,8 @@ def _message(answer: Budget) -> str:
     if answer.freedoms < len(answer.machine.family.components):
         sentences.append(_uncorrected(answer, pose))
     if answer.pressed:
-        sentences.append(f"The load presses {len(answer.pressed)} joints to one end of their clearance.")
+        some = f" ({len(answer.sometimes)} of them at some poses only)" if answer.sometimes else ""
+        sentences.append(f"The load presses {len(answer.pressed)} joints to one end of their clearance{some}.")
     return " ".join(sentences)
 
 

@@ -59,6 +59,7 @@ def as_json(budget: Budget) -> dict[str, Any]:
             "shares_by_line": budget.shares_by("line"),
             "shares_by_leg": budget.shares_by("leg"),
             "pressed_joints": budget.pressed,
+            "sometimes_pressed_joints": budget.sometimes,
             "freedoms": budget.freedoms,
             "parasitic": budget.parasitic,
             "exact": _exact(budget),

@@ -2,7 +2,8 @@
 
 A number between limits is one variable from -1 to 1. The free motion of a joint without load is a point in a disc or a
 ball, one variable for each direction. A load presses the joint to the end of its free motion: the reaction of the joint
-is what the load does per unit of that motion (virtual work), and the motion goes from 0 to the clearance along it.
+is what the load does per unit of that motion (virtual work), and the motion goes from 0 to the clearance along it. At
+poses where it has no reaction it is free.
 
 Source: theory (50) and (51).
 """
@@ -33,16 +34,18 @@ class Inputs:
     Attributes:
         parts: what has a tolerance.
         owner: number of the part of each variable [q].
+        block: number of the block of each variable: coordinates of one point in a disc or ball [q].
         variance: of each variable [q].
         columns: twist of the tool when a variable is 1 [n x 6 x q].
         shift: twist of the tool when all variables are 0: joints that a load presses to one end [n x 6].
         errors: value of each error of the model when a variable is 1, at the first pose [errors x q].
         drawn: value of each error when all variables are 0, at the first pose [errors].
-        pressed: which parts are joints that a load presses [parts].
+        pressed: which parts are joints that a load presses at each pose [n x parts].
     """
 
     parts: tuple[Toleranced, ...]
     owner: npt.NDArray[np.int64]
+    block: npt.NDArray[np.int64]
     variance: Array
     columns: Array
     shift: Array
@@ -81,8 +84,8 @@ class Inputs:
 
     @property
     def together(self) -> list[npt.NDArray[np.int64]]:
-        """The variables of each part."""
-        return [np.flatnonzero(self.owner == number) for number in range(len(self.parts))]
+        """The variables of each block."""
+        return [np.flatnonzero(self.block == number) for number in range(int(self.block.max(initial=-1)) + 1)]
 
 
 def _in_ball(cube: Array) -> Array:
@@ -101,7 +104,7 @@ def inputs_of(
     rates: Array,
     load: Array,
     length: float,
-    pressed: npt.NDArray[np.bool_] | None = None,
+    others: bool = False,
 ) -> Inputs:
     """State what the tolerances of a machine do at n poses.
 
@@ -110,43 +113,48 @@ def inputs_of(
         rates: of the error model, SI [n x 6 x errors].
         load: wrench at the tool point, base axes, N·m and N [n x 6].
         length: a characteristic length of the machine, m.
-        pressed: which parts are joints that the load presses [parts]; those with a reaction at any pose if None.
+        others: whether there are other poses, at which joints that are free here may be pressed and pressed ones free:
+            then all of them have variables for both.
     """
     count, _, size = rates.shape
     work = np.einsum("nie,ni->ne", rates, load)
     # The most that any motion of a length can do: what is far below it is no reaction.
     most = np.abs(load[:, 3:]).sum(axis=1) + np.abs(load[:, :3]).sum(axis=1) / length
     owner: list[int] = []
+    block: list[int] = []
     variance: list[float] = []
     columns: list[Array] = []
     errors: list[Array] = []
     shift, drawn = np.zeros((count, 6)), np.zeros(size)
-    if pressed is None:
-        felt = np.abs(work) > NO_REACTION * most[:, None]
-        pressed = np.array([part.free and bool(felt[:, list(part.errors)].any()) for part in parts], dtype=bool)
+    felt = np.abs(work) > NO_REACTION * most[:, None]
+    pressed = np.array([part.free & felt[:, list(part.errors)].any(axis=1) for part in parts]).T
     for number, part in enumerate(parts):
-        places = list(part.errors)
-        if pressed[number]:
+        places, bears = list(part.errors), pressed[:, number]
+        if bears.any() or (others and part.free):
             reaction = work[:, places]
-            along = reaction / np.maximum(np.linalg.norm(reaction, axis=1), 1e-300)[:, None]
+            along = reaction / np.maximum(np.linalg.norm(reaction, axis=1), 1e-300)[:, None] * bears[:, None]
             half = 0.5 * part.limit * np.einsum("nie,ne->ni", rates[:, :, places], along)
             value = np.zeros(size)
             value[places] = 0.5 * part.limit * along[0]
             columns.append(half[:, :, None])
             errors.append(value[:, None])
             owner.append(number)
+            block.append(block[-1] + 1 if block else 0)
             variance.append(1.0 / 3.0)
             shift += half
             drawn += value
+        if bears.all() and not (others and part.free):
             continue
-        columns.append(part.limit * rates[:, :, places])
-        errors.append(part.limit * np.eye(size)[:, places])
+        columns.append(part.limit * rates[:, :, places] * ~bears[:, None, None])
+        errors.append(part.limit * np.eye(size)[:, places] * (not bears[0]))
         owner += [number] * len(places)
+        block += [block[-1] + 1 if block else 0] * len(places)
         usual = 1.0 / (len(places) + 2.0)  # of each coordinate of a point in a ball; of a single one, 1/3
         variance += [SIGMAS**-2 if part.normal and not part.free else usual] * len(places)
     return Inputs(
         tuple(parts),
         np.array(owner),
+        np.array(block),
         np.array(variance),
         np.concatenate(columns, axis=2),
         shift,
