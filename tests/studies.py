@@ -1,4 +1,6 @@
-"""Problems for tests: bundled studies with overrides, and studies written as text."""
+"""Problems for tests: bundled studies with overrides, studies written as text, and waiting for a search at work."""
+
+import time
 
 from kinetostat.spec import document as documents
 from kinetostat.spec.study import read_study
@@ -26,6 +28,18 @@ to = "26 cm"
 [[objectives]]
 quantity = "compliance_sum"
 """
+
+
+MOMENT = 0.02
+"""Seconds between two looks at a search. It gives way to every other process: a test that looked without a pause would
+take the processor that the search needs."""
+
+
+def waited_for(look):
+    """What a look at a search shows, once it shows anything."""
+    while not (seen := look()):
+        time.sleep(MOMENT)
+    return seen
 
 
 def problem(name=PAPER, *settings):

@@ -20,6 +20,7 @@ from kinetostat.machine.loading import bundled, load
 from kinetostat.studio import elements
 from kinetostat.studio.design.design_tab import Workshop
 from kinetostat.studio.serving import show
+from studies import MOMENT
 
 KINDS = (elements.MachineView, elements.MapView, elements.CurveView, elements.FrontView)
 PATIENCE = 300
@@ -70,6 +71,12 @@ class Page:
             timer = next(e for e in self.user.client.elements.values() if isinstance(e, ui.timer) and e.active)
             timer.callback()
         await self.settled()
+
+    async def watching(self, condition: Callable[[], bool]) -> None:
+        """Let the page look at its searches until something holds; between two looks they have the processor."""
+        while not condition():
+            await asyncio.sleep(MOMENT)
+            await self.glance()
 
     async def front(self, tab: str) -> None:
         """Bring a linked view to the front."""

@@ -33,8 +33,7 @@ async def small_study(page, generations="4"):
 
 async def until(page, word):
     """Until the search in front says so."""
-    while not page.one("run-line").text.startswith(word):
-        await page.glance()
+    await page.watching(lambda: page.one("run-line").text.startswith(word))
 
 
 def test_a_study_made_in_the_form_is_what_the_command_solves(tmp_path, capsys):
@@ -126,8 +125,7 @@ def test_stopped_reloaded_resumed_and_deleted(tmp_path):
     async def steps(page):
         await small_study(page, "100000")
         await page.send("study-start", "click")
-        while not page.one("run-load").enabled:
-            await page.glance()
+        await page.watching(lambda: page.one("run-load").enabled)
         assert page.one("run-stop").enabled
         await page.again()
         await design(page)

@@ -22,7 +22,7 @@ from kinetostat.studio.design.run_panel import convergence
 from kinetostat.studio.design.runs import MOST_RUNNING, UNREADABLE, Run, Runs, Stage
 from kinetostat.studio.design.state_folder import Favourites
 from refusals import refused
-from studies import PAPER, SMALL, problem, written
+from studies import PAPER, SMALL, problem, waited_for, written
 
 QUICK = ("optimizer.population=8", "optimizer.generations=4")
 LONG = ("optimizer.population=8", "optimizer.generations=100000")
@@ -91,9 +91,7 @@ def until_begun(runs, number):
     """Until a search has made a step, which takes as long as its process needs to start."""
     run = runs.of(number)
     follower = Follower(run)
-    while not (found := follower.progress(run)).steps:
-        pass
-    return found
+    waited_for(lambda: follower.progress(run).steps)
 
 
 def test_a_search_ends_as_the_command_does(runs, capsys, tmp_path):
@@ -163,8 +161,7 @@ def test_stopped_after_a_step_it_goes_on_to_the_same_end(runs, tmp_path):
     with refused("only a search that was stopped can be resumed"):
         again.go_on(run.number)
     follower = Follower(run)
-    while follower.progress(run).steps <= found.steps:
-        pass
+    waited_for(lambda: follower.progress(run).steps > found.steps)
     again.close()
     again.wait(run.number)
     assert followed(again, run.number).best[: found.steps] == found.best
@@ -188,8 +185,7 @@ def test_when_the_server_is_killed_the_search_stops_and_is_kept(tmp_path):
         runs.stop(1)
     server.kill()
     server.communicate()
-    while runs.of(1).stage.active:
-        pass
+    waited_for(lambda: not runs.of(1).stage.active)
     (run,) = runs.every()
     assert (run.stage, run.name) == (Stage.STOPPED, "Zhang & Gosselin, section 4.3")
     assert followed(runs, 1).steps
