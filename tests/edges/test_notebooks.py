@@ -32,12 +32,27 @@ def test_they_are_what_the_tutorials_make(tmp_path):
     assert made == kept, "run `python docs/site_build/notebooks.py`"
 
 
+def kinds(notebook):
+    """The kinds of cells: programs, commands (!), files (%%)."""
+    return {cell.source[0] if cell.source[0] in "!%" else "program" for cell in code_of(notebook)}
+
+
+def code_of(notebook):
+    return [cell for cell in notebook.cells if cell.cell_type == "code"]
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_a_notebook_runs(path, tmp_path, monkeypatch):
-    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+def test_a_notebook_is_stored_with_its_answers(path):
     notebook = nbformat.read(path, as_version=4)
-    assert all(cell.outputs for cell in notebook.cells if "print(" in cell.source and cell.cell_type == "code")
+    assert all(cell.outputs for cell in code_of(notebook) if "print(" in cell.source)
+
+
+def test_a_notebook_runs(tmp_path, monkeypatch):
+    """One that has every kind of cell: the cells of all are those of pages, which `test_documents` runs and checks."""
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    notebook = nbformat.read(ROOT / "examples" / "read-a-map.ipynb", as_version=4)
+    assert kinds(notebook) == set().union(*(kinds(nbformat.read(path, as_version=4)) for path in EXAMPLES))
     nbclient.NotebookClient(notebook, timeout=None, resources={"metadata": {"path": str(tmp_path)}}).execute()
-    said = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    assert said
+    said = [output for cell in code_of(notebook) for output in cell.outputs]
+    assert any("image/png" in output.get("data", {}) for output in said)
     assert not [output for output in said if "kinetostat: " in output.get("text", "")]
