@@ -1,8 +1,8 @@
 """What holds for the whole suite: profiles of Hypothesis, markers of slow files, the option that rewrites pages.
 
 The default profile draws the same examples on every run, so that a failure is never a matter of luck, and reports the
-first one it meets. CI runs the property tests with `--hypothesis-profile=fresh` as well, whose examples are new every
-time; `--hypothesis-profile=explore` looks long for new counter-examples, and for the least of them.
+first one it meets. CI runs the laws, which draw random machines, with `--hypothesis-profile=fresh` as well, whose
+examples are new every time; `--hypothesis-profile=explore` looks long for new counter-examples, and for the least.
 """
 
 import gc
@@ -43,7 +43,7 @@ MARKERS = {
     "reports": ("test_report",),
     "step": ("test_glb", "test_step_file", "test_step_outlines", "test_step_solids"),
 }
-"""Files of tests that plain `pytest` leaves out, because they take long; CI runs them with `-m slow`. A single test of
+"""Files of tests that plain `pytest` leaves out, because they take long; `-m slow` runs them. A single test of
 another file that takes long carries one of these markers itself."""
 
 os.environ.pop("UV_RUN_RECURSION_DEPTH", None)
@@ -80,19 +80,27 @@ MARKED = re.compile(rf"mark\.(?:slow|{'|'.join(MARKERS)})\b")
 """How a file that is not slow as a whole marks those of its tests that are."""
 
 
+LAWS = "property"
+"""The folder of the laws: its tests that draw examples are marked so. What draws none is the same in every profile."""
+SLOW_ONES = ("slow", "slow or laws")
+
+
 def pytest_ignore_collect(collection_path, config):
-    """Leave out, before it is imported, a file of which `-m "not slow"` or `-m slow` would choose no test.
+    """Leave out, before it is imported, a file of which `-m "not slow"`, `-m slow` or CI would choose no test.
 
     Every process of the tests imports every file, and JAX, engines and the studio with them: that takes longer than
     many a test. A file that is named on the command line is always read.
     """
-    wanted = {"not slow": False, "slow": True}.get(config.option.markexpr)
-    is_named = any(collection_path.name in argument for argument in config.args)
-    if wanted is None or is_named or not collection_path.name.startswith("test_"):
+    expression, name = config.option.markexpr, collection_path.name
+    if not name.startswith("test_") or any(name in argument for argument in config.args):
         return None
-    if collection_path.stem in BY_FILE:
-        return True if not wanted else None
-    return True if wanted and not MARKED.search(collection_path.read_text("utf-8")) else None
+    if expression == "not slow":
+        return True if collection_path.stem in BY_FILE else None
+    if expression not in SLOW_ONES or collection_path.stem in BY_FILE:
+        return None
+    if expression != "slow" and collection_path.parent.name == LAWS:
+        return None
+    return None if MARKED.search(collection_path.read_text("utf-8")) else True
 
 
 def pytest_collection_finish():
@@ -107,10 +115,18 @@ def pytest_collection_finish():
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Mark the tests of each slow file, before `-m` chooses among them."""
+    """Mark the laws and the tests of each slow file, before `-m` chooses among them.
+
+    What takes longest comes first, in the order of MARKERS: whole files go to one process each, and at the end short
+    ones are left for those that would have nothing to do.
+    """
     for item in items:
         if item.path.stem in BY_FILE:
             item.add_marker(BY_FILE[item.path.stem])
+        if item.path.parent.name == LAWS and getattr(item.function, "is_hypothesis_test", False):
+            item.add_marker("laws")
         # Not `item.keywords`: the names of the folders are among them.
         if any(item.get_closest_marker(marker) for marker in MARKERS):
             item.add_marker("slow")
+    order = {marker: place for place, marker in enumerate(MARKERS)}
+    items.sort(key=lambda item: order.get(BY_FILE.get(item.path.stem), len(order)))
