@@ -57,3 +57,42 @@ def test_exact_machines_scatter_as_the_first_order_says():
     assert answer.exact.failed == 0
     assert answer.exact.rms == pytest.approx(answer.spread.rms[0], rel=0.1)
     assert answer.exact.usual == pytest.approx(answer.spread.usual[0], rel=0.12)
+
+
+def total_indices(machine, made, groups, count=256):
+    """Total Sobol indices of groups of variables for the tool's displacement, by exact equations (M. Jansen, 1999)."""
+    drawn = np.concatenate(list(made.machines(2 * count, 5)))
+    rng = np.random.default_rng(5)
+    first, second = np.split(drawn[rng.permutation(2 * count)], 2)
+    path = next(path for path in values(machine) if path.startswith("pose."))
+    model = error_model(machine, {path: np.full(count, float(values(machine)[path]))}, count)
+
+    def moved(variables):
+        return model.displaced(made.drawn + variables @ made.errors.T)[0][:, 3:]
+
+    whole, indices = moved(first), []
+    for group in groups:
+        other = first.copy()
+        other[:, group] = second[:, group]
+        indices.append(0.5 * ((whole - moved(other)) ** 2).mean(axis=0).sum() / whole.var(axis=0).sum())
+    return np.array(indices)
+
+
+def test_what_single_contributions_leave_bounds_total_indices_and_falls_with_the_square():
+    """With tolerances of millimetres errors act together; total indices stay within the bound of the theory."""
+    machine, left = load("planar-3rpr"), []
+    for size in ("4 mm", "2 mm"):
+        lines = {"joints": size, "zeros": size}
+        answer = budget(machine, tolerances=lines, samples=16, exact=512)
+        left.append(answer.exact.unexplained[answer.measures.index("position")])
+        model = error_model(machine, {}, 1)
+        parts = toleranced(machine, model.errors, read_tolerances(lines))
+        made = inputs_of(parts, model.rates(), model.load, model.length)
+        names = list(dict.fromkeys(part.line for part in parts))
+        groups = [np.flatnonzero(np.array([parts[o].line == name for o in made.owner])) for name in names]
+        total = total_indices(machine, made, groups)
+        single = np.array([answer.shares_by("line", "position")[name] for name in names])
+        assert (total <= (np.sqrt(single) + np.sqrt(left[-1])) ** 2 + 0.05).all()
+        assert total.sum() > 0.9
+    assert left[0] > 1e-4
+    assert left[0] / left[1] == pytest.approx(4.0, rel=0.2)

@@ -108,7 +108,8 @@ def _print_exact(console: Console, budget: Budget) -> None:
     lost = f" {exact.failed:,} of them cannot be assembled." if exact.failed else ""
     console.print(
         f"{exact.machines:,} machines solved exactly: 95 % keep within {show(float(exact.usual[place]), 'm')}; the "
-        f"first order is off by at most {show(float(exact.difference[place]), 'm')}.{lost}",
+        f"first order is off by at most {show(float(exact.difference[place]), 'm')}.{lost} Single contributions "
+        f"explain all of the variance but {number(100.0 * float(exact.unexplained[place]), digits=2)} %.",
         highlight=False,
     )
 

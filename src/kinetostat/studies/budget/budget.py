@@ -19,13 +19,13 @@ from kinetostat.engine.batch import Progress, silent
 from kinetostat.equilibrium.motion import Array
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import POSE, values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.tolerance_table import Tolerance, joined, read_tolerances
 from kinetostat.studies.budget.allocation import Allocation, allocated, reach_of
+from kinetostat.studies.budget.exact import ExactSample, solved_exactly
 from kinetostat.studies.budget.inputs import Inputs, inputs_of
 from kinetostat.studies.budget.measures import PARASITIC, measures_of
 from kinetostat.studies.budget.spread import SHARE, Measures, Spread, shares, spread_of, squares_of
@@ -45,8 +45,6 @@ POSES_AT_ONCE = 128
 MOST_AT_ONCE = 1 << 20
 """Products of poses and machines that are kept at once: each has a dozen numbers."""
 MOST_POSES = 200_000
-EXACT_AT_ONCE = 1024
-"""Machines that are solved exactly together."""
 BY = ("rss", "worst")
 STATISTICS = ("mean", "rms", "rss", "usual", "worst")
 KEYS = ("line", "leg", "group", "path")
@@ -54,25 +52,6 @@ NOTHING = 1e-9
 """Share of an error below which a part of it is round-off."""
 DIGITS = 3
 """Of errors of the tool: percentiles of drawn machines have no more."""
-
-
-@dataclass(frozen=True, eq=False)
-class ExactSample(Immutable):
-    """Machines whose equations were solved exactly, at the pose of the machine.
-
-    Attributes:
-        machines: how many.
-        failed: how many of them cannot be assembled with their actuators there.
-        rms: root of the mean square of each measure [measures].
-        usual: what 95 % of them keep within [measures].
-        difference: the largest difference of a measure from its first order [measures].
-    """
-
-    machines: int
-    failed: int
-    rms: Array
-    usual: Array
-    difference: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -346,7 +325,7 @@ def _answer(
         work.freedoms,
         work.parasitic,
         work.samples,
-        _exact(work, inputs, measures, _power(exact)) if exact else None,
+        solved_exactly(work.machine, inputs, measures, _power(exact), work.seed) if exact else None,
         None,
         "",
     )
@@ -368,38 +347,6 @@ def _whole(work: _Work, size: int) -> Spread:
             tables.append(table)
     everywhere = np.percentile(np.asarray(work.largest), SHARE, axis=0)
     return Spread(**{name: np.concatenate(tables) for name, tables in parts.items()}, everywhere=everywhere)
-
-
-def _exact(work: _Work, inputs: Inputs, measures: Measures, count: int) -> ExactSample:
-    """Solve machines exactly at the pose of the machine."""
-    path = next(path for path in values(work.machine) if path.startswith(POSE))
-    here = float(values(work.machine)[path])
-    sizes, first = [], []
-    model: ErrorModel | None = None
-    for slab in inputs.machines(count, work.seed):
-        for start in range(0, len(slab), EXACT_AT_ONCE):
-            drawn = slab[start : start + EXACT_AT_ONCE]
-            if model is None or len(model) != len(drawn):
-                model = error_model(work.machine, {path: np.full(len(drawn), here)}, len(drawn))
-            moved, _ = model.displaced(inputs.drawn + drawn @ inputs.errors.T)
-            linear = inputs.shift[0] + drawn @ inputs.columns[0].T
-            sizes.append(measures.sizes(measures.applied(moved[None].swapaxes(1, 2))[0].T))
-            first.append(measures.sizes(measures.applied(linear[None].swapaxes(1, 2))[0].T))
-    solved, linear = np.concatenate(sizes), np.concatenate(first)
-    closed = np.isfinite(solved).all(axis=1)
-    if not closed.any():
-        raise InputError(
-            f"{work.machine.name}: none of the {count:,} machines can be assembled with its actuators there; make the "
-            "tolerances smaller."
-        )
-    solved, linear = solved[closed], linear[closed]
-    return ExactSample(
-        count,
-        int((~closed).sum()),
-        np.sqrt((solved**2).mean(axis=0)),
-        np.percentile(solved, SHARE, axis=0),
-        np.abs(solved - linear).max(axis=0),
-    )
 
 
 def _message(answer: Budget) -> str:

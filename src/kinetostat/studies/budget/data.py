@@ -78,7 +78,7 @@ def _exact(budget: Budget) -> dict[str, Any] | None:
     exact = budget.exact
     if exact is None:
         return None
-    tables = {name: getattr(exact, name) for name in ("rms", "usual", "difference")}
+    tables = {name: getattr(exact, name) for name in ("rms", "usual", "difference", "unexplained")}
     by_measure = {name: dict(zip(budget.measures, table.tolist(), strict=True)) for name, table in tables.items()}
     return {"machines": exact.machines, "failed": exact.failed, **by_measure}
 
