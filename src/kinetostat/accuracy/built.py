@@ -36,11 +36,13 @@ class AsBuilt:
         configuration: with every leg where it is.
         commands: by actuator, the coordinate that is to be commanded there, m or rad.
         coordinates: by actuator, where it really stands.
+        senses: by actuator, 1 or -1: whether its coordinate grows as its joint moves forward in a file leg by leg.
     """
 
     configuration: Configuration
     commands: dict[str, float]
     coordinates: dict[str, float]
+    senses: dict[str, float]
 
 
 def as_built(machine: Machine, errors: Array, model: ErrorModel | None = None) -> AsBuilt:
@@ -178,16 +180,16 @@ def _softer(leg: Leg, element: Element, softer: dict[str, float]) -> Element:
     return replace(element, stiffness=element.stiffness / factor)
 
 
-def _commands(model: ErrorModel, values: Array, coordinates: list[Array]) -> tuple[dict[str, float], dict[str, float]]:
-    """What is to be commanded there, and where actuators really stand, by "leg joint"."""
+def _commands(model: ErrorModel, values: Array, coordinates: list[Array]) -> tuple[dict[str, float], ...]:
+    """What is to be commanded there, where actuators really stand, and the senses of their counts, by "leg joint"."""
     known = {error.path: value for error, value in zip(model.errors, values, strict=True)}
-    commands, stands = {}, {}
+    commands, stands, senses = {}, {}, {}
     for row, joints in zip(model.rows.legs, coordinates, strict=True):
         for unit in (unit for unit in row.units if unit.drive):
             drive, path = unit.drive, f"legs.{row.name}.{unit.name}"
             if drive is not None:
                 stand = drive.home + drive.sense * float(joints[0, drive.coordinate])
                 name = f"{row.name} {unit.name}"
-                stands[name] = stand
+                stands[name], senses[name] = stand, float(drive.sense)
                 commands[name] = (stand - known.get(f"{path}.zero", 0.0)) / (1.0 + known.get(f"{path}.gain", 0.0))
-    return commands, stands
+    return commands, stands, senses

@@ -105,7 +105,7 @@ def _write(options: argparse.Namespace, answer: "Identification") -> list[Path]:
     except InputError as error:
         record["machine_file"] = str(error)
     else:
-        record["home"] = {"commands": built.commands, "actuators": built.coordinates}
+        record["home"] = {"commands": built.commands, "actuators": built.coordinates, "senses": built.senses}
         notes = [f"{answer.machine.name} as built, from {answer.observed.data.path}."]
         notes += ["Zeros and gains of actuators are in the record of the fit; coordinates here are the real ones."]
         machine = options.output / "machine.toml"

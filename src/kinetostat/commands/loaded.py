@@ -81,6 +81,11 @@ def add_command_command(commands: "Commands") -> None:
         "error without corrections)",
     )  # fmt: skip
     command.add_argument(
+        "--fit", metavar="FOLDER", type=Path,
+        help="folder of `identify -o` in which MACHINE lies: coordinates are then those that the controller counts, "
+        "with the zeros and gains that were found",
+    )  # fmt: skip
+    command.add_argument(
         "-o", "--output", metavar="FILE", type=Path, help="write the commands, and the corrections of a table, as CSV"
     )
     takes_json(command)
@@ -96,10 +101,12 @@ def _command(options: argparse.Namespace) -> int:
     for path in written:
         choice(path.suffix.lower(), (".csv",), f'the suffix of "{path}"')
     if options.ranges:
+        if options.fit is not None:
+            raise InputError("--fit is about commands at poses; leave out --over, and give a file of poses.")
         return _corrections(options, written)
     if options.tolerance is not None:
         raise InputError("--tolerance is about the law of a table of corrections; give its axes with --over.")
-    answer = command(load_machine(options), options.poses)
+    answer = command(load_machine(options), options.poses, options.fit)
     for path in written:
         write_text(path, as_csv(answer))
     return give(

@@ -6,20 +6,26 @@ The equations are in `equilibrium.commanding`; the command is `command`.
 import csv
 import io
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from kinetostat.equilibrium.motion import Array
+from kinetostat.kinematics.closing import pose_of
+from kinetostat.machine.changing import changed
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import POSE
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.analysis import analyze
 from kinetostat.studies.driven import Driven, driven
 from kinetostat.studies.evaluation.columns import PoseColumns
 from kinetostat.studies.evaluation.given_poses import given_poses
+from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.plain_data import as_answer, no_formula
 
 
@@ -63,7 +69,7 @@ class Command(Immutable):
 
 
 @checked
-def command(machine: Machine, poses: Any = None) -> Command:
+def command(machine: Machine, poses: Any = None, fit: str | Path | None = None) -> Command:
     """Find where the actuators of a loaded machine must stand so that its tool is where it should be.
 
     A machine bends under its loads, so that actuators that stand where an ideal machine would have them leave the tool
@@ -74,14 +80,46 @@ def command(machine: Machine, poses: Any = None) -> Command:
         machine: with its loads; its pose is the one that is wanted, if no poses are given.
         poses: that are wanted: a DataFrame, a dictionary of columns, an array, a dataset or the path of a CSV file, as
             for `evaluate`.
+        fit: folder or fit.json of `identify`, where the machine is the one as built that the fit has written: zeros
+            and gains of its actuators are not in its file, and coordinates are then those that its controller counts.
 
     Raises:
-        InputError: there is gravity but no mass, no actuator, tensions are to be chosen, or the poses cannot be read.
+        InputError: there is gravity but no mass, no actuator, tensions are to be chosen, the poses cannot be read, or
+            the fit is that of another machine.
     """
     refuse_tensions(machine)
+    record = None if fit is None else read_fit(fit)
+    if record is not None:
+        record.check(machine, drawn=False)
+        _refuse_drawn(machine, record)
     columns = None if poses is None else given_poses(machine, poses)
     leaves, count = ({}, 1) if columns is None else (columns.leaves, columns.count)
-    return answer_of(machine, columns, driven(machine, leaves, count))
+    answer = answer_of(machine, columns, driven(machine, leaves, count))
+    if record is None:
+        return answer
+    home = home_coordinates(machine)
+    return replace(
+        answer,
+        coordinates=record.counted(answer.actuators, answer.coordinates, home),
+        unloaded=record.counted(answer.actuators, answer.unloaded, home),
+        message=f"{answer.message} Zeros and gains of the fit are counted in.",
+    )
+
+
+def home_coordinates(machine: Machine) -> dict[str, float]:
+    """Where the actuators of a machine leg by leg stand at its home pose, by name, m or rad."""
+    home = pose_of(machine.chains().home) if machine.family.chains else {}
+    there = changed(machine, {f"{POSE}{name}": float(home[name]) for name in machine.chains().pose} if home else {})
+    return {actuator.name: actuator.coordinate for actuator in analyze(there).actuators}
+
+
+def _refuse_drawn(machine: Machine, record: FitRecord) -> None:
+    """Refuse a machine as drawn, whose geometry is not the one that was found."""
+    if record.family == machine.family.name and machine.family.chains is None:
+        raise InputError(
+            f'{machine.name} is the machine as drawn, and the fit "{record.path}" is about the one as built; give the '
+            "machine.toml that lies beside it."
+        )
 
 
 def refuse_tensions(machine: Machine) -> None:

@@ -4,7 +4,7 @@ Nothing is fitted here, and nothing of the file is trusted before its form has b
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -53,6 +53,9 @@ class FitRecord:
         outliers: line of the file, name, and residual in standard deviations.
         unseen: a sentence, and how far the combination moves the tool, in all and inside the machine, m.
         pictures: PNG by name, as far as they lie beside the record.
+        home: where actuators stand at the home pose of the machine as built, by name, counted as in the drawn machine,
+            m or rad; none in a record without a machine file.
+        senses: 1 or -1 by name: whether that count grows with the one of the machine as built.
     """
 
     path: str
@@ -70,6 +73,39 @@ class FitRecord:
     outliers: tuple[tuple[int, str, float], ...]
     unseen: tuple[tuple[str, float, float], ...]
     pictures: Mapping[str, bytes]
+    home: Mapping[str, float]
+    senses: Mapping[str, float]
+
+    def counted(self, actuators: Sequence[str], coordinates: Array, home: Mapping[str, float]) -> Array:
+        """Coordinates of actuators as their controller counts them, with the zeros and gains that were found.
+
+        An actuator that is commanded to c stands at c + zero + gain c, theory (45) and what follows it.
+
+        Args:
+            actuators: their names, "leg 1 actuator".
+            coordinates: where they are to stand in the machine as built, m or rad [poses x actuators].
+            home: where they stand at its home pose by its own count, which begins elsewhere for cranks and slides.
+
+        Raises:
+            InputError: the fit is about an actuator that is not among them.
+        """
+        from_home = np.asarray(coordinates, dtype=float) - [home[name] for name in actuators]
+        counts = from_home * [self.senses.get(name, 1.0) for name in actuators]
+        counts += [self.home.get(name, home[name]) for name in actuators]
+        for what in ("zero", "gain"):
+            for unknown in self.unknowns:
+                path, _, kind = unknown.path.removeprefix("legs.").rpartition(".")
+                if kind != what or unknown.group not in ("zeros", "gains"):
+                    continue
+                name = path.replace(".", " ")
+                if name not in actuators:
+                    raise InputError(
+                        f'"{self.path}" is about an actuator {name}, which this machine does not have; give the '
+                        "machine.toml that the same fit has written."
+                    )
+                column = counts[:, list(actuators).index(name)]
+                column[:] = column - unknown.value if what == "zero" else column / (1.0 + unknown.value)
+        return counts
 
     def check(self, machine: Machine, drawn: bool = True) -> None:
         """Refuse a machine that was not fitted.
@@ -148,4 +184,8 @@ def _checked(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecord
         tuple((int(o["line"]), str(o["value"]), float(o["sigmas"])) for o in record.get("outliers", [])),
         tuple((str(u["words"]), float(u["tool"]), float(u["inside"])) for u in record.get("unseen", [])),
         {name: data for name, data in pictures.items() if data.startswith(PNG)},
+        *(
+            {str(name): float(value) for name, value in record.get("home", {}).get(what, {}).items()}
+            for what in ("actuators", "senses")
+        ),
     )
