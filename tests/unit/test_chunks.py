@@ -11,7 +11,7 @@ from kinetostat.engine.chunks import Work, here, in_chunks
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import parameters, values
-from machines import every_machine
+from machines import one_of_each
 
 SLAB = 64
 NAMES = ("compliance_x", "stiffness_x", "singularity_margin")
@@ -38,7 +38,7 @@ def grid_around(case):
     return machine, Grid(axes)
 
 
-@every_machine
+@one_of_each
 def test_chunks_of_any_size_give_the_same_bits(case, small_slabs):
     machine, grid = grid_around(case)
     names = [name for name in NAMES if name.split("_")[-1] in (*machine.family.component_names, "singularity_margin")]
