@@ -85,6 +85,7 @@ def crowd(count: int, seconds: float) -> Iterator[str]:
 
 def show(kind: str, number: int, seed: int, longest: float) -> None:
     """Print a case and how it ends."""
+    os.chdir(tempfile.mkdtemp())  # a command line brings files
     rng = Random(f"{seed} {kind} {number}")
     print(command_line(rng) if kind == "line" else GROWN.get(kind, partial(file, kind=kind))(rng))
     print("->", attack(kind, number, seed, allowed(longest)) or "well answered")

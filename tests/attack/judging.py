@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tables import MACHINE
+from tables import GOOD_ENTRIES, MACHINE
 
 from kinetostat.cli import main
 from kinetostat.exchange import urdf_import
@@ -174,7 +174,7 @@ def table_case(text: str) -> str | None:
 
 def record_case(text: str) -> str | None:
     """The record of a fit."""
-    entries = _file_of("entries.csv", "entry,value,sigma\nstiffness_x,20 N/um,3 %\n")
+    entries = _file_of("entries.csv", GOOD_ENTRIES)
     return _first_finding([lambda: validate_measured(load(MACHINE), entries, fit=_file_of("fit.json", text))])
 
 

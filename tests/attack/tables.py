@@ -8,13 +8,14 @@ import io
 import json
 import math
 import tempfile
+import tomllib
 from functools import cache
 from pathlib import Path
 from random import Random
 
-from hostile import NUMBERS, UNITS, WORDS, entries_of
+from hostile import LOADS, NUMBERS, UNITS, WORDS, entries_of, toml
 
-from kinetostat.machine.loading import load
+from kinetostat.machine.loading import bundled, load
 from kinetostat.studies.identification.identification import as_json, identify
 
 MACHINE = "planar-3rpr"
@@ -128,6 +129,15 @@ def good_table() -> str:
         near = (x, y, yaw * math.pi / 0.18)
         writer.writerow(f"{number + rng.gauss(0.0, 1e-3):.5f}" for number in (x, y, yaw, *near))
     return out.getvalue()
+
+
+GOOD_ENTRIES = "entry,value,sigma\nstiffness_x,20 N/um,3 %\ncompliance_y,0.05 um/N,2 %\n"
+"""A stiffness as measured."""
+
+
+def good_machine() -> str:
+    """The machine with all that vibrations, tolerances and loads need."""
+    return toml({**tomllib.loads(bundled()[MACHINE]), **tomllib.loads(LOADS)})
 
 
 @cache

@@ -76,6 +76,7 @@ MISTAKES = {
     "no pose": ('x = "0.5 m"\ny = "0.5 m"\nz = "0.5 m"', "", ["[pose] must give the task coordinates"]),
     "no legs": (GOOD[GOOD.index("[[legs]]") :], "", ["needs 1 to 24 legs"]),
     "a leg without joints": (GOOD[GOOD.index("[[legs]]") :], '[[legs]]\nname = "a"\njoints = []', ["has 0 joints"]),
+    "a link without a model": ('model = "beam", section', "section", ['link "proximal": model is missing', "rigid"]),
     "a matrix where none belongs": (
         'model = "beam", section',
         'model = "matrix", section',

@@ -7,6 +7,7 @@ from matplotlib.font_manager import fontManager
 
 from kinetostat.views import lettering
 from kinetostat.views.figures import fix_layout, set_title
+from kinetostat.views.influence_figures import coloured_table
 
 
 def test_a_character_without_a_font_is_shown_by_its_number(monkeypatch):
@@ -50,3 +51,13 @@ def test_a_name_with_dollar_signs_is_no_mathematics_in_a_legend_either():
     assert [text.get_parse_math() for text in legend.get_texts()] == [False, True]
     assert not axes.yaxis.label.get_parse_math()
     assert all(label.get_parse_math() for label in axes.get_xticklabels())
+
+
+def test_names_beside_an_axis_are_drawn_as_they_are_and_fit(monkeypatch):
+    monkeypatch.setattr(lettering, "_known", lambda: frozenset(range(128)))
+    names = ["leg $a$ 1", "脚 of leg " + 40 * "m"]
+    figure = coloured_table(("title", "setting"), {name: [1.0] for name in names}, ["x"], "RdBu_r", "percent")
+    labels = figure.axes[0].get_yticklabels()
+    assert [label.get_text() for label in labels] == [names[0], names[1].replace("脚", "[U+811A]")]
+    assert not labels[0].get_parse_math()
+    assert all(label.get_window_extent().x0 >= 0.0 for label in labels)

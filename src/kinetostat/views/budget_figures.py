@@ -12,9 +12,12 @@ from kinetostat.studies.budget.data import as_dataset
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.budget_tables import ranked_by
 from kinetostat.views.figures import COLOURS, STYLE, Drawings, contour_maps, curves, fix_layout, note_setting, set_title
+from kinetostat.views.lettering import width_of
 
 MOST_BARS = 15
 """Single tolerances that have bars."""
+NAMES = 4.0
+"""Inches for what bars are about, at least."""
 BAR = 0.8
 """Height of all bars of a row together."""
 
@@ -49,7 +52,8 @@ def contributions_figure(budget: Budget) -> Figure:
     }
     heights = [len(bars) + 0.6 for bars in panels.values()]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.4, 1.4 + 0.24 * sum(heights)), layout="constrained")
+        beside = max(NAMES, width_of(label for bars in panels.values() for label in bars))
+        figure = Figure(figsize=(beside + 2.4, 1.4 + 0.24 * sum(heights)), layout="constrained")
         axes = figure.subplots(len(panels), 1, height_ratios=heights, squeeze=False)[:, 0]
         for panel, (title, bars) in zip(axes, panels.items(), strict=True):
             _bars(panel, title, bars, names)

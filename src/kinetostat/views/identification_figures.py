@@ -9,11 +9,14 @@ from matplotlib.figure import Figure
 from kinetostat.studies.identification.identification import Identification
 from kinetostat.studies.identification.measurements import EULER, TURNED
 from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, note_setting, set_title, slim_bar
+from kinetostat.views.lettering import width_of
 
 FEW_NAMES = 60
 """Unknowns whose paths still fit beside a matrix."""
 NAME_SIZE = 6.0
 """Of the letters of these paths, in points."""
+NAMES = 1.4
+"""Inches for them, at least."""
 
 
 def identification_figures(answer: Identification) -> Drawings:
@@ -70,13 +73,15 @@ def correlation_figure(answer: Identification) -> Figure:
     hidden = ~np.isfinite(answer.fit.sure)
     matrix[hidden] = matrix[:, hidden] = np.nan
     size = min(2.5 + 0.14 * len(matrix), 9.0)  # inches
+    few = answer.unknowns if len(matrix) <= FEW_NAMES else ()
+    names = [unknown.path.removeprefix("legs.").replace(".", " ") for unknown in few]
+    beside = max(NAMES, width_of(names, NAME_SIZE))
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(size + 2.2, size + 1.6), layout="constrained")
+        figure = Figure(figsize=(size + beside + 0.8, size + beside + 0.2), layout="constrained")
         panel = figure.subplots()
         image = panel.imshow(matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0, interpolation="nearest")
         panel.grid(visible=False)
-        if len(matrix) <= FEW_NAMES:
-            names = [unknown.path.removeprefix("legs.").replace(".", " ") for unknown in answer.unknowns]
+        if names:
             panel.set_yticks(range(len(names)), names, fontsize=NAME_SIZE)
             panel.set_xticks(range(len(names)), names, fontsize=NAME_SIZE, rotation=90)
         slim_bar(figure.colorbar(image, ax=panel, shrink=0.5, pad=0.02, label="correlation"))

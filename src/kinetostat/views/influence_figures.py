@@ -26,10 +26,13 @@ from kinetostat.studies.sensitivity import PER, Sensitivity
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import COLOURS, DASHES, STYLE, Drawings, fix_layout, note_setting, set_title, slim_bar
 from kinetostat.views.influence_tables import NEGLIGIBLE
+from kinetostat.views.lettering import width_of
 from kinetostat.views.usual_values import usual_range
 
 MOST_LINES = 30
 """Parameters that are shown."""
+NAMES = 2.1
+"""Inches for their names, at least."""
 LEAST_SCALE = 0.1
 """Percent per percent at the end of the colour scale, at least: what is small everywhere stays pale."""
 LETTERS = 12
@@ -62,7 +65,8 @@ def coloured_table(
     shown = list(rows)[:MOST_LINES]
     cells = np.array([[np.nan if p is None else p for p in rows[path]] for path in shown], dtype=float)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(2.6 + 0.7 * len(heads), 1.1 + 0.2 * len(shown)), layout="constrained")
+        beside = max(NAMES, width_of(shown))
+        figure = Figure(figsize=(beside + 0.5 + 0.7 * len(heads), 1.1 + 0.2 * len(shown)), layout="constrained")
         panel = figure.subplots()
         room = int(LETTERS * BAR_SHARE * figure.get_figheight())
         _draw_cells(panel, cells, colours, "\n".join(textwrap.wrap(label, room)))

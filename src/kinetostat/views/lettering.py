@@ -1,11 +1,14 @@
 """Texts of figures in fonts that have their characters; a character that no font has is shown by its number."""
 
 import re
+from collections.abc import Iterable
 from functools import cache
 
 from matplotlib.figure import Figure
-from matplotlib.font_manager import fontManager, get_font
+from matplotlib.font_manager import FontProperties, fontManager, get_font
 from matplotlib.text import Text
+from matplotlib.textpath import text_to_path
+from matplotlib.ticker import FixedLocator
 
 from kinetostat.kinetostatics.quantities import QUANTITIES
 
@@ -17,6 +20,10 @@ WIDE = (
 )  # fmt: skip
 """Fonts that have Chinese, Japanese and Korean characters; those that are installed stand behind the usual font."""
 MATHEMATICS = re.compile(r"\$[^$]*\$")
+POINTS = 72
+"""Of an inch."""
+TICKS = 7.5
+"""Size of the labels beside an axis, points."""
 POWER = r"\mathdefault"
 """What Matplotlib writes for numbers on an axis."""
 
@@ -50,8 +57,20 @@ def is_mathematics(text: str) -> bool:
     return all(part in _symbols() or POWER in part for part in MATHEMATICS.findall(text))
 
 
+def width_of(labels: Iterable[str], size: float = TICKS) -> float:
+    """Return the room that the longest of some labels beside an axis takes, inches."""
+    font = FontProperties(family=[*families()], size=size)
+    widths = (text_to_path.get_text_width_height_descent(drawable(label), font, False)[0] for label in labels)
+    return float(max(widths, default=0.0)) / POINTS
+
+
 def letter(figure: Figure) -> None:
     """Make all texts of a figure drawable: symbols of quantities are mathematics, names with dollar signs are not."""
+    for axis in (axis for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)):
+        if isinstance(axis.get_major_locator(), FixedLocator):
+            names = [label.get_text() for label in axis.get_ticklabels()]  # now they have texts, not only when drawn
+            if not all(name.isascii() for name in names):
+                axis.set_ticklabels([drawable(name) for name in names])
     for text in figure.findobj(Text):
         written = text.get_text()
         if not is_mathematics(written):

@@ -17,6 +17,7 @@ from kinetostat.studies.setting import setting_of
 from kinetostat.studies.under_load import LoadedState, load_curve
 from kinetostat.views.drawing import flat, loop, views_of
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout, look_of, note_setting, set_title
+from kinetostat.views.lettering import width_of
 from kinetostat.views.loaded_tables import leg_loads
 from kinetostat.views.scene.analysis_overlays import exaggerated, exaggeration_of, motions_of
 from kinetostat.views.scene.proportions import proportions_of
@@ -24,6 +25,8 @@ from kinetostat.views.scene.proportions import proportions_of
 UNLOADED, LOADED, SLACK = "#9a9a9a", COLOURS[0], COLOURS[1]
 BAR = 0.24
 """Inches of a bar."""
+NAMES = 2.0
+"""Inches for the names of legs, at least."""
 BENDS = 12
 """Pieces of which a bent link is drawn."""
 MOST_SPRINGS = 12
@@ -139,7 +142,8 @@ def bars_figure(state: LoadedState) -> Figure:
     ]
     groups = [[(name, spring) for name, spring in shown if spring.turning is turns] for _, turns in kinds]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.6, 0.6 * len(groups) + BAR * len(shown)), layout="constrained")
+        beside = max(NAMES, width_of(name for name, _ in shown))
+        figure = Figure(figsize=(beside + 4.6, 0.6 * len(groups) + BAR * len(shown)), layout="constrained")
         heights = [len(group) + 1 for group in groups]
         panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=heights).flat
         for panel, (unit, _), group in zip(panels, kinds, groups, strict=True):

@@ -126,6 +126,8 @@ def _merged(leg: dict[str, Any], where: str) -> dict[str, Any]:
     for name in links:
         if name in joints:
             raise InputError(f'{where}: joint "{name}" and link "{name}" share a name; rename one of them.')
+        if isinstance(links[name], dict) and "model" not in links[name]:  # otherwise it would pass for a joint
+            choice(None, LINK_MODELS, f'{where}, link "{name}": model')
     leg.pop("name", None)
     return {**leg, **joints, **links}
 
