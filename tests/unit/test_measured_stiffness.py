@@ -73,6 +73,38 @@ def test_errors_of_geometry_count_as_a_machine_drawn_otherwise_has_them(tmp_path
         assert row.u_input == pytest.approx(abs(sizes[0] - sizes[1]) / 2e-5 * 1e-3, rel=1e-4)
 
 
+def test_errors_of_geometry_count_at_several_poses(tmp_path):
+    """Deflections against differences of machines with another radius that are drawn at each pose."""
+    radius = "tolerances.geometry.base_radius=sigma 1 mm"
+    text = (
+        "x [mm], yaw [deg], force.z [N], force.x [N], deflection.x [um], deflection.z [um]\n"
+        "0, 0, 100, 40, 1, 1\n8, 5, -100, 40, 1, 1\n-6, 9, 50, 200, 1, 1\n"
+    )
+    answer = validate_measured(load_without_limits("hexapod", [radius]), written(tmp_path, text), sigma="1 um")
+    assert not answer.left_out
+    loads = {(0, 0): (40, 100), (8, 5): (40, -100), (-6, 9): (200, 50)}
+    for place, ((x, yaw), (along_x, along_z)) in enumerate(loads.items()):
+        pose = [f'pose.x="{x} mm"', f'pose.yaw="{yaw} deg"']
+        ends = [
+            np.array(
+                analyze(load_without_limits("hexapod", [f'geometry.base_radius="{115 + o} mm"', *pose])).compliance
+            )
+            for o in (0.01, -0.01)
+        ]
+        slope = (ends[0] - ends[1]) / 2e-5 * 1e-3 @ [0, 0, 0, along_x, 0, along_z]
+        for component, row in zip((3, 5), answer.rows[2 * place : 2 * place + 2], strict=True):
+            assert row.u_input == pytest.approx(abs(slope[component]), rel=1e-4)
+
+
+def test_errors_of_geometry_do_not_count_where_they_would_bend_legs_or_springs_change(tmp_path):
+    poses = "x [mm], force.z [N], deflection.z [um]\n0, 100, 1\n5, 100, 1\n"
+    joints = "tolerances.joints=0.05 mm"
+    stretched = load_without_limits("hexapod", [joints, "stiffness.leg_axial=3e7 N"])
+    answer = validate_measured(stretched, written(tmp_path, poses), sigma="1 um")
+    assert len(answer.left_out) == 36
+    assert not any(row.u_input for row in answer.rows)
+
+
 def test_deflections_at_poses_are_those_of_the_compliance_there(tmp_path):
     machine = load_without_limits("delta", [SOFT])
     text = (

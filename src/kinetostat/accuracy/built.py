@@ -6,6 +6,7 @@ commanded otherwise; otherwise actuators stand as drawn, and the platform is whe
 Source: theory (45).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,9 +15,11 @@ from kinetostat.accuracy.closing import Errors, Place, followed, placed
 from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.accuracy.rows import Row
 from kinetostat.accuracy.screws import scaled
+from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
 from kinetostat.equilibrium.motion import Array, Motions, exponential, logarithm, still
-from kinetostat.kinematics.closing import pose_of
+from kinetostat.kinematics.closing import pose_of, stacked
+from kinetostat.kinetostatics.response import compliance_at
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Configuration, Machine
@@ -64,12 +67,46 @@ def as_built(machine: Machine, errors: Array, model: ErrorModel | None = None) -
             "rigid links can say; use the record of the fit instead."
         )
     values = np.asarray(errors, dtype=float)
+    configuration, coordinates = _placed(model, values, still(1), None)
+    return AsBuilt(configuration, *_commands(model, values, coordinates))
+
+
+def compliances_as_built(errors: Array, model: ErrorModel) -> Array:
+    """C of a machine with errors at the tool point, at all poses of a model, base axes, SI [n x 6 x 6].
+
+    Where all legs reach the drawn place of the platform it stands there; if they do not at some pose, actuators stand
+    as drawn at all of them.
+
+    Args:
+        errors: SI, in the order of the model [errors].
+        model: of a machine that is not overconstrained.
+    """
+    configuration, _ = _placed(model, np.asarray(errors, dtype=float), model.drawn.platform, model.drawn.coordinates)
+    rows = compliance_at(model.machine, configuration).rows()
+    return stacked([entry for row in rows for entry in row], len(model)).reshape(-1, 6, 6)
+
+
+def _placed(
+    model: ErrorModel, values: Array, target: Motions, drawn: Sequence[Array] | None
+) -> tuple[Configuration, list[Array]]:
+    """Place all legs with errors [errors] where their platform is displaced to a target, or near it.
+
+    Args:
+        model: of the machine.
+        values: of the errors.
+        target: displacement of the platform from its home place [n].
+        drawn: coordinates of the legs there without errors; None to have them found.
+    """
     actuators = np.array([error.group in ("zeros", "gains") for error in model.errors])
     links = model.inserted(np.where(actuators, 0.0, values))
     rows = model.rows
-    coordinates = [followed(row, still(1), rows.length, e) for row, e in zip(rows.legs, links, strict=True)]
-    gaps = [_gap(row, q, e, rows.length) for row, q, e in zip(rows.legs, coordinates, links, strict=True)]
-    platform = still(1)
+    coordinates = [
+        drawn[number] if drawn and not links[number] else followed(row, target, rows.length, links[number])
+        for number, row in enumerate(rows.legs)
+    ]
+    every = zip(rows.legs, coordinates, links, strict=True)
+    gaps = [_gap(target, placed(row, q, e).end, rows.length) for row, q, e in every]
+    platform = target
     if max(gaps) > REACHED:
         platform, coordinates = _driven(model, values, links)
     places = [placed(row, q, e) for row, q, e in zip(rows.legs, coordinates, links, strict=True)]
@@ -80,7 +117,7 @@ def as_built(machine: Machine, errors: Array, model: ErrorModel | None = None) -
     configuration = replace(
         rows.configuration, platform=_displacement(platform) @ rows.configuration.platform, legs=tuple(legs)
     )
-    return AsBuilt(configuration, *_commands(model, values, coordinates))
+    return configuration, coordinates
 
 
 def model_at_home(machine: Machine) -> ErrorModel:
@@ -97,9 +134,9 @@ def _home(machine: Machine) -> dict[str, Array]:
     return {f"{POSE}{name}": np.array([float(home[name])]) for name in chains.pose}
 
 
-def _gap(row: Row, coordinates: Array, errors: dict[int, Array], length: float) -> float:
-    """How far a leg is from the home place, rad or in units of the length."""
-    return float(np.abs(scaled(logarithm(placed(row, coordinates, errors).end), length)).max())
+def _gap(target: Motions, end: Motions, length: float) -> float:
+    """How far the end of a leg is from its target, rad or in units of the length."""
+    return float(np.abs(scaled(logarithm(target @ end.inverse()), length)).max())
 
 
 def _driven(model: ErrorModel, values: Array, links: Errors) -> tuple[Motions, list[Array]]:
@@ -113,8 +150,12 @@ def _driven(model: ErrorModel, values: Array, links: Errors) -> tuple[Motions, l
 
 
 def _displacement(motion: Motions) -> Displacement:
-    columns = [Vector(*column) for column in motion.rotation[0].T.tolist()]
-    return Displacement(Rotation(*columns), Vector(*motion.translation[0].tolist()))
+    """As scalars: floats at a single pose, else arrays [n]."""
+    if len(motion.translation) == 1:
+        columns = [Vector(*column) for column in motion.rotation[0].T.tolist()]
+        return Displacement(Rotation(*columns), Vector(*motion.translation[0].tolist()))
+    columns = [Vector(*motion.rotation[:, :, axis].T) for axis in range(3)]
+    return Displacement(Rotation(*columns), Vector(*motion.translation.T))
 
 
 def _leg(leg: Leg, row: Row, place: Place, errors: dict[int, Array]) -> Leg:
@@ -134,14 +175,15 @@ def _leg(leg: Leg, row: Row, place: Place, errors: dict[int, Array]) -> Leg:
 
 
 def _idle(chain: list[Element]) -> tuple[int, ...]:
-    """The passive freedoms that follow from those before them, such as the spin of a strut between two balls."""
+    """The passive freedoms that follow from those before them, such as the spin of a strut, at the first pose."""
     joints = [joint for element in chain for joint in element.freedoms]
     if not joints:
         return ()
     points = [joint.point for joint in joints if joint.point is not None]
-    length = max([float((point - points[0]).norm()) for point in points], default=0.0) or 1.0
+    length = max([_first((point - points[0]).norm()) for point in points], default=0.0) or 1.0
     about = points[0] if points else ZERO
-    twists = np.array([joint.twist(about).components() for joint in joints], dtype=float) / [1, 1, 1, *[length] * 3]
+    twists = np.array([[_first(c) for c in joint.twist(about).components()] for joint in joints])
+    twists = twists / [1, 1, 1, *[length] * 3]
     basis: list[Array] = []
     idle = []
     for number, twist in enumerate(twists):
@@ -151,6 +193,10 @@ def _idle(chain: list[Element]) -> tuple[int, ...]:
         else:
             basis.append(rest / np.linalg.norm(rest))
     return tuple(idle)
+
+
+def _first(scalar: Scalar) -> float:
+    return float(np.ravel(scalar)[0])
 
 
 def _same_centre(drawn: Element, before: Element, element: Joint, moved: Joint) -> Joint:

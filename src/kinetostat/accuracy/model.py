@@ -93,6 +93,11 @@ class ErrorModel:
         return self.rows.length
 
     @property
+    def drawn(self) -> State:
+        """Where the drawn machine is at the poses."""
+        return self._drawn
+
+    @property
     def overconstrained(self) -> bool:
         """Whether the legs carry more wrenches than the platform needs, so that they share a misfit."""
         return sum(6 - len(chosen) for chosen in self._chosen) + len(self.rows.absent) > 6

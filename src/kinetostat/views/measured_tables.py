@@ -86,7 +86,7 @@ def measured_notes(answer: MeasuredComparison) -> list[str]:
         notes.append(f"How sure the machine's numbers are is from {answer.source}.")
     if answer.left_out:
         notes.append(
-            f"{len(answer.left_out)} errors of geometry do not count: they do where one pose is compared, at which the "
-            "legs of a machine as built close without being bent."
+            f"{len(answer.left_out)} errors of geometry do not count: they do where the legs of a machine as built "
+            "close without being bent, and its springs are the same at all poses."
         )
     return notes

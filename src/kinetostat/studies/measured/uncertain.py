@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.accuracy.built import as_built, model_at_home
+from kinetostat.accuracy.built import compliances_as_built
 from kinetostat.accuracy.model import ErrorModel
 from kinetostat.equilibrium.motion import Array
-from kinetostat.kinetostatics.response import compliance_at
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.tolerance_table import SIGMAS
@@ -100,7 +99,8 @@ def dyads_of(model: ErrorModel) -> Array:
 def compliance_changes(model: ErrorModel, uncertain: Uncertain, dyads: Array) -> tuple[Array, tuple[str, ...]]:
     """How the compliance changes per unit of each uncertain number [n x 6 x 6 x p], and which ones are not counted.
 
-    Errors of geometry count at one pose, at which the machine as built can be placed; elsewhere they are left out.
+    Errors of geometry are left out of an overconstrained machine, whose legs would be bent by them, and of one whose
+    springs change with the pose, away from its home place.
 
     Args:
         model: of the machine at n poses.
@@ -115,34 +115,25 @@ def compliance_changes(model: ErrorModel, uncertain: Uncertain, dyads: Array) ->
             changes[..., n] = dyads[..., place - first]
     if not geometry:
         return changes, ()
-    built = _Built(model.machine) if len(model) == 1 else None
-    if built is None or not built.agrees(dyads[0].sum(axis=2)):
+    if model.overconstrained or not _agrees(model, dyads):
         return changes, tuple(model.errors[uncertain.places[n]].path for n in geometry)
     for n in geometry:
-        changes[0, :, :, n] = built.change(int(uncertain.places[n]))
+        changes[..., n] = _change(model, int(uncertain.places[n]))
     return changes, ()
 
 
-class _Built:
-    """Compliances of a machine that is placed with errors of its geometry."""
+def _agrees(model: ErrorModel, dyads: Array) -> bool:
+    """Whether the machine placed without errors has the compliance of the drawn one at all poses.
 
-    def __init__(self, machine: Machine) -> None:
-        self.machine, self.model = machine, model_at_home(machine)
+    It has not where springs change with the pose, as a strut does that is longer elsewhere.
+    """
+    drawn = dyads.sum(axis=3)
+    off = np.abs(compliances_as_built(np.zeros(len(model.errors)), model) - drawn)
+    return bool((off.max(axis=(1, 2)) <= SAME * np.abs(drawn).max(axis=(1, 2))).all())
 
-    def compliance(self, values: Array) -> Array:
-        """With errors [errors], at the tool point [6 x 6]."""
-        configuration = as_built(self.machine, values, self.model).configuration
-        return np.array(compliance_at(self.machine, configuration).rows(), dtype=float)
 
-    def agrees(self, drawn: Array) -> bool:
-        """Whether it can be placed, and without errors has the compliance that the drawn machine has at its pose."""
-        if self.model.overconstrained:
-            return False
-        off = np.abs(self.compliance(np.zeros(len(self.model.errors))) - drawn)
-        return bool(off.max() <= SAME * np.abs(drawn).max())
-
-    def change(self, place: int) -> Array:
-        """Of the compliance per unit of an error, by central differences [6 x 6]."""
-        size = STEP * (self.model.length if self.model.errors[place].kind == "length" else 1.0)
-        way = size * np.eye(len(self.model.errors))[place]
-        return (self.compliance(way) - self.compliance(-way)) / (2.0 * size)
+def _change(model: ErrorModel, place: int) -> Array:
+    """Of the compliance per unit of an error, by central differences [n x 6 x 6]."""
+    size = STEP * (model.length if model.errors[place].kind == "length" else 1.0)
+    way = size * np.eye(len(model.errors))[place]
+    return (compliances_as_built(way, model) - compliances_as_built(-way, model)) / (2.0 * size)
