@@ -404,7 +404,7 @@ def test_along_a_direction_the_worst_case_is_met():
     [
         ({}, r"has no tolerances.*under \[tolerances\]"),
         ({"tolerances": {"jonts": "1 mm"}}, 'did you mean "joints"'),
-        ({"tolerances": {"joints": "1 %"}}, "what it is about are lengths"),
+        ({"tolerances": {"joints": "1 %"}}, "the numbers that it is about are lengths; write for example \"0.05 mm\""),
         ({"tolerances": {"joints": "IT7"}}, 'write it, for example "IT7 at 300 mm"'),
         ({"tolerances": {"joints": "1 mm"}, "allocate": "5 kg"}, "allocate, the wanted error"),
         ({"tolerances": {"joints": "1 mm"}, "allocate": "0 mm"}, "greater than 0"),

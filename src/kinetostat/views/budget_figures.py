@@ -40,8 +40,13 @@ def _over_poses(budget: Budget) -> Figure:
     return curves(dataset, names, title)
 
 
-def contributions_figure(budget: Budget) -> Figure:
-    """Draw what the variance of the error is made of: by line of [tolerances], by leg, by single tolerance."""
+def contributions_figure(budget: Budget, title: str = "{}: what the error of the tool is made of") -> Figure:
+    """Draw what the variance of the error is made of: by line of [tolerances], by leg, by single tolerance.
+
+    Args:
+        budget: of a machine with tolerances.
+        title: over the figure, with braces for the name of the machine.
+    """
     names = ranked_by(budget)
     rows = budget.shares[[budget.measures.index(name) for name in names]]
     order = np.argsort(-rows[0], kind="stable")[:MOST_BARS]
@@ -55,12 +60,12 @@ def contributions_figure(budget: Budget) -> Figure:
         beside = max(NAMES, width_of(label for bars in panels.values() for label in bars))
         figure = Figure(figsize=(beside + 2.4, 1.4 + 0.24 * sum(heights)), layout="constrained")
         axes = figure.subplots(len(panels), 1, height_ratios=heights, squeeze=False)[:, 0]
-        for panel, (title, bars) in zip(axes, panels.items(), strict=True):
-            _bars(panel, title, bars, names)
+        for panel, (name, bars) in zip(axes, panels.items(), strict=True):
+            _bars(panel, name, bars, names)
         axes[-1].set_xlabel("share of the variance (%)")
         if len(names) > 1:
             axes[-1].legend(loc="lower right")
-        set_title(figure, f"{budget.machine.name}: what the error of the tool is made of")
+        set_title(figure, title.format(budget.machine.name))
         many = f"{len(budget.status):,} poses together" if len(budget.status) > 1 else setting_of(budget.machine)
         note_setting(figure, many)
         fix_layout(figure)

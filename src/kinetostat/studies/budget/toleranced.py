@@ -26,6 +26,8 @@ GROUPS = {
 """Groups of errors by the names that a line may have."""
 CLEARANCE = "clearance"
 """Part of the path of free motions of joints; paths with * are about these only where they name it."""
+EXAMPLES = {"length": "0.05 mm", "angle": "0.02 deg", "ratio": "20 um/m"}
+"""A tolerance of each kind of number, for messages."""
 WRITE = (
     'write for example the lines joints = ["0.05 mm", "0.02 deg"] (where joints sit, how their axes stand) and zeros = '
     '"0.02 mm" (of actuators) under [tolerances] into its file, or give --tolerance "joints=0.05 mm"'
@@ -89,10 +91,11 @@ def toleranced(
         fitting = [(place, line.of(errors[place].kind)) for place in places]
         known = {place: (line, deviation) for place, deviation in fitting if deviation is not None}
         if not known:
-            kinds = " and ".join(dict.fromkeys(_plural(errors[place].kind) for place in places))
+            kinds = list(dict.fromkeys(errors[place].kind for place in places))
             raise InputError(
-                f'{machine.name}: tolerances.{line.about} is "{line.text}", but what it is about are {kinds}; give a '
-                "value with a unit of these."
+                f'{machine.name}: tolerances.{line.about} is "{line.text}", but the numbers that it is about are '
+                f'{" and ".join(map(_plural, kinds))}; write for example "{EXAMPLES[kinds[0]]}". '
+                "`kinetostat budget MACHINE --list` shows every number that can move the tool."
             )
         kept = {**kept, **known}
     sizes = values(machine)

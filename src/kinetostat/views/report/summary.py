@@ -33,6 +33,8 @@ def summary_section(answers: Answers, validation: Validation | str, portrait: Fi
     points = tuple((typeset(text), "") for text in _findings(answers, validation))
     answer = [Paragraph(typeset(text), f"{label}:") for label, text in first_lines(answers.analysis)]
     answer += [verdict_of(answers.loaded)] if answers.loaded else []
+    for label, known in (("Vibration", answers.vibration), ("As built", answers.budget)):
+        answer += [Paragraph(typeset(known.message), f"{label}:")] if known else []
     return Section("Summary", (*answer, *_requirements(answers), portrait, Points(points), _directions(answers)))
 
 

@@ -23,6 +23,6 @@ def tolerances_section(budget: Budget) -> Section:
         blocks += [
             printed(lines_table(budget), "Contributions of the lines of [tolerances] to the variance."),
             printed(legs_table(budget), "Contributions of the legs to the variance."),
-            drawn(contributions_figure(budget), "What the variance of the error is made of."),
+            drawn(contributions_figure(budget, ""), "What the variance of the error is made of."),
         ]
     return Section("Error by tolerances", tuple(blocks))
