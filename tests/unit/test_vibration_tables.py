@@ -4,9 +4,11 @@ import pytest
 
 from kinetostat.machine.changing import changed
 from kinetostat.machine.loading import load
+from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.grid.grid import evaluate_grid
 from kinetostat.studies.vibration import modes
 from kinetostat.views.figures import curves, look_of
+from kinetostat.views.vibration_figures import response_figure
 from kinetostat.views.vibration_tables import MOST_PARTS, cut_by_table, mode_table, share_table, strain_of
 
 LIGHT_LEGS = {"tool.mass": 12.0, "linear_density.legs": 0.5, "drives.rotor_inertia": 2e-5, "drives.lead": 0.01}
@@ -66,3 +68,20 @@ def test_a_sweep_draws_every_quantity_each_with_a_look_of_its_own():
     (panel,) = curves(evaluate_grid(machine, ["z=0.12:0.15:3"], names), names, "").axes
     assert len(panel.lines) == len(names)
     assert len({str(look_of(place)) for place in range(36)}) == 36
+
+
+def test_the_response_marks_the_point_that_limits_a_cut():
+    answer = modes(changed(load("hexapod"), LIGHT_LEGS))
+    real = next(panel for panel in response_figure(answer, (1.0, 0.0, 0.0)).axes if panel.get_ylabel()[:4] == "real")
+    mark = next(line for line in real.lines if line.get_marker() == "o")
+    softest = answer.softest([1.0, 0.0, 0.0])
+    assert mark.get_xdata()[0] == softest.frequency
+    assert mark.get_ydata()[0] == pytest.approx(1e6 * softest.real)
+
+
+def test_entries_of_vectors_and_tensors_have_names_for_people():
+    machine = load("hexapod")
+    assert with_leg(machine, "tool.inertia.0") == "tool.inertia.0 (xx)"
+    assert with_leg(machine, "tool.centre_of_mass.2") == "tool.centre_of_mass.2 (z)"
+    assert with_leg(machine, "geometry.base_angles.5") == "geometry.base_angles.5 (leg 6)"
+    assert with_leg(machine, "tool.mass") == "tool.mass"

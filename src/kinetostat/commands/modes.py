@@ -42,8 +42,14 @@ def add_modes_command(commands: "Commands") -> None:
         help='cutting force per area of the chip, e.g. "2000 N/mm**2": tells the width of cut that stays stable in the '
         "direction of --along",
     )  # fmt: skip
-    command.add_argument("--from", metavar="FREQUENCY", dest="lowest", help='of the response, e.g. "10 Hz"')
-    command.add_argument("--to", metavar="FREQUENCY", dest="highest", help='of the response, e.g. "500 Hz"')
+    command.add_argument(
+        "--from", metavar="FREQUENCY", dest="lowest",
+        help='lowest frequency of the response, e.g. "10 Hz" (default: a fifth of the first mode)',
+    )  # fmt: skip
+    command.add_argument(
+        "--to", metavar="FREQUENCY", dest="highest",
+        help='highest frequency of the response, e.g. "500 Hz" (default: above the sixth mode)',
+    )  # fmt: skip
     takes_figures(command, "modes.csv, response.nc and the figures")
     takes_json(command)
 

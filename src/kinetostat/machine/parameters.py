@@ -92,11 +92,18 @@ VECTORS = (
 """Fields whose entries are along x, y, z."""
 TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
 """Entries of an inertia tensor."""
+TENSORS = ("inertia", "payload_inertia")
+"""Fields whose entries are these."""
+
+
+def names_entries(field: str) -> bool:
+    """Return whether the entries of a field have names: those of a vector and of an inertia tensor have."""
+    return field in VECTORS or field in TENSORS
 
 
 def entry_name(field: str, entry: int) -> str:
-    """Return the name of an entry, counted from 0: x, y or z of a vector, else its number from 1."""
-    if field.endswith("inertia"):
+    """Return the name of an entry, counted from 0: x, y or z of a vector, xx of a tensor, else its number from 1."""
+    if field in TENSORS:
         return TENSOR[entry]
     return AXES[entry] if field in VECTORS else str(entry + 1)
 
@@ -234,8 +241,11 @@ def read_number(parameter: Parameter, value: object, path: str = "") -> float:
 
 
 def with_leg(machine: HasNumbers, path: str) -> str:
-    """Return a path for people: "geometry.base_angles.5 (leg 6)", as entries count from 0 and legs have names."""
+    """Return a path for people, as entries count from 0: "geometry.base_angles.5 (leg 6)", "tool.inertia.0 (xx)"."""
     field, _, entry = path.rpartition(".")
+    last = field.rpartition(".")[2]
+    if entry.isdecimal() and names_entries(last):
+        return f"{path} ({entry_name(last, int(entry))})"
     whole = next((p for p in parameters(machine.family) if p.path == field and p.quantity.per_leg), None)
     if whole is None:
         return path

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 
 from kinetostat.display import Scale, number, with_unit
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
-from kinetostat.machine.parameters import VECTORS, entry_name
+from kinetostat.machine.parameters import entry_name, names_entries
 from kinetostat.studies.grid.grid import failures, field_of
 from kinetostat.studies.storage import replacing
 from kinetostat.views.grid_tables import display_of
@@ -212,7 +212,7 @@ def _plain(path: str) -> str:
     """A path as an axis label: "pose.x" to "x", "stiffness.passive_links" to "stiffness: passive links"."""
     section, _, field = path.partition(".")
     parts = field.split(".")
-    if parts[-1].isdecimal() and parts[-2:-1] and parts[-2] in VECTORS:
+    if parts[-1].isdecimal() and parts[-2:-1] and names_entries(parts[-2]):
         parts[-1] = entry_name(parts[-2], int(parts[-1]))
     words = " ".join(parts).replace("_", " ")
     return words if section == "pose" else f"{section}: {words}"

@@ -15,6 +15,7 @@ from kinetostat.studies.setting import setting_of
 from kinetostat.studies.vibration import DRAWN, Vibration, frequency_range
 from kinetostat.views.figures import COLOURS, DASHES, STYLE, Drawings, fix_layout, note_setting, set_title
 from kinetostat.views.loaded_figures import moved_figure
+from kinetostat.views.vibration_tables import axis_of
 
 LEAST_GAP = 0.025
 """Least distance between the numbers of two modes, as a share of the width of a panel."""
@@ -47,7 +48,7 @@ def response_figure(
     machine = answer.machine
     given = frequency_range(answer) if frequencies is None else frequencies
     scale = machine.display.scale("m/N")
-    ways = {",".join(f"{part:g}" for part in direction): tuple(direction)} if direction else AXES
+    ways = {axis_of(direction): tuple(direction)} if direction else AXES
     ways = {name: way for name, way in ways.items() if name not in AXES or name in answer.components}
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.6, 5.6), layout="constrained")
@@ -61,6 +62,11 @@ def response_figure(
             size.loglog(given, np.abs(curve), **look)
             phase.semilogx(given, np.degrees(np.unwrap(np.angle(curve))), **look)
             real.semilogx(given, curve.real, **look)
+            softest = answer.softest(way)
+            if given[0] <= softest.frequency <= given[-1]:  # the point that limits the width of a cut
+                real.plot(
+                    softest.frequency, softest.real * scale.factor, "o", color=COLOURS[place], ms=3.5, mfc="white"
+                )
             nyquist.plot(curve.real, curve.imag, **look)
         for panel in (size, phase, real):
             for mode in answer.modes:
@@ -81,7 +87,10 @@ def response_figure(
         _number_modes(size, answer, given)
         size.legend(loc="best")
         set_title(figure, title.format(machine.name))
-        note_setting(figure, setting_of(machine, []), "grey lines: natural frequencies, numbered from the lowest")
+        about = (
+            "grey lines: natural frequencies, numbered from the lowest; circles: least real part, which limits a cut"
+        )
+        note_setting(figure, setting_of(machine, []), about)
         fix_layout(figure)
     return figure
 
