@@ -251,10 +251,18 @@ def _message(machine: Machine, response: Response, shown: Sequence[Mode]) -> str
     first = [mode for mode in shown if math.isclose(mode.frequency, lowest, rel_tol=EQUAL_FREQUENCIES)]
     together = {name: sum(mode.strain[name] for mode in first) / len(first) for name in shown[0].strain}
     springs = largest_contributors(*parts_and_kinds(springs_of(response.configuration), together))
-    ways = _motions([mode.direction for mode in first])
+    ways = _motions(_directions(machine, first, float(response.configuration.length)))
     in_modes = f", in {len(first)} modes" if len(first) > 1 else ""
     text = f"It rings first at {machine.display.show(lowest, 'Hz')}{in_modes}: the tool {ways}."
     return f"{text} The strain energy is mainly in {springs}." if springs else text
+
+
+def _directions(machine: Machine, together: Sequence[Mode], length: float) -> list[str]:
+    """As many components as there are modes: those in which all of them together move the tool most."""
+    names = machine.family.component_names
+    scales = np.array([length if len(name) == 2 else 1.0 for name in names])
+    sizes = np.linalg.norm([mode.tool for mode in together], axis=0) * scales
+    return [names[place] for place in sorted(np.argsort(-sizes, kind="stable")[: len(together)])]
 
 
 def _motions(components: Sequence[str]) -> str:

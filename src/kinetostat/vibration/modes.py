@@ -20,8 +20,11 @@ from kinetostat.equilibrium.balance import Balance, placed_leg
 from kinetostat.equilibrium.motion import Array, skew_of
 from kinetostat.equilibrium.tangent import motions_of, starts_of, within
 from kinetostat.kinetostatics.quantities import MODES
-from kinetostat.tolerances import UNRESISTED
+from kinetostat.tolerances import EQUAL_STIFFNESSES, UNRESISTED
 from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
+
+WELL = 0.1
+"""Share of the largest component of the tool's motion from which modes move the tool well along a component."""
 
 
 @dataclass(frozen=True)
@@ -264,8 +267,36 @@ def modes(equations: Balance) -> Modes | None:
     part = next(solved(equations), None)
     if part is None:
         return None
-    shapes = part.shapes[0]
-    return Modes(part.squares[0], shapes, tool_motions(equations) @ shapes, tuple(_drives(equations, shapes)))
+    motions = tool_motions(equations)
+    shapes = _settled(part.squares[0], part.shapes[0], motions, float(equations.mechanism.length[0]))
+    return Modes(part.squares[0], shapes, motions @ shapes, tuple(_drives(equations, shapes)))
+
+
+def _settled(squares: Array, shapes: Array, motions: Array, length: float) -> Array:
+    """The same modes with what is arbitrary in them settled, so that no round-off decides what is shown.
+
+    Of modes of equal frequency the first moves the tool along the first component that they move well, x y z rx ry rz,
+    the next one not at all along this one, and along the next such component; each moves along its own to the
+    positive side.
+
+    Args:
+        squares, shapes: as in `Modes`, of one pose.
+        motions: see `tool_motions`.
+        length: of the machine, by which turns are compared with displacements, m.
+    """
+    result = shapes.copy()
+    scaled = np.roll(motions * np.array([length] * 3 + [1.0] * 3)[:, None], 3, axis=0)
+    borders = np.flatnonzero(squares[:-1] - squares[1:] > EQUAL_STIFFNESSES * squares[:-1]) + 1
+    for first, last in pairwise([0, *borders.tolist(), len(squares)]):
+        for place in range(first, last):
+            among = scaled @ result[:, place:last]
+            sizes = np.linalg.norm(among, axis=1)
+            row = among[int(np.argmax(sizes >= WELL * sizes.max()))]
+            # The reflection that brings this row to its first entry.
+            mirror = row - np.linalg.norm(row) * np.eye(last - place)[0]
+            if mirror @ mirror > 0.0:
+                result[:, place:last] -= np.outer(result[:, place:last] @ mirror, mirror) * (2.0 / (mirror @ mirror))
+    return result
 
 
 def _drives(equations: Balance, shapes: Array) -> Iterator[Drive]:
