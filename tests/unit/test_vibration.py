@@ -19,7 +19,7 @@ from kinetostat.machine.mass import located_members
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.grid.grid import evaluate_grid
-from kinetostat.studies.vibration import NOTHING_RINGS, modes
+from kinetostat.studies.vibration import NOTHING_RINGS, TOO_DIFFERENT, modes
 from kinetostat.vibration.reduced import free_frequencies, reducible
 from machines import with_bodies
 
@@ -193,6 +193,19 @@ def test_what_cannot_ring_is_said():
     answer = modes(heavy("hexapod", **{"stiffness.actuator": math.inf}))
     assert (answer.modes, answer.message) == ((), NOTHING_RINGS)
     assert modes(changed(heavy("hexapod"), {"pose.z": 3.0})).status is Status.JOINT_LIMIT
+
+
+def test_a_motion_too_soft_to_compute_with_is_said_at_a_pose_and_over_a_grid():
+    drives = {"drives.lead": 0.01, "drives.rotor_inertia": 1e-4}
+    machine = heavy("hexapod", **drives, **{"stiffness.actuator.0": 1e-6})
+    answer = modes(machine)
+    assert (answer.status, answer.message) == (Status.SINGULAR, TOO_DIFFERENT)
+    found = evaluate_grid(machine, ["x=-1 mm:1 mm:3"], ["frequency_1"])
+    assert set(found["status"].values) == {Status.SINGULAR}
+    rigid = evaluate_grid(
+        heavy("hexapod", **drives, **{"stiffness.actuator": math.inf}), ["x=0:1 mm:2"], ["frequency_1"]
+    )
+    assert (set(rigid["status"].values), set(rigid["frequency_1"].values)) == ({Status.OK}, {math.inf})
 
 
 def test_rotors_need_a_lead():

@@ -90,6 +90,21 @@ def loaded_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str
         quantities: names from `QUANTITIES`.
         way: how to find the states.
     """
+    fill = _filled(machine, paths, quantities, way)
+    modal = [place for place, name in enumerate(quantities) if QUANTITIES[name].modal]
+
+    def with_status(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        fill(columns, results, status)
+        # Springs more than 1e12 times as stiff as others leave no digit of the softest motion.
+        hidden = np.isnan(results[modal]).any(axis=0) & (status == Status.OK)
+        status[hidden] = Status.SINGULAR
+        results[:, hidden] = np.nan
+
+    return with_status
+
+
+def _filled(machine: Machine, paths: Sequence[str], quantities: Sequence[str], way: Way) -> Fill:
+    """The same, which may leave vibrations unknown at poses that are said to be OK."""
     plain = way in (Way.ANY_MACHINE, Way.MODES, Way.COLUMNS)
     solved = partial(_solve_in_parts, machine, tuple(quantities), (way if plain else Way.ANY_MACHINE).slab)
     if plain or not _over_scalars(machine, tuple(paths), quantities):

@@ -61,9 +61,11 @@ SMALL = 1e-6
 """Size of the motion by which shapes are read off the exact motions of the links, rad or in machine lengths."""
 MOST_SHOWN = 12
 """Modes that are shown; higher ones add to the response all the same."""
-NOTHING_RINGS = (
-    "Nothing rings: all that could move is rigid, or so much stiffer than the softest part that round-off hides that "
-    'one; write "rigid" for springs that are meant to be.'
+NOTHING_RINGS = "Nothing rings: all that could move is rigid."
+TOO_DIFFERENT = (
+    "Nothing can be said about vibrations at this pose: the softest motion is so much softer than the others, more "
+    'than 1e12 times, that round-off hides it. Write "rigid" for springs that are meant to be, or make the softest '
+    "one stiffer."
 )
 DRAWN = 6
 """Modes of which shapes are drawn, and about which responses are."""
@@ -220,6 +222,8 @@ def modes(machine: Machine) -> Vibration:
         equations = balance(mechanism, free_state(mechanism))
     solution = solved_modes(equations)
     if solution is None:
+        return Vibration(machine, Status.SINGULAR, TOO_DIFFERENT, names)
+    if not solution.squares.size:
         return Vibration(machine, Status.OK, NOTHING_RINGS, names)
     return _vibration(machine, response, equations, solution)
 

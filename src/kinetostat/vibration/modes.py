@@ -184,8 +184,7 @@ def _allowed(
             np.concatenate([inverse[here] @ platform, np.swapaxes(right[here, rank:], 1, 2)], axis=2)
             for inverse, (_, right), rank in zip(inverses, owns, each[1:], strict=True)
         ]
-        if any(part.shape[2] for part in moved):
-            yield rows[here], [platform, *moved]
+        yield rows[here], [platform, *moved]
 
 
 def _places(basis: Sequence[Array]) -> Iterator[npt.NDArray[np.int64]]:
@@ -263,7 +262,10 @@ def frequencies(equations: Balance, count: int = MODES) -> Array:
 
 
 def modes(equations: Balance) -> Modes | None:
-    """The natural vibrations at a single pose; None where springs and loads do not hold the machine there."""
+    """The natural vibrations at a single pose; None where springs and loads do not hold the machine there.
+
+    There are none of them where all is rigid.
+    """
     part = next(solved(equations), None)
     if part is None:
         return None
