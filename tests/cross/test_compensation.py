@@ -9,13 +9,13 @@ from kinetostat.accuracy.built import as_built, model_at_home
 from kinetostat.accuracy.model import error_model
 from kinetostat.equilibrium.motion import exponential
 from kinetostat.exchange.leg_by_leg import built_text
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.changing import changed
-from kinetostat.machine.loading import load
+from kinetostat.machine.loading import build, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.assembly import forward
 from kinetostat.studies.command import command
-from machines import load_without_limits
 from synthetic_measurements import truth_of
 
 
@@ -37,7 +37,7 @@ def fitted(folder, machine, truth):
 
 @pytest.mark.parametrize("name", ["hexapod", "hexapod-rus", "delta", "orthoglide"])
 def test_zeros_gains_and_geometry_are_compensated_together(name, tmp_path):
-    machine = load_without_limits(name)
+    machine = load(name)
     # A file leg by leg counts rotations from its home pose, which is that of the drawn machine.
     machine = changed(
         machine, {path: 0.0 for path in values(machine) if path in ("pose.roll", "pose.pitch", "pose.yaw")}
@@ -66,9 +66,25 @@ def test_zeros_gains_and_geometry_are_compensated_together(name, tmp_path):
 
 
 def test_a_fit_of_another_machine_is_refused(tmp_path):
-    machine = load_without_limits("hexapod")
+    machine = load("hexapod")
     fitted(tmp_path, machine, truth_of(model_at_home(machine)))
     with pytest.raises(InputError, match="is the machine as drawn"):
         command(machine, fit=tmp_path)
     with pytest.raises(InputError, match="is the fit of 6-UPS hexapod"):
         command(load("delta"), fit=tmp_path)
+
+
+@pytest.mark.parametrize("size", [1e-12, 1e-9, 1e-6, 2e-4])
+@pytest.mark.parametrize("name", ["hexapod", "hexapod-hardware", "tricept", "orthoglide", "zhang-gosselin-4dof"])
+def test_a_machine_with_errors_of_any_size_is_a_file_that_can_be_read(name, size):
+    """Also where no two axes of a joint meet, and where errors make rigid links yield by less than a file may say."""
+    machine = load(name)
+    errors = size * np.random.default_rng(1).standard_normal(len(model_at_home(machine).errors))
+    text = built_text(machine, as_built(machine, errors).configuration, ())
+    limits = build(text).tables["limits"]
+    if name == "hexapod" and size > 1e-9:  # six legs of one length at its home pose
+        leg = respond(machine).configuration.legs[0]
+        drawn, length = machine.tables["limits"], (leg.path[-1] - leg.path[0]).norm()
+        between = (drawn.shortest_leg - length, drawn.longest_leg - length)
+        assert (limits.travel_from, limits.travel_to) == pytest.approx(between)
+        assert "Left out, since axes of joints do not meet: limits.shortest_leg" in text

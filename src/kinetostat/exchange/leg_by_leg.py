@@ -5,8 +5,9 @@ link, which is exact. Points, axes and matrices are in the base frame at the pos
 """
 
 import json
+import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise
 from typing import Any
 
@@ -18,15 +19,16 @@ from kinetostat.kinematics.mobility import task_coordinates
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.common_tables import Load, Tool
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring
-from kinetostat.machine.limits import limits_set
+from kinetostat.machine.limits import LIMITS, limits_set, unloaded_parts
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.mass import turned_tensor
+from kinetostat.machine.rods import driven_slides, rods
 from kinetostat.machine.written.plan import BASE, NAME, PLATFORM, SPATIAL_POSE
 from kinetostat.spec.document import Document, toml_key
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.fields import quantities
+from kinetostat.spec.fields import LARGEST_OTHER, quantities
 from kinetostat.spec.validation import SCHEMA_VERSION
 from kinetostat.studies.rounding import clean_screw
 
@@ -52,7 +54,12 @@ def built_text(machine: Machine, built: Configuration, notes: Sequence[str]) -> 
         built: where its legs are as built, at the home pose of the file.
         notes: lines of comment at its head.
     """
-    return "".join(f"# {note}\n" for note in notes) + _text(document_of(machine, built), machine)
+    document = document_of(machine, built)
+    lost = [name for name in document_of(machine).get("limits", {}) if name not in document.get("limits", {})]
+    if lost:
+        names = ", ".join(f"limits.{name}" for name in lost)
+        notes = [*notes, f"Left out, since axes of joints do not meet: {names}; travels stand for lengths of legs."]
+    return "".join(f"# {note}\n" for note in notes) + _text(document, machine)
 
 
 def document_of(machine: Machine, built: Configuration | None = None) -> Document:
@@ -84,7 +91,42 @@ def document_of(machine: Machine, built: Configuration | None = None) -> Documen
     limits = {limit.name: getattr(table, limit.name) for limit in limits_set(table)}
     if not upright:  # the platform's z axis is that of the base at the home pose of a file leg by leg
         limits.pop("platform_joint_angle", None)
+    if built:
+        limits = _limits_as_built(limits, machine, built)
     return document | ({"limits": limits} if limits else {})
+
+
+def _limits_as_built(limits: dict[str, float], machine: Machine, built: Configuration) -> dict[str, float]:
+    """Limits of a machine whose axes of joints no longer meet: a length of such a leg becomes a travel of its ram.
+
+    Args:
+        limits: of the machine as drawn, SI.
+        machine: as drawn.
+        built: where its legs are as built, at the home pose.
+    """
+    parted = [leg.name for leg in built.legs if _is_parted(leg)]
+    drawn = [rod for rod in rods(respond(machine).configuration.legs) if rod.telescopic and rod.leg in parted]
+    rams = [(rod.leg, 0.0) for rod in drawn]
+    rams += [(leg.name, 0.0) for leg in built.legs for _ in driven_slides(leg.chain)]
+    every = unloaded_parts(built.legs, built.platform.rotation.z, machine.family.planar, rams)
+    parts = replace(every, legs=[leg for leg in built.legs if leg.name not in parted])
+    kept = {name: limit for name, limit in limits.items() if any(True for _ in LIMITS[name].measure(parts))}
+    lengths = [float(rod.length) for rod in drawn]
+    if lengths and "shortest_leg" in limits:
+        kept["travel_from"] = max(limits["shortest_leg"] - min(lengths), limits.get("travel_from", -math.inf))
+    if lengths and "longest_leg" in limits:
+        kept["travel_to"] = min(limits["longest_leg"] - max(lengths), limits.get("travel_to", math.inf))
+    return kept
+
+
+def _is_parted(leg: Leg) -> bool:
+    """Whether the axes of a joint of several axes do not meet in a point."""
+    points: dict[str, set[Vector]] = {}
+    for element in leg.chain:
+        for joint in element.freedoms:
+            if joint.point is not None:
+                points.setdefault(joint.name, set()).add(joint.point)
+    return any(len(places) > 1 for places in points.values())
 
 
 def _tool(machine: Machine, turn: Rotation) -> dict[str, Any]:
@@ -245,10 +287,13 @@ def _parallelogram(element: Parallelogram) -> dict[str, Any]:
 def compliance_at(springs: Sequence[Spring], point: Vector) -> npt.NDArray[np.float64]:
     """Return the sum of what springs between two bodies deflect at a point [6 x 6], base axes, rx ry rz x y z, SI.
 
-    Components of a spring's twist that are only round-off are left out: a file gives 0 where a link is rigid.
+    A file gives 0 where a link is rigid, and so it is where a spring's twist is only round-off, or less than a file may
+    say.
     """
     twists = [clean_screw(spring.joint.twist(point), 1.0).components() for spring in springs]
-    return sum((np.outer(t, t) / s.stiffness for t, s in zip(twists, springs, strict=True)), np.zeros((6, 6)))
+    whole = sum((np.outer(t, t) / s.stiffness for t, s in zip(twists, springs, strict=True)), np.zeros((6, 6)))
+    kept = np.diag(whole) >= 1.0 / LARGEST_OTHER
+    return np.asarray(np.where(np.outer(kept, kept), whole, 0.0))
 
 
 def _stiffness(spring: Spring) -> str:

@@ -287,6 +287,18 @@ def is_set(limit: Scalar) -> bool:
     return not (type(limit) is float and math.isinf(limit))
 
 
+def unloaded_parts(
+    legs: Sequence[Leg], normal: Vector, planar: bool, slides: Sequence[tuple[str, Scalar]] = ()
+) -> Parts:
+    """The parts of a machine whose actuators carry nothing, to ask which limits mean something for it.
+
+    Args:
+        legs, normal, planar, slides: see `Parts`.
+    """
+    carrying = [(spring, 0.0) for leg in legs for spring in leg.springs if spring.actuated]
+    return Parts(legs, normal, planar, slides, carrying)
+
+
 def limits_set(limits: object) -> list[Limit]:
     """Return the rows of the limits that a table [limits] sets."""
     return [limit for limit in LIMITS.values() if is_set(getattr(limits, limit.name))]

@@ -14,13 +14,12 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from kinetostat.algebra.scalar import Scalar
 from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.machine import pickling as _pickling  # noqa: F401  # machines that are loaded can be pickled
 from kinetostat.machine.catalogue import families, family_named
 from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_inertia
-from kinetostat.machine.leg import Leg, Spring
-from kinetostat.machine.limits import Parts, check_limits
+from kinetostat.machine.leg import Leg
+from kinetostat.machine.limits import check_limits, unloaded_parts
 from kinetostat.machine.machine import Family, Machine, Written
 from kinetostat.machine.named_loads import family_with_loads
 from kinetostat.machine.orientation import ANGLES, form_of, make_room, orientation_schema, with_angles
@@ -147,7 +146,7 @@ def _build_family(document: Document, origin: str, settings: Sequence[str]) -> M
     whole = family_with_loads(family_with_parts(family, changed), changed, origin)
     machine = _validated(whole, resolved, origin, display)
     placed = machine.configure()
-    parts = Parts(placed.legs, placed.platform.rotation.z, family.planar, (), _unloaded(placed.legs))
+    parts = unloaded_parts(placed.legs, placed.platform.rotation.z, family.planar)
     check_limits(machine.tables["limits"], parts, origin)
     return replace(machine, loaded=loaded)
 
@@ -167,7 +166,7 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     chains = whole.chains()
     legs = [Leg(leg.name, tuple(s.element for s in steps)) for leg, steps in zip(plan.legs, chains.legs, strict=True)]
     slides = [(leg.name, 0.0) for leg in legs for _ in driven_slides(leg.chain)]
-    parts = Parts(legs, chains.home.rotation.z, plan.planar, slides, _unloaded(legs))
+    parts = unloaded_parts(legs, chains.home.rotation.z, plan.planar, slides)
     check_limits(machine.tables["limits"], parts, origin)
     return replace(whole, loaded=loaded)
 
@@ -197,11 +196,6 @@ def _write_out(document: Document, path: str) -> None:
         table = table.setdefault(part, {}) if isinstance(table, dict) else None
     if isinstance(table, dict):
         table.setdefault(key, list(getattr(known, key)))
-
-
-def _unloaded(legs: Sequence[Leg]) -> list[tuple[Spring, Scalar]]:
-    """All actuators, for questions about which there are and not about what they carry."""
-    return [(spring, 0.0) for leg in legs for spring in leg.springs if spring.actuated]
 
 
 def _validated(family: Family, document: Document, origin: str, display: Display) -> Machine:

@@ -68,9 +68,10 @@ def letter(figure: Figure) -> None:
     """Make all texts of a figure drawable: symbols of quantities are mathematics, names with dollar signs are not."""
     for axis in (axis for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)):
         if isinstance(axis.get_major_locator(), FixedLocator):
-            names = [label.get_text() for label in axis.get_ticklabels()]  # now they have texts, not only when drawn
-            if not all(name.isascii() for name in names):
+            names = axis.get_major_formatter().format_ticks([*axis.get_majorticklocs()])  # also of ticks out of view
+            if any(drawable(name) != name for name in names):
                 axis.set_ticklabels([drawable(name) for name in names])
+            axis.get_ticklabels()  # now they have texts, not only when drawn
     for text in figure.findobj(Text):
         written = text.get_text()
         if not is_mathematics(written):
