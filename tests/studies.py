@@ -1,6 +1,6 @@
 """Problems for tests: bundled studies with overrides, studies written as text, and waiting for a search at work."""
 
-import time
+from watchfiles import watch
 
 from kinetostat.spec import document as documents
 from kinetostat.spec.study import read_study
@@ -30,15 +30,18 @@ quantity = "compliance_sum"
 """
 
 
-MOMENT = 0.02
-"""Seconds between two looks at a search. It gives way to every other process: a test that looked without a pause would
-take the processor that the search needs."""
+LOOK = 100
+"""Milliseconds after which to look although nothing has changed: a process that is killed writes nothing."""
 
 
-def waited_for(look):
-    """What a look at a search shows, once it shows anything."""
+def waited_for(look, folder):
+    """What a look at a search shows, once it shows anything; there is something new where its folder changes.
+
+    A search gives way to every other process: a test that looked all the time would take the processor that it needs.
+    """
+    changes = watch(folder, yield_on_timeout=True, rust_timeout=LOOK)
     while not (seen := look()):
-        time.sleep(MOMENT)
+        next(changes)
     return seen
 
 

@@ -15,12 +15,13 @@ from nicegui.elements.upload_files import SmallFileUpload
 from nicegui.events import GenericEventArguments, handle_event
 from nicegui.testing import User
 from nicegui.testing.user_simulation import user_simulation
+from watchfiles import awatch
 
 from kinetostat.machine.loading import bundled, load
 from kinetostat.studio import elements
 from kinetostat.studio.design.design_tab import Workshop
 from kinetostat.studio.serving import show
-from studies import MOMENT
+from studies import LOOK
 
 KINDS = (elements.MachineView, elements.MapView, elements.CurveView, elements.FrontView)
 PATIENCE = 300
@@ -72,10 +73,11 @@ class Page:
             timer.callback()
         await self.settled()
 
-    async def watching(self, condition: Callable[[], bool]) -> None:
-        """Let the page look at its searches until something holds; between two looks they have the processor."""
+    async def watching(self, condition: Callable[[], bool], folder: Path) -> None:
+        """Let the page look at its searches whenever their folder changes, until something holds."""
+        changes = awatch(folder, yield_on_timeout=True, rust_timeout=LOOK)
         while not condition():
-            await asyncio.sleep(MOMENT)
+            await anext(changes)
             await self.glance()
 
     async def front(self, tab: str) -> None:

@@ -31,9 +31,9 @@ async def small_study(page, generations="4"):
     await page.choose("study-generations", generations)
 
 
-async def until(page, word):
+async def until(page, word, folder):
     """Until the search in front says so."""
-    await page.watching(lambda: page.one("run-line").text.startswith(word))
+    await page.watching(lambda: page.one("run-line").text.startswith(word), folder)
 
 
 def test_a_study_made_in_the_form_is_what_the_command_solves(tmp_path, capsys):
@@ -48,7 +48,7 @@ def test_a_study_made_in_the_form_is_what_the_command_solves(tmp_path, capsys):
         saved.append((await download).text)
         await page.send("study-start", "click")
         assert page.one("study-problem").text == ""
-        await until(page, "done")
+        await until(page, "done", tmp_path)
         shown = page.shown("CurveView", "show")
         assert [line["name"] for line in shown["lines"]] == ["best", "mean"]
         saved.append(shown["lines"][0]["values"])
@@ -78,7 +78,7 @@ def test_a_front_is_shown_and_a_click_loads_a_design(tmp_path):
         await page.choose("objective 0 direction", "0, 1, 0")
         await page.send("study-start", "click")
         assert page.one("study-problem").text == ""
-        await until(page, "done")
+        await until(page, "done", tmp_path)
         shown = page.shown("FrontView", "show")
         assert len(shown["points"]) > 1
         assert shown["initial"] is not None
@@ -102,7 +102,7 @@ def test_a_front_of_three_objectives_is_seen_along_any_of_them(tmp_path):
         await page.choose("objective 2 quantity", "stiffness_x")
         await page.send("study-start", "click")
         assert page.one("study-problem").text == ""
-        await until(page, "done")
+        await until(page, "done", tmp_path)
         shown = page.shown("FrontView", "show")
         assert (shown["axes"], shown["coloured"]) == ([0, 1], 2)
         assert shown["labels"] == ["compliance sum (SI)", "compliance z (m/N)", "stiffness x (N/m)"]
@@ -125,18 +125,18 @@ def test_stopped_reloaded_resumed_and_deleted(tmp_path):
     async def steps(page):
         await small_study(page, "100000")
         await page.send("study-start", "click")
-        await page.watching(lambda: page.one("run-load").enabled)
+        await page.watching(lambda: page.one("run-load").enabled, tmp_path)
         assert page.one("run-stop").enabled
         await page.again()
         await design(page)
         assert page.one("run-line").text.startswith("running")
         await page.send("run-stop", "click")
-        await until(page, "stopped")
+        await until(page, "stopped", tmp_path)
         assert "times that of the initial design" in page.one("run-result").content
         await page.send("run-play_arrow", "click")
-        await until(page, "running")
+        await until(page, "running", tmp_path)
         await page.send("run-stop", "click")
-        await until(page, "stopped")
+        await until(page, "stopped", tmp_path)
         await page.send("run-delete", "click")
         await page.send("confirm-yes", "click")
         assert page.one("run-choice").options == {}

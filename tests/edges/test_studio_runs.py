@@ -91,7 +91,7 @@ def until_begun(runs, number):
     """Until a search has made a step, which takes as long as its process needs to start."""
     run = runs.of(number)
     follower = Follower(run)
-    waited_for(lambda: follower.progress(run).steps)
+    waited_for(lambda: follower.progress(run).steps, run.folder)
 
 
 def test_a_search_ends_as_the_command_does(runs, capsys, tmp_path):
@@ -161,7 +161,7 @@ def test_stopped_after_a_step_it_goes_on_to_the_same_end(runs, tmp_path):
     with refused("only a search that was stopped can be resumed"):
         again.go_on(run.number)
     follower = Follower(run)
-    waited_for(lambda: follower.progress(run).steps > found.steps)
+    waited_for(lambda: follower.progress(run).steps > found.steps, run.folder)
     again.close()
     again.wait(run.number)
     assert followed(again, run.number).best[: found.steps] == found.best
@@ -185,7 +185,7 @@ def test_when_the_server_is_killed_the_search_stops_and_is_kept(tmp_path):
         runs.stop(1)
     server.kill()
     server.communicate()
-    waited_for(lambda: not runs.of(1).stage.active)
+    waited_for(lambda: not runs.of(1).stage.active, tmp_path)
     (run,) = runs.every()
     assert (run.stage, run.name) == (Stage.STOPPED, "Zhang & Gosselin, section 4.3")
     assert followed(runs, 1).steps
