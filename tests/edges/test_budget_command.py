@@ -68,7 +68,7 @@ def test_poses_of_a_file_and_grids_become_files(tmp_path, capsys):
         assert dataset["usual_position"].units == "m"
     ranked = list(csv.DictReader((tmp_path / "out" / "contributions.csv").read_text().splitlines()))
     shares = [float(row["share position"]) for row in ranked]
-    assert shares == sorted(shares, reverse=True)
+    assert shares == pytest.approx(sorted(shares, reverse=True))
     assert sum(shares) == pytest.approx(1.0)
 
 

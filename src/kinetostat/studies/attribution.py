@@ -6,7 +6,7 @@ The formulas are in `kinetostatics.assembly`; tables and bars of the contributio
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.kinetostatics.assembly import Statics, compliance_shares, stiffness_shares
@@ -83,6 +83,7 @@ NAMED = 0.05
 MOST_OF_IT = 0.6
 """Share that the named parts must have together; otherwise kinds of parts are named."""
 
+Key = TypeVar("Key")
 Shares: TypeAlias = tuple[tuple[str, float], ...]
 """Names of parts and their shares, the greatest share first."""
 
@@ -152,11 +153,11 @@ def parts_and_kinds(springs: Sequence[Spring], shares: Mapping[str, float]) -> t
         f"{kind} ×{len(members)}" if len(members) > 1 else next(iter(members)): sum(parts[part] for part in members)
         for kind, members in kinds.items()
     }
-    return _ranked(parts), _ranked(together)
+    return ranked(parts), ranked(together)
 
 
-def _ranked(shares: Mapping[str, float]) -> Shares:
-    """Sort shares, the greatest first; equal shares keep their order."""
+def ranked(shares: Mapping[Key, float]) -> tuple[tuple[Key, float], ...]:
+    """Sort shares, the greatest first; those that are equal but for round-off keep their order."""
     return tuple(sorted(shares.items(), key=lambda item: -round(item[1], EQUAL_SHARES)))
 
 

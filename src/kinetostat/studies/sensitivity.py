@@ -24,6 +24,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.analysis import analyze
+from kinetostat.studies.attribution import ranked
 from kinetostat.studies.grid.quantities import refuse_absent, refuse_loaded, resolve_quantities
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.tolerances import NO_INFLUENCE, ROUND_OFF_OF_ENTRY, ZERO_LENGTH
@@ -205,10 +206,11 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     reasons = {p.path: _no_derivative(p, here, slopes) for p in candidates}
     known = [p for p in candidates if not reasons[p.path]]
     influences = [_influence(p, here, indices, slopes[p.path], length) for p in known]
-    ranked = sorted((item for item in influences if item.greatest > NO_INFLUENCE), key=lambda item: -item.greatest)
+    order = ranked({place: item.greatest for place, item in enumerate(influences) if item.greatest > NO_INFLUENCE})
+    shown = tuple(influences[place] for place, _ in order)
     quiet = tuple(item.path for item in influences if item.greatest <= NO_INFLUENCE)
     skipped = tuple((path, reason) for path, reason in reasons.items() if reason)
-    return Sensitivity(machine, status, status.sentence, names, indices, length, tuple(ranked), quiet, skipped)
+    return Sensitivity(machine, status, status.sentence, names, indices, length, shown, quiet, skipped)
 
 
 def _without_round_off(name: str, value: float, response: Response) -> float:

@@ -49,7 +49,7 @@ def contributions_figure(budget: Budget, title: str = "{}: what the error of the
     """
     names = ranked_by(budget)
     rows = budget.shares[[budget.measures.index(name) for name in names]]
-    order = np.argsort(-rows[0], kind="stable")[:MOST_BARS]
+    order = budget.ranking[:MOST_BARS]
     panels = {
         "lines of [tolerances]": _sums(budget, "line", names),
         "legs": _sums(budget, "leg", names),

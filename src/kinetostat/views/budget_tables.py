@@ -150,7 +150,7 @@ def legs_table(budget: Budget) -> FittedTable:
 
 def _print_parts(console: Console, budget: Budget, full: bool) -> None:
     names = ranked_by(budget)
-    order = np.argsort(-budget.shares[budget.measures.index(budget.leading)], kind="stable")
+    order = budget.ranking
     shown = order if full else order[:MOST_PARTS]
     table = text_table("Contributions to the variance: the largest single tolerances", "number of the machine", "±")
     for name in names:

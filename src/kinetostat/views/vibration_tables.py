@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from kinetostat.display import Display, number
+from kinetostat.studies.attribution import ranked
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.vibration import Mode, Vibration
 from kinetostat.views.tables import numeric_table, print_doubts
@@ -131,12 +132,12 @@ def share_table(title: str, shares: Sequence[Mapping[str, float]]) -> Table:
     """Shares of an energy by part in each mode, the greatest parts first, in percent."""
     names = dict.fromkeys(name for mode in shares for name in mode)
     largest = {name: max(abs(mode.get(name, 0.0)) for mode in shares) for name in names}
-    ranked = sorted(names, key=lambda name: -largest[name])
-    shown = [name for name in ranked if largest[name] >= LEAST_SHARE][:MOST_PARTS]
+    order = [name for name, _ in ranked(largest)]
+    shown = [name for name in order if largest[name] >= LEAST_SHARE][:MOST_PARTS]
     table = numeric_table(title, "", [str(place) for place in range(1, len(shares) + 1)])
     for name in shown:
         table.add_row(name, *(percent(mode.get(name, 0.0)) for mode in shares))
-    rest = ranked[len(shown) :]
+    rest = order[len(shown) :]
     left = [sum(mode.get(name, 0.0) for name in rest) for mode in shares]
     if any(abs(share) >= LEAST_PERCENT for share in left):
         table.add_row(rest[0] if len(rest) == 1 else f"{len(rest)} others", *map(percent, left))

@@ -24,6 +24,7 @@ from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.tolerance_table import Tolerance, joined, read_tolerances
+from kinetostat.studies.attribution import ranked
 from kinetostat.studies.budget.allocation import Allocation, allocated, reach_of
 from kinetostat.studies.budget.exact import ExactSample, solved_exactly
 from kinetostat.studies.budget.inputs import Inputs, inputs_of
@@ -149,8 +150,13 @@ class Budget(Immutable):
         for part, share in zip(self.parts, row.tolist(), strict=True):
             name = getattr(part, key) or "shared by all legs"
             sums[name] = sums.get(name, 0.0) + share
-        # Shares that are equal but for round-off stay in the order of the machine.
-        return dict(sorted(sums.items(), key=lambda item: -round(item[1], 9)))
+        return dict(ranked(sums))
+
+    @property
+    def ranking(self) -> list[int]:
+        """Places of the parts, the most important for the leading measure first."""
+        row = self.shares[self.measures.index(self.leading)]
+        return [place for place, _ in ranked(dict(enumerate(row.tolist())))]
 
 
 @checked

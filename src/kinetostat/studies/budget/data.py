@@ -97,7 +97,7 @@ def _fields(budget: Budget) -> dict[str, tuple[Any, str]]:
 
 def contributions_csv(budget: Budget) -> str:
     """Write the share of each tolerance in the variance of each measure as CSV, the most important first."""
-    order = np.argsort(-budget.shares[budget.measures.index(budget.leading)], kind="stable")
+    order = budget.ranking
     rows = [
         [
             *map(no_formula, (part.path, part.words, part.leg, part.group, part.line)),

@@ -15,6 +15,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.engine.points import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
+from kinetostat.studies.attribution import ranked
 from kinetostat.studies.vibration import Mode
 from kinetostat.studio.answers import Report, finite, weighs
 from kinetostat.studio.controls import STEPS
@@ -256,8 +257,8 @@ def energies_text(mode: Mode, number: int, legs: Mapping[str, str]) -> str:
     """
     text = ""
     for title, shares in ((f"Strain energy of mode {number}", mode.strain), ("Its kinetic energy", mode.kinetic)):
-        ranked = sorted(shares.items(), key=lambda item: -abs(item[1]))
-        rows = [(name, share, f"{percent(share)} %") for name, share in ranked if abs(share) >= LEAST_SHARE]
+        order = ranked({name: abs(share) for name, share in shares.items()})
+        rows = [(name, shares[name], f"{percent(shares[name])} %") for name, size in order if size >= LEAST_SHARE]
         of_leg = {name: leg for name in shares for part, leg in legs.items() if f"{name} ".startswith(f"{part} ")}
         more = f"{len(rows) - MOST_PARTS} parts with less are omitted."
         text += heading(title) + bars(title, rows[:MOST_PARTS], of_leg)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from kinetostat.display import Display
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.attribution import by_part
+from kinetostat.studies.attribution import by_part, ranked
 from kinetostat.studies.guidelines.sentences import statements
 from kinetostat.studies.optimisation.result_data import message
 from kinetostat.studies.report.answers import Answers
@@ -81,7 +81,7 @@ def _scaled(value: float, quantity: str, infinite: str, display: Display) -> str
 def _contributors(analysis: Analysis, i: int) -> str:
     parts = by_part(analysis.attribution).items()
     shares = {name: sum(spring.compliance_share[i] or 0.0 for spring in springs) for name, springs in parts}
-    largest = sorted((pair for pair in shares.items() if pair[1] >= NAMED), key=lambda pair: -pair[1])
+    largest = [pair for pair in ranked(shares) if pair[1] >= NAMED]
     named = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in largest[:MOST_NAMED])
     more = len(largest) - MOST_NAMED
     return f"{named} and {more} more" if more > 0 else named or "nothing"
