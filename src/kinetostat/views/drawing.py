@@ -17,6 +17,8 @@ from kinetostat.tolerances import SAME_TO_THE_EYE
 from kinetostat.views.figures import COLOURS, STYLE, fix_layout, set_title
 
 VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
+MARGIN = 0.12
+"""Room beside a machine, as a share of its size."""
 MILLIMETRES = 1e3
 LEG, CONSTRAINT, PLATE = COLOURS[0], COLOURS[1], "#555555"
 OFFSETS = {"P": (4, 4), "T": (4, -10)}
@@ -50,10 +52,19 @@ def views_of(configuration: Configuration, draw: Callable[[Axes, str, str], None
     """
     views = VIEWS if configuration.plane is None else VIEWS[2:]
     figure = Figure(figsize=(7.6 if len(views) > 1 else 4.0, 3.3), layout="constrained")
-    for panel, (name, across, up) in zip(figure.subplots(1, len(views), squeeze=False).flat, views, strict=True):
+    panels = dict(zip(views, figure.subplots(1, len(views), squeeze=False).flat, strict=True))
+    ends: dict[str, list[float]] = {}
+    for (name, across, up), panel in panels.items():
         draw(panel, across, up)
         panel.set(title=name, xlabel=f"{across} (mm)", ylabel=f"{up} (mm)", aspect="equal")
-        panel.margins(0.12)
+        for axis, interval in ((across, panel.dataLim.intervalx), (up, panel.dataLim.intervaly)):
+            ends.setdefault(axis, []).extend(interval)
+    # One scale for all views, so that what stands side by side can be compared.
+    half = (0.5 + MARGIN) * max(max(part) - min(part) for part in ends.values())
+    middle = {axis: 0.5 * (max(part) + min(part)) for axis, part in ends.items()}
+    for (_, across, up), panel in panels.items():
+        panel.set_xlim(middle[across] - half, middle[across] + half)
+        panel.set_ylim(middle[up] - half, middle[up] + half)
     return figure
 
 

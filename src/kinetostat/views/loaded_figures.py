@@ -124,11 +124,12 @@ def moved_figure(
         figure = views_of(configuration, draw)
         styles: list[tuple[str, str, Any]] = [(named[0], UNLOADED, "-"), (named[1], LOADED, "-")]
         styles += [("slack", SLACK, "--")] if slack_legs else []
-        figure.legend(
+        legend = figure.legend(
             handles=[Line2D([], [], color=colour, linestyle=dash, label=text) for text, colour, dash in styles],
             loc="outside lower center", ncols=len(styles), title_fontsize=6.5,
             title=f"{setting_of(machine, [])}\n{size or drawn_larger(factor)}",
         )  # fmt: skip
+        legend.get_title().set(multialignment="center", color="#555555")
         set_title(figure, title)
         fix_layout(figure)
     return figure
