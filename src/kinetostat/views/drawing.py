@@ -59,12 +59,14 @@ def views_of(configuration: Configuration, draw: Callable[[Axes, str, str], None
         panel.set(title=name, xlabel=f"{across} (mm)", ylabel=f"{up} (mm)", aspect="equal")
         for axis, interval in ((across, panel.dataLim.intervalx), (up, panel.dataLim.intervaly)):
             ends.setdefault(axis, []).extend(interval)
-    # One scale for all views, so that what stands side by side can be compared.
-    half = (0.5 + MARGIN) * max(max(part) - min(part) for part in ends.values())
-    middle = {axis: 0.5 * (max(part) + min(part)) for axis, part in ends.items()}
-    for (_, across, up), panel in panels.items():
-        panel.set_xlim(middle[across] - half, middle[across] + half)
-        panel.set_ylim(middle[up] - half, middle[up] + half)
+    # One scale for all views, so that what stands side by side can be compared; a machine in a point has none.
+    size = max(max(part) - min(part) for part in ends.values())
+    if 0.0 < size < math.inf:
+        middle = {axis: 0.5 * (max(part) + min(part)) for axis, part in ends.items()}
+        half = (0.5 + MARGIN) * size
+        for (_, across, up), panel in panels.items():
+            panel.set_xlim(middle[across] - half, middle[across] + half)
+            panel.set_ylim(middle[up] - half, middle[up] + half)
     return figure
 
 
