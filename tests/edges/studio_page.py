@@ -173,9 +173,15 @@ def on_page(
             await show(load(machine, settings), machine if machine in bundled() and not settings else "", workshop)
 
         calls: list[tuple[str, str, Any]] = []
+        failed: BaseException | None = None
         with recorded(calls), nothing_fails():
             async with user_simulation(root=root) as user:
-                await steps(await opened(user, calls))
+                try:
+                    await steps(await opened(user, calls))
+                except BaseException as error:  # NiceGUI ends its tasks only where all went well; they would run on
+                    failed = error
+            if failed is not None:
+                raise failed
         workshop.close()
 
     with TemporaryDirectory() as own:
