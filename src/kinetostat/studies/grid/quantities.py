@@ -41,14 +41,18 @@ def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONE
 
 
 def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Sequence[str]) -> str:
-    """The sentence about an unknown quantity: which was probably meant, or all that there are."""
-    others = (other for other, quantity in QUANTITIES.items() if not quantity.components)
-    known = [*groups, *(member for group in groups.values() for member in group), *others]
+    """The sentence about an unknown quantity: which was probably meant, or what there is."""
+    members = [member for group in groups.values() for member in group]
+    others = [other for other, quantity in QUANTITIES.items() if not quantity.components and other not in members]
     matrix, _, parts = name.partition("_")
     turned = "_".join([matrix, *reversed(parts.split("_"))])  # compliance_x_ry is written compliance_ry_x
     there = turned != name and turned in QUANTITIES and _exists(turned, components)
-    near = [turned] if there else difflib.get_close_matches(name, known, 1)
-    every = f"choose from {', '.join(known)}, or an entry such as compliance_{components[0]}_{components[-1]}."
+    near = [turned] if there else difflib.get_close_matches(name, [*groups, *members, *others], 1)
+    first, last = components[0], components[-1]
+    every = (
+        f"choose a group ({', '.join(groups)}), one of its members such as compliance_{first} or frequency_1, an entry "
+        f"such as compliance_{first}_{last}, or one of {', '.join(others)}."
+    )
     return f'"{name}" is not a quantity; ' + (f"did you mean {near[0]}?" if near else every)
 
 
