@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -174,7 +174,7 @@ def on_page(
 
         calls: list[tuple[str, str, Any]] = []
         failed: BaseException | None = None
-        with recorded(calls), nothing_fails():
+        with closing(workshop), recorded(calls), nothing_fails():
             async with user_simulation(root=root) as user:
                 try:
                     await steps(await opened(user, calls))
@@ -182,7 +182,6 @@ def on_page(
                     failed = error
             if failed is not None:
                 raise failed
-        workshop.close()
 
     with TemporaryDirectory() as own:
         asyncio.run(run(Workshop(state or Path(own))))

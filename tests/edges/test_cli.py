@@ -67,7 +67,13 @@ REFUSED = [
     (["map", MACHINE, "--over", "x=0:1:3"], ["two --over", "sweep"]),
     (["map", MACHINE, "--over", "x=0:1:3", "--over", "x=0:1:3"], ["pose.x is varied twice"]),
     (["map", MACHINE, "--over", "x=0:1:3000", "--over", "z=0:1:3000"], ["9,000,000", "lower the counts"]),
-    (["map", MACHINE, "--over", "x=0:1:3", "--over", "z=0:1:3", "--quantity", "q"], ['"q" is not a quantity']),
+    (
+        ["map", MACHINE, "--over", "x=0:1:3", "--over", "z=0:1:3", "--quantity", "q"],
+        [
+            '"q" is not a quantity; choose a group (compliance, stiffness,',
+            "compliance_rx_z, or one of singularity_margin, ",
+        ],
+    ),
     (["sweep", MACHINE, "--vary", "x=0:1:3", "--quantity", "compliance_x_ry"], ["did you mean compliance_ry_x?"]),
 ]
 
