@@ -4,6 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from geometry import rotations, vectors
+from kinetostat.algebra.scalar import total, weighted
 from kinetostat.algebra.vector import Rotation
 
 LENGTH = 0.3
@@ -60,3 +61,9 @@ def compliance_at(compliance, offset) -> np.ndarray:
     """C [6 x 6] likewise."""
     there = np.block([[np.eye(3), np.zeros((3, 3))], [-cross(offset), np.eye(3)]])
     return there @ compliance @ there.T
+
+
+def leg_compliance(leg):
+    """G = W^T J_e S J_e^T W [m x m] of theory (3): W^T t = G lambda."""
+    size, springs = range(len(leg.wrenches)), list(zip(leg.compliance, leg.loads, strict=True))
+    return [[total([weighted(s, row[a] * row[b]) for s, row in springs]) for b in size] for a in size]

@@ -147,8 +147,6 @@ ZERO_LENGTH = 1e-9
 """Share of the characteristic length below which a length counts as zero, and no percent of it means anything."""
 ROUND_OFF_OF_ENTRY = 1e-12
 """Share of what an entry of a screw, of K or of C is compared with below which it is only round-off."""
-DEPENDENT_MOTIONS = 1e-9
-"""Relative singular value below which the motions of springs are dependent, where the rank of C or K is counted."""
 EQUAL_DESIGNS = 1e-9
 """Relative difference up to which a number is the same for two designs, so that neither is the better one."""
 EQUAL_ROUTES = 1e-9
@@ -184,29 +182,31 @@ PARALLEL_SEGMENTS = 1e-14
 common perpendicular has lost half of its digits and any point serves."""
 ZERO_PIVOT = 1e-100
 """Size below which a pivot counts as zero: the square of its inverse would overflow soon after."""
-DEPENDENT_COLUMN = 1e-24
-"""Square of 1e-12. Where less than this share of the square of a column is left once those before it are subtracted,
-the rest is round-off: cancellation leaves some hundred units of 1e-16, and the square of that."""
 
 # Statics of machines
 
 SINGULAR = 1e-6
 """Singularity margin below which a pose counts as singular: results have then lost six of their digits. A leg exactly
 at its limit comes out at the square root of a few units of round-off, 1e-8 to 3e-7, not at zero."""
-UNREACHED_COMPONENT = 1e-26
-"""Square of 1e-13: share of the largest component of a screw, squared, below which a rigid or free spring does not
-reach the other one. Without it, round-off times infinity would make entries of K or C infinite."""
+ROUND_OFF_OF_LOAD = 1e-9
+"""Share of the load that a wrench of its size can exert on a spring below which it exerts none: legs close up to
+`CLOSED`, and the screws of a leg are known to that and to a digit that its condition costs. Parts that are rigid by
+form carry such loads away from home, where they are 1e-12, and C would be wrong if they counted."""
+SURE_LOAD = 1e-6
+"""The same share above which a spring surely feels the load. Between the two nobody can say whether rigid parts share a
+load with it, and the answer says so; of a thousand random poses none lies there."""
+UNREACHED_COMPONENT = 1e-18
+"""Square of `ROUND_OFF_OF_LOAD`: share of the largest component of a screw, squared, below which a rigid or free spring
+does not reach the other one. Without it, round-off times infinity would make entries of K or C infinite."""
 DEPENDENT_LOADS = 1e-12
 """Sine of the angle between the loads of a leg's springs below which they are dependent up to round-off."""
 DEPENDENT_WRENCHES = 1e-9
 """Relative singular value below which wrenches of legs are dependent, where internal loads are counted."""
-RIGID_AGAINST_LOAD = 1e-12
-"""Share of the largest flexibility below which an internal load meets nothing that deflects."""
 ROUND_OFF_OF_ELEMENT = 1e-12
 """Share of what an element adds to an entry of C below which what the other elements add is only round-off."""
-ROUND_OFF_OF_COMPLIANCE = 1e-24
-"""Square of 1e-12: share of the other diagonal entries of C, made comparable by the length of the machine, below which
-one of them is the square of a rounding error and stands for 0."""
+ROUND_OFF_OF_COMPLIANCE = 1e-20
+"""Square of `CLOSED`: share of the other diagonal entries of C, made comparable by the length of the machine, below
+which one of them is the square of a rounding error and stands for 0."""
 ROUND_OFF_OF_EIGENVALUE = 1e-14
 """Share of the largest eigenvalue or singular value below which one stands for 0: some dozen units of round-off."""
 ROUND_OFF_OF_COMPLEMENT = 1e-12

@@ -43,8 +43,8 @@ def sparse_complement(a, b, c, d):
 
 
 def conjugate_columns(a, b, c):
-    columns, shares, pivots = conjugate([[a, 1.0, 0.0], [b, 0.0, c], [0.0, 1.0, c]], [2.0, a * a, 1.0])
-    return [*(entry for row in (*columns, *shares) for entry in row), *pivots]
+    found = conjugate([[a, 1.0, 0.0], [b, 0.0, c], [0.0, 1.0, c]], [2.0, a * a, 1.0], [5.0, 1.0, 2.0 + a])
+    return [*(entry for row in (*found.columns, *found.shares) for entry in row), *found.pivots, found.doubt]
 
 
 def triangle(x, z, first, second):

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastic import leg_compliance
 from kinetostat.kinematics.closing import why_out_of_reach
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.leg import leg_compliance
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import build, bundled
 from kinetostat.machine.parameters import parameters, values, with_values

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from elastic import leg_compliance
 from geometry import displacements, rotations, vectors
 from kinetostat.algebra.screw import force_along
 from kinetostat.algebra.vector import AXES, X_AXIS, Y_AXIS, Z_AXIS, ZERO, Vector
-from kinetostat.kinetostatics.leg import leg_compliance, relaxed
+from kinetostat.kinetostatics.leg import relaxed
 from kinetostat.machine.leg import Joint, Leg, Spring, reciprocal_wrenches, revolutes, two_force_leg
 from kinetostat.machine.link import Beam, Parallelogram, Rigidity
 from numeric import U, screw

@@ -48,6 +48,7 @@ def test_the_codes_of_a_status_are_those_of_saved_files():
         "singular": 3,
         "not_converged": 4,
         "no_rest": 5,
+        "undecided": 6,
     }
 
 
@@ -71,6 +72,9 @@ def test_every_status_has_its_own_sentence(status):
         (Status.OK, True, SINGULAR / 2, (False, True), Status.JOINT_LIMIT),
         (Status.OK, True, SINGULAR / 2, (True, False), Status.SINGULAR),
         (Status.OK, True, 1.0, (True, False), Status.JOINT_LIMIT),
+        (Status.OK, True, 1.0, (True, False, 1.0), Status.UNDECIDED),
+        (Status.OK, True, SINGULAR / 2, (True, True, 1.0), Status.SINGULAR),
+        (Status.OK, True, 1.0, (True, True, 0.0), Status.OK),
     ],
 )
 def test_the_most_fundamental_obstacle_comes_first(placed, reached, singularity_margin, limits, status):

@@ -27,7 +27,7 @@ SIX = [
 
 
 def legs_of(wrenches, singularity_margin=1.0):
-    return [LegScrews((), (), (), (wrench,), (), singularity_margin) for wrench in wrenches]
+    return [LegScrews((), (), (), (wrench,), (), (), singularity_margin) for wrench in wrenches]
 
 
 @pytest.mark.parametrize(

@@ -122,11 +122,16 @@ def test_complement_of_nothing_new_has_singularity_margin_zero():
 
 def conjugated(columns, weights):
     """A' [n x m], L [m x m] and d [m] as arrays."""
-    turned, shares, pivots = conjugate(columns.T.tolist(), weights.tolist())
-    factor = np.eye(len(pivots))
-    for k, row in enumerate(shares):
+    found = conjugate(columns.T.tolist(), weights.tolist(), bounds_of(columns))
+    factor = np.eye(len(found.pivots))
+    for k, row in enumerate(found.shares):
         factor[k, :k] = row
-    return np.array(turned).T, factor, np.array(pivots)
+    return np.array(found.columns).T, factor, np.array(found.pivots)
+
+
+def bounds_of(columns):
+    """The sizes that the components have here."""
+    return np.maximum(np.abs(columns).max(axis=1), 1e-30).tolist()
 
 
 @given(matrices(), st.integers(0, 6), st.lists(st.floats(-8, 8), min_size=6, max_size=6))
@@ -166,7 +171,8 @@ def test_least_energy_leaves_nothing_to_gain(rows, exponents):
     every = np.array(rows) + 2.0 * np.eye(len(rows))
     assume(len(every) > 1 and np.linalg.cond(every) < 1e4)
     weights = 10.0 ** np.array(exponents[: len(every)])
-    found = np.array(least_energy(every.T[:1].tolist(), every.T[1:].tolist(), weights.tolist()))[0]
+    left = least_energy(every.T[:1].tolist(), every.T[1:].tolist(), weights.tolist(), bounds_of(every))
+    found = np.array(left.columns)[0]
     mix = np.linalg.lstsq(every[:, 1:], found - every[:, 0], rcond=None)[0]
     assert np.allclose(every[:, 1:] @ mix, found - every[:, 0], rtol=0, atol=1e-9 * np.linalg.norm(every))
     roots = np.sqrt(weights)
@@ -176,27 +182,39 @@ def test_least_energy_leaves_nothing_to_gain(rows, exponents):
 
 
 def test_structural_zeros_survive_among_sparse_columns():
-    turned, shares, pivots = conjugate([[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [1.0, 0.0, 5.0]], [1.0, 1.0, 2.0])
-    assert turned == [[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 5.0]]
-    assert pivots == [4.0, 9.0, 50.0]
-    assert shares == [[], [0.0], [0.5, 0.0]]
-    assert is_zero(turned[1][0])
-    assert is_zero(turned[0][1])
+    columns = [[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [1.0, 0.0, 5.0]]
+    found = conjugate(columns, [1.0, 1.0, 2.0], [2.0, 3.0, 5.0])
+    assert found.columns == [[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 5.0]]
+    assert found.pivots == [4.0, 9.0, 50.0]
+    assert found.shares == [[], [0.0], [0.5, 0.0]]
+    assert is_zero(found.columns[1][0])
+    assert is_zero(found.columns[0][1])
+    assert found.doubt == 0.0
 
 
 @pytest.mark.parametrize("size", [1, 2, 3])
 def test_what_no_weight_sees_has_zero_pivots(size):
     """A rigid leg: G = 0."""
     columns = np.eye(size).tolist()
-    turned, shares, pivots = conjugate(columns, [0.0] * size)
-    assert turned == columns
-    assert pivots == [0.0] * size
-    assert not any(any(row) for row in shares)
+    found = conjugate(columns, [0.0] * size, [1.0] * size)
+    assert found.columns == columns
+    assert found.pivots == [0.0] * size
+    assert not any(any(row) for row in found.shares)
+    assert found.doubt == 0.0
 
 
 def test_components_without_a_weight_are_carried_along():
-    turned, _, _ = conjugate([[1.0, 10.0], [2.0, 50.0]], [3.0])
-    assert turned == [[1.0, 10.0], [0.0, 30.0]]
+    assert conjugate([[1.0, 10.0], [2.0, 50.0]], [3.0], [2.0]).columns == [[1.0, 10.0], [0.0, 30.0]]
+
+
+@pytest.mark.parametrize("contrast", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize(("load", "pivot", "doubt"), [(1e-12, False, 0.0), (1e-8, True, 1.0), (1e-5, True, 0.0)])
+def test_whether_a_weight_sees_a_column_is_a_question_of_geometry(load, pivot, doubt, contrast):
+    """Round-off of a rigid load is unseen whatever the weights, also where no column came before it."""
+    alone = conjugate([[load, 0.0]], [1.0, contrast], [1.0, 1.0])
+    assert (alone.pivots[0] > 0.0, alone.doubt) == (pivot, doubt)
+    after = conjugate([[1.0, 0.5], [2.0 + load, 1.0]], [1.0, contrast], [1.0, 1.0])
+    assert (after.pivots[1] > 0.0, after.doubt) == (pivot, doubt)
 
 
 @pytest.mark.parametrize("symmetric", [True, False])

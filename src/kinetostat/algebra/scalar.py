@@ -78,6 +78,11 @@ def smaller(a: Scalar, b: Scalar) -> Scalar:
     return where(a < b, a, b)
 
 
+def larger(a: Scalar, b: Scalar) -> Scalar:
+    """The larger of the two; `b` where either is NaN."""
+    return where(a > b, a, b)
+
+
 def reciprocal(a: Scalar) -> Scalar:
     """1 / a for a >= 0 with the ends of the scale exchanged exactly: 0 gives infinity, infinity gives 0."""
     if isinstance(a, float):

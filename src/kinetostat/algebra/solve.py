@@ -10,8 +10,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller, sqrt, total, weighted, where
-from kinetostat.tolerances import DEPENDENT_COLUMN, ZERO_PIVOT
+from kinetostat.algebra.scalar import Scalar, is_zero, larger, reciprocal, smaller, sqrt, total, weighted, where
+from kinetostat.tolerances import ROUND_OFF_OF_LOAD, SURE_LOAD, ZERO_PIVOT
 
 Row = list[Scalar]
 
@@ -166,52 +166,96 @@ def _reflect(column: Row, others: list[Row], rows: list[int]) -> None:
     column[rows[0]] = pivot
 
 
-def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar]) -> tuple[list[Row], list[Row], Row]:
-    """Find A', L and d with A = A' L^T and A'^T S A' = diag(d), L unit lower triangular, for A given by its columns.
+@dataclass(frozen=True)
+class Conjugated:
+    """A = A' L^T with A'^T S A' = diag(d): columns that S tells apart.
 
-    A^T S A = L diag(d) L^T is never formed, so that half as many digits are lost where weights differ much. If the part
-    of a column that is independent of those before it has no weight in S, up to round-off, its d is 0.
+    Attributes:
+        columns: of A'.
+        shares: rows of the unit lower triangular L below the diagonal; row k has k entries.
+        pivots: d >= 0, exactly 0 where S does not see a column beyond those before it.
+        doubt: 1 where some column is so nearly unseen that nobody can say whether it is, else 0.
+    """
+
+    columns: list[Row]
+    shares: list[Row]
+    pivots: Row
+    doubt: Scalar
+
+
+def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar], bounds: Sequence[Scalar]) -> Conjugated:
+    """Make the columns of A conjugate with the weights S, by Gram and Schmidt's method, one column after the other.
+
+    A^T S A = L diag(d) L^T is never formed, so that half as many digits are lost where weights differ much.
+
+    Whether S sees a column is a question of geometry: its components are compared with the size that they can have, and
+    not with the energies of others, so that no contrast of the weights decides it. Subtracting columns that were seen
+    before enlarges round-off, and this is followed. A column all of whose components are round-off is unseen
+    (`ROUND_OFF_OF_LOAD`); one whose components are neither round-off nor surely more (`SURE_LOAD`) is seen in doubt.
 
     Args:
         columns: of A; components beyond the weights have none and are carried along.
         weights: the diagonal of S, >= 0.
-
-    Returns:
-        Columns of A', rows of L below the diagonal (row k has k entries), and d >= 0.
+        bounds: for each weight, the size that its component of a column of unit size may have, > 0.
     """
     left = [list(column) for column in columns]
     shares: list[Row] = [[] for _ in left]
     pivots: Row = []
-    taken: Row = [0.0] * len(left)  # of a^T S a, what lies in the columns before
+    doubt: Scalar = 0.0
+    growth: Row = [1.0] * len(left)  # of round-off, by what was subtracted
+    scales = [reciprocal(bound * bound) for bound in bounds]
     for k, column in enumerate(left):
         felt = [weighted(w, c) for w, c in zip(weights, column, strict=False)]
         pivot = _product(felt, column)
-        alive = pivot > DEPENDENT_COLUMN * taken[k]
+        size = growth[k] * growth[k]
+        share_seen = _greatest_share(column, weights, scales)
+        alive = share_seen > ROUND_OFF_OF_LOAD * ROUND_OFF_OF_LOAD * size
+        unsure = where(share_seen > SURE_LOAD * SURE_LOAD * size, 0.0, 1.0)
+        doubt = larger(doubt, where(alive, unsure, 0.0))
         pivots.append(where(alive, pivot, 0.0))
         inverse = where(alive, reciprocal(where(alive, pivot, 1.0)), 0.0)
         for i in range(k + 1, len(left)):
-            shared = _product(felt, left[i])
-            share = weighted(shared, inverse)
+            share = weighted(_product(felt, left[i]), inverse)
             shares[i].append(share)
             left[i] = _less(left[i], share, column)
-            taken[i] = taken[i] + weighted(shared, share)
-    return left, shares, pivots
+            growth[i] = growth[i] + abs(share) * growth[k]
+    return Conjugated(left, shares, pivots, doubt)
+
+
+def _greatest_share(column: Sequence[Scalar], weights: Sequence[Scalar], scales: Sequence[Scalar]) -> Scalar:
+    """The square of the greatest component that has a weight, as a share of its bound."""
+    greatest: Scalar = 0.0
+    for component, weight, scale in zip(column, weights, scales, strict=False):
+        if not (is_zero(component) or is_zero(weight)):
+            greatest = larger(greatest, where(weight > 0.0, component * component * scale, 0.0))
+    return greatest
+
+
+@dataclass(frozen=True)
+class LeastEnergy:
+    """Columns of least energy; `doubt` as in `Conjugated`, of the internal columns."""
+
+    columns: list[Row]
+    doubt: Scalar
 
 
 def least_energy(
-    columns: Sequence[Sequence[Scalar]], internal: Sequence[Sequence[Scalar]], weights: Sequence[Scalar]
-) -> list[Row]:
+    columns: Sequence[Sequence[Scalar]],
+    internal: Sequence[Sequence[Scalar]],
+    weights: Sequence[Scalar],
+    bounds: Sequence[Scalar],
+) -> LeastEnergy:
     """Subtract from each column x the mix of the internal ones that makes x^T S x least; S as in `conjugate`.
 
-    Mixes of internal columns that have no weight in S are left as they are.
+    Mixes of internal columns that S does not see are left out: nothing that S weighs depends on them.
     """
-    modes, _, pivots = conjugate(internal, weights)
+    modes = conjugate(internal, weights, bounds)
     left = [list(column) for column in columns]
-    for mode, pivot in zip(modes, pivots, strict=True):
+    for mode, pivot in zip(modes.columns, modes.pivots, strict=True):
         inverse = where(pivot > 0.0, reciprocal(where(pivot > 0.0, pivot, 1.0)), 0.0)
         felt = [weighted(w, c) for w, c in zip(weights, mode, strict=True)]
         left = [_less(column, weighted(_product(felt, column), inverse), mode) for column in left]
-    return left
+    return LeastEnergy(left, modes.doubt)
 
 
 def _product(felt: Sequence[Scalar], column: Sequence[Scalar]) -> Scalar:

@@ -14,6 +14,7 @@ class Status(IntEnum):
     SINGULAR = 3
     NOT_CONVERGED = 4
     NO_REST = 5
+    UNDECIDED = 6
 
     @classmethod
     def _missing_(cls, value: object) -> "Status":
@@ -22,7 +23,7 @@ class Status(IntEnum):
 
     @property
     def word(self) -> str:
-        """As written in JSON and tables: ok, out_of_reach, joint_limit, singular, not_converged, no_rest."""
+        """As written in JSON and tables: ok, out_of_reach, joint_limit, singular, not_converged, no_rest, undecided."""
         return self.name.lower()
 
     @property
@@ -43,4 +44,8 @@ _SENTENCES = {
     "mode, of those that were tried; yet nothing shows that there is none. The pose may lie behind a singularity or in "
     "another assembly mode: move it nearer to the home pose, or write the machine down at a home pose nearer to it.",
     Status.NO_REST: "The machine comes to no rest under its loads: reduce them, or preload what only pulls.",
+    Status.UNDECIDED: "Rigid parts of several legs hold the platform against the same motion, but not exactly so: "
+    "their axes differ by more than round-off and by too little to count, so that it is undecided which of them share "
+    "a load. Write points and axes with all their digits, give a link or a bearing of each leg its stiffness, or move "
+    "the pose.",
 }

@@ -9,14 +9,14 @@ Source: theory (4)-(6) and (8)-(11). All screws, K and C are at one reference po
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinetostat.algebra.scalar import Scalar, reciprocal, total, where
+from kinetostat.algebra.scalar import Scalar, larger, reciprocal, total, where
 from kinetostat.algebra.screw import Screw, Twist, Wrench
 from kinetostat.algebra.solve import dual_basis, least_energy, right_inverse
 from kinetostat.algebra.symmetric import POSITIONS, SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.kinetostatics.leg import INFINITE, Action, Modes, combine, leg_modes, leg_resistance, modes_of, relaxed
 from kinetostat.machine.leg import LegScrews
-from kinetostat.tolerances import UNREACHED_COMPONENT
+from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, UNREACHED_COMPONENT
 
 NO_MOTION = Twist(ZERO, ZERO)
 
@@ -42,6 +42,8 @@ class Statics:
         length: characteristic length, m; rotations and translations compare through it where rounding is judged.
         singularity_margin: 0 where the wrenches do not span all six dimensions: the platform is free with
             locked actuators.
+        doubt: 1 where redundant legs are so nearly rigid against each other that nobody can say whether they are, and C
+            depends on it; else 0.
     """
 
     wrenches: tuple[tuple[Wrench, ...], ...]
@@ -54,6 +56,7 @@ class Statics:
     actions: tuple[Action, ...]
     length: Scalar
     singularity_margin: Scalar
+    doubt: Scalar = 0.0
 
 
 def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench] = ()) -> Statics:
@@ -80,6 +83,7 @@ def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
         tuple(mode for resistance in resistances for mode in resistance.modes),
         length,
         shared.singularity_margin,
+        shared.doubt,
     )
 
 
@@ -90,7 +94,7 @@ def compliance_of(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
         legs, guide: as for `solve_statics`.
         length: characteristic length, m.
     """
-    return weighted_sum(_shared(legs, length, guide).motions, reciprocal(length))
+    return without_round_off(weighted_sum(_shared(legs, length, guide).motions, reciprocal(length)), length)
 
 
 @dataclass(frozen=True)
@@ -102,6 +106,7 @@ class _Shared:
     flexibility: Sequence[Twist]
     motions: Sequence[Motion]
     singularity_margin: Scalar
+    doubt: Scalar
 
 
 def _shared(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) -> _Shared:
@@ -112,9 +117,9 @@ def _shared(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) 
     wrenches = [wrench for leg in balanced for wrench in leg.wrenches] + list(guide)
     if len(wrenches) == SIZE:
         twists, singularity_margin = dual_twists(wrenches, length)
-        rows = in_modes(modes, [twist.components() for twist in twists])
+        rows, doubt = in_modes(modes, [twist.components() for twist in twists]), 0.0
     else:
-        rows, singularity_margin = least_energy_rows(modes, wrenches, length)
+        rows, doubt, singularity_margin = least_energy_rows(modes, wrenches, length)
     sharing: list[tuple[Twist, ...]] = []
     flexibility: list[Twist] = []
     motions: list[Motion] = []
@@ -126,7 +131,7 @@ def _shared(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) 
         flexibility += felt
         # Springs in series: the fewest shares of C are those of the leg's modes; otherwise one per spring.
         motions += zip(*((shares, mode.compliance) if _in_series(leg) else (felt, leg.compliance)), strict=True)
-    return _Shared(modes, sharing, flexibility, motions, singularity_margin)
+    return _Shared(modes, sharing, flexibility, motions, singularity_margin, doubt)
 
 
 def _in_series(leg: LegScrews) -> bool:
@@ -155,7 +160,27 @@ def compliance_matrix(statics: Statics) -> Symmetric6:
 
     Source: theory (6) and (10), eq. 21 extended to flexible links.
     """
-    return weighted_sum(statics.motions, reciprocal(statics.length))
+    return without_round_off(weighted_sum(statics.motions, reciprocal(statics.length)), statics.length)
+
+
+def without_round_off(compliance: Symmetric6, length: Scalar) -> Symmetric6:
+    """C with exact zeros in the rows and columns of components that rigid parts hold.
+
+    A component that nothing can move comes out as the square of round-off, and no inverse must be taken of that.
+
+    Args:
+        compliance: C at any point (rad, m per N·m, N).
+        length: characteristic length, m, through which rotations and translations compare.
+    """
+    area = length * length
+    turns, moves = (total([compliance.entry(i, i) for i in rows]) for rows in (range(3), range(3, SIZE)))
+    sizes = [turns + reciprocal(area) * moves, moves + area * turns]
+    limits = [where(size < INFINITE, ROUND_OFF_OF_COMPLIANCE * size, 0.0) for size in sizes]
+    moved = [compliance.entry(i, i) > limits[i // 3] for i in range(SIZE)]
+    entries = []
+    for entry, (i, j) in zip(compliance.upper, POSITIONS, strict=True):
+        entries.append(where(moved[i], where(moved[j], entry, 0.0), 0.0))
+    return Symmetric6(tuple(entries))
 
 
 def stiffness_matrix(statics: Statics) -> Symmetric6:
@@ -193,7 +218,7 @@ def dual_twists(wrenches: Sequence[Wrench], length: Scalar) -> tuple[list[Twist]
 
 def least_energy_rows(
     modes: Sequence[Modes], wrenches: Sequence[Wrench], length: Scalar
-) -> tuple[list[tuple[Scalar, ...]], Scalar]:
+) -> tuple[list[tuple[Scalar, ...]], Scalar, Scalar]:
     """Share a load among legs that carry more than six wrenches: of all balances, that of least elastic energy.
 
     lambda = W+ w + N z with W N = 0 and lambda^T G lambda least (force method). Where rigid parts leave z undecided, no
@@ -205,18 +230,25 @@ def least_energy_rows(
         length: m, scales rows.
 
     Returns:
-        Amounts of the modes per unit platform wrench [wrenches x 6], and the singularity margin of W.
+        Amounts of the modes per unit platform wrench [wrenches x 6]; the doubt as in `Statics`; and the singularity
+        margin of W.
     """
     shrink = reciprocal(length)
     columns = [Wrench(wrench.rotational * shrink, wrench.translational).components() for wrench in wrenches]
     if len(wrenches) < SIZE:
-        return [NO_MOTION.components()] * len(wrenches), 0.0
+        return [NO_MOTION.components()] * len(wrenches), 0.0, 0.0
     balance, internal, singularity_margin = right_inverse([list(row) for row in zip(*columns, strict=True)])
     compliance = [d for leg in modes for d in leg.compliance]
     every, null = (in_modes(modes, rows) for rows in (balance, [*zip(*internal, strict=True)]))
-    weights = compliance + [0.0] * (len(wrenches) - len(compliance))
-    shared = least_energy([*zip(*every, strict=True)], [*zip(*null, strict=True)], weights)
-    return [(*(c * shrink for c in row[:3]), *row[3:]) for row in zip(*shared, strict=True)], singularity_margin
+    guides = len(wrenches) - len(compliance)
+    weights = compliance + [0.0] * guides
+    bounds = [bound for leg in modes for bound in leg.bounds()] + [1.0] * guides
+    shared = least_energy([*zip(*every, strict=True)], [*zip(*null, strict=True)], weights, bounds)
+    doubt = shared.doubt
+    for leg in modes:
+        doubt = larger(doubt, leg.doubt)
+    rows = [(*(c * shrink for c in row[:3]), *row[3:]) for row in zip(*shared.columns, strict=True)]
+    return rows, doubt, singularity_margin
 
 
 def weighted_sum(shares: Sequence[tuple[Screw, Scalar]], length: Scalar) -> Symmetric6:

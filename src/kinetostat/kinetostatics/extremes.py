@@ -16,7 +16,6 @@ from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
 from kinetostat.kinetostatics.response import Response, actuator_loads
 from kinetostat.machine.leg import Leg, comparable
 from kinetostat.machine.rods import rods
-from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE
 
 ROTATIONS, TRANSLATIONS = range(3), range(3, 6)
 SPACE = 3
@@ -36,15 +35,9 @@ def free_stiffness(response: Response, row: int) -> Scalar:
         row: of rx ry rz x y z = 0 ... 5.
 
     Returns:
-        0 where the direction is free, infinity where nothing deflects in it, up to round-off.
+        0 where the direction is free, infinity where nothing deflects in it.
     """
-    soft, length = response.compliance.entry(row, row), response.configuration.length
-    turns = total([response.compliance.entry(i, i) for i in ROTATIONS])
-    moves = total([response.compliance.entry(i, i) for i in TRANSLATIONS])
-    area = length * length
-    size = turns + reciprocal(area) * moves if row in ROTATIONS else moves + area * turns
-    least = where(size < math.inf, ROUND_OFF_OF_COMPLIANCE * size, 0.0)
-    return where(soft > least, reciprocal(soft), math.inf)
+    return reciprocal(response.compliance.entry(row, row))
 
 
 def least_stiffness(response: Response, block: Sequence[int]) -> Scalar:

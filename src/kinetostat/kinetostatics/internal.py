@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.algebra.screw import Wrench
-from kinetostat.kinetostatics.leg import leg_compliance, relaxed
+from kinetostat.kinetostatics.leg import relaxed
 from kinetostat.machine.leg import LegScrews
-from kinetostat.tolerances import DEPENDENT_WRENCHES, RIGID_AGAINST_LOAD
+from kinetostat.tolerances import DEPENDENT_WRENCHES, ROUND_OFF_OF_LOAD
 
 Array = npt.NDArray[np.float64]
 
@@ -58,24 +58,29 @@ def internal_loads(
     sizes = np.linalg.norm(matrix, axis=0)
     _, values, rows = np.linalg.svd(matrix / sizes)
     internal = (rows[int((values > DEPENDENT_WRENCHES * values[0]).sum()) :] / sizes).T[: len(owners)]
-    flexibility = _block_diagonal([np.array(leg_compliance(leg), dtype=float) for leg in balanced])
-    energy = internal.T @ flexibility @ internal
-    amounts, modes = np.linalg.eigh(energy) if internal.shape[1] else (np.zeros(0), np.zeros((0, 0)))
-    stiff = amounts <= RIGID_AGAINST_LOAD * max(np.abs(flexibility).max(initial=0.0), 1e-300)
-    undecided = internal @ modes[:, stiff]
+    _, seen, modes = np.linalg.svd(_seen(balanced) @ internal)
+    decided = int((seen > ROUND_OFF_OF_LOAD).sum())
+    undecided = internal @ modes[decided:].T
     return InternalLoads(
-        internal.shape[1], int(stiff.sum()), _involved(names, owners, internal), _involved(names, owners, undecided)
+        internal.shape[1],
+        internal.shape[1] - decided,
+        _involved(names, owners, internal),
+        _involved(names, owners, undecided),
     )
 
 
-def _block_diagonal(blocks: Sequence[Array]) -> Array:
-    size = sum(len(block) for block in blocks)
-    whole = np.zeros((size, size))
+def _seen(legs: Sequence[LegScrews]) -> Array:
+    """Loads in the springs that deflect, as shares of what they may be, per unit of the wrenches of all legs."""
+    rows: list[Array] = []
+    every = sum(len(leg.wrenches) for leg in legs)
     at = 0
-    for block in blocks:
-        whole[at : at + len(block), at : at + len(block)] = block
-        at += len(block)
-    return whole
+    for leg in legs:
+        for loads, compliance, bound in zip(leg.loads, leg.compliance, leg.bounds, strict=True):
+            if compliance > 0.0:
+                rows.append(np.zeros(every))
+                rows[-1][at : at + len(loads)] = np.array(loads, dtype=float) / float(bound)
+        at += len(leg.wrenches)
+    return np.array(rows).reshape(-1, every)
 
 
 def _involved(names: Sequence[str], owners: npt.NDArray[np.int64], loads: Array) -> tuple[str, ...]:

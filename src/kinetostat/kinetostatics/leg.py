@@ -26,15 +26,6 @@ Action = tuple[Wrench, Scalar]
 """A wrench b (N·m, N per N or N·m of load) and a stiffness k (N/m or N·m/rad): the share k b b^T of a leg in K."""
 
 
-def leg_compliance(leg: LegScrews) -> list[list[Scalar]]:
-    """G = W^T J_e S J_e^T W [m x m], symmetric and >= 0: W^T t = G lambda.
-
-    Source: theory (3). Zero for a rigid leg; infinite where a free spring is loaded.
-    """
-    size, springs = range(len(leg.wrenches)), list(zip(leg.compliance, leg.loads, strict=True))
-    return [[total([weighted(s, row[a] * row[b]) for s, row in springs]) for b in size] for a in size]
-
-
 def relaxed(leg: LegScrews) -> LegScrews:
     """Turn the free springs of a leg into passive joints: it then carries only wrenches that load none of them.
 
@@ -115,29 +106,38 @@ class Modes:
         loads: load in each spring of the leg per unit of each of them.
         compliance: d with G = L diag(d) L^T.
         shares: rows of L, unit lower triangular, below the diagonal.
+        doubt: 1 where nobody can say whether the leg deflects under one of them at all, else 0.
     """
 
     wrenches: tuple[Wrench, ...]
     loads: tuple[tuple[Scalar, ...], ...]
     compliance: tuple[Scalar, ...]
     shares: tuple[tuple[Scalar, ...], ...]
+    doubt: Scalar = 0.0
 
     def amounts(self, amounts: Sequence[Scalar]) -> list[Scalar]:
         """Return the amounts of the modes in a load given by amounts of the leg's wrenches: L^T times these."""
         size = range(len(amounts))
         return [amounts[k] + total([self.shares[j][k] * amounts[j] for j in size if j > k]) for k in size]
 
+    def bounds(self) -> list[Scalar]:
+        """The amount of each mode that no load of unit size exceeds, measured by the leg's own wrenches."""
+        size = range(len(self.wrenches))
+        return [sqrt(1.0 + total([self.shares[j][k] * self.shares[j][k] for j in size if j > k])) for k in size]
+
 
 def modes_of(leg: LegScrews) -> Modes:
     """The modes of a leg; each is one of its wrenches less a mix of those before."""
     springs = len(leg.loads)
     columns = [(*(row[k] for row in leg.loads), *wrench.components()) for k, wrench in enumerate(leg.wrenches)]
-    combined, shares, pivots = conjugate(columns, leg.compliance)
+    modes = conjugate(columns, leg.compliance, leg.bounds)
+    combined = modes.columns
     return Modes(
         tuple(Wrench(Vector(*column[springs : springs + 3]), Vector(*column[springs + 3 :])) for column in combined),
         tuple(tuple(column[e] for column in combined) for e in range(springs)),
-        tuple(pivots),
-        tuple(tuple(row) for row in shares),
+        tuple(modes.pivots),
+        tuple(tuple(row) for row in modes.shares),
+        modes.doubt,
     )
 
 

@@ -101,12 +101,19 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
         stiffness_matrix(statics),
         compliance_matrix(statics),
         singularity_margin,
-        pose_status(joints.status, reached, singularity_margin, within(geometric), within(loaded)),
+        pose_status(joints.status, reached, singularity_margin, within(geometric), within(loaded), statics.doubt),
         machine.load_at(configuration.platform),
         (*geometric, *loaded),
         moving_mass(machine, configuration),
         joints.status,
-        pose_status(joints.status, reached, singularity_margin if loaded else 1.0, within(geometric), within(loaded)),
+        pose_status(
+            joints.status,
+            reached,
+            singularity_margin if loaded else 1.0,
+            within(geometric),
+            within(loaded),
+            statics.doubt if loaded else 0.0,
+        ),
     )
 
 
@@ -145,7 +152,12 @@ def _out_of_plane(configuration: Configuration, reference: Vector) -> tuple[tupl
 
 
 def pose_status(
-    placed: Scalar, reached: Scalar, singularity_margin: Scalar, allowed: Scalar = True, borne: Scalar = True
+    placed: Scalar,
+    reached: Scalar,
+    singularity_margin: Scalar,
+    allowed: Scalar = True,
+    borne: Scalar = True,
+    doubt: Scalar = 0.0,
 ) -> Scalar:
     """Status code of a pose, the most fundamental obstacle first; a singularity margin of NaN counts as singular.
 
@@ -155,9 +167,11 @@ def pose_status(
         singularity_margin: of the pose.
         allowed: whether the limits of geometry are kept.
         borne: whether the actuators bear the load, which means something where the pose is regular.
+        doubt: 1 where it is undecided which rigid parts share a load, else 0.
     """
     bearable = where(borne, int(Status.OK), int(Status.JOINT_LIMIT))
-    solvable = where(singularity_margin > SINGULAR, bearable, int(Status.SINGULAR))
+    decided = where(doubt > 0.5, int(Status.UNDECIDED), bearable)
+    solvable = where(singularity_margin > SINGULAR, decided, int(Status.SINGULAR))
     possible = where(allowed, solvable, int(Status.JOINT_LIMIT))
     return where(placed > Status.OK + 0.5, placed, where(reached, possible, int(Status.OUT_OF_REACH)))
 

@@ -238,6 +238,7 @@ class LegScrews:
         compliance: of each spring (diagonal of S): 0 rigid, infinity free; m/N or rad/(N·m).
         wrenches: basis of what the leg can carry (W): no work on any passive twist.
         loads: load in each spring per unit of each wrench (J_e^T W).
+        bounds: load in each spring that no unit wrench exceeds, moments over the characteristic length (N, N·m).
         singularity_margin: 0 where the passive joints lock up, 1 where they are orthogonal (dimensionless).
     """
 
@@ -246,6 +247,7 @@ class LegScrews:
     compliance: tuple[Scalar, ...]
     wrenches: tuple[Wrench, ...]
     loads: tuple[tuple[Scalar, ...], ...]
+    bounds: tuple[Scalar, ...]
     singularity_margin: Scalar
 
 
@@ -347,6 +349,7 @@ class Leg:
             compliance=tuple(reciprocal(spring.stiffness) for spring in self.springs),
             wrenches=wrenches,
             loads=tuple(self._loads(s, twist, wrenches) for s, twist in zip(self.springs, elastic, strict=True)),
+            bounds=tuple(twist.greatest_work(length) for twist in elastic),
             singularity_margin=singularity_margin,
         )
 
@@ -363,10 +366,7 @@ class Leg:
 def felt(wrench: Wrench, twist: Twist) -> Scalar:
     """The work of a wrench on the twist of a free spring, exactly 0 where it is only round-off.
 
-    A free spring gives way to any load at all, so that round-off would move it without end.
-
-    Args:
-        wrench, twist: at one point, in the same axes.
+    A free spring gives way to any load at all, so that round-off would move it without end. Both are at one point.
     """
     turning = wrench.rotational.norm() * twist.rotational.norm()
     size = turning + wrench.translational.norm() * twist.translational.norm()

@@ -18,7 +18,7 @@ from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import IDENTITY, Rotation
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.mobility import Mobility, mobility
-from kinetostat.kinematics.singularity import actuator_jacobian, conditioning, describe, independent
+from kinetostat.kinematics.singularity import actuator_jacobian, columns, conditioning, describe, independent
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, stiffness_matrix
 from kinetostat.kinetostatics.conditioning import twist_condition
@@ -40,7 +40,7 @@ from kinetostat.studies.loads import LoadCase, load_case
 from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
 from kinetostat.studies.refusal import why_not
 from kinetostat.studies.rounding import clean_matrix, clean_statics
-from kinetostat.tolerances import DEPENDENT_MOTIONS
+from kinetostat.tolerances import ROUND_OFF_OF_LOAD
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -247,7 +247,7 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
         compliance=compliance_rows,
         stiffness_diagonal=tuple(stiffness.entry(i, i) for i in kept),
         compliance_diagonal=tuple(compliance.entry(i, i) for i in kept),
-        rank=_rank(statics, compliance_rows is None),
+        rank=_rank(response, statics, compliance_rows is None),
         rigid=rigid,
         free=free,
         attribution=contributions(all_springs, statics, stiffness, compliance, kept),
@@ -316,17 +316,23 @@ def _turned(statics: Statics, turn: Rotation) -> Statics:
     )
 
 
-def _rank(statics: Statics, compliance_infinite: bool) -> int:
+def _rank(response: Response, statics: Statics, compliance_infinite: bool) -> int:
     """Rank of C, or of K where C is not finite.
 
-    The rank of a sum over springs is the number of their independent screws. These are counted at unit size, so that a
-    spring that is much softer than another cannot hide it.
+    The rank of a sum over springs is the number of their independent screws. They are counted at the size that they may
+    have, so that a spring that is much softer than another cannot hide it, and round-off does not count.
     """
+    length = float(statics.length)
     if compliance_infinite:
         wrenches: list[Screw] = [wrench for wrench, k in statics.actions if k > 0.0]
-        return independent(wrenches, statics.length, DEPENDENT_MOTIONS)
-    twists: list[Screw] = [twist for twist, s in statics.motions if s > 0.0]
-    return independent(twists, 1.0 / statics.length, DEPENDENT_MOTIONS)
+        return independent(wrenches, length, ROUND_OFF_OF_LOAD)
+    bounds = [bound for leg in response.legs for bound in leg.bounds]
+    greatest = np.linalg.norm(columns([twist for leg in statics.sharing for twist in leg], 1.0, 1.0 / length))
+    springs = zip(statics.flexibility, statics.compliance, bounds, strict=True)
+    twists = [twist * (1.0 / (float(bound) * greatest)) for twist, s, bound in springs if s > 0.0]
+    if not twists:
+        return 0
+    return int((np.linalg.svd(columns(twists, 1.0, 1.0 / length), compute_uv=False) > ROUND_OFF_OF_LOAD).sum())
 
 
 def _message(

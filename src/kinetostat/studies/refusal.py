@@ -35,6 +35,8 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
         return why_out_of_reach(configuration)
     if status is Status.JOINT_LIMIT:
         return why_beyond(response.checks, machine.display)
+    if status is Status.UNDECIDED:
+        return status.sentence
     motion = _mobility(response, nearby)
     if motion and not nearby and _locked_joints(configuration) < motion.full_cycle:
         return _lacks_actuators(configuration, motion)

@@ -13,7 +13,7 @@ import numpy as np
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Array, Axis, Grid
 from kinetostat.kinematics.singularity import free_twist
-from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.common_tables import Load
@@ -81,9 +81,9 @@ def picture(request: PictureRequest) -> Picture:
 
 
 def _drawable(status: Status, response: Response) -> bool:
-    """Return whether a pose without an answer has a picture: singular or past a limit, but each joint has its place."""
+    """Return whether a pose without an answer has a picture: each joint has its place."""
     points = [c for leg in response.configuration.legs for p in leg.path for c in p.components()]
-    return status in (Status.SINGULAR, Status.JOINT_LIMIT) and all(math.isfinite(c) for c in points)
+    return status not in PLACELESS and all(math.isfinite(c) for c in points)
 
 
 def _with_free_twist(scene: Scene, response: Response, sizes: Proportions) -> Scene:
@@ -137,7 +137,7 @@ class Report:
 def report(request: ReportRequest) -> Report:
     """Analyse the machine at its pose and make the solids that are drawn over it."""
     analysis = analyze(request.machine)
-    unplaced = analysis.status in (Status.OUT_OF_REACH, Status.NOT_CONVERGED)
+    unplaced = analysis.status in PLACELESS
     placed = () if unplaced else respond(request.machine).configuration.legs
     legs = {str(spring.of): leg.name for leg in placed for spring in leg.springs}
     loaded, refused = _at_rest(request.machine) if request.machine.loaded else (None, "")

@@ -40,7 +40,7 @@ from kinetostat.views.figures import (
 from kinetostat.views.grid_tables import display_of
 from kinetostat.views.usual_values import WIDE, usual_range
 
-SHADES = ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#d9c79a", "#e3bcd1")
+SHADES = ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#d9c79a", "#c9c0d9", "#e3bcd1")
 KNOWN = dict(zip([*PLAIN.values(), BEYOND], SHADES, strict=True))
 """Colours of verdicts that need no limit and no condition."""
 LIMITED = ("#f2c77a", "#eea27a", "#f3ea9a", "#d8b98a", "#e7d3b5", "#c9a27e", "#f5dfa8", "#dcae92", "#cfc08a")

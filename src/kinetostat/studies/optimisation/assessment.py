@@ -32,7 +32,7 @@ Codes = npt.NDArray[np.int8]
 
 
 class Verdict(IntEnum):
-    """Why a design is or is not feasible; up to `NOT_CONVERGED` as the `Status` of the poses that it lacks."""
+    """Why a design is or is not feasible."""
 
     FEASIBLE = 0
     OUT_OF_REACH = 1
@@ -41,6 +41,8 @@ class Verdict(IntEnum):
     NOT_CONVERGED = 4
     CONSTRAINT = 5
     NOT_FINITE = 6
+    NO_REST = 7
+    UNDECIDED = 8
 
     @property
     def phrase(self) -> str:
@@ -48,6 +50,10 @@ class Verdict(IntEnum):
         return {5: "a constraint is violated", 6: "an objective is infinite"}.get(
             self.value, self.name.lower().replace("_", " ")
         )
+
+
+OF_STATUS = np.array([Verdict.FEASIBLE, *(Verdict[status.name] for status in Status if status)])
+"""The verdict on a design by the status of the poses that it lacks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +150,7 @@ def _verdicts(problem: Problem, objectives: Array, constraints: Array, status: C
     counts = np.stack([(status == code).sum(axis=1) for code in Status])
     missing = problem.poses.required - counts[0] / status.shape[1]
     lacking = (missing > 1e-12) | (counts[0] == 0)
-    verdict[lacking] = counts[1:, lacking].argmax(axis=0) + 1
+    verdict[lacking] = OF_STATUS[counts[1:, lacking].argmax(axis=0) + 1]
     violation[lacking] = most + 2.0 + missing[lacking]
     known = np.where(lacking[:, None], np.nan, objectives)
     return Outcome(known, constraints, violation, verdict.astype(np.int8))

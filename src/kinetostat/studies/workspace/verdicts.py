@@ -35,6 +35,7 @@ PLAIN = {
     Status.SINGULAR: "singular",
     Status.NOT_CONVERGED: "not converged",
     Status.NO_REST: "no rest under load",
+    Status.UNDECIDED: "undecided",
 }
 """Verdicts of statuses; for a limit that is passed, the verdict names the limit."""
 LIMIT, FAILS = "limits.", "fails "

@@ -20,7 +20,7 @@ BED = 4.5
 """Depth of a rail's bed below its carriage's joint, in radii of its leg."""
 FRAME = 0.11
 """Length of a frame's axes as a share of the machine's diagonal."""
-DRAWN = (Status.OK, Status.JOINT_LIMIT, Status.SINGULAR)
+DRAWN = (Status.OK, Status.JOINT_LIMIT, Status.SINGULAR, Status.UNDECIDED)
 """Status of poses at which every part has a place."""
 
 
