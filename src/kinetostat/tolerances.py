@@ -91,6 +91,10 @@ NO_FREEDOM = 1e-7
 
 # Equilibrium under load
 
+OPEN_BY_STEP = 30.0
+"""Times the gap of the closing equations up to which conditions are dependent: Newton's steps open legs by the square
+of their length, and the screws of redundant legs then differ by some of that."""
+
 AT_REST = 1e-10
 """Motion in one of Newton's steps, rad or in units of the machine's length, below which steps converge quadratically or
 are round-off: the next one is the square of it."""
@@ -100,9 +104,9 @@ UNMOVED_TOOL = 1e-13
 tenth of a picometre of a metre, and what round-off leaves of a rigid machine."""
 BALANCED = 1e-9
 """Share of the load that may be left over where tensions are chosen: least squares keep some twelve digits."""
-STIFFEST_LEG = 1e9
-"""Stiffness of a leg, in units of the typical one of the machine's springs, beyond which it counts as rigid: the sum of
-all legs keeps seven digits."""
+STIFFEST_LEG = 1e6
+"""Stiffness of a leg, in units of the typical one of the machine's springs, beyond which it counts as rigid where legs
+are eliminated: the sum of all legs keeps ten digits."""
 UNRESISTED = 1e-12
 """Share of the largest singular value or stiffness below which a motion meets no condition, or no spring."""
 
@@ -188,15 +192,15 @@ ZERO_PIVOT = 1e-100
 SINGULAR = 1e-6
 """Singularity margin below which a pose counts as singular: results have then lost six of their digits. A leg exactly
 at its limit comes out at the square root of a few units of round-off, 1e-8 to 3e-7, not at zero."""
-ROUND_OFF_OF_LOAD = 1e-9
-"""Share of the load that a wrench of its size can exert on a spring below which it exerts none: legs close up to
-`CLOSED`, and the screws of a leg are known to that and to a digit that its condition costs. Parts that are rigid by
-form carry such loads away from home, where they are 1e-12, and C would be wrong if they counted."""
-SURE_LOAD = 1e-6
-"""The same share above which a spring surely feels the load. Between the two nobody can say whether rigid parts share a
-load with it, and the answer says so; of a thousand random poses none lies there."""
+CLOSING_ROUND_OFF = 1e-9
+"""Share of a unit screw, or of the load that it can exert on a spring, below which the rest is round-off: legs close up
+to `CLOSED`, and their condition costs a digit. Away from home, rigid parts that hold the same motion differ by some
+1e-12, and C would be wrong if that counted."""
+SURELY_MORE = 1e-6
+"""The same share above which it is surely more. Between the two nobody can say whether rigid parts share a load, and
+the answer says so; of a thousand random poses none lies there."""
 UNREACHED_COMPONENT = 1e-18
-"""Square of `ROUND_OFF_OF_LOAD`: share of the largest component of a screw, squared, below which a rigid or free spring
+"""Square of `CLOSING_ROUND_OFF`: share of the largest component of a screw, squared, below which a rigid or free spring
 does not reach the other one. Without it, round-off times infinity would make entries of K or C infinite."""
 DEPENDENT_LOADS = 1e-12
 """Sine of the angle between the loads of a leg's springs below which they are dependent up to round-off."""

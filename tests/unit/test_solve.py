@@ -122,16 +122,16 @@ def test_complement_of_nothing_new_has_singularity_margin_zero():
 
 def conjugated(columns, weights):
     """A' [n x m], L [m x m] and d [m] as arrays."""
-    found = conjugate(columns.T.tolist(), weights.tolist(), bounds_of(columns))
+    found = conjugate(columns.T.tolist(), weights.tolist(), sizes_of(columns))
     factor = np.eye(len(found.pivots))
     for k, row in enumerate(found.shares):
         factor[k, :k] = row
     return np.array(found.columns).T, factor, np.array(found.pivots)
 
 
-def bounds_of(columns):
-    """The sizes that the components have here."""
-    return np.maximum(np.abs(columns).max(axis=1), 1e-30).tolist()
+def sizes_of(columns):
+    """Squares of the sizes that the components have here."""
+    return np.maximum(np.square(columns).max(axis=1), 1e-60).tolist()
 
 
 @given(matrices(), st.integers(0, 6), st.lists(st.floats(-8, 8), min_size=6, max_size=6))
@@ -171,7 +171,7 @@ def test_least_energy_leaves_nothing_to_gain(rows, exponents):
     every = np.array(rows) + 2.0 * np.eye(len(rows))
     assume(len(every) > 1 and np.linalg.cond(every) < 1e4)
     weights = 10.0 ** np.array(exponents[: len(every)])
-    left = least_energy(every.T[:1].tolist(), every.T[1:].tolist(), weights.tolist(), bounds_of(every))
+    left = least_energy(every.T[:1].tolist(), every.T[1:].tolist(), weights.tolist(), sizes_of(every))
     found = np.array(left.columns)[0]
     mix = np.linalg.lstsq(every[:, 1:], found - every[:, 0], rcond=None)[0]
     assert np.allclose(every[:, 1:] @ mix, found - every[:, 0], rtol=0, atol=1e-9 * np.linalg.norm(every))
@@ -183,7 +183,7 @@ def test_least_energy_leaves_nothing_to_gain(rows, exponents):
 
 def test_structural_zeros_survive_among_sparse_columns():
     columns = [[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [1.0, 0.0, 5.0]]
-    found = conjugate(columns, [1.0, 1.0, 2.0], [2.0, 3.0, 5.0])
+    found = conjugate(columns, [1.0, 1.0, 2.0], [4.0, 9.0, 25.0])
     assert found.columns == [[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 5.0]]
     assert found.pivots == [4.0, 9.0, 50.0]
     assert found.shares == [[], [0.0], [0.5, 0.0]]

@@ -9,7 +9,7 @@ and 2.5. Axes are whatever the caller's are; every function names the point at w
 from dataclasses import dataclass
 from typing import Self
 
-from kinetostat.algebra.scalar import Scalar, is_zero, sqrt
+from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import ZERO, Rotation, Vector
 
 COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")
@@ -49,12 +49,10 @@ class Twist(Screw):
         """The same motion referred to the point at `offset` (m) from the present one: v' = v + omega x offset."""
         return Twist(self.rotational, self.translational + self.rotational.cross(offset))
 
-    def greatest_work(self, length: Scalar) -> Scalar:
-        """The most work of any unit wrench on a unit twist, moments divided by `length` (m); 1 on a translation."""
-        if all(is_zero(c) for c in self.rotational.components()):
-            return 1.0
-        turning = self.rotational.norm() * length
-        return sqrt(turning * turning + self.translational.dot(self.translational))
+    @property
+    def slides(self) -> bool:
+        """Whether it is a pure translation by form."""
+        return all(is_zero(c) for c in self.rotational.components())
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kinetostat.algebra.scalar import Scalar, is_zero, larger, reciprocal, smaller, sqrt, total, weighted, where
-from kinetostat.tolerances import ROUND_OFF_OF_LOAD, SURE_LOAD, ZERO_PIVOT
+from kinetostat.tolerances import CLOSING_ROUND_OFF, SURELY_MORE, ZERO_PIVOT
 
 Row = list[Scalar]
 
@@ -174,16 +174,18 @@ class Conjugated:
         columns: of A'.
         shares: rows of the unit lower triangular L below the diagonal; row k has k entries.
         pivots: d >= 0, exactly 0 where S does not see a column beyond those before it.
+        inverses: 1/d, and 0 where d is 0.
         doubt: 1 where some column is so nearly unseen that nobody can say whether it is, else 0.
     """
 
     columns: list[Row]
     shares: list[Row]
     pivots: Row
+    inverses: Row
     doubt: Scalar
 
 
-def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar], bounds: Sequence[Scalar]) -> Conjugated:
+def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar], squares: Sequence[Scalar]) -> Conjugated:
     """Make the columns of A conjugate with the weights S, by Gram and Schmidt's method, one column after the other.
 
     A^T S A = L diag(d) L^T is never formed, so that half as many digits are lost where weights differ much.
@@ -191,44 +193,48 @@ def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar], bo
     Whether S sees a column is a question of geometry: its components are compared with the size that they can have, and
     not with the energies of others, so that no contrast of the weights decides it. Subtracting columns that were seen
     before enlarges round-off, and this is followed. A column all of whose components are round-off is unseen
-    (`ROUND_OFF_OF_LOAD`); one whose components are neither round-off nor surely more (`SURE_LOAD`) is seen in doubt.
+    (`CLOSING_ROUND_OFF`); one whose components are neither round-off nor surely more (`SURELY_MORE`) is seen in doubt.
 
     Args:
         columns: of A; components beyond the weights have none and are carried along.
         weights: the diagonal of S, >= 0.
-        bounds: for each weight, the size that its component of a column of unit size may have, > 0.
+        squares: for each weight, the square of the size that its component of a column of unit size may have, > 0; its
+            order of magnitude counts.
     """
     left = [list(column) for column in columns]
     shares: list[Row] = [[] for _ in left]
     pivots: Row = []
+    inverses: Row = []
     doubt: Scalar = 0.0
     growth: Row = [1.0] * len(left)  # of round-off, by what was subtracted
-    scales = [reciprocal(bound * bound) for bound in bounds]
+    scales = [reciprocal(square) for square in squares]
     for k, column in enumerate(left):
         felt = [weighted(w, c) for w, c in zip(weights, column, strict=False)]
         pivot = _product(felt, column)
         size = growth[k] * growth[k]
-        share_seen = _greatest_share(column, weights, scales)
-        alive = share_seen > ROUND_OFF_OF_LOAD * ROUND_OFF_OF_LOAD * size
-        unsure = where(share_seen > SURE_LOAD * SURE_LOAD * size, 0.0, 1.0)
+        seen = _share_seen(column, weights, scales)
+        alive = seen > CLOSING_ROUND_OFF * CLOSING_ROUND_OFF * size
+        unsure = where(seen > SURELY_MORE * SURELY_MORE * size, 0.0, 1.0)
         doubt = larger(doubt, where(alive, unsure, 0.0))
         pivots.append(where(alive, pivot, 0.0))
-        inverse = where(alive, reciprocal(where(alive, pivot, 1.0)), 0.0)
+        inverses.append(where(alive, reciprocal(where(alive, pivot, 1.0)), 0.0))
         for i in range(k + 1, len(left)):
-            share = weighted(_product(felt, left[i]), inverse)
+            share = weighted(_product(felt, left[i]), inverses[k])
             shares[i].append(share)
             left[i] = _less(left[i], share, column)
             growth[i] = growth[i] + abs(share) * growth[k]
-    return Conjugated(left, shares, pivots, doubt)
+    return Conjugated(left, shares, pivots, inverses, doubt)
 
 
-def _greatest_share(column: Sequence[Scalar], weights: Sequence[Scalar], scales: Sequence[Scalar]) -> Scalar:
-    """The square of the greatest component that has a weight, as a share of its bound."""
-    greatest: Scalar = 0.0
-    for component, weight, scale in zip(column, weights, scales, strict=False):
-        if not (is_zero(component) or is_zero(weight)):
-            greatest = larger(greatest, where(weight > 0.0, component * component * scale, 0.0))
-    return greatest
+def _share_seen(column: Sequence[Scalar], weights: Sequence[Scalar], scales: Sequence[Scalar]) -> Scalar:
+    """The squares of the components that have a weight, as shares of those of their bounds; their sum."""
+    return total(
+        [
+            where(weight > 0.0, component * component * scale, 0.0)
+            for component, weight, scale in zip(column, weights, scales, strict=False)
+            if not (is_zero(component) or is_zero(weight))
+        ]
+    )
 
 
 @dataclass(frozen=True)
@@ -243,16 +249,15 @@ def least_energy(
     columns: Sequence[Sequence[Scalar]],
     internal: Sequence[Sequence[Scalar]],
     weights: Sequence[Scalar],
-    bounds: Sequence[Scalar],
+    squares: Sequence[Scalar],
 ) -> LeastEnergy:
     """Subtract from each column x the mix of the internal ones that makes x^T S x least; S as in `conjugate`.
 
     Mixes of internal columns that S does not see are left out: nothing that S weighs depends on them.
     """
-    modes = conjugate(internal, weights, bounds)
+    modes = conjugate(internal, weights, squares)
     left = [list(column) for column in columns]
-    for mode, pivot in zip(modes.columns, modes.pivots, strict=True):
-        inverse = where(pivot > 0.0, reciprocal(where(pivot > 0.0, pivot, 1.0)), 0.0)
+    for mode, inverse in zip(modes.columns, modes.inverses, strict=True):
         felt = [weighted(w, c) for w, c in zip(weights, mode, strict=True)]
         left = [_less(column, weighted(_product(felt, column), inverse), mode) for column in left]
     return LeastEnergy(left, modes.doubt)

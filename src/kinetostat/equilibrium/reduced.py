@@ -384,7 +384,7 @@ class Tangent:
         elastic, rates = self.place.elastic, self.place.rates
         half = eliminated((0.5 * (elastic + elastic.T)).tolist())
         greatest = greatest_eigenvalue(relative(half, elastic - 0.5 * (rates + rates.T)))
-        grows = greatest > 0.0
+        grows = greatest > UNRESISTED
         return where(grows, 1.0 / where(grows, greatest, 1.0), math.inf), definite(half, elastic)
 
 

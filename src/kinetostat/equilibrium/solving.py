@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.equilibrium.admissible import solve_over_admissible, solved
 from kinetostat.equilibrium.balance import Balance, State, balance, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.motion import Array, Motions
@@ -150,8 +151,8 @@ def newton(mechanism: Mechanism, state: State, iterations: int = MOST_ITERATIONS
 def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
     """Solve the linear equations at a state for right sides [n x unknowns x k].
 
-    Each leg is eliminated by itself, so that it is a stiffness to the platform; a leg with rigid parts only has none,
-    and then all equations are solved together, singular ones by least norm.
+    Each leg is eliminated by itself, so that it is a stiffness to the platform. A leg with rigid parts only has none,
+    and then the equations are solved over the motions that keep all legs closed.
 
     Args:
         equations: at the state.
@@ -169,34 +170,11 @@ def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
                 equations.leg_rates(number, loaded), np.concatenate([right[:, start:end], pushed], axis=2)
             )
         except np.linalg.LinAlgError:
-            return _together(equations, right, loaded)
+            return solve_over_admissible(equations, right, loaded)
         stiffness = part[:, -size:, -size:]
         if not (np.abs(stiffness) < STIFFEST_LEG).all():
-            return _together(equations, right, loaded)
+            return solve_over_admissible(equations, right, loaded)
         parts.append(part)
         whole, total = whole + stiffness, total - part[:, -size:, :-size]
-    twist = _solved(whole, total)
+    twist = solved(whole, total)
     return np.concatenate([twist, *(part[:, :, :-size] + part[:, :, -size:] @ twist for part in parts)], axis=1)
-
-
-def _together(equations: Balance, right: Array, loaded: bool) -> Array:
-    size, starts = equations.mechanism.ways.shape[1], equations.starts
-    rates = np.zeros((len(right), starts[-1], starts[-1]))
-    rates[:, :size, :size] = equations.platform_rates(loaded)
-    for number, (start, end) in enumerate(pairwise(starts)):
-        rates[:, start:end, start:end] = equations.leg_rates(number, loaded)
-        rates[:, end - size : end, :size] = -np.eye(size)
-        rates[:, :size, end - size : end] = np.eye(size)
-    return _solved(rates, right)
-
-
-def _solved(rates: Array, right: Array) -> Array:
-    """Solutions of linear equations; NaN where these are not finite, which a pose without a place leaves behind."""
-    sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2))
-    result = np.full((*rates.shape[:2], right.shape[2]), np.nan)
-    try:
-        result[sound] = np.linalg.solve(rates[sound], right[sound])
-    except np.linalg.LinAlgError:
-        for row in np.flatnonzero(sound):
-            result[row] = np.linalg.lstsq(rates[row], right[row], rcond=None)[0]
-    return result

@@ -9,23 +9,23 @@ Source: theory (39) and (40). M. Zefran and V. Kumar, "A geometrical approach to
 matrix", J. Mechanical Design 124(1), 2002. Units are those of `mechanism`.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.equilibrium.admissible import admissible, gaps_of, motions_of, starts_of, within
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.motion import Array, skew_of
 from kinetostat.equilibrium.solving import solve
-from kinetostat.tolerances import UNRESISTED
+from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, UNRESISTED
 
 
 def compliance(equations: Balance) -> Array:
     """The twist of the platform per unit of a further wrench, at the loaded tool point [n x 6 x 6].
 
-    Entries that are round-off beside the compliance of a typical spring are 0: something rigid holds there.
+    Rows and columns of components that rigid parts hold are exactly 0, as in `assembly.without_round_off`.
     """
     ways = equations.mechanism.ways
     size = ways.shape[1]
@@ -36,7 +36,10 @@ def compliance(equations: Balance) -> Array:
     shift[:, 3:, :3] = -skew_of(equations.state.platform.translation)
     moved = shift @ moved @ np.swapaxes(shift, 1, 2)
     moved = 0.5 * (moved + np.swapaxes(moved, 1, 2))
-    return np.where(np.abs(moved) < UNRESISTED, 0.0, moved)
+    sizes = np.abs(np.diagonal(moved, axis1=1, axis2=2))
+    # In these units a typical spring has the compliance 1.
+    moves = sizes > ROUND_OFF_OF_COMPLIANCE * np.maximum(sizes.sum(axis=1, keepdims=True), 1.0)
+    return np.where(moves[:, :, None] & moves[:, None] | np.isnan(moved), moved, 0.0)
 
 
 def inverse(compliances: Array) -> Array:
@@ -110,14 +113,17 @@ def stabilities(equations: Balance) -> Stabilities:
     sound = np.isfinite(elastic + geometric).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
     stable: npt.NDArray[np.bool_] = np.array(sound)
     factors, modes = np.where(sound, np.inf, np.nan), np.zeros((count, starts[-1]))
-    for here, allowed in allowed_motions(conditions, np.flatnonzero(sound)):
+    for part in admissible(conditions, np.flatnonzero(sound), gaps_of(equations)):
+        here, allowed = part.rows, part.motions
+        if not allowed.size:  # nothing can move at all
+            continue
         stiff, turning = (within(part[here], allowed) for part in (elastic, geometric))
         stable[here] = np.linalg.eigvalsh(stiff + turning)[:, 0] > 0.0
         least, springs = np.linalg.eigh(stiff)
         holds = least[:, 0] > UNRESISTED * least[:, -1]
         half = springs / np.sqrt(np.where(holds[:, None], least, 1.0))[:, None]
         shares, turns = np.linalg.eigh(-np.swapaxes(half, 1, 2) @ turning @ half)
-        grows = holds & (shares[:, -1] > 0.0)
+        grows = holds & (shares[:, -1] > UNRESISTED)
         factors[here] = np.where(grows, 1.0 / np.where(grows, shares[:, -1], 1.0), np.where(holds, np.inf, np.nan))
         moved = (allowed @ half @ turns[:, :, -1:])[:, :, 0]
         modes[here] = np.where(grows[:, None], moved / np.abs(moved).max(axis=1, keepdims=True), 0.0)
@@ -125,49 +131,3 @@ def stabilities(equations: Balance) -> Stabilities:
     return Stabilities(
         stable, factors, modes[:, :size] @ ways.T, np.stack(legs, axis=1) if legs else np.zeros((count, 0))
     )
-
-
-def allowed_motions(conditions: Array, rows: npt.NDArray[np.int64]) -> Iterator[tuple[npt.NDArray[np.int64], Array]]:
-    """Poses with as many motions that obey the conditions, and an orthonormal basis of these, as columns.
-
-    Poses at which nothing can move at all are left out.
-
-    Args:
-        conditions: that motions must make 0 [n x conditions x coordinates].
-        rows: of the poses at which they are finite.
-    """
-    _, values, bases = np.linalg.svd(conditions[rows])
-    ranks = (values > UNRESISTED * values[:, :1]).sum(axis=1)
-    for rank in np.unique(ranks):
-        here = ranks == rank
-        allowed = np.swapaxes(bases[here, rank:], 1, 2)
-        if allowed.size:
-            yield rows[here], allowed
-
-
-def starts_of(equations: Balance) -> npt.NDArray[np.int64]:
-    """Where the coordinates of each leg begin after the ways of the platform, and where the last ones end."""
-    sizes = [leg.size for leg in equations.mechanism.legs]
-    return equations.mechanism.ways.shape[1] + np.cumsum([0, *sizes])
-
-
-def motions_of(equations: Balance) -> tuple[Array, Array, Array]:
-    """Springs, and what loads and wrenches add, over the twist of the platform and all coordinates; what these obey."""
-    mechanism, ways, starts = equations.mechanism, equations.mechanism.ways, starts_of(equations)
-    count, size, end = len(equations.left), ways.shape[1], int(starts[-1])
-    elastic, geometric = np.zeros((2, count, end, end))
-    conditions = np.zeros((count, size * len(mechanism.legs), end))
-    geometric[:, :size, :size] = -ways.T @ equations.load_change @ ways
-    for k, (leg, terms) in enumerate(zip(mechanism.legs, equations.legs, strict=True)):
-        moving, rows = slice(starts[k], starts[k + 1]), slice(size * k, size * (k + 1))
-        springs = terms.carrying[:, :, None] * np.eye(leg.size)
-        elastic[:, moving, moving] = springs + leg.idle @ np.swapaxes(leg.idle, 1, 2)
-        geometric[:, moving, moving] = terms.geometric
-        conditions[:, rows, moving] = ways.T @ terms.rates
-        conditions[:, rows, :size] = -np.eye(size)
-    return elastic, geometric, conditions
-
-
-def within(matrix: Array, allowed: Array) -> Array:
-    """The symmetric part of a matrix over the motions that are allowed, the columns [n x k x k]."""
-    return np.asarray(0.5 * np.swapaxes(allowed, 1, 2) @ (matrix + np.swapaxes(matrix, 1, 2)) @ allowed)

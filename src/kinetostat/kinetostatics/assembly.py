@@ -242,8 +242,8 @@ def least_energy_rows(
     every, null = (in_modes(modes, rows) for rows in (balance, [*zip(*internal, strict=True)]))
     guides = len(wrenches) - len(compliance)
     weights = compliance + [0.0] * guides
-    bounds = [bound for leg in modes for bound in leg.bounds()] + [1.0] * guides
-    shared = least_energy([*zip(*every, strict=True)], [*zip(*null, strict=True)], weights, bounds)
+    sizes = [size for leg in modes for size in leg.sizes()] + [1.0] * guides
+    shared = least_energy([*zip(*every, strict=True)], [*zip(*null, strict=True)], weights, sizes)
     doubt = shared.doubt
     for leg in modes:
         doubt = larger(doubt, leg.doubt)

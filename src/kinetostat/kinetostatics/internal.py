@@ -6,6 +6,7 @@ motion of the platform depends on them.
 Source: theory (9) and theory section 7.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,7 +16,7 @@ import numpy.typing as npt
 from kinetostat.algebra.screw import Wrench
 from kinetostat.kinetostatics.leg import relaxed
 from kinetostat.machine.leg import LegScrews
-from kinetostat.tolerances import DEPENDENT_WRENCHES, ROUND_OFF_OF_LOAD
+from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT_WRENCHES
 
 Array = npt.NDArray[np.float64]
 
@@ -59,7 +60,7 @@ def internal_loads(
     _, values, rows = np.linalg.svd(matrix / sizes)
     internal = (rows[int((values > DEPENDENT_WRENCHES * values[0]).sum()) :] / sizes).T[: len(owners)]
     _, seen, modes = np.linalg.svd(_seen(balanced) @ internal)
-    decided = int((seen > ROUND_OFF_OF_LOAD).sum())
+    decided = int((seen > CLOSING_ROUND_OFF).sum())
     undecided = internal @ modes[decided:].T
     return InternalLoads(
         internal.shape[1],
@@ -75,10 +76,10 @@ def _seen(legs: Sequence[LegScrews]) -> Array:
     every = sum(len(leg.wrenches) for leg in legs)
     at = 0
     for leg in legs:
-        for loads, compliance, bound in zip(leg.loads, leg.compliance, leg.bounds, strict=True):
+        for loads, compliance, size in zip(leg.loads, leg.compliance, leg.sizes, strict=True):
             if compliance > 0.0:
                 rows.append(np.zeros(every))
-                rows[-1][at : at + len(loads)] = np.array(loads, dtype=float) / float(bound)
+                rows[-1][at : at + len(loads)] = np.array(loads, dtype=float) / math.sqrt(size)
         at += len(leg.wrenches)
     return np.array(rows).reshape(-1, every)
 

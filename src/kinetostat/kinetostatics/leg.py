@@ -120,17 +120,17 @@ class Modes:
         size = range(len(amounts))
         return [amounts[k] + total([self.shares[j][k] * amounts[j] for j in size if j > k]) for k in size]
 
-    def bounds(self) -> list[Scalar]:
-        """The amount of each mode that no load of unit size exceeds, measured by the leg's own wrenches."""
+    def sizes(self) -> list[Scalar]:
+        """The square of the amount of each mode that no load of unit size exceeds, by the leg's own wrenches."""
         size = range(len(self.wrenches))
-        return [sqrt(1.0 + total([self.shares[j][k] * self.shares[j][k] for j in size if j > k])) for k in size]
+        return [1.0 + total([self.shares[j][k] * self.shares[j][k] for j in size if j > k]) for k in size]
 
 
 def modes_of(leg: LegScrews) -> Modes:
     """The modes of a leg; each is one of its wrenches less a mix of those before."""
     springs = len(leg.loads)
     columns = [(*(row[k] for row in leg.loads), *wrench.components()) for k, wrench in enumerate(leg.wrenches)]
-    modes = conjugate(columns, leg.compliance, leg.bounds)
+    modes = conjugate(columns, leg.compliance, leg.sizes)
     combined = modes.columns
     return Modes(
         tuple(Wrench(Vector(*column[springs : springs + 3]), Vector(*column[springs + 3 :])) for column in combined),

@@ -15,10 +15,7 @@ from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin, whe
 from kinetostat.algebra.screw import Twist, Wrench, force_along, pure_moment, rotation_about, translation_along
 from kinetostat.algebra.solve import complement
 from kinetostat.algebra.vector import AXES, IDENTITY, ZERO, Displacement, Vector, rotation_along
-from kinetostat.tolerances import SAME_CENTRE
-
-UNSEEN = 1e-12
-"""Share of the sizes of a wrench and a twist below which the work of one on the other is the rounding of zero."""
+from kinetostat.tolerances import CLOSING_ROUND_OFF, SAME_CENTRE
 
 RIGID = float("inf")
 """Stiffness of a rigid part: exactly infinite, not merely large."""
@@ -27,9 +24,7 @@ RIGID = float("inf")
 class PartName(str):
     """Name of a joint or link, e.g. "leg 1 actuator", that knows which leg it is in and what it is there.
 
-    Attributes:
-        leg: name of the leg, "leg 1".
-        kind: what the part is in it, "actuator": alike in legs that are alike.
+    Its `kind`, "actuator", is alike in legs that are alike.
     """
 
     leg: str
@@ -238,7 +233,7 @@ class LegScrews:
         compliance: of each spring (diagonal of S): 0 rigid, infinity free; m/N or rad/(N·m).
         wrenches: basis of what the leg can carry (W): no work on any passive twist.
         loads: load in each spring per unit of each wrench (J_e^T W).
-        bounds: load in each spring that no unit wrench exceeds, moments over the characteristic length (N, N·m).
+        sizes: order of the square of each load, moments of wrenches over the characteristic length (N², N²m²).
         singularity_margin: 0 where the passive joints lock up, 1 where they are orthogonal (dimensionless).
     """
 
@@ -247,7 +242,7 @@ class LegScrews:
     compliance: tuple[Scalar, ...]
     wrenches: tuple[Wrench, ...]
     loads: tuple[tuple[Scalar, ...], ...]
-    bounds: tuple[Scalar, ...]
+    sizes: tuple[Scalar, ...]
     singularity_margin: Scalar
 
 
@@ -349,9 +344,15 @@ class Leg:
             compliance=tuple(reciprocal(spring.stiffness) for spring in self.springs),
             wrenches=wrenches,
             loads=tuple(self._loads(s, twist, wrenches) for s, twist in zip(self.springs, elastic, strict=True)),
-            bounds=tuple(twist.greatest_work(length) for twist in elastic),
+            sizes=self._sizes(elastic, length),
             singularity_margin=singularity_margin,
         )
+
+    def _sizes(self, elastic: Sequence[Twist], length: Scalar) -> tuple[Scalar, ...]:
+        """Squares of the loads by unit wrenches; for all turns, those by the arm of the first one."""
+        turning = next((twist for twist in elastic if not twist.slides), None)
+        square = 1.0 if turning is None else length * length + turning.translational.dot(turning.translational)
+        return tuple(1.0 if twist.slides else square for twist in elastic)
 
     def _loads(self, spring: Spring, twist: Twist, wrenches: Sequence[Wrench]) -> tuple[Scalar, ...]:
         """Load in a spring per unit of each wrench, by virtual work; exactly 1 in a slide along the line of force."""
@@ -371,7 +372,7 @@ def felt(wrench: Wrench, twist: Twist) -> Scalar:
     turning = wrench.rotational.norm() * twist.rotational.norm()
     size = turning + wrench.translational.norm() * twist.translational.norm()
     load = wrench.work(twist)
-    return where(abs(load) > UNSEEN * size, load, 0.0)
+    return where(abs(load) > CLOSING_ROUND_OFF * size, load, 0.0)
 
 
 def two_force_leg(
@@ -437,7 +438,7 @@ def reciprocal_wrenches(passive: Sequence[Twist], length: Scalar) -> tuple[tuple
 
 def comparable(twist: Twist, shrink: Scalar) -> tuple[Scalar, ...]:
     """The components of a unit twist, translations times `shrink` (1/m); a slide stays of unit size."""
-    if all(is_zero(c) for c in twist.rotational.components()):
+    if twist.slides:
         return twist.components()
     return Twist(twist.rotational, twist.translational * shrink).components()
 

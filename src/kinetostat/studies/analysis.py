@@ -40,7 +40,7 @@ from kinetostat.studies.loads import LoadCase, load_case
 from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
 from kinetostat.studies.refusal import why_not
 from kinetostat.studies.rounding import clean_matrix, clean_statics
-from kinetostat.tolerances import ROUND_OFF_OF_LOAD
+from kinetostat.tolerances import CLOSING_ROUND_OFF
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -325,14 +325,14 @@ def _rank(response: Response, statics: Statics, compliance_infinite: bool) -> in
     length = float(statics.length)
     if compliance_infinite:
         wrenches: list[Screw] = [wrench for wrench, k in statics.actions if k > 0.0]
-        return independent(wrenches, length, ROUND_OFF_OF_LOAD)
-    bounds = [bound for leg in response.legs for bound in leg.bounds]
+        return independent(wrenches, length, CLOSING_ROUND_OFF)
+    sizes = [math.sqrt(size) for leg in response.legs for size in leg.sizes]
     greatest = np.linalg.norm(columns([twist for leg in statics.sharing for twist in leg], 1.0, 1.0 / length))
-    springs = zip(statics.flexibility, statics.compliance, bounds, strict=True)
-    twists = [twist * (1.0 / (float(bound) * greatest)) for twist, s, bound in springs if s > 0.0]
+    springs = zip(statics.flexibility, statics.compliance, sizes, strict=True)
+    twists = [twist * (1.0 / (size * greatest)) for twist, s, size in springs if s > 0.0]
     if not twists:
         return 0
-    return int((np.linalg.svd(columns(twists, 1.0, 1.0 / length), compute_uv=False) > ROUND_OFF_OF_LOAD).sum())
+    return int((np.linalg.svd(columns(twists, 1.0, 1.0 / length), compute_uv=False) > CLOSING_ROUND_OFF).sum())
 
 
 def _message(

@@ -15,13 +15,14 @@ import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS, Twist, Wrench
 from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.equilibrium.admissible import starts_of
 from kinetostat.equilibrium.balance import Balance, balance, free_state
 from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import loaded_mechanism
 from kinetostat.equilibrium.shape import loaded_links
 from kinetostat.equilibrium.solving import at_rest, with_share
-from kinetostat.equilibrium.tangent import stability, starts_of
+from kinetostat.equilibrium.tangent import stability
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.deflected import Deflection

@@ -16,11 +16,11 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.equilibrium.admissible import motions_of, starts_of, within
 from kinetostat.equilibrium.balance import Balance, placed_leg
 from kinetostat.equilibrium.motion import Array, skew_of
-from kinetostat.equilibrium.tangent import motions_of, starts_of, within
 from kinetostat.kinetostatics.quantities import MODES
-from kinetostat.tolerances import EQUAL_STIFFNESSES, UNRESISTED
+from kinetostat.tolerances import CLOSING_ROUND_OFF, EQUAL_STIFFNESSES, UNRESISTED
 from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
 
 WELL = 0.1
@@ -167,7 +167,7 @@ def _allowed(
         kept = kept[:, kept.any(axis=(0, 2))]
         closing = conditions[rows, size * leg : size * (leg + 1), first:last]
         left, sizes, right = np.linalg.svd(np.concatenate([closing, kept], axis=1))
-        rank = (sizes > UNRESISTED * sizes[:, :1]).sum(axis=1)
+        rank = (sizes > CLOSING_ROUND_OFF * sizes[:, :1]).sum(axis=1)
         acts = np.arange(sizes.shape[1]) < rank[:, None]
         shrink = np.divide(1.0, sizes, where=acts, out=np.zeros_like(sizes))
         count = sizes.shape[1]
@@ -176,7 +176,7 @@ def _allowed(
         missed.append(np.eye(back.shape[1])[:, :size] - back @ np.swapaxes(back, 1, 2)[:, :, :size])
         owns.append((rank, right))
     _, sizes, ways = np.linalg.svd(np.concatenate(missed, axis=1), full_matrices=False)
-    ranks = np.stack([(sizes > UNRESISTED).sum(axis=1), *(rank for rank, _ in owns)], axis=1)
+    ranks = np.stack([(sizes > CLOSING_ROUND_OFF).sum(axis=1), *(rank for rank, _ in owns)], axis=1)
     for each in np.unique(ranks, axis=0):
         here = (ranks == each).all(axis=1)
         platform = np.swapaxes(ways[here, each[0] :], 1, 2)

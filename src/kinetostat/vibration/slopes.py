@@ -15,16 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, total
+from kinetostat.equilibrium.admissible import motions_of, starts_of
 from kinetostat.equilibrium.balance import Balance, balance, free_state, placed_leg
 from kinetostat.equilibrium.chains import Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.motion import Array, of_scalars, still
 from kinetostat.equilibrium.solving import with_share
-from kinetostat.equilibrium.tangent import motions_of, starts_of
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
-from kinetostat.tolerances import UNRESISTED
+from kinetostat.tolerances import CLOSING_ROUND_OFF, UNRESISTED
 from kinetostat.vibration.inertia import PartRates, energies, leg_rates, platform_rates
 from kinetostat.vibration.modes import mass_matrix, motions_left_out, solved
 
@@ -56,7 +56,7 @@ def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
         shown = min(most, part.squares.shape[1])
         squares, shapes = part.squares[:, :shown], part.shapes[:, :, :shown]
         left = stiff[part.rows] @ shapes * squares[:, None] - mass[part.rows] @ shapes
-        forces = np.linalg.pinv(np.swapaxes(held_still[part.rows], 1, 2), rcond=UNRESISTED) @ left
+        forces = np.linalg.pinv(np.swapaxes(held_still[part.rows], 1, 2), rcond=CLOSING_ROUND_OFF) @ left
         rows = np.concatenate([squares[:, None], shapes, forces[:, :closing]], axis=1)
         columns[part.rows] = 0.0
         columns[part.rows, :shown] = np.swapaxes(rows, 1, 2)

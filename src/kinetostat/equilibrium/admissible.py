@@ -1,0 +1,172 @@
+"""Admissible motions: those of platform and coordinates that keep all legs closed, and statics over them.
+
+Whether a closing condition repeats others is a question of geometry, and is decided here alone: rigid parts of several
+legs often hold the same motion, and beside their stiffness, or beside contrasts of springs, nobody could tell.
+
+Source: theory (38) and (39). Units, axes and origin are those of `mechanism`; arrays have the poses first.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.equilibrium.balance import Balance
+from kinetostat.equilibrium.motion import Array
+from kinetostat.tolerances import CLOSING_ROUND_OFF, OPEN_BY_STEP, UNRESISTED
+
+Rows = npt.NDArray[np.int64]
+
+
+def starts_of(equations: Balance) -> npt.NDArray[np.int64]:
+    """Where the coordinates of each leg begin after the ways of the platform, and where the last ones end."""
+    sizes = [leg.size for leg in equations.mechanism.legs]
+    return equations.mechanism.ways.shape[1] + np.cumsum([0, *sizes])
+
+
+def motions_of(equations: Balance) -> tuple[Array, Array, Array]:
+    """Springs, and what loads and wrenches add, over the twist of the platform and all coordinates; what these obey."""
+    mechanism, ways, starts = equations.mechanism, equations.mechanism.ways, starts_of(equations)
+    count, size, end = len(equations.left), ways.shape[1], int(starts[-1])
+    elastic, geometric = np.zeros((2, count, end, end))
+    conditions = np.zeros((count, size * len(mechanism.legs), end))
+    geometric[:, :size, :size] = -ways.T @ equations.load_change @ ways
+    for k, (leg, terms) in enumerate(zip(mechanism.legs, equations.legs, strict=True)):
+        moving, rows = slice(starts[k], starts[k + 1]), slice(size * k, size * (k + 1))
+        springs = terms.carrying[:, :, None] * np.eye(leg.size)
+        elastic[:, moving, moving] = springs + leg.idle @ np.swapaxes(leg.idle, 1, 2)
+        geometric[:, moving, moving] = terms.geometric
+        conditions[:, rows, moving] = ways.T @ terms.rates
+        conditions[:, rows, :size] = -np.eye(size)
+    return elastic, geometric, conditions
+
+
+def gaps_of(equations: Balance) -> Array:
+    """The largest gap of each leg's closing equations, rad or in units of the length [n]."""
+    ways = equations.mechanism.ways.shape[1]
+    ends = [equations.left[:, end - ways : end] for end in equations.starts[1:]]
+    return np.asarray(np.abs(np.concatenate(ends, axis=1)).max(axis=1, initial=0.0))
+
+
+@dataclass(frozen=True)
+class Admissible:
+    """Poses at which as many closing conditions A are independent: A = U diag(s) V^T, and what keeps A x = 0.
+
+    Attributes:
+        rows: of the poses [k].
+        motions: an orthonormal basis of the admissible motions, as columns [k x coordinates x m].
+        inverse: A+, of the independent conditions [k x coordinates x conditions].
+    """
+
+    rows: Rows
+    motions: Array
+    inverse: Array
+
+
+def admissible(conditions: Array, rows: Rows, gaps: Array) -> Iterator[Admissible]:
+    """Sort poses by the number of their independent conditions.
+
+    Args:
+        conditions: A [n x conditions x coordinates].
+        rows: of the poses at which they are finite.
+        gaps: of the closing equations there [n].
+    """
+    left, values, right = np.linalg.svd(conditions[rows])
+    count = values.shape[1]
+    least = np.maximum(CLOSING_ROUND_OFF, OPEN_BY_STEP * gaps[rows])
+    ranks = (values > least[:, None] * values[:, :1]).sum(axis=1)
+    for rank in np.unique(ranks):
+        here = ranks == rank
+        shrink = 1.0 / values[here, None, :rank]
+        inverse = np.swapaxes(right[here, :rank], 1, 2) * shrink @ np.swapaxes(left[here, :, :count][:, :, :rank], 1, 2)
+        yield Admissible(rows[here], np.swapaxes(right[here, rank:], 1, 2), inverse)
+
+
+def within(matrix: Array, allowed: Array) -> Array:
+    """The symmetric part of a matrix over the motions that are allowed, the columns [n x k x k]."""
+    return np.asarray(0.5 * np.swapaxes(allowed, 1, 2) @ (matrix + np.swapaxes(matrix, 1, 2)) @ allowed)
+
+
+def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Array:
+    """Solve the linear equations at a state over the admissible motions, for right sides [n x unknowns x k].
+
+    Twist and coordinates are x = A+ b + Z y, where Z^T H Z y balances what is left. Springs enter by the triangular
+    factor of diag(sqrt k) Z, the stiffest first, and not by Z^T H Z, so that contrasts cost half of their digits. Of
+    the wrenches of legs that are not determined, those of least norm are taken. NaN where the equations are not finite.
+
+    Args:
+        equations: at the state.
+        right: right sides, in the order of the unknowns.
+        loaded: with what loads and wrenches do by turning.
+    """
+    elastic, geometric, conditions = motions_of(equations)
+    geometric = geometric if loaded else np.zeros_like(geometric)
+    moving, carried = _places(equations)
+    force, gap = right[:, moving], right[:, carried]
+    sound = [np.isfinite(part).all(axis=(1, 2)) for part in (elastic, geometric, conditions, right)]
+    result = np.full_like(right, np.nan)
+    for part in admissible(conditions, np.flatnonzero(np.all(sound, axis=0)), gaps_of(equations)):
+        whole = elastic[part.rows] + geometric[part.rows]
+        motion = part.inverse @ gap[part.rows]
+        back = np.swapaxes(part.motions, 1, 2)
+        if part.motions.shape[2]:
+            resisted = back @ (force[part.rows] - whole @ motion)
+            bent = back @ geometric[part.rows] @ part.motions
+            motion = motion + part.motions @ _resisted(_springs(equations, part), bent, resisted)
+        wrenches = np.swapaxes(part.inverse, 1, 2) @ (whole @ motion - force[part.rows])
+        result[part.rows[:, None], moving], result[part.rows[:, None], carried] = motion, wrenches
+    return result
+
+
+def _places(equations: Balance) -> tuple[Rows, Rows]:
+    """Where the twist and all coordinates are among the unknowns, and where the wrenches of the legs are."""
+    ways, starts = equations.mechanism.ways.shape[1], equations.starts
+    every = np.arange(starts[-1])
+    carried = np.concatenate([every[end - ways : end] for end in starts[1:]])
+    return np.setdiff1d(every, carried), carried
+
+
+def _springs(equations: Balance, part: Admissible) -> Array:
+    """Upper triangular R with R^T R the stiffness of the springs over the admissible motions [k x m x m]."""
+    size = equations.mechanism.ways.shape[1]
+    stiff = [terms.carrying[part.rows] for terms in equations.legs]
+    roots = np.sqrt(np.concatenate(stiff, axis=1)) if stiff else np.zeros((len(part.rows), 0))
+    stretched = roots[:, :, None] * part.motions[:, size:]
+    # Householder's reflections keep small rows below large ones, and lose them above.
+    order = np.argsort(-roots, axis=1, kind="stable")
+    rows = [np.take_along_axis(stretched, order[:, :, None], axis=1)]
+    for leg, (first, last) in zip(equations.mechanism.legs, pairwise(starts_of(equations)), strict=True):
+        rows.append(np.swapaxes(leg.idle[part.rows], 1, 2) @ part.motions[:, first:last])
+    missing = part.motions.shape[2] - sum(row.shape[1] for row in rows)
+    rows.append(np.zeros((len(part.rows), max(missing, 0), part.motions.shape[2])))
+    return np.asarray(np.linalg.qr(np.concatenate(rows, axis=1), mode="r"))
+
+
+def _resisted(springs: Array, bent: Array, force: Array) -> Array:
+    """The motions y with (R^T R + G) y = f: by R where springs hold every motion, else as one matrix."""
+    sizes = np.abs(np.diagonal(springs, axis1=1, axis2=2))
+    holds = sizes.min(axis=1) > UNRESISTED * sizes.max(axis=1)
+    result = np.zeros_like(force)
+    if holds.any():
+        inverse = np.linalg.inv(springs[holds])
+        back = np.swapaxes(inverse, 1, 2)
+        turned = np.eye(springs.shape[1]) + back @ bent[holds] @ inverse
+        result[holds] = inverse @ solved(turned, back @ force[holds])
+    if not holds.all():
+        whole = np.swapaxes(springs[~holds], 1, 2) @ springs[~holds] + bent[~holds]
+        result[~holds] = solved(whole, force[~holds])
+    return result
+
+
+def solved(rates: Array, right: Array) -> Array:
+    """Solutions of linear equations; NaN where these are not finite, which a pose without a place leaves behind."""
+    sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2))
+    result = np.full((*rates.shape[:2], right.shape[2]), np.nan)
+    try:
+        result[sound] = np.linalg.solve(rates[sound], right[sound])
+    except np.linalg.LinAlgError:
+        for row in np.flatnonzero(sound):
+            result[row] = np.linalg.lstsq(rates[row], right[row], rcond=None)[0]
+    return result
