@@ -81,7 +81,7 @@ def _seen(legs: Sequence[LegScrews]) -> Array:
                 rows.append(np.zeros(every))
                 rows[-1][at : at + len(loads)] = np.array(loads, dtype=float) / math.sqrt(size)
         at += len(leg.wrenches)
-    return np.array(rows).reshape(-1, every)
+    return np.array(rows).reshape(len(rows), every)
 
 
 def _involved(names: Sequence[str], owners: npt.NDArray[np.int64], loads: Array) -> tuple[str, ...]:
