@@ -1,10 +1,14 @@
 """Files of machines written leg by leg: what is refused, and that each message names leg and joint and the way out."""
 
 import json
+import math
+from pathlib import Path
 
 import jsonschema
 import pytest
 
+from kinetostat.cli import main
+from kinetostat.commands.common import NO_ANSWER
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import build, bundled, load, machine_schema, template
 from kinetostat.spec import document
@@ -194,3 +198,29 @@ def test_a_missing_actuator_is_no_singularity(count, words):
 def test_a_flexure_that_holds_a_slide_stands_for_an_actuator():
     found = analyze(build(GOOD.replace(SLIDE, 'stiffness = "1e6 N/m"', 1)))
     assert found.compliance_diagonal == pytest.approx(analyze(build(GOOD)).compliance_diagonal)
+
+
+CASES = Path(__file__).parents[1] / "cases"
+
+
+def test_a_link_behind_a_parallelogram_begins_at_its_far_side():
+    """A cantilever of 1 m: C = L^3 / (3 E I), and the mass of 1 m of it."""
+    analysis = analyze(load(CASES / "link-behind-parallelogram.toml"))
+    assert analysis.compliance_diagonal[5] == pytest.approx(5.1738e-06, rel=1e-5)
+    assert analysis.moving_mass == pytest.approx(7850.0 * math.pi / 4.0 * 0.05**2, rel=1e-9)
+
+
+def test_legs_with_and_without_a_carriage_are_of_two_builds(capsys):
+    assert main(["analyze", str(CASES / "legs-of-two-builds.toml")]) == NO_ANSWER
+    said = capsys.readouterr()
+    assert "Actuators are missing: 2 for 6 freedoms" in said.out + said.err
+
+
+def test_what_is_said_of_rigid_parts_is_true_of_the_stiffness_shown():
+    """A rigid slide between links that flex leaves K finite."""
+    analysis = analyze(load(CASES / "one-rigid-slide.toml"))
+    assert analysis.rigid == ("left slide actuator",)
+    assert analysis.stiffness is not None
+    assert analysis.rank == 6
+    assert "so that K is finite" in analysis.message
+    assert "infinite" not in analysis.message

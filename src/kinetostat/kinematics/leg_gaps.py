@@ -65,19 +65,29 @@ class Build:
 
 def builds_of(chains: Chains) -> list[Build]:
     """Sort the legs of a machine by their build."""
-    alike: dict[tuple[tuple[type, bool, bool], ...], list[tuple[list[Any], Numbers]]] = {}
+    alike: dict[tuple[Any, ...], list[tuple[list[Any], Numbers]]] = {}
     first = 0
     for steps in chains.legs:
         elements = [getattr(step.element, "joint", step.element) for step in steps if step.moves]
-        sorts = tuple((type(e), e.mover.point is None, is_zero(e.mover.pitch)) for e in elements)
+        sorts = tuple(_sort(element) for element in elements)
         alike.setdefault(sorts, []).append((elements, np.arange(first, first + len(elements))))
         first += len(elements)
     builds = []
-    for sorts, legs in alike.items():
+    for legs in alike.values():
         elements = [_merged(each, _row) for each in zip(*(elements for elements, _ in legs), strict=True)]
-        slides = np.array([slide for _, slide, _ in sorts], dtype=bool)
+        slides = np.array([element.mover.point is None for element in legs[0][0]], dtype=bool)
         builds.append(Build(tuple(elements), slides, np.stack([places for _, places in legs])))
     return builds
+
+
+def _sort(element: Any) -> tuple[Any, ...]:
+    """What elements must have in common to be placed by one evaluation: their class, and what they have at all.
+
+    A joint with a carriage and one without, for instance, have other fields that are None.
+    """
+    values = [getattr(element, field.name) for field in fields(element)]
+    kinds = tuple(type(value) if isinstance(value, Vector | str | None) else float for value in values)
+    return type(element), element.mover.point is None, is_zero(element.mover.pitch), kinds
 
 
 def _merged(elements: Sequence[Any], merge: Callable[[Sequence[Scalar]], Scalar]) -> Any:

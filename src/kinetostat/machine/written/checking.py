@@ -13,7 +13,7 @@ from kinetostat.machine.leg import Joint, rows_about_one_point
 from kinetostat.machine.machine import Plane
 from kinetostat.machine.written.closed_form import closed_form
 from kinetostat.machine.written.family import chains, place
-from kinetostat.machine.written.joints import JOINT_TYPES
+from kinetostat.machine.written.joints import JOINT_TYPES, departure
 from kinetostat.machine.written.plan import JointPlan, LegPlan, LinkPlan, Plan
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import PARALLEL_AXES
@@ -79,7 +79,8 @@ def _check_link(
     leg: LegPlan, near: JointPlan, far: JointPlan, link: LinkPlan, tables: Mapping[str, Any], shape: str, origin: str
 ) -> None:
     where = f'"{origin}": leg "{leg.written or leg.name}", link "{link.name}"'
-    ends = [np.array(tables[leg.table(joint.name)].point) for joint in (near, far)]
+    before, behind = (tables[leg.table(joint.name)] for joint in (near, far))
+    ends = [np.array(departure(before).components()), np.array(behind.point)]
     span = ends[1] - ends[0]
     if np.linalg.norm(span) < LEAST_AXIS:
         raise InputError(

@@ -18,7 +18,7 @@ from kinetostat.machine.machine import Chains, Configuration, Family, Member, Pl
 from kinetostat.machine.mass import turned_tensor
 from kinetostat.machine.series import springs_in_a_row
 from kinetostat.machine.written.copies import direction_in, inertia_in, joint_numbers, matrix_in
-from kinetostat.machine.written.joints import JOINT_TYPES, own_axis
+from kinetostat.machine.written.joints import JOINT_TYPES, departure, own_axis
 from kinetostat.machine.written.plan import NAME, SUMMARY, JointPlan, LegPlan, LinkPlan, Plan, literals
 from kinetostat.machine.written.struts import rod_of, with_rods
 from kinetostat.machine.written.tables import tables_of
@@ -97,7 +97,7 @@ def _parts_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[
         steps = [*moving, *seat] if JOINT_TYPES[joint.kind].seat_travels else [*seat, *moving]
         link, flexible = leg.links.get(joint.joins[1]), []
         if link is not None:
-            ends = Vector(*data[i].point), Vector(*data[i + 1].point)
+            ends = departure(data[i]), Vector(*data[i + 1].point)
             flexible = [Step(element, False) for element in _link_elements(leg, link, ends, plan, tables)]
         parts.append((steps, flexible))
     return parts
@@ -166,10 +166,11 @@ def members(plan: Plan, joints: Sequence[Scalar | Turn] | None = None, **tables:
     """
     links, left = [], None if joints is None else iter(joints)
     for leg in plan.legs:
-        points = [Vector(*joint_numbers(leg, joint, tables).point) for joint in leg.joints]
-        placed = [None] * len(points) if left is None else _carriers(plan, leg, tables, left)
+        data = [joint_numbers(leg, joint, tables) for joint in leg.joints]
+        starts, ends = [departure(numbers) for numbers in data], [Vector(*numbers.point) for numbers in data[1:]]
+        placed = [None] * len(starts) if left is None else _carriers(plan, leg, tables, left)
         moves = False
-        for joint, start, end, carrier in zip(leg.joints, points, points[1:], placed, strict=False):
+        for joint, start, end, carrier in zip(leg.joints, starts, ends, placed, strict=False):
             moves = moves or joint.kind != "fixed"
             if moves:
                 links.append(_member(plan, leg, joint.joins[1], (start, end), carrier, tables))

@@ -81,6 +81,11 @@ def needs_axis(kind: str) -> bool:
     return not {"axis", "first_axis"} & JOINT_TYPES[kind].fields.keys()
 
 
+def departure(data: Any) -> Vector:
+    """Where the link behind a joint begins: at the far side of a parallelogram, else at the joint's point (m)."""
+    return Vector(*getattr(data, "far", data.point))
+
+
 def own_axis(data: Any) -> Vector:
     """The axis from which the stiffness of a joint's bearings counts; of a universal joint, the normal of both axes."""
     if hasattr(data, "axis"):
