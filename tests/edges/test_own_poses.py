@@ -186,3 +186,12 @@ def test_a_path_without_a_picture_loads_no_library_of_tables_or_figures(tmp_path
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize("character", ["\0", "\x1f", "\x85", "\u2028"])
+def test_a_control_character_in_a_file_is_refused_with_its_line(tmp_path, capsys, character):
+    """Without this, the number before it would be read as another one."""
+    path = tmp_path / "poses.csv"
+    path.write_text(f"x [mm],y [mm]\n1,2\n1{character}5,2\n", "utf-8")
+    assert main(["path", "hexapod", str(path)]) == BAD_INPUT
+    assert "line 3 has the control character" in capsys.readouterr().err

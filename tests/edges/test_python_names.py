@@ -15,6 +15,7 @@ from dataclasses import is_dataclass
 from pathlib import Path
 from typing import get_type_hints
 
+import numpy as np
 import pytest
 import xarray as xr
 from report_pages import Page, no_pictures
@@ -117,6 +118,11 @@ def test_a_machine_is_built_from_text_or_tables_as_from_its_file():
         build({**tables, "geometry": {"base_radius": "wide", "platform_radius": 0.1}})
     with refused("not valid TOML"):
         build("family =")
+
+
+@pytest.mark.parametrize("force", [[0.0, 0.0, 1.0], (0.0, 0.0, 1.0), np.array([0.0, 0.0, 1.0])])
+def test_a_changed_machine_takes_arrays(force):
+    assert kinetostat.changed(kinetostat.load("hexapod"), {"load.force": force}).tables["load"].force == (0.0, 0.0, 1.0)
 
 
 def test_a_changed_machine_takes_numbers_and_text_and_leaves_the_first_alone():

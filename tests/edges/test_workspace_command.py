@@ -132,3 +132,14 @@ def test_points_that_do_not_converge_count_in_the_error_and_the_assembly_mode_is
     assert "keeps to the assembly mode of its home pose" in text
     assert main(PLANE) == DONE
     assert "assembly mode" not in capsys.readouterr().out, "a family states its mode by its formulas"
+
+
+def test_too_few_cells_have_no_error(capsys):
+    """Two points in one cell agree by chance: "± 0" would be wrong."""
+    axes = ["--over", "x=0:1 mm:2", "--over", "y=0:1 mm:2"]
+    assert main(["workspace", "hexapod", *axes]) == DONE
+    said = " ".join(capsys.readouterr().out.split())
+    assert "The grid is too coarse to say how far that may be wrong: it has 1 cell;" in said
+    assert "±" not in said
+    assert main(["workspace", "hexapod", *axes, "--json"]) == DONE
+    assert json.loads(capsys.readouterr().out)["volume"]["standard_error"] is None

@@ -6,7 +6,7 @@ from dataclasses import replace
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.orientation import form_of
-from kinetostat.machine.parameters import Given, find
+from kinetostat.machine.parameters import Given, find_field
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.document import parse
 
@@ -37,7 +37,7 @@ def related(machine: Machine, path: str) -> bool:
     """Whether a field is checked against others: then `rebuilt` has the last word on a change."""
     if form_of(path):
         return False
-    parameter = find(machine.family, path)
+    parameter = find_field(machine.family, path)
     table = parameter.path.split(".")[0]
     written = machine.family.chains is not None and not parameter.quantity.stiff
     return table == "limits" or (written and table not in INDEPENDENT)

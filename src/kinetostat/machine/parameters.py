@@ -141,7 +141,7 @@ def find(family: HasFields, text: str) -> Parameter:
     Raises:
         InputError: none, several, or several numbers that are never alike; the message lists what is near.
     """
-    matches = _find(family, text)
+    matches = find_field(family, text)
     if matches.quantity.apart and len(matches.leaves) > 1:
         raise InputError(
             f"{matches.shown} holds {len(matches.leaves)} numbers; name one of them: {', '.join(matches.leaves)}."
@@ -149,7 +149,8 @@ def find(family: HasFields, text: str) -> Parameter:
     return matches
 
 
-def _find(family: HasFields, text: str) -> Parameter:
+def find_field(family: HasFields, text: str) -> Parameter:
+    """The field people mean, as in `find`, also one with several numbers that are never alike."""
     known = {parameter.path: parameter for parameter in parameters(family)}
     for exact in (text, f"{POSE}{text}"):
         if exact in known:
@@ -214,7 +215,7 @@ def read_numbers(family: HasFields, given: Mapping[str, Given]) -> dict[str, flo
             parameter = find(family, name)
             read.update(dict.fromkeys(parameter.leaves, read_number(parameter, value)))
             continue
-        parameter, entries = _find(family, name), list(value)
+        parameter, entries = find_field(family, name), list(value)
         if len(entries) != len(parameter.leaves):
             allowed = f"{len(parameter.leaves)} values" if len(parameter.leaves) > 1 else "one value"
             raise InputError(f"{parameter.shown} is {shorten(entries)}; give {allowed}.")

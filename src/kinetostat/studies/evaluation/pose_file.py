@@ -17,6 +17,8 @@ SEPARATORS = (";", "\t", ",")
 """Looked for in this order: where a semicolon separates, a comma is the decimal sign."""
 ANSWERS = {"pose", "status", *QUANTITIES}
 """Columns that `kinetostat path` writes beside the poses: its own files are read again without them."""
+_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\x85\u2028\u2029]")
+"""Characters that end a number without a trace, or a line where no editor shows its end."""
 _HEAD = re.compile(r"(.+?)\s*(?:\[(.*)\]|\((.*)\))?")
 
 
@@ -108,6 +110,13 @@ def _lines(path: Path) -> list[tuple[int, str]]:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f'"{path}" is not text; give a CSV file of poses, saved as UTF-8.') from None
+    control = _CONTROL.search(text)
+    if control is not None:
+        line = text.count("\n", 0, control.start()) + 1
+        raise InputError(
+            f'"{path}", line {line} has the control character {control[0]!r}, which no number and no name has; remove '
+            "it, or save the file as CSV again."
+        )
     lines = enumerate(text.splitlines(), 1)
     return [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
 

@@ -13,6 +13,10 @@ from kinetostat.engine.points import PER_CELL
 POWERS = {1: "", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶"}
 
 
+FEWEST_CELLS = 30
+"""Cells below which the differences within them are too few to estimate an error from: it then often comes out as 0."""
+
+
 @dataclass(frozen=True)
 class Volume:
     """The volume of a region of pose space; over two coordinates, its area.
@@ -44,6 +48,11 @@ class Volume:
     @property
     def share(self) -> float:
         return self.value / self.box
+
+    @property
+    def too_coarse(self) -> bool:
+        """Whether there are too few cells for a standard error that means anything."""
+        return self.cells < FEWEST_CELLS
 
 
 Points = npt.NDArray[np.bool_]

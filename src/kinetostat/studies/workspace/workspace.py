@@ -255,7 +255,7 @@ def as_json(workspace: Workspace) -> dict[str, Any]:
             "coordinates": coordinates,
             "volume": {
                 "value": volume.value,
-                "standard_error": volume.standard_error,
+                "standard_error": None if volume.too_coarse else volume.standard_error,
                 "unknown": volume.unknown,
                 "units": volume.unit,
                 "share_of_box": volume.share,
