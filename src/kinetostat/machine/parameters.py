@@ -150,7 +150,11 @@ def find(family: HasFields, text: str) -> Parameter:
 
 
 def find_field(family: HasFields, text: str) -> Parameter:
-    """The field people mean, as in `find`, also one with several numbers that are never alike."""
+    """The field people mean, as in `find`, also one with several numbers that are never alike.
+
+    Raises:
+        InputError: there is no such field, or several; the message lists what is near.
+    """
     known = {parameter.path: parameter for parameter in parameters(family)}
     for exact in (text, f"{POSE}{text}"):
         if exact in known:

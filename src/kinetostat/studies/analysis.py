@@ -348,9 +348,9 @@ def _message(
     if not finite and not rigid:
         sentences.append("At this pose a leg is rigid against some load: K is infinite against it, and C is exact.")
     if rigid:
-        held = "other parts deflect in the same directions, so that K is finite"
-        held = held if finite else "K is infinite in the directions that they hold, C is exact"
-        sentences.append(f"Rigid: {', '.join(rigid)}; {held}.")
+        infinite = "K is infinite in the directions that they hold, C is exact"
+        consequence = "other parts deflect in the same directions, so that K is finite" if finite else infinite
+        sentences.append(f"Rigid: {', '.join(rigid)}; {consequence}.")
     all_springs = springs(response.configuration)
     for spring, twist in zip(all_springs, response.statics.flexibility, strict=True):
         if spring.name in free:
