@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from kinetostat import analyze, evaluate, load
+from kinetostat.cli import main
+from kinetostat.commands.common import BAD_INPUT, NO_ANSWER
 from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.solving import Rest, at_rest, with_share
 from kinetostat.equilibrium.tangent import compliance, stability
@@ -110,3 +112,51 @@ def test_motors_carry_what_loads_them(name):
     energy = sum(spring.load * spring.deformation for spring in state.springs)
     assert work == pytest.approx(energy, rel=1e-3), "of first order in the displacement"
     assert work > 0.0
+
+
+@pytest.fixture(scope="module")
+def nearly_overconstrained(tmp_path_factory):
+    """An Exechon at home, whose two pins are parallel but for 3e-8: neither by round-off nor clearly."""
+    text = (CASES / "ideal-links-exechon.toml").read_text("utf-8")
+    pin = "point = [-0.2, 0.0, 0.8], axis = [0, 1, 0]"
+    home = {pin: pin.replace("[0, 1", "[3e-8, 1"), "z = 0.85": "z = 0.8", "roll = 0.2": "roll = 0.0"}
+    for old, new in home.items():
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    path = tmp_path_factory.mktemp("doubt") / "doubt.toml"
+    path.write_text(text.replace("pitch = -0.1", "pitch = 0.0"), "utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["analyze"],
+        ["analyze", "--loaded", "--set", "load.force.0=5"],
+        ["modes", "--set", "tool.mass=1"],
+        ["modes", "--loaded", "--set", "tool.mass=1", "--set", "load.gravity=[0, 0, -9.81]"],
+        ["guidelines"],
+        ["sensitivity", "--quantity", "compliance_x"],
+    ],
+    ids=" ".join,
+)
+def test_where_nobody_can_say_no_command_gives_a_number(nearly_overconstrained, capsys, words):
+    assert main([words[0], str(nearly_overconstrained), *words[1:]]) == NO_ANSWER
+    said = capsys.readouterr()
+    assert "undecided" in " ".join((said.out + said.err).split())
+
+
+def test_an_undecided_machine_is_not_commanded(nearly_overconstrained, tmp_path, capsys):
+    poses = tmp_path / "poses.csv"
+    poses.write_text("z [mm]\n799\n800\n", "utf-8")
+    assert main(["command", str(nearly_overconstrained), str(poses), "--set", "load.force.0=5"]) == BAD_INPUT
+    assert "undecided there which rigid parts share a load" in capsys.readouterr().err
+
+
+def test_undecided_poses_of_grids_have_no_numbers(nearly_overconstrained):
+    machine = with_values(load(nearly_overconstrained), {"load.force.0": 5.0})
+    grid = evaluate(machine, {"pose.z": np.linspace(0.795, 0.805, 5)}, ["compliance_x"])
+    assert set(grid.status.values.tolist()) == {Status.UNDECIDED}
+    assert np.isnan(grid["compliance_x"]).all()
+    loaded = evaluate(machine, {"pose.z": np.linspace(0.795, 0.805, 5)}, ["tangent_free_stiffness_x"])
+    assert set(loaded.status.values.tolist()) == {Status.UNDECIDED}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kinetostat.engine.points import Axis, Cells
-from kinetostat.studies.workspace.region import estimate_volume, surface
+from kinetostat.studies.workspace.region import FEWEST_CELLS, estimate_volume, surface
 from kinetostat.studies.workspace.workspace import connected_to
 
 
@@ -78,9 +78,13 @@ class TestVolume:
             assert estimate_volume(ALL, NONE, [1] * len(units), units).unit == unit
 
     def test_all_or_nothing_has_no_error(self):
-        full = estimate_volume(ALL, NONE, [2.0, 3.0], ["m", "m"])
+        every = np.ones(2 * FEWEST_CELLS, dtype=bool)
+        full = estimate_volume(every, ~every, [2.0, 3.0], ["m", "m"])
         assert (full.value, full.standard_error, full.unknown, full.share) == (6.0, 0.0, 0.0, 1.0)
         assert estimate_volume(NONE, NONE, [2.0, 3.0], ["m", "m"]).value == 0.0
+
+    def test_too_few_cells_have_no_error(self):
+        assert math.isnan(estimate_volume(ALL, NONE, [2.0, 3.0], ["m", "m"]).standard_error)
 
     def test_a_cell_with_an_unknown_point_counts_whole_and_once(self):
         unknown = np.array([1, 1, 0, 1, 0, 0, 0, 0], dtype=bool)

@@ -168,7 +168,7 @@ def _reflect(column: Row, others: list[Row], rows: list[int]) -> None:
 
 @dataclass(frozen=True)
 class Conjugated:
-    """A = A' L^T with A'^T S A' = diag(d): columns that S tells apart.
+    """Columns made conjugate, A'^T S A' = diag(d), and how the given ones are made of them, A = A' L^T.
 
     Attributes:
         columns: of A'.
@@ -212,7 +212,7 @@ def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar], sq
         felt = [weighted(w, c) for w, c in zip(weights, column, strict=False)]
         pivot = _product(felt, column)
         size = growth[k] * growth[k]
-        seen = _share_seen(column, weights, scales)
+        seen = _squared_shares(column, weights, scales)
         alive = seen > CLOSING_ROUND_OFF * CLOSING_ROUND_OFF * size
         unsure = where(seen > SURELY_MORE * SURELY_MORE * size, 0.0, 1.0)
         doubt = larger(doubt, where(alive, unsure, 0.0))
@@ -226,8 +226,8 @@ def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar], sq
     return Conjugated(left, shares, pivots, inverses, doubt)
 
 
-def _share_seen(column: Sequence[Scalar], weights: Sequence[Scalar], scales: Sequence[Scalar]) -> Scalar:
-    """The squares of the components that have a weight, as shares of those of their bounds; their sum."""
+def _squared_shares(column: Sequence[Scalar], weights: Sequence[Scalar], scales: Sequence[Scalar]) -> Scalar:
+    """Sum the squares of the components that have a weight, each as a share of the square that it may have."""
     return total(
         [
             where(weight > 0.0, component * component * scale, 0.0)
@@ -237,30 +237,25 @@ def _share_seen(column: Sequence[Scalar], weights: Sequence[Scalar], scales: Seq
     )
 
 
-@dataclass(frozen=True)
-class LeastEnergy:
-    """Columns of least energy; `doubt` as in `Conjugated`, of the internal columns."""
-
-    columns: list[Row]
-    doubt: Scalar
-
-
 def least_energy(
     columns: Sequence[Sequence[Scalar]],
     internal: Sequence[Sequence[Scalar]],
     weights: Sequence[Scalar],
     squares: Sequence[Scalar],
-) -> LeastEnergy:
+) -> tuple[list[Row], Scalar]:
     """Subtract from each column x the mix of the internal ones that makes x^T S x least; S as in `conjugate`.
 
     Mixes of internal columns that S does not see are left out: nothing that S weighs depends on them.
+
+    Returns:
+        The columns, and the doubt as in `Conjugated`, about the internal ones.
     """
     modes = conjugate(internal, weights, squares)
     left = [list(column) for column in columns]
     for mode, inverse in zip(modes.columns, modes.inverses, strict=True):
         felt = [weighted(w, c) for w, c in zip(weights, mode, strict=True)]
         left = [_less(column, weighted(_product(felt, column), inverse), mode) for column in left]
-    return LeastEnergy(left, modes.doubt)
+    return left, modes.doubt
 
 
 def _product(felt: Sequence[Scalar], column: Sequence[Scalar]) -> Scalar:

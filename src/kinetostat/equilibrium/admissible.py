@@ -1,7 +1,7 @@
-"""Admissible motions: those of platform and coordinates that keep all legs closed, and statics over them.
+"""Admissible motions: small motions of platform and coordinates that keep all legs closed, and statics over them.
 
-Whether a closing condition repeats others is a question of geometry, and is decided here alone: rigid parts of several
-legs often hold the same motion, and beside their stiffness, or beside contrasts of springs, nobody could tell.
+Rigid parts of several legs often hold the same motion, so that closing conditions repeat each other. Which ones do is
+decided here, by geometry alone: in equations that hold stiffnesses too, soft springs could not be told from round-off.
 
 Source: theory (38) and (39). Units, axes and origin are those of `mechanism`; arrays have the poses first.
 """
@@ -21,13 +21,17 @@ Rows = npt.NDArray[np.int64]
 
 
 def starts_of(equations: Balance) -> npt.NDArray[np.int64]:
-    """Where the coordinates of each leg begin after the ways of the platform, and where the last ones end."""
+    """The first place of each leg's coordinates, after those of the platform's twist, and the end of the last one's."""
     sizes = [leg.size for leg in equations.mechanism.legs]
     return equations.mechanism.ways.shape[1] + np.cumsum([0, *sizes])
 
 
-def motions_of(equations: Balance) -> tuple[Array, Array, Array]:
-    """Springs, and what loads and wrenches add, over the twist of the platform and all coordinates; what these obey."""
+def tangent_matrices(equations: Balance) -> tuple[Array, Array, Array]:
+    """The matrices of springs, of loads and wrenches that turn, and of closing conditions, for small motions.
+
+    The first two are over the twist of the platform and all coordinates [n x N x N]; the third, over the same, must
+    give 0 [n x conditions x N].
+    """
     mechanism, ways, starts = equations.mechanism, equations.mechanism.ways, starts_of(equations)
     count, size, end = len(equations.left), ways.shape[1], int(starts[-1])
     elastic, geometric = np.zeros((2, count, end, end))
@@ -74,18 +78,17 @@ def admissible(conditions: Array, rows: Rows, gaps: Array) -> Iterator[Admissibl
         gaps: of the closing equations there [n].
     """
     left, values, right = np.linalg.svd(conditions[rows])
-    count = values.shape[1]
     least = np.maximum(CLOSING_ROUND_OFF, OPEN_BY_STEP * gaps[rows])
     ranks = (values > least[:, None] * values[:, :1]).sum(axis=1)
     for rank in np.unique(ranks):
         here = ranks == rank
         shrink = 1.0 / values[here, None, :rank]
-        inverse = np.swapaxes(right[here, :rank], 1, 2) * shrink @ np.swapaxes(left[here, :, :count][:, :, :rank], 1, 2)
+        inverse = np.swapaxes(right[here, :rank], 1, 2) * shrink @ np.swapaxes(left[here, :, :rank], 1, 2)
         yield Admissible(rows[here], np.swapaxes(right[here, rank:], 1, 2), inverse)
 
 
 def within(matrix: Array, allowed: Array) -> Array:
-    """The symmetric part of a matrix over the motions that are allowed, the columns [n x k x k]."""
+    """The symmetric part of a matrix M over some motions, the columns of Z: that of Z^T M Z [n x k x k]."""
     return np.asarray(0.5 * np.swapaxes(allowed, 1, 2) @ (matrix + np.swapaxes(matrix, 1, 2)) @ allowed)
 
 
@@ -101,7 +104,7 @@ def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Arr
         right: right sides, in the order of the unknowns.
         loaded: with what loads and wrenches do by turning.
     """
-    elastic, geometric, conditions = motions_of(equations)
+    elastic, geometric, conditions = tangent_matrices(equations)
     geometric = geometric if loaded else np.zeros_like(geometric)
     moving, carried = _places(equations)
     force, gap = right[:, moving], right[:, carried]
@@ -114,14 +117,14 @@ def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Arr
         if part.motions.shape[2]:
             resisted = back @ (force[part.rows] - whole @ motion)
             bent = back @ geometric[part.rows] @ part.motions
-            motion = motion + part.motions @ _resisted(_springs(equations, part), bent, resisted)
+            motion = motion + part.motions @ _balanced_motion(_springs(equations, part), bent, resisted)
         wrenches = np.swapaxes(part.inverse, 1, 2) @ (whole @ motion - force[part.rows])
         result[part.rows[:, None], moving], result[part.rows[:, None], carried] = motion, wrenches
     return result
 
 
 def _places(equations: Balance) -> tuple[Rows, Rows]:
-    """Where the twist and all coordinates are among the unknowns, and where the wrenches of the legs are."""
+    """The places of the twist and all coordinates among the unknowns, and those of the wrenches of the legs."""
     ways, starts = equations.mechanism.ways.shape[1], equations.starts
     every = np.arange(starts[-1])
     carried = np.concatenate([every[end - ways : end] for end in starts[1:]])
@@ -144,7 +147,7 @@ def _springs(equations: Balance, part: Admissible) -> Array:
     return np.asarray(np.linalg.qr(np.concatenate(rows, axis=1), mode="r"))
 
 
-def _resisted(springs: Array, bent: Array, force: Array) -> Array:
+def _balanced_motion(springs: Array, bent: Array, force: Array) -> Array:
     """The motions y with (R^T R + G) y = f: by R where springs hold every motion, else as one matrix."""
     sizes = np.abs(np.diagonal(springs, axis1=1, axis2=2))
     holds = sizes.min(axis=1) > UNRESISTED * sizes.max(axis=1)
@@ -153,14 +156,14 @@ def _resisted(springs: Array, bent: Array, force: Array) -> Array:
         inverse = np.linalg.inv(springs[holds])
         back = np.swapaxes(inverse, 1, 2)
         turned = np.eye(springs.shape[1]) + back @ bent[holds] @ inverse
-        result[holds] = inverse @ solved(turned, back @ force[holds])
+        result[holds] = inverse @ finite_solution(turned, back @ force[holds])
     if not holds.all():
         whole = np.swapaxes(springs[~holds], 1, 2) @ springs[~holds] + bent[~holds]
-        result[~holds] = solved(whole, force[~holds])
+        result[~holds] = finite_solution(whole, force[~holds])
     return result
 
 
-def solved(rates: Array, right: Array) -> Array:
+def finite_solution(rates: Array, right: Array) -> Array:
     """Solutions of linear equations; NaN where these are not finite, which a pose without a place leaves behind."""
     sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2))
     result = np.full((*rates.shape[:2], right.shape[2]), np.nan)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.equilibrium.admissible import solve_over_admissible, solved
+from kinetostat.equilibrium.admissible import finite_solution, solve_over_admissible
 from kinetostat.equilibrium.balance import Balance, State, balance, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.motion import Array, Motions
@@ -33,6 +33,7 @@ class Rest(IntEnum):
     OK = 0
     NO_REST = 1
     UNSTABLE = 2
+    UNDECIDED = 3
 
     @property
     def word(self) -> str:
@@ -176,5 +177,5 @@ def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
             return solve_over_admissible(equations, right, loaded)
         parts.append(part)
         whole, total = whole + stiffness, total - part[:, -size:, :-size]
-    twist = solved(whole, total)
+    twist = finite_solution(whole, total)
     return np.concatenate([twist, *(part[:, :, :-size] + part[:, :, -size:] @ twist for part in parts)], axis=1)

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.equilibrium.admissible import admissible, gaps_of, motions_of, starts_of, within
+from kinetostat.equilibrium.admissible import admissible, gaps_of, starts_of, tangent_matrices, within
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.motion import Array, skew_of
 from kinetostat.equilibrium.solving import solve
@@ -108,7 +108,7 @@ def stability(equations: Balance) -> Stability:
 def stabilities(equations: Balance) -> Stabilities:
     """Judge states of rest; what is not finite is not stable."""
     ways, starts = equations.mechanism.ways, starts_of(equations)
-    elastic, geometric, conditions = motions_of(equations)
+    elastic, geometric, conditions = tangent_matrices(equations)
     count, size = len(elastic), ways.shape[1]
     sound = np.isfinite(elastic + geometric).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
     stable: npt.NDArray[np.bool_] = np.array(sound)

@@ -81,9 +81,9 @@ def builds_of(chains: Chains) -> list[Build]:
 
 
 def _sort(element: Any) -> tuple[Any, ...]:
-    """What elements must have in common to be placed by one evaluation: their class, and what they have at all.
+    """The class of an element, and which of its fields are points, names or None: alike in elements of one build.
 
-    A joint with a carriage and one without, for instance, have other fields that are None.
+    Only then can one evaluation place them all. A joint with a carriage and one without it differ.
     """
     values = [getattr(element, field.name) for field in fields(element)]
     kinds = tuple(type(value) if isinstance(value, Vector | str | None) else float for value in values)

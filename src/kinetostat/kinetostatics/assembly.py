@@ -242,12 +242,11 @@ def least_energy_rows(
     every, null = (in_modes(modes, rows) for rows in (balance, [*zip(*internal, strict=True)]))
     guides = len(wrenches) - len(compliance)
     weights = compliance + [0.0] * guides
-    sizes = [size for leg in modes for size in leg.sizes()] + [1.0] * guides
-    shared = least_energy([*zip(*every, strict=True)], [*zip(*null, strict=True)], weights, sizes)
-    doubt = shared.doubt
+    squares = [square for leg in modes for square in leg.amount_squares()] + [1.0] * guides
+    shared, doubt = least_energy([*zip(*every, strict=True)], [*zip(*null, strict=True)], weights, squares)
     for leg in modes:
         doubt = larger(doubt, leg.doubt)
-    rows = [(*(c * shrink for c in row[:3]), *row[3:]) for row in zip(*shared.columns, strict=True)]
+    rows = [(*(c * shrink for c in row[:3]), *row[3:]) for row in zip(*shared, strict=True)]
     return rows, doubt, singularity_margin
 
 

@@ -59,7 +59,7 @@ def internal_loads(
     sizes = np.linalg.norm(matrix, axis=0)
     _, values, rows = np.linalg.svd(matrix / sizes)
     internal = (rows[int((values > DEPENDENT_WRENCHES * values[0]).sum()) :] / sizes).T[: len(owners)]
-    _, seen, modes = np.linalg.svd(_seen(balanced) @ internal)
+    _, seen, modes = np.linalg.svd(_load_shares(balanced) @ internal)
     decided = int((seen > CLOSING_ROUND_OFF).sum())
     undecided = internal @ modes[decided:].T
     return InternalLoads(
@@ -70,16 +70,16 @@ def internal_loads(
     )
 
 
-def _seen(legs: Sequence[LegScrews]) -> Array:
+def _load_shares(legs: Sequence[LegScrews]) -> Array:
     """Loads in the springs that deflect, as shares of what they may be, per unit of the wrenches of all legs."""
     rows: list[Array] = []
     every = sum(len(leg.wrenches) for leg in legs)
     at = 0
     for leg in legs:
-        for loads, compliance, size in zip(leg.loads, leg.compliance, leg.sizes, strict=True):
+        for loads, compliance, square in zip(leg.loads, leg.compliance, leg.load_squares, strict=True):
             if compliance > 0.0:
                 rows.append(np.zeros(every))
-                rows[-1][at : at + len(loads)] = np.array(loads, dtype=float) / math.sqrt(size)
+                rows[-1][at : at + len(loads)] = np.array(loads, dtype=float) / math.sqrt(square)
         at += len(leg.wrenches)
     return np.array(rows).reshape(len(rows), every)
 

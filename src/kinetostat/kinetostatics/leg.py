@@ -120,8 +120,8 @@ class Modes:
         size = range(len(amounts))
         return [amounts[k] + total([self.shares[j][k] * amounts[j] for j in size if j > k]) for k in size]
 
-    def sizes(self) -> list[Scalar]:
-        """The square of the amount of each mode that no load of unit size exceeds, by the leg's own wrenches."""
+    def amount_squares(self) -> list[Scalar]:
+        """For each mode, the square of its greatest amount in any load that is of unit size in the leg's wrenches."""
         size = range(len(self.wrenches))
         return [1.0 + total([self.shares[j][k] * self.shares[j][k] for j in size if j > k]) for k in size]
 
@@ -130,7 +130,7 @@ def modes_of(leg: LegScrews) -> Modes:
     """The modes of a leg; each is one of its wrenches less a mix of those before."""
     springs = len(leg.loads)
     columns = [(*(row[k] for row in leg.loads), *wrench.components()) for k, wrench in enumerate(leg.wrenches)]
-    modes = conjugate(columns, leg.compliance, leg.sizes)
+    modes = conjugate(columns, leg.compliance, leg.load_squares)
     combined = modes.columns
     return Modes(
         tuple(Wrench(Vector(*column[springs : springs + 3]), Vector(*column[springs + 3 :])) for column in combined),

@@ -73,6 +73,11 @@ class Response:
     softest: Scalar | None = None
     regularity = renamed_property("singularity_margin")
 
+    @property
+    def undecided(self) -> bool:
+        """Whether it is undecided, at a single pose that is not singular, which rigid parts share a load."""
+        return bool(self.statics.doubt > 0.5 and self.singularity_margin > SINGULAR)
+
 
 def respond(machine: Machine, joints: Joints | None = None) -> Response:
     """Compute K, C and the status of a machine at its pose.

@@ -233,7 +233,7 @@ class LegScrews:
         compliance: of each spring (diagonal of S): 0 rigid, infinity free; m/N or rad/(N·m).
         wrenches: basis of what the leg can carry (W): no work on any passive twist.
         loads: load in each spring per unit of each wrench (J_e^T W).
-        sizes: order of the square of each load, moments of wrenches over the characteristic length (N², N²m²).
+        load_squares: order of the square of each load, moments of wrenches over the characteristic length (N², N²m²).
         singularity_margin: 0 where the passive joints lock up, 1 where they are orthogonal (dimensionless).
     """
 
@@ -242,7 +242,7 @@ class LegScrews:
     compliance: tuple[Scalar, ...]
     wrenches: tuple[Wrench, ...]
     loads: tuple[tuple[Scalar, ...], ...]
-    sizes: tuple[Scalar, ...]
+    load_squares: tuple[Scalar, ...]
     singularity_margin: Scalar
 
 
@@ -344,11 +344,11 @@ class Leg:
             compliance=tuple(reciprocal(spring.stiffness) for spring in self.springs),
             wrenches=wrenches,
             loads=tuple(self._loads(s, twist, wrenches) for s, twist in zip(self.springs, elastic, strict=True)),
-            sizes=self._sizes(elastic, length),
+            load_squares=self._load_squares(elastic, length),
             singularity_margin=singularity_margin,
         )
 
-    def _sizes(self, elastic: Sequence[Twist], length: Scalar) -> tuple[Scalar, ...]:
+    def _load_squares(self, elastic: Sequence[Twist], length: Scalar) -> tuple[Scalar, ...]:
         """Squares of the loads by unit wrenches; for all turns, those by the arm of the first one."""
         turning = next((twist for twist in elastic if not twist.slides), None)
         square = 1.0 if turning is None else length * length + turning.translational.dot(turning.translational)

@@ -326,7 +326,7 @@ def _rank(response: Response, statics: Statics, compliance_infinite: bool) -> in
     if compliance_infinite:
         wrenches: list[Screw] = [wrench for wrench, k in statics.actions if k > 0.0]
         return independent(wrenches, length, CLOSING_ROUND_OFF)
-    sizes = [math.sqrt(size) for leg in response.legs for size in leg.sizes]
+    sizes = [math.sqrt(size) for leg in response.legs for size in leg.load_squares]
     greatest = np.linalg.norm(columns([twist for leg in statics.sharing for twist in leg], 1.0, 1.0 / length))
     springs = zip(statics.flexibility, statics.compliance, sizes, strict=True)
     twists = [twist * (1.0 / (size * greatest)) for twist, s, size in springs if s > 0.0]

@@ -18,7 +18,7 @@ from kinetostat.equilibrium.tangent import stabilities
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.forward import leg_names
-from kinetostat.kinematics.status import PLACELESS
+from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators, senses_of
 from kinetostat.machine.machine import Machine
@@ -99,7 +99,8 @@ def driven(machine: Machine, columns: Mapping[str, Array], count: int, progress:
     names = next((slab.actuators for slab in slabs if slab is not None and slab.actuators), None)
     if names is None:
         raise InputError(
-            f"{machine.name} reaches none of these poses, or has no actuator that could be commanded; change the pose."
+            f"{machine.name} reaches none of these poses, or it is undecided there which rigid parts share a load, or it has "
+            "no actuator that could be commanded; change the pose."
         )
     sizes = [min(SLAB, count - start) for start in range(0, count, SLAB)]
     return _joined([slab or _nowhere(names, size) for slab, size in zip(slabs, sizes, strict=True)])
@@ -116,9 +117,9 @@ def _nowhere(actuators: tuple[Actuator, ...], count: int) -> Driven:
 
 
 def _slab(machine: Machine, columns: Mapping[str, Array], count: int) -> Driven | None:
-    """Some poses at once; None where the machine has no place at any of them."""
+    """Some poses at once; None where the machine has no state of rest to look for at any of them."""
     status = np.broadcast_to(respond(with_values(machine, columns)).status, (count,))
-    rows = np.flatnonzero(~np.isin(status, PLACELESS))
+    rows = np.flatnonzero(~np.isin(status, (*PLACELESS, Status.UNDECIDED)))
     if not len(rows):
         return None
     placed = {path: column[rows] for path, column in columns.items()}

@@ -128,6 +128,8 @@ def under_load(machine: Machine) -> LoadedState:
     names = machine.family.component_names
     if int(response.status) in PLACELESS:
         return LoadedState(machine, Rest.NO_REST, why_not(machine, response, []), names)
+    if response.undecided:
+        return LoadedState(machine, Rest.UNDECIDED, Status.UNDECIDED.sentence, names)
     mechanism, balanced = loaded_mechanism(machine, response, joints)
     if not balanced[0]:
         return LoadedState(machine, Rest.NO_REST, why_no_tensions(machine), names)

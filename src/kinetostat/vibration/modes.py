@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.equilibrium.admissible import motions_of, starts_of, within
+from kinetostat.equilibrium.admissible import starts_of, tangent_matrices, within
 from kinetostat.equilibrium.balance import Balance, placed_leg
 from kinetostat.equilibrium.motion import Array, skew_of
 from kinetostat.kinetostatics.quantities import MODES
@@ -123,7 +123,7 @@ def solved(equations: Balance, shaped: bool = True) -> Iterator[Solved]:
         equations: of the states.
         shaped: whether shapes are wanted; without them they are empty, and frequencies take half of the time.
     """
-    elastic, geometric, conditions = motions_of(equations)
+    elastic, geometric, conditions = tangent_matrices(equations)
     stiff, mass = elastic + geometric, mass_matrix(equations)
     left_out, starts = motions_left_out(equations), starts_of(equations)
     sound = np.isfinite(stiff).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))

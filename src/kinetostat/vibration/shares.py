@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from kinetostat.equilibrium.admissible import motions_of, starts_of
+from kinetostat.equilibrium.admissible import starts_of, tangent_matrices
 from kinetostat.equilibrium.balance import Balance, placed_leg
 from kinetostat.equilibrium.motion import Array
 from kinetostat.vibration.inertia import energies, leg_rates, platform_rates
@@ -21,7 +21,7 @@ TURNING_LOADS = "weight and wrenches as they turn"
 
 def strain_shares(equations: Balance, shapes: Array) -> dict[str, Array]:
     """Shares of the strain energy by spring [modes]; wrenches and weights that turn have what is left."""
-    elastic, geometric, _ = motions_of(equations)
+    elastic, geometric, _ = tangent_matrices(equations)
     shares: dict[str, Array] = {}
     for leg, (first, _last) in zip(equations.mechanism.legs, pairwise(starts_of(equations)), strict=True):
         for number, spring in enumerate(leg.springs):

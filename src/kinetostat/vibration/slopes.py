@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, total
-from kinetostat.equilibrium.admissible import motions_of, starts_of
+from kinetostat.equilibrium.admissible import starts_of, tangent_matrices
 from kinetostat.equilibrium.balance import Balance, balance, free_state, placed_leg
 from kinetostat.equilibrium.chains import Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
@@ -48,7 +48,7 @@ def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
     joints = solve_joints(machine) if machine.family.chains else None
     mechanism = with_share(mechanism_of(machine, respond(machine, joints), joints, count), 0.0)
     equations = balance(mechanism, free_state(mechanism))
-    elastic, geometric, conditions = motions_of(equations)
+    elastic, geometric, conditions = tangent_matrices(equations)
     stiff, mass, closing = elastic + geometric, mass_matrix(equations), conditions.shape[1]
     held_still = np.concatenate([conditions, motions_left_out(equations)], axis=1)
     columns = np.full((count, most, 1 + stiff.shape[1] + closing), np.nan)

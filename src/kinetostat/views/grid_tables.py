@@ -15,7 +15,7 @@ from kinetostat.machine.limits import Limits, unlimited
 from kinetostat.machine.parameters import dimension, shown
 from kinetostat.studies.grid.grid import failures, field_of
 from kinetostat.studies.grid.stored_grid import Extremes, StoredGrid
-from kinetostat.studies.workspace.region import FEWEST_CELLS, Volume
+from kinetostat.studies.workspace.region import FEWEST_CELLS
 from kinetostat.studies.workspace.verdicts import INSIDE, phrase
 from kinetostat.studies.workspace.workspace import Workspace
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
@@ -130,31 +130,28 @@ def print_workspace(console: Console, workspace: Workspace) -> None:
         console.print(table)
 
 
-def _volume_line(name: str, volume: Volume) -> str:
-    return (
-        f"{name}: {volume.value:.5g} ± {ERRORS * volume.standard_error:.2g} {volume.unit} "
-        f"({100.0 * volume.share:.4g} % of the box; two random points in each of {volume.cells:,} cells, ± two "
-        "standard errors)."
-    )
-
-
 def _summary(workspace: Workspace) -> Iterator[str]:
     volume = workspace.volume
     name = "Area" if len(workspace.dataset["verdict"].dims) == 2 else "Volume"
     yield workspace.dataset.attrs["machine"]
-    if volume.too_coarse:
+    if volume.cells < FEWEST_CELLS:
+        cells = "1 cell" if volume.cells == 1 else f"{volume.cells:,} cells"
         yield (
             f"{name}: about {volume.value:.2g} {volume.unit} ({100.0 * volume.share:.3g} % of the box). The grid is "
-            f"too coarse to say how far that may be wrong: it has {volume.cells:,} "
-            f"{'cell' if volume.cells == 1 else 'cells'}; give the axes more points, so that there are "
+            f"too coarse to say how far that may be wrong: it has {cells}; give the axes more points, for "
             f"{FEWEST_CELLS} cells or more."
         )
     else:
-        yield _volume_line(name, volume)
+        yield (
+            f"{name}: {volume.value:.5g} ± {ERRORS * volume.standard_error:.2g} {volume.unit} "
+            f"({100.0 * volume.share:.4g} % of the box; two random points in each of {volume.cells:,} cells, ± two "
+            "standard errors)."
+        )
     if volume.unknown_cells:
         yield (
             f"It may be larger by up to {volume.unknown:.2g} {volume.unit}: in {volume.unknown_cells:,} of the cells a "
-            "point did not converge. Whether it can be reached is not known; it counts as outside."
+            "point did not converge or is undecided. Whether it belongs to the workspace is not known; it counts as "
+            "outside."
         )
     if "assembly_mode" in workspace.dataset.attrs:
         yield "The machine keeps to the assembly mode of its home pose, the one in which its legs are written down."

@@ -82,7 +82,7 @@ def needs_axis(kind: str) -> bool:
 
 
 def departure(data: Any) -> Vector:
-    """Where the link behind a joint begins: at the far side of a parallelogram, else at the joint's point (m)."""
+    """The point (m) at which the link behind a joint begins: at the far side of a parallelogram, else at the joint."""
     return Vector(*getattr(data, "far", data.point))
 
 

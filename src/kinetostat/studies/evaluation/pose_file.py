@@ -18,7 +18,7 @@ SEPARATORS = (";", "\t", ",")
 ANSWERS = {"pose", "status", *QUANTITIES}
 """Columns that `kinetostat path` writes beside the poses: its own files are read again without them."""
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\x85\u2028\u2029]")
-"""Characters that end a number without a trace, or a line where no editor shows its end."""
+"""Control characters. Python drops some of them from a number, and takes others for the end of a line."""
 _HEAD = re.compile(r"(.+?)\s*(?:\[(.*)\]|\((.*)\))?")
 
 

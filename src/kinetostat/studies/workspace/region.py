@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import prod, sqrt
+from math import nan, prod, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,8 @@ POWERS = {1: "", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶"}
 
 
 FEWEST_CELLS = 30
-"""Cells below which the differences within them are too few to estimate an error from: it then often comes out as 0."""
+"""Fewest cells from which a standard error is estimated. With fewer, both points of every cell often agree by chance,
+and the error would come out as 0."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class Volume:
 
     Attributes:
         value: the volume, in the product of the SI units of the coordinates.
-        standard_error: standard error of the value, in the same unit.
+        standard_error: standard error of the value, in the same unit; NaN where there are too few cells for one.
         unit: the unit of both, e.g. "m³" or "m²·rad".
         box: volume of all cells together.
         cells: number of cells.
@@ -48,11 +49,6 @@ class Volume:
     @property
     def share(self) -> float:
         return self.value / self.box
-
-    @property
-    def too_coarse(self) -> bool:
-        """Whether there are too few cells for a standard error that means anything."""
-        return self.cells < FEWEST_CELLS
 
 
 Points = npt.NDArray[np.bool_]
@@ -79,7 +75,8 @@ def estimate_volume(inside: Points, unknown: Points, sizes: Sequence[float], uni
     box = prod(sizes)
     cell = box / len(pairs)
     divided = int((pairs[:, 0] != pairs[:, 1]).sum())
-    value, error = cell * float(inside.sum()) / PER_CELL, 0.5 * cell * sqrt(divided)
+    value = cell * float(inside.sum()) / PER_CELL
+    error = 0.5 * cell * sqrt(divided) if len(pairs) >= FEWEST_CELLS else nan
     unknown_cells = int(unknown.reshape(-1, PER_CELL).any(axis=1).sum())
     return Volume(value, error, unit_product(units), box, len(pairs), divided, unknown_cells)
 

@@ -3,6 +3,7 @@
 What is drawn or printed of it is elsewhere (`views.workspace_figures`, `views.grid_tables`).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -165,7 +166,7 @@ def _volume(judge: Judge, question: GridQuestion, seed: int, progress: Progress)
     evaluation = evaluate(judge.machine, Cells(axes, seed), judge.quantities, progress)
     sizes = [float(axis.values[-1] - axis.values[0]) for axis in axes]
     units = [str(question.labels[dim].attrs["units"]) for dim in question.dims]
-    unknown = np.asarray(evaluation.status == Status.NOT_CONVERGED)
+    unknown = np.isin(evaluation.status, (Status.NOT_CONVERGED, Status.UNDECIDED))
     return estimate_volume(judge.inside(evaluation.status, evaluation.values), unknown, sizes, units)
 
 
@@ -255,7 +256,7 @@ def as_json(workspace: Workspace) -> dict[str, Any]:
             "coordinates": coordinates,
             "volume": {
                 "value": volume.value,
-                "standard_error": None if volume.too_coarse else volume.standard_error,
+                "standard_error": None if math.isnan(volume.standard_error) else volume.standard_error,
                 "unknown": volume.unknown,
                 "units": volume.unit,
                 "share_of_box": volume.share,
