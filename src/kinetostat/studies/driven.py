@@ -99,8 +99,8 @@ def driven(machine: Machine, columns: Mapping[str, Array], count: int, progress:
     names = next((slab.actuators for slab in slabs if slab is not None and slab.actuators), None)
     if names is None:
         raise InputError(
-            f"{machine.name} reaches none of these poses, or it is undecided there which rigid parts share a load, or it has "
-            "no actuator that could be commanded; change the pose."
+            f"{machine.name} reaches none of these poses, or it is undecided there which rigid parts share a load, or "
+            "no actuator could be commanded; change the pose."
         )
     sizes = [min(SLAB, count - start) for start in range(0, count, SLAB)]
     return _joined([slab or _nowhere(names, size) for slab, size in zip(slabs, sizes, strict=True)])
