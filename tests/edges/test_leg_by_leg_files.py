@@ -224,3 +224,36 @@ def test_what_is_said_of_rigid_parts_is_true_of_the_stiffness_shown():
     assert analysis.rank == 6
     assert "so that K is finite" in analysis.message
     assert "infinite" not in analysis.message
+
+
+def written_out(name, capsys):
+    assert main(["new", "--legs-of", name]) == 0
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["tricept", "tricept-rus", "passive-leg-3dof-pu", "planar-3rrr"])
+def test_a_machine_written_out_leg_by_leg_keeps_its_limits_and_its_joints(name, tmp_path, capsys):
+    file = tmp_path / "legs.toml"
+    file.write_text(written_out(name, capsys))
+    assert main(["check", str(file)]) == 0
+    assert "The pose can be reached and the machine resists every load." in capsys.readouterr().out
+    kept, drawn = (vars(load(machine).tables["limits"]) for machine in (str(file), name))
+    left_out = {limit for limit in kept if not kept[limit] == pytest.approx(drawn[limit])}
+    assert left_out == ({"platform_joint_angle"} if "Left out" in file.read_text() else set())
+    assert "joint 2" not in file.read_text()
+
+
+def test_a_hooke_joint_described_axis_by_axis_is_no_straight_leg(tmp_path, capsys):
+    """Its two centres coincide: they had been taken for the ends of a rod, whose direction was compared."""
+    whole = next(line for line in written_out("tricept", capsys).splitlines() if '"Hooke joint"' in line)
+    first, second = (whole.partition(f"{n}_axis = ")[2].partition("]")[0] + "]" for n in ("first", "second"))
+    parts = [
+        f'  {{ name = "U{i}", type = "revolute", joins = {joins}, point = [0, 0, 0], axis = {axis} }},'
+        for i, joins, axis in ((1, '["base", "cross"]', first), (2, '["cross", "body 1"]', second))
+    ]
+    file = tmp_path / "legs.toml"
+    file.write_text(written_out("tricept", capsys).replace(whole, "\n".join(parts)))
+    assert main(["analyze", str(file), "--json"]) == 0
+    answer, family = json.loads(capsys.readouterr().out), analyze(load("tricept"))
+    assert answer["status"] == "ok"
+    assert answer["compliance_diagonal"] == pytest.approx(family.compliance_diagonal, rel=1e-8)

@@ -8,6 +8,8 @@ import pytest
 
 from kinetostat.algebra.lines import squared_distance
 from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.display import ENGINEERING
+from kinetostat.kinematics.limits import Check, why_beyond
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import pose_status, respond
 from kinetostat.machine.limits import LIMITS
@@ -153,7 +155,8 @@ def test_the_straight_legs_are_those_a_family_draws_straight(name):
     }
     expected |= {"delta": 0, "orthoglide": 0, "tripteron": 0, "tricept": 3, "tricept-rus": 3}
     count = expected.get(name, int(name.split("dof")[0][-1]) if "dof" in name else None)
-    found = rods(respond(load(name)).configuration.legs)
+    machine = load(name)
+    found = rods(respond(machine).configuration.legs, machine.family.planar)
     assert len(found) == count
     telescopic = not name.endswith("rus") and name != "planar-3rrr"
     assert all(rod.telescopic == telescopic and rod.on_base == telescopic and rod.on_platform for rod in found)
@@ -229,6 +232,12 @@ def test_a_pose_beyond_a_limit_says_which_and_by_how_much(name, settings, words)
     for word in words:
         assert word in answer.message
     assert "  " not in answer.message
+
+
+def test_a_direction_without_length_is_not_said_to_be_an_angle():
+    check = Check(LIMITS["base_joint_angle"], "leg 1", math.nan, 0.5, 0.0)
+    assert "Leg 1: both joints stand in one point" in why_beyond([check], ENGINEERING)
+    assert "0 deg" not in why_beyond([check], ENGINEERING)
 
 
 REFUSED = [

@@ -43,7 +43,14 @@ def legs_of(name: str) -> str:
         InputError: no such machine, or it cannot be placed at its pose.
     """
     machine = load(name)
-    return _text(document_of(machine), machine)
+    document = document_of(machine)
+    lost = _limits_lost((limit.name for limit in limits_set(machine.tables["limits"])), document)
+    note = f"# Left out, since the platform is tilted at this pose: {lost}.\n" if lost else ""
+    return note + _text(document, machine)
+
+
+def _limits_lost(limits: Iterable[str], document: Document) -> str:
+    return ", ".join(f"limits.{name}" for name in limits if name not in document.get("limits", {}))
 
 
 def built_text(machine: Machine, built: Configuration, notes: Sequence[str]) -> str:
@@ -55,10 +62,9 @@ def built_text(machine: Machine, built: Configuration, notes: Sequence[str]) -> 
         notes: lines of comment at its head.
     """
     document = document_of(machine, built)
-    lost = [name for name in document_of(machine).get("limits", {}) if name not in document.get("limits", {})]
+    lost = _limits_lost(document_of(machine).get("limits", {}), document)
     if lost:
-        names = ", ".join(f"limits.{name}" for name in lost)
-        notes = [*notes, f"Left out, since axes of joints do not meet: {names}; travels stand for lengths of legs."]
+        notes = [*notes, f"Left out, since axes of joints do not meet: {lost}; travels stand for lengths of legs."]
     return "".join(f"# {note}\n" for note in notes) + _text(document, machine)
 
 
@@ -173,9 +179,9 @@ class _Chain:
     def document(self) -> dict[str, Any]:
         """The leg as its entry in the file."""
         elements = list(_free_where_zero(self.leg.chain))
-        for kind, run in groupby(elements, key=_run):
+        for (passive, _), run in groupby(elements, key=_run):
             row = list(run)
-            if kind == "joint":
+            if passive:
                 self._add_joints([element for element in row if isinstance(element, Joint)])
             else:
                 self._add_elements(row)
@@ -255,8 +261,9 @@ class _Chain:
         return name if name not in used else next(other for other in numbered if other not in used)
 
 
-def _run(element: Element) -> str:
-    return "joint" if isinstance(element, Joint) else "element"
+def _run(element: Element) -> tuple[bool, Vector | None]:
+    """Neighbours in a chain that are written together: axes through one point, so that a Hooke joint stays one."""
+    return (True, element.point) if isinstance(element, Joint) else (False, None)
 
 
 def _free_where_zero(chain: Iterable[Element]) -> Iterable[Element]:

@@ -5,6 +5,7 @@ Every comparison is between scalars without a branch, so that one pose, many and
 Source: the definitions on the documentation's page on limits and workspace.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -136,9 +137,15 @@ def _limits_of(checks: Sequence[Check]) -> list[Limit]:
 
 
 def _sentence(passed: Sequence[Check], display: Display) -> str:
-    """Say that one limit is passed, from its checks that are not kept."""
-    worst = max(passed, key=lambda check: abs(check.measure - check.bound))
+    """Say that one limit is passed, from its checks that are not kept; a direction without length is not a number."""
+    unknown = [check for check in passed if math.isnan(check.measure)]
+    worst = unknown[0] if unknown else max(passed, key=lambda check: abs(check.measure - check.bound))
     limit = worst.limit
+    if unknown:
+        return (
+            f"{worst.part[0].upper()}{worst.part[1:]}: both joints stand in one point, so that limits.{limit.name} "
+            f"cannot be judged; {limit.advice} or leave the limit out."
+        )
     value, allowed = (
         display.show(limit.shown(float(number)), limit.unit, digits=DIGITS) for number in (worst.measure, worst.bound)
     )

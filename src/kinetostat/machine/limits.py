@@ -44,7 +44,7 @@ class Parts:
     @cached_property
     def rods(self) -> list[Rod]:
         """The straight legs."""
-        return rods(self.legs)
+        return rods(self.legs, self.planar)
 
 
 Measured = Iterator[tuple[int, str, Scalar]]

@@ -47,16 +47,21 @@ class Rod:
         return reciprocal(self.span.dot(self.span))
 
 
-def rods(legs: Sequence[Leg]) -> list[Rod]:
+def rods(legs: Sequence[Leg], planar: bool = False) -> list[Rod]:
     """Return the straight parts of those legs that have one.
 
     That is a leg with a slide between its two passive joints (U-P-S, R-P-S, R-P-R), and the rod of a crank between two
-    joints that both have several axes, or in a plane both have one.
+    joints that both have several axes, or in a plane both have one. Two single axes in space are no rod: they may be
+    a Hooke joint that a file describes axis by axis, and its centres then coincide.
+
+    Args:
+        legs: at a pose.
+        planar: whether the machine moves in a plane.
     """
-    return [rod for leg in legs if (rod := _rod(leg)) is not None]
+    return [rod for leg in legs if (rod := _rod(leg, planar)) is not None]
 
 
-def _rod(leg: Leg) -> Rod | None:
+def _rod(leg: Leg, planar: bool = False) -> Rod | None:
     places: dict[str, list[tuple[int, Vector]]] = {}
     for i, element in enumerate(leg.chain):
         if isinstance(element, Parallelogram):
@@ -69,7 +74,8 @@ def _rod(leg: Leg) -> Rod | None:
     first, last = places.values()
     between = leg.chain[first[-1][0] + 1 : last[0][0]]
     slides = any(_is_slide(element) for element in between)
-    if not slides and (len(first) == 1) != (len(last) == 1):
+    single = len(first) == 1, len(last) == 1
+    if not slides and single != (planar, planar):
         return None
     return Rod(
         leg.name,
