@@ -238,7 +238,7 @@ def test_a_machine_written_out_leg_by_leg_keeps_its_limits_and_its_joints(name, 
     assert main(["check", str(file)]) == 0
     assert "The pose can be reached and the machine resists every load." in capsys.readouterr().out
     kept, drawn = (vars(load(machine).tables["limits"]) for machine in (str(file), name))
-    left_out = {limit for limit in kept if not kept[limit] == pytest.approx(drawn[limit])}
+    left_out = {limit for limit in kept if kept[limit] != pytest.approx(drawn[limit])}
     assert left_out == ({"platform_joint_angle"} if "Left out" in file.read_text() else set())
     assert "joint 2" not in file.read_text()
 
