@@ -1,11 +1,13 @@
 """Joints with bearings, series of parts and copies of legs, each against a second way of writing the same machine."""
 
+import json
 import math
 
 import numpy as np
 import pytest
 
 from kinetostat.algebra.vector import Vector
+from kinetostat.cli import main
 from kinetostat.exchange.leg_by_leg import legs_of
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.link import seat_springs
@@ -68,6 +70,49 @@ def test_bearings_of_a_carriage_travel_with_it():
     flat = np.diag(compliance(build(text.replace("\n            ", " "), "gantry")))
     lever = 0.4**2 / 1e6 + 1 / 80e6
     np.testing.assert_allclose(flat, [1e-6, 1e-6, 0.5e-6, lever, lever, 1 / 50e6], rtol=1e-12)
+
+
+GANTRY = """
+name = "gantry"
+family = "legs"
+[platform]
+point = [0, 0, 1]
+[pose]
+z = 1.3
+[[legs]]
+name = "only"
+joints = [
+  { name = "rail", type = "TYPE", joins = ["base", "car"], point = [0, 0, 0.6], AXIS, MATRIX },
+  { name = "flange", type = "fixed", joins = ["car", "platform"], point = [0, 0, 0.6], BEHIND },
+]
+"""
+SLIDES = {
+    "prismatic": 'axis = [0, 0, 1], actuated = true, stiffness = "rigid"',
+    "helical": 'axis = [0, 0, 1], pitch = "10 mm", actuated = true, stiffness = "rigid"',
+}
+
+
+@pytest.mark.parametrize("kind", SLIDES)
+@pytest.mark.parametrize(("at", "travel"), [("MATRIX", 0.3), ("BEHIND", 0.0)])
+def test_the_matrix_of_a_slide_stays_at_its_seat_and_that_of_a_flange_behind_it_travels(
+    kind, at, travel, tmp_path, capsys
+):
+    """C of a body at r from an elastic seat, X C_seat X^T with X = [[1, 0], [-[r]x, 1]]; r grows as the slide travels."""
+    rng = np.random.default_rng(5)
+    root = rng.normal(size=(6, 6)) * np.repeat([1e-4, 1e-5], 3)[:, None]
+    seat = root @ root.T
+    text = GANTRY.replace("TYPE", kind).replace("AXIS", SLIDES[kind]).replace(at, f"compliance = {seat.tolist()}")
+    file = tmp_path / "gantry.toml"
+    file.write_text(text.replace(", MATRIX", "").replace(", BEHIND", ""))
+    turn = 0.3 / 0.01 if kind == "helical" else 0.0
+    r = np.array([0.0, 0.0, 0.4 + travel])
+    shift = np.eye(6)
+    shift[3:, :3] = -np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0]])
+    spin = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    turned = np.kron(np.eye(2), spin if at == "BEHIND" else np.eye(3))
+    assert main(["analyze", str(file), "--json"]) == 0
+    answer = np.array(json.loads(capsys.readouterr().out)["compliance"])
+    np.testing.assert_allclose(answer, shift @ turned @ seat @ turned.T @ shift.T, rtol=1e-9)
 
 
 @pytest.mark.parametrize("pose", POSES)

@@ -94,7 +94,9 @@ def _parts_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[
     for i, joint in enumerate(leg.joints):
         seat = [Step(spring, False) for spring in _seat(leg, joint, data[i])]
         moving = _moving(leg, joint, data[i], plan, tables)
-        steps = [*moving, *seat] if JOINT_TYPES[joint.kind].seat_travels else [*seat, *moving]
+        # A matrix is that of the seat: a rail's foot stays where it is, however far its carriage has gone.
+        travels = JOINT_TYPES[joint.kind].bearings_travel and not joint.compliance
+        steps = [*moving, *seat] if travels else [*seat, *moving]
         link, flexible = leg.links.get(joint.joins[1]), []
         if link is not None:
             ends = departure(data[i]), Vector(*data[i + 1].point)

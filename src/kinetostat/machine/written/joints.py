@@ -49,8 +49,8 @@ class JointType:
             of its own; None for all others.
         motors: of a type of several freedoms, those that may have an actuator each, by what `actuated` says.
         seat: directions in which its bearings may have a stiffness: those of `SEAT` in which it does not move.
-        seat_travels: whether its bearings go with the body that it moves, as those of a carriage do; those of other
-            joints stay on the base side.
+        bearings_travel: whether bearings given by `seat` go with the body that it moves, as those of a carriage do;
+            those of other joints stay on the base side, and so does the matrix of any joint.
         in_plane: where its axis must point in a planar machine, "normal" to the plane or "along" it, "always" if it has
             none; empty if a planar machine cannot have it.
     """
@@ -61,7 +61,7 @@ class JointType:
     stiffness: str | None = None
     in_plane: str = ""
     seat: tuple[str, ...] = ()
-    seat_travels: bool = False
+    bearings_travel: bool = False
     motors: Mapping[str, Motor] = field(default_factory=dict)
 
 
@@ -165,7 +165,7 @@ JOINT_TYPES = {
         _prismatic,
         stiffness="linear stiffness",
         seat=("radial", "tilt", "torsion"),
-        seat_travels=True,
+        bearings_travel=True,
         in_plane="along",
     ),
     "cylindrical": JointType(
@@ -173,7 +173,7 @@ JOINT_TYPES = {
         {"point": POINT, "axis": AXIS},
         _cylindrical,
         seat=("radial", "tilt"),
-        seat_travels=True,
+        bearings_travel=True,
         motors={"rotation": Motor(0, "torsional stiffness"), "translation": Motor(1, "linear stiffness")},
     ),
     "universal": JointType(
@@ -198,7 +198,7 @@ JOINT_TYPES = {
         {"point": POINT, "first_axis": AXIS, "second_axis": AXIS},
         _planar,
         seat=("axial", "tilt"),
-        seat_travels=True,
+        bearings_travel=True,
         motors={
             "first_axis": Motor(0, "linear stiffness"),
             "second_axis": Motor(1, "linear stiffness"),
@@ -211,7 +211,7 @@ JOINT_TYPES = {
         _helical,
         stiffness="torsional stiffness",
         seat=("radial", "axial", "tilt"),
-        seat_travels=True,
+        bearings_travel=True,
     ),
     "parallelogram": JointType(
         "two bars from the short side at `point` to the one at `far`, short sides along `axis`",
