@@ -36,7 +36,12 @@ MISTAKES = {
     "a body passed twice": (
         'joins = ["proximal", "distal"]',
         'joins = ["proximal", "carriage"]',
-        ['leg "z", joint "elbow" leads to "carriage" too early'],
+        ['leg "z", joint "elbow" leads to "carriage" too early', "only a parallelogram can be written"],
+    ),
+    "a leg that branches": (
+        'joins = ["distal", "platform"]',
+        'joins = ["carriage", "platform"]',
+        ['leg "z", joint "wrist" starts at "carriage"', 'has left "carriage" already', "a leg does not branch"],
     ),
     "an axis of zero length": (
         "axis = [0, 0, 1], actuated",
@@ -224,6 +229,32 @@ def test_what_is_said_of_rigid_parts_is_true_of_the_stiffness_shown():
     assert analysis.rank == 6
     assert "so that K is finite" in analysis.message
     assert "infinite" not in analysis.message
+
+
+CANNOT_BE_WRITTEN = {
+    "shared-carriage": [
+        'leg "b", joint "p" starts at "carriage"',
+        '"carriage" is a body of leg "a"',
+        "A body that carries two legs cannot be written",
+        "one leg with a parallelogram",
+        'add the joints between "base" and "carriage"',
+    ],
+    "wrist-body": [
+        'leg "b" does not reach the platform: its last joint "b" ends at "wrist"',
+        'If "wrist" is a slip for "platform", write joins = ["rod", "platform"]',
+        'otherwise add the joints between "wrist" and "platform"',
+        "one whose parts move against each other cannot be written",
+    ],
+}
+
+
+@pytest.mark.parametrize("name", CANNOT_BE_WRITTEN)
+def test_advice_about_a_body_out_of_place_does_not_make_another_machine(name, capsys):
+    assert main(["analyze", str(CASES / f"{name}.toml")]) == 2
+    said = capsys.readouterr().err
+    assert '["base", "rod"]' not in said
+    for words in CANNOT_BE_WRITTEN[name]:
+        assert words in said
 
 
 def written_out(name, capsys):

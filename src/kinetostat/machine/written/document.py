@@ -12,6 +12,7 @@ import numpy as np
 
 from kinetostat.machine.cross_section import MATERIALS, SHAPES
 from kinetostat.machine.series import is_series, parts
+from kinetostat.machine.written.bodies import check_chain
 from kinetostat.machine.written.copies import KEYS, copied, copies_in
 from kinetostat.machine.written.directions import directed
 from kinetostat.machine.written.joints import JOINT_TYPES, ONE_FREEDOM, SEAT, needs_axis, stiffness_kind
@@ -205,10 +206,11 @@ def _cross_sections(rest: Document, origin: str) -> tuple[dict[str, str], dict[s
 def _legs(written: dict[str, Any], origin: str, shapes: Mapping[str, str]) -> tuple[LegPlan, ...]:
     """The legs of a machine with all copies."""
     legs: list[LegPlan] = []
+    as_written = copy.deepcopy(written)
     for name, leg in written.items():
         where = f'"{origin}": leg "{name}"'
         copies = copies_in(leg, where)
-        legs += copied(_leg(name, leg, where, shapes), copies, where)
+        legs += copied(_leg(name, leg, as_written, where, shapes), copies, where)
     names = [leg.name for leg in legs]
     for name in names:
         if names.count(name) > 1:
@@ -218,7 +220,7 @@ def _legs(written: dict[str, Any], origin: str, shapes: Mapping[str, str]) -> tu
     return tuple(legs)
 
 
-def _leg(name: str, leg: dict[str, Any], where: str, shapes: Mapping[str, str]) -> LegPlan:
+def _leg(name: str, leg: dict[str, Any], legs: Mapping[str, Any], where: str, shapes: Mapping[str, str]) -> LegPlan:
     joints = {key: part for key, part in leg.items() if isinstance(part, dict) and "model" not in part}
     links = {key: part for key, part in leg.items() if isinstance(part, dict) and "model" in part}
     for key in leg.keys() - joints.keys() - links.keys():
@@ -227,7 +229,7 @@ def _leg(name: str, leg: dict[str, Any], where: str, shapes: Mapping[str, str]) 
         raise InputError(f"{where} has {len(joints)} joints; it needs 1 to {MOST_JOINTS}, from base to platform.")
     directed(joints, where)
     plans = tuple(_joint(key, part, f'{where}, joint "{key}"', shapes) for key, part in joints.items())
-    _check_chain(plans, where)
+    check_chain(name, plans, legs, where)
     for place, plan in enumerate(plans):
         if plan.rod:
             check_strut(plans, place, f'{where}, joint "{plan.name}"')
@@ -332,30 +334,6 @@ def _seat(kind: str, part: dict[str, Any], has_matrix: bool, where: str) -> tupl
             f"{where}: stiffness_{seat[0]} refers to an axis; add the axis of the bearing, e.g. axis = [0, 0, 1]."
         )
     return seat
-
-
-def _check_chain(joints: tuple[JointPlan, ...], where: str) -> None:
-    """The joints must lead from the base to the platform, body by body."""
-    at, seen = BASE, {BASE}
-    for i, joint in enumerate(joints):
-        near, far = joint.joins
-        if near != at:
-            before = f'joint "{joints[i - 1].name}" ends at "{at}"' if i else 'a leg starts at "base"'
-            raise InputError(
-                f'{where}, joint "{joint.name}" starts at "{near}", but {before}: the chain is disconnected; '
-                f'write joins = ["{at}", "{far}"].'
-            )
-        if far in seen or (far == PLATFORM and i < len(joints) - 1):
-            raise InputError(
-                f'{where}, joint "{joint.name}" leads to "{far}" too early; a leg passes each body once and '
-                "ends at the platform."
-            )
-        at, seen = far, {*seen, far}
-    if at != PLATFORM:
-        raise InputError(
-            f'{where} does not reach the platform: its last joint "{joints[-1].name}" ends at "{at}"; '
-            f'write joins = ["{joints[-1].joins[0]}", "platform"], or add the joints that are missing.'
-        )
 
 
 def _link(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str]) -> LinkPlan:
