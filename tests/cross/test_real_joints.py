@@ -97,7 +97,7 @@ SLIDES = {
 def test_the_matrix_of_a_slide_stays_at_its_seat_and_that_of_a_flange_behind_it_travels(
     kind, at, travel, tmp_path, capsys
 ):
-    """C of a body at r from an elastic seat, X C_seat X^T with X = [[1, 0], [-[r]x, 1]]; r grows as the slide travels."""
+    """C at r from an elastic seat is X C_seat X^T with X = [[1, 0], [-[r]x, 1]]; r grows as the slide travels."""
     rng = np.random.default_rng(5)
     root = rng.normal(size=(6, 6)) * np.repeat([1e-4, 1e-5], 3)[:, None]
     seat = root @ root.T

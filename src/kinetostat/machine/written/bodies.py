@@ -56,9 +56,9 @@ def _elsewhere(body: str, leg: str, legs: Mapping[str, Any], expected: str, join
     """Advice about a body that stands in the place of another one."""
     owner = next((other for other in legs if other != leg and body in _bodies(legs[other])), None)
     between = f'"{body}" and "{expected}"' if expected == PLATFORM else f'"{expected}" and "{body}"'
-    own = f'If leg "{leg}" has a "{body}" of its own, add the joints between {between}.'
+    missing = f'If leg "{leg}" has a "{body}" of its own, add the joints between {between}.'
     if owner is not None:
-        return f'"{body}" is a body of leg "{owner}". {SHARED}. {own}'
+        return f'"{body}" is a body of leg "{owner}". {SHARED}. {missing}'
     return f'If "{body}" is a slip for "{expected}", write joins = {joins}; otherwise add the joints between {between}.'
 
 
