@@ -214,4 +214,12 @@ def test_words_of_the_version_before_still_work_with_a_warning():
         assert analysis.attribution[0].compliance == analysis.attribution[0].compliance_share
     data = as_json(analysis)
     assert data["order"] == data["components"]
-    assert data["deprecated_keys"] == {"order": "components"}
+    assert data["deprecated_keys"]["order"] == "components"
+    for old, new in (
+        ("leg_distance", "leg_least_singular_value"),
+        ("platform_distance", "platform_least_singular_value"),
+    ):
+        assert data["deprecated_keys"][old] == new
+        assert data["mobility"][old] == data["mobility"][new]
+        with pytest.warns(DeprecationWarning, match=new):
+            assert getattr(analysis.mobility, old) == getattr(analysis.mobility, new)

@@ -16,6 +16,7 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics.singularity import Array, columns
 from kinetostat.machine.leg import Joint, Leg
 from kinetostat.machine.machine import Configuration
+from kinetostat.spec.renamed import former_names
 from kinetostat.tolerances import DEPENDENT
 
 SPATIAL = 6
@@ -49,6 +50,7 @@ class Freedoms:
     locked: int
 
 
+@former_names(leg_distance="leg_least_singular_value", platform_distance="platform_least_singular_value")
 @dataclass(frozen=True)
 class Mobility:
     """What can move at a pose, and in general.
@@ -60,7 +62,7 @@ class Mobility:
         kind: of the pose.
         lost: names of legs that lose a freedom here.
         twists: what the platform gains, each [omega; v] at the reference point, base axes; of 1 rad, or 1 m.
-        leg_distance, platform_distance: smallest singular value of the unit joint screws of any leg, and of the unit
+        leg_least_singular_value, platform_least_singular_value: of the unit joint screws of any leg, and of the unit
             wrenches that hold the platform with actuators locked, lengths in units of the machine's; 0 if singular.
     """
 
@@ -70,8 +72,8 @@ class Mobility:
     kind: Kind
     lost: tuple[str, ...]
     twists: tuple[tuple[float, ...], ...]
-    leg_distance: float
-    platform_distance: float
+    leg_least_singular_value: float
+    platform_least_singular_value: float
 
 
 def mobility(here: Configuration, nearby: Sequence[Configuration], reference: Vector) -> Mobility:

@@ -18,6 +18,9 @@ RENAMED: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "ridges_told": "ridges_text",
             "regularity": "singularity_margin",
             "side": "aspect",
+            "compliance": "tangent_compliance",
+            "leg_distance": "leg_least_singular_value",
+            "platform_distance": "platform_least_singular_value",
         },
         "attribute": {"sections": "tables", "own_sections": "family_tables", "every_section": "every_table"},
     }

@@ -79,6 +79,9 @@ class Analysis(Immutable):
         load: effects of the machine's [load], None where it has none.
         masses: mass of each moving part.
         actuators: where they stand: length of the leg, position, travel or angle, as each says; `forward` takes them.
+        singularity_margin: of the pose, theory section 2: the least of the next two.
+        leg_singularity_margin, platform_singularity_margin: the least of any leg's passive joints, and that of the
+            wrenches that hold the platform.
         wrench_condition: ratio of the extreme singular values of W, moments divided by the characteristic length.
         jacobian_condition: condition number of the actuators' Jacobian, angles multiplied by the characteristic length;
             None where some actuators are rotary and others linear, or where there is no actuator.
@@ -106,6 +109,9 @@ class Analysis(Immutable):
     load: LoadCase | None = None
     masses: tuple[Mass, ...] = ()
     actuators: tuple[Actuator, ...] = ()
+    singularity_margin: float | None = None
+    leg_singularity_margin: float | None = None
+    platform_singularity_margin: float | None = None
     wrench_condition: float | None = None
     jacobian_condition: float | None = None
     characteristic_length: float | None = None
@@ -258,6 +264,9 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
         load=load,
         masses=tuple(moving_masses(machine, configuration)),
         actuators=actuators_at(machine, joints),
+        singularity_margin=float(response.singularity_margin),
+        leg_singularity_margin=min((float(leg.singularity_margin) for leg in response.legs), default=1.0),
+        platform_singularity_margin=float(response.statics.singularity_margin),
         wrench_condition=float(extremes[0] / extremes[-1]),
         jacobian_condition=_jacobian_condition(response, length),
         characteristic_length=length,
@@ -386,6 +395,9 @@ def as_json(analysis: Analysis, along: Sequence[Along] = (), requirements: Seque
         "rank": analysis.rank,
         "rigid": analysis.rigid,
         "free": analysis.free,
+        "singularity_margin": analysis.singularity_margin,
+        "leg_singularity_margin": analysis.leg_singularity_margin,
+        "platform_singularity_margin": analysis.platform_singularity_margin,
         "wrench_condition": analysis.wrench_condition,
         "jacobian_condition": analysis.jacobian_condition,
         "characteristic_length": analysis.characteristic_length,
@@ -417,6 +429,6 @@ def _mobility_json(mobility: Mobility) -> dict[str, Any]:
         "kind": mobility.kind,
         "locked_legs": mobility.lost,
         "free_twists": mobility.twists,
-        "leg_distance": mobility.leg_distance,
-        "platform_distance": mobility.platform_distance,
+        "leg_least_singular_value": mobility.leg_least_singular_value,
+        "platform_least_singular_value": mobility.platform_least_singular_value,
     }

@@ -298,7 +298,7 @@ def as_json(state: LoadedState, requirements: Sequence[object] = ()) -> dict[str
             "slack_legs": state.slack_legs,
             "elastic_stiffness": state.elastic,
             "tangent_stiffness": state.tangent,
-            "compliance": state.compliance,
+            "tangent_compliance": state.compliance,
             "load_factor": state.factor,
             "mode": state.mode,
             "mode_legs": state.mode_legs,

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.kinematics.mobility import Mobility
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.attribution import Softest, largest_contributors
 from kinetostat.studies.loads import LoadCase
@@ -27,18 +26,19 @@ def first_lines(analysis: Analysis) -> list[tuple[str, str]]:
         )
     if analysis.softest:
         lines.append(("Softest", "; ".join(_softest(analysis)) + "."))
-    if analysis.mobility:
-        lines.append(("Margin", margins(analysis.mobility)))
+    if analysis.singularity_margin is not None:
+        lines.append(("Margin", margins(analysis)))
     if analysis.load:
         lines.append(("Load", _loaded(analysis, analysis.load)))
     return lines
 
 
-def margins(mobility: Mobility) -> str:
-    """Return a sentence with the singularity margins of a pose, to two digits."""
-    legs, platform = mobility.leg_distance, mobility.platform_distance
-    least = min(legs, platform)
-    return f"Singularity margin {least:.2g} (0 singular, 1 best): legs {legs:.2g}, platform {platform:.2g}."
+def margins(analysis: Analysis) -> str:
+    """Return a sentence with the singularity margin of an analysed pose and the two of which it is the least."""
+    number = analysis.machine.display.number
+    legs, platform = number(analysis.leg_singularity_margin), number(analysis.platform_singularity_margin)
+    least = number(analysis.singularity_margin)
+    return f"Singularity margin {least} (0 singular, 1 best): legs {legs}, platform {platform}."
 
 
 def _felt(analysis: Analysis) -> str:

@@ -12,7 +12,6 @@ from kinetostat.engine.batch import Progress
 from kinetostat.engine.points import Array
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.grid.grid import evaluate_grid
@@ -78,7 +77,7 @@ def rows_at_poses(analyses: Sequence[Analysis]) -> tuple[Row, ...]:
         ("least stiffness, force", "N/m", Better.MORE, lambda analysis: _least(analysis, "translation")),
         ("least stiffness, moment", "N·m/rad", Better.MORE, lambda analysis: _least(analysis, "rotation")),
         ("condition of K", "1", Better.LESS, _condition),
-        ("singularity margin", "1", Better.MORE, _singularity_margin),
+        ("singularity margin", "1", Better.MORE, lambda analysis: analysis.singularity_margin),
         ("moving mass", "kg", Better.LESS, lambda analysis: analysis.moving_mass),
     ]
     for name, unit, better, value in scalars:
@@ -96,10 +95,6 @@ def _least(analysis: Analysis, block: str) -> float | None:
     """The least principal stiffness of a block, with the motions of the other block free."""
     blocks = analysis.indices.free if analysis.indices else None
     return {str(name): block_values.stiffnesses[0] for name, block_values in (blocks or {}).items()}.get(block)
-
-
-def _singularity_margin(analysis: Analysis) -> float:
-    return float(respond(analysis.machine).singularity_margin)
 
 
 def _condition(analysis: Analysis) -> float | None:

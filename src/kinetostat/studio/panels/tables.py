@@ -125,6 +125,9 @@ def _principal(analysis: Analysis) -> str:
 def _pose(analysis: Analysis) -> str:
     mobility, indices = analysis.mobility, analysis.indices
     rows = [
+        ["singularity margin (0 to 1)", engineering(analysis.singularity_margin)],
+        ["singularity margin of the legs", engineering(analysis.leg_singularity_margin)],
+        ["singularity margin of the platform", engineering(analysis.platform_singularity_margin)],
         ["condition number of W", engineering(analysis.wrench_condition)],
         ["condition number of the actuators' Jacobian", engineering(analysis.jacobian_condition)],
         ["condition number of K", engineering(indices.stiffness_condition if indices else None)],
@@ -137,8 +140,8 @@ def _pose(analysis: Analysis) -> str:
             ["degrees of freedom", str(mobility.full_cycle)],
             ["actuators", str(mobility.actuators)],
             ["redundant constraints", str(mobility.here.redundant)],
-            ["singularity margin of the legs (0 to 1)", f"{mobility.leg_distance:.4g}"],
-            ["singularity margin of the platform (0 to 1)", f"{mobility.platform_distance:.4g}"],
+            ["least singular value of the joints of a leg", engineering(mobility.leg_least_singular_value)],
+            ["least singular value of what holds the platform", engineering(mobility.platform_least_singular_value)],
         ]
     return heading("Pose") + table("Pose", ["", ""], rows)
 

@@ -39,7 +39,7 @@ def portrait(analysis: Analysis, pictures: Shown, live: bool) -> Figure:
 def machine_section(analysis: Analysis) -> Section:
     """Write the section with drawings and mobility."""
     summary = Paragraph(_first_upper(analysis.machine.family.summary))
-    return Section("The machine", (summary, *_mobility(analysis.mobility), _drawing(analysis)))
+    return Section("The machine", (summary, *_mobility(analysis), _drawing(analysis)))
 
 
 def _drawing(analysis: Analysis) -> Figure:
@@ -51,19 +51,20 @@ def _drawing(analysis: Analysis) -> Figure:
     )
 
 
-def pose_kind(mobility: Mobility) -> str:
+def _pose_kind(analysis: Analysis, mobility: Mobility) -> str:
     """Say in a sentence or two what kind of pose it is, and how far it is from a singularity."""
     kind = f"{mobility.kind} pose" if mobility.kind is Kind.REGULAR else mobility.kind
-    return f"{_first_upper(kind)} {margins(mobility)}"
+    return f"{_first_upper(kind)} {margins(analysis)}"
 
 
-def _mobility(mobility: Mobility | None) -> tuple[Block, ...]:
+def _mobility(analysis: Analysis) -> tuple[Block, ...]:
+    mobility = analysis.mobility
     if mobility is None:
         return ()
     redundant = f", {mobility.here.redundant} constraints redundant" if mobility.here.redundant else ""
     text = (
-        f"{mobility.full_cycle} freedoms, {mobility.actuators} actuators{redundant}. {pose_kind(mobility)} At a margin "
-        "of 0 a leg locks up, or the platform moves although the actuators are locked."
+        f"{mobility.full_cycle} freedoms, {mobility.actuators} actuators{redundant}. {_pose_kind(analysis, mobility)} "
+        "At a margin of 0 a leg locks up, or the platform moves although the actuators are locked."
     )
     return (Paragraph(typeset(text), "Mobility and singularity:"),)
 
