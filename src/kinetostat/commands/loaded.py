@@ -28,6 +28,7 @@ def analyze_loaded(options: argparse.Namespace, machine: "Machine") -> int:
     Raises:
         InputError: options that only the unloaded machine has.
     """
+    from kinetostat.equilibrium.solving import Rest
     from kinetostat.spec.errors import InputError
     from kinetostat.studies.under_load import as_json, under_load
     from kinetostat.views.loaded_tables import print_loaded
@@ -46,7 +47,8 @@ def analyze_loaded(options: argparse.Namespace, machine: "Machine") -> int:
         _drawn(options, state),
         message=state.message,
     )
-    return code if all(verdict.met for verdict in verdicts) else NO_ANSWER
+    kept = state.rest is not Rest.JOINT_LIMIT and all(verdict.met for verdict in verdicts)
+    return code if kept else NO_ANSWER
 
 
 def _drawn(options: argparse.Namespace, state: "LoadedState") -> list[Path]:

@@ -15,11 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.engine.kernel import Fill, fill_some, slab_kernel
-from kinetostat.engine.loaded import loaded_fill, way_of
+from kinetostat.engine.loaded import Way, loaded_fill, way_of
 from kinetostat.engine.points import Array, Part, Points
-from kinetostat.kinematics.limits import Check
+from kinetostat.equilibrium.numbers import states_of_rest
+from kinetostat.kinematics.limits import Check, load_checks
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import QUANTITIES, needs_state, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, with_values
@@ -78,7 +79,7 @@ def evaluate(
             pays to compile for few points as well: a thousand poses take a millisecond from then on.
     """
     method: Method
-    if any(QUANTITIES[name].stateful for name in quantities):
+    if needs_state(machine, quantities):
         way = way_of(machine, points.paths, quantities, points.size, repeated)
         slab, most, method = way.slab, threads or available_cores(), partial(loaded_fill, way=way)
     elif repeated or points.size >= NATIVE_FROM:
@@ -239,8 +240,14 @@ def limits_used(machine: Machine, columns: Mapping[str, Array]) -> dict[str, tup
 
 
 def _checked(machine: Machine, columns: Mapping[str, Array]) -> Iterator[tuple[slice, tuple[Check, ...]]]:
-    size = len(next(iter(columns.values())))
-    for start in range(0, size, NUMPY_SLAB):
-        part = slice(start, start + NUMPY_SLAB)
+    """The limits that some points are compared with, a slab at a time, and these points."""
+    size, judged_at_rest = len(next(iter(columns.values()))), "actuators" in rest_numbers(machine, ())
+    slab = Way.ANY_MACHINE.slab if judged_at_rest else NUMPY_SLAB
+    for start in range(0, size, slab):
+        part = slice(start, min(start + slab, size))
         with np.errstate(all="ignore"):
-            yield part, respond(with_values(machine, {path: column[part] for path, column in columns.items()})).checks
+            here = {path: column[part] for path, column in columns.items()}
+            posed = with_values(machine, here)
+            response = respond(posed)
+            loads = states_of_rest(machine, here, part.stop - start).loads if judged_at_rest else ()
+            yield part, (*response.checks, *load_checks(posed, response.configuration, loads))

@@ -24,7 +24,7 @@ from kinetostat.engine.loaded import States
 from kinetostat.engine.points import Points
 from kinetostat.engine.trace import Array, Codes, Runnable
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.tolerances import IDLE_COORDINATES, OPENING, ROUND_OFF_DERIVATIVE, SAME_DERIVATIVE
@@ -189,7 +189,7 @@ class _Routes:
         self._form, self._fixed = form_of(machine, varying, self._differentiated)
         self._angles = angles(machine)
         self._modes = modes
-        self._loaded = any(QUANTITIES[name].loaded for objective in weights for name, _ in objective)
+        self._loaded = bool(rest_numbers(machine, [name for objective in weights for name, _ in objective]))
 
     def direct(self, closed: bool = False) -> Fill:
         """Return the fill by a single program, in which the family places the joints or `closed` forms give them."""

@@ -17,7 +17,7 @@ from kinetostat.equilibrium.reduced import reduced_machine
 from kinetostat.kinematics.closing import closing_equations
 from kinetostat.kinematics.closure import CLOSED_FORMS, Joints, solve_joints
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
@@ -98,15 +98,17 @@ def reduced(angle: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """A machine as a specimen of its family: equal to every other one of it."""
+    """A machine as a specimen of its family: equal to every other one of it that is meant in the same state."""
 
     machine: Machine
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Kind) and self.machine.family == other.machine.family
+        if not isinstance(other, Kind):
+            return False
+        return (self.machine.family, self.machine.loaded) == (other.machine.family, other.machine.loaded)
 
     def __hash__(self) -> int:
-        return hash(self.machine.family)
+        return hash((self.machine.family, self.machine.loaded))
 
 
 @dataclass(frozen=True)
@@ -174,13 +176,13 @@ def objectives_of(
     joints, columns = _joints(given, closed)
     response = respond(given.machine, joints)
     coordinates: tuple[Traced, ...] = ()
-    wanted = {QUANTITIES[name].loaded for weights in objectives for name, _ in weights} - {""}
+    wanted = rest_numbers(given.machine, [name for weights in objectives for name, _ in weights])
     if wanted:
         equations = reduced_machine(given.machine, response, joints)
         coordinates = _inputs(given.graph, equations.size)
         # At a state of rest a step has no size, but the derivatives of the state: it follows the parameters.
         there = equations.step([*coordinates])[0] if paths else [*coordinates]
-        loaded, status = equations.numbers(there, wanted, response.place_status)
+        loaded, status = equations.numbers(there, wanted, response)
         if "frequency" in wanted:
             loaded["frequency"] = frequencies_at(equations.cut, there, bool(paths))
         response = replace(response, loaded=loaded, status=status)

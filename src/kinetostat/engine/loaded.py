@@ -20,7 +20,7 @@ from kinetostat.engine.trace import Array, Body, Codes, Runnable
 from kinetostat.equilibrium.numbers import check_loads, loaded_numbers
 from kinetostat.equilibrium.reduced import cut_machine
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
@@ -73,7 +73,7 @@ def way_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], co
         count: of points.
         repeated: whether the same will be asked many times, so that compiling pays for few points too.
     """
-    loaded = any(QUANTITIES[name].loaded or QUANTITIES[name].cut for name in quantities)
+    loaded = bool(rest_numbers(machine, quantities)) or any(QUANTITIES[name].cut for name in quantities)
     if not loaded and count < COLUMNS_TO and not repeated and platform_alone(machine, paths):
         return Way.COLUMNS
     if (count < NUMPY_FROM and not repeated) or not _over_scalars(machine, tuple(paths), quantities):
@@ -111,7 +111,7 @@ def _filled(machine: Machine, paths: Sequence[str], quantities: Sequence[str], w
         return solved
     form, fixed = form_of(machine, paths)
     closed, native, turning = closes_inside(machine), way is Way.NATIVE, angles(machine)
-    cut = _cut(machine, tuple(paths)) if any(QUANTITIES[name].loaded for name in quantities) else None
+    cut = _cut(machine, tuple(paths)) if rest_numbers(machine, quantities) else None
     states = States(machine, form, closed, native) if cut else None
     program = _program(Kind(machine), form, tuple(quantities), closed, native)
 
@@ -157,8 +157,8 @@ def _solved(machine: Machine, quantities: Sequence[str], columns: Mapping[str, A
     if any(quantity.cut for quantity in wanted):
         pressure = posed.tables["cutting"].pressure
         response = replace(response, softest=cut_receptances(posed, response, count), cutting_pressure=pressure)
-    if any(quantity.loaded for quantity in wanted):
-        further = {"frequency": frequencies} if any(quantity.loaded == "frequency" for quantity in wanted) else None
+    if at_rest := rest_numbers(machine, quantities):
+        further = {"frequency": frequencies} if "frequency" in at_rest else None
         loaded, status = loaded_numbers(machine, columns, count, further)
         response = replace(response, loaded={name: values.T for name, values in loaded.items()}, status=status)
     return response
@@ -216,12 +216,12 @@ _reducible = lru_cache(KEPT)(reducible)
 
 def _over_scalars(machine: Machine, paths: tuple[str, ...], quantities: Sequence[str]) -> bool:
     """Whether programs can compute all that these quantities need."""
-    wanted = [QUANTITIES[name] for name in quantities]
+    wanted, needed = [QUANTITIES[name] for name in quantities], rest_numbers(machine, quantities)
     if any(quantity.cut for quantity in wanted):
         return False
-    machine_cut = _cut(machine, paths) if any(quantity.loaded for quantity in wanted) else None
-    at_rest = not any(quantity.loaded for quantity in wanted) or machine_cut is not None
-    if machine_cut is not None and any(quantity.loaded == "frequency" for quantity in wanted):
+    machine_cut = _cut(machine, paths) if needed else None
+    at_rest = not needed or machine_cut is not None
+    if machine_cut is not None and "frequency" in needed:
         at_rest = not leaves_plane(machine, machine_cut)
     rings = not any(q.modal and not q.loaded for q in wanted) or _reducible(machine, paths)
     return at_rest and rings

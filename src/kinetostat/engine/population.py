@@ -18,7 +18,7 @@ from kinetostat.engine.batch import (
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.loaded import loaded_fill, way_of
 from kinetostat.engine.points import Array
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import needs_state
 from kinetostat.machine.machine import Machine
 
 
@@ -86,7 +86,7 @@ class Evaluator:
         """
         self._names, self._slab = tuple(quantities), NATIVE_SLAB
         method: Method = program_fill
-        if any(QUANTITIES[name].stateful for name in self._names):
+        if needs_state(machine, self._names):
             way = way_of(machine, paths, self._names, NATIVE_SLAB, repeated=True)
             self._slab, method = way.slab, partial(loaded_fill, way=way)
         self._fill = by_free_springs(machine, paths, self._names, method)

@@ -75,6 +75,7 @@ class LegTerms:
         rates: twist of its end per unit of each coordinate [n x 6 x coordinates].
         driven: the same per unit of each given amount [n x 6 x amounts].
         loads: in its springs [n x coordinates], 0 of a passive coordinate.
+        holding: what is needed along each given amount to keep it, such as the load of an actuator [n x amounts].
         carrying: stiffness of each spring that carries, 0 of those that are slack [n x coordinates].
         left: what is left of the equilibrium of its coordinates [n x coordinates].
         geometric: change of `left` by the coordinates through weight and wrenches alone [n x c x c].
@@ -85,6 +86,7 @@ class LegTerms:
     rates: Array
     driven: Array
     loads: Array
+    holding: Array
     carrying: Array
     left: Array
     geometric: Array
@@ -148,6 +150,7 @@ def leg_terms(
         np.swapaxes(screws, 1, 2) @ follows,
         np.swapaxes(screws, 1, 2) @ drives,
         loads,
+        (work - weight) @ drives,
         stiffness,
         loads + (weight - work) @ follows,
         follows.T @ change @ follows,

@@ -14,17 +14,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, total, where
-from kinetostat.algebra.vector import Vector
+from kinetostat.algebra.scalar import Scalar, is_zero, total
+from kinetostat.algebra.vector import Displacement
 from kinetostat.equilibrium.chains import Chain, Given, Masses, Units, Weight, chain_of
 from kinetostat.equilibrium.drives import with_drives
-from kinetostat.equilibrium.motion import Array, along, of_scalars
+from kinetostat.equilibrium.motion import Array, of_scalars
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.common_tables import Load
 from kinetostat.machine.leg import Spring, Turn
+from kinetostat.machine.loads import gravity_of, platform_masses
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.mass import PAYLOAD, PLATFORM, located_members, turned_tensor
+from kinetostat.machine.mass import located_members, turned_tensor
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Mechanism:
 
     Attributes:
         legs: of it.
-        actuators: names of the actuators that can be driven, in the order of the legs.
+        driven: the springs of the actuators that can be driven, in the order of the legs.
         growth: by which links are longer because they are warmer, in units of length [n x links].
         platform: masses of platform, tool and payload.
         wrench: the moment of all loads, and the force at the tool point, base axes [n x 6].
@@ -47,7 +47,7 @@ class Mechanism:
     """
 
     legs: tuple[Chain, ...]
-    actuators: tuple[str, ...]
+    driven: tuple[Spring, ...]
     growth: Array
     platform: Masses
     wrench: Array
@@ -73,6 +73,11 @@ class Mechanism:
             length=self.length[rows],
             force=self.force[rows],
         )
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Names of the actuators that can be driven."""
+        return tuple(spring.joint.name or spring.of for spring in self.driven)
 
     @property
     def twist_units(self) -> Array:
@@ -120,7 +125,8 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
         here = [m for m in members if m.leg == leg.name or (not m.leg and leg.number is None)]
         chain = chain_of(leg, units, amounts, here, travels.get(leg.name, ()))
         legs.append(with_drives(chain, units, machine.tables["drives"], machine.tables["damping"]))
-    platform, weights = configuration.platform, platform_weights(machine, response)
+    platform = configuration.platform
+    weights = platform_weights(machine, platform)
     load = machine.tables["load"]
     named = machine.named_loads
     moment = machine.load.rotational
@@ -133,13 +139,13 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
         ways = np.column_stack([[*turn, 0.0, 0.0, 0.0], *([0.0, 0.0, 0.0, *axis] for axis in slides)])
     return Mechanism(
         tuple(legs),
-        tuple(spring.joint.name or spring.of for spring in amounts.actuators),
+        tuple(amounts.actuators),
         of_scalars(amounts.growth, count) * units.shrink,
         units.masses(weights),
         wrench,
         units.points([platform.apply(point) for point, _ in named]),
         units.forces([other.translational for _, other in named]),
-        _gravity(load, count),
+        of_scalars(gravity_of(load).components(), count),
         ways,
         length,
         force,
@@ -147,18 +153,11 @@ def mechanism_of(machine: Machine, response: Response, joints: Joints | None, co
     )
 
 
-def platform_weights(machine: Machine, response: Response) -> list[Weight]:
-    """The masses of platform with tool and of the payload at the pose, base frame; those that are zero are left out."""
-    platform, tool = response.configuration.platform, machine.tables["tool"]
-    payload = response.reference + platform.rotation.apply(Vector(*tool.payload_centre))
-    parts = (
-        (PLATFORM, platform.apply(Vector(*tool.centre_of_mass)), tool.mass, tool.inertia),
-        (PAYLOAD, payload, tool.payload, tool.payload_inertia),
-    )
+def platform_weights(machine: Machine, platform: Displacement) -> list[Weight]:
+    """The masses of platform with tool and of the payload at the pose, with their inertia in base axes."""
     return [
-        Weight(name, 0, point, mass, turned_tensor(platform.rotation.apply, inertia))
-        for name, point, mass, inertia in parts
-        if not (is_zero(mass) and all(is_zero(entry) for entry in inertia))
+        Weight(part.name, 0, part.centre, part.mass, turned_tensor(platform.rotation.apply, part.inertia))
+        for part in platform_masses(machine, platform)
     ]
 
 
@@ -177,14 +176,6 @@ def _travels(machine: Machine, joints: Joints, count: int) -> dict[str, list[Arr
             row.append(last)
         travels[leg.name] = row
     return travels
-
-
-def _gravity(load: Load, count: int | None) -> Array:
-    """Acceleration by gravity, turned as the machine is tilted, m/s² [n x 3]."""
-    size = Vector(*load.gravity_axis).norm()
-    axis = Vector(*load.gravity_axis) * reciprocal(where(size > 0.0, size, 1.0))
-    turn = along(of_scalars([*axis.components(), 0.0, 0.0, 0.0], count), of_scalars([load.gravity_angle], count)[:, 0])
-    return turn.point(of_scalars(load.gravity, count))
 
 
 def _linear(spring: Spring, length: Scalar) -> Scalar:

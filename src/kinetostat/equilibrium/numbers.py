@@ -3,12 +3,13 @@
 Source: theory section 12.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from kinetostat.algebra.scalar import Scalar, smaller, total, where
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.motion import Array
@@ -17,8 +18,11 @@ from kinetostat.equilibrium.tangent import Stabilities, compliance, inverse, sta
 from kinetostat.equilibrium.tensions import tensioned
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.limits import load_checks, within
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.leg import Spring
 from kinetostat.machine.links import growth_of
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
@@ -104,17 +108,21 @@ class States:
         rows: of the points at which the machine is at rest and stable.
         equations: at all states of rest, stable or not; None if no point has a place.
         judged: their stability; `rows` are those that are stable, in their order.
+        loads: size of what each actuator carries, N or N·m [n]; NaN where the machine is not at rest.
     """
 
     status: npt.NDArray[np.int64]
     rows: npt.NDArray[np.int64]
     equations: Balance | None = None
     judged: Stabilities | None = None
+    loads: tuple[tuple[Spring, Array], ...] = ()
 
 
 def states_of_rest(machine: Machine, columns: Mapping[str, Array], count: int) -> States:
     """Find the states of rest at n points; arguments and errors as for `loaded_numbers`."""
-    status = np.broadcast_to(respond(with_values(machine, columns)).status, (count,)).astype(np.int64)
+    everywhere = with_values(machine, columns)
+    response = respond(everywhere)
+    status = np.broadcast_to(response.status, (count,)).astype(np.int64)
     rows = np.flatnonzero(np.isin(status, FREE))
     if not len(rows):
         return States(status, rows)
@@ -127,7 +135,73 @@ def states_of_rest(machine: Machine, columns: Mapping[str, Array], count: int) -
     judged = stabilities(equations)
     status[rows], rested = Status.NO_REST, rows[settled[judged.stable]]
     status[rested] = Status.OK
-    return States(status, rested, equations, judged)
+    loads = [(spring, np.full(count, np.nan)) for spring in mechanism.driven]
+    for (_, whole), (_, sizes) in zip(loads, actuator_loads_at_rest(equations), strict=True):
+        whole[rested] = sizes[judged.stable]
+    status[rested] = borne(everywhere, response, loads, status)[rested]
+    return States(status, rested, equations, judged, tuple(loads))
+
+
+def borne(machine: Machine, response: Response, loads: Sequence[tuple[Spring, Scalar]], status: Scalar) -> Scalar:
+    """Return the status of a machine at rest; where it is meant so, limits bound what its actuators carry there.
+
+    Args:
+        machine: with its limits.
+        response: of it, without loads.
+        loads: size of what each actuator carries at rest, N or N·m.
+        status: `Status` code of the state without these limits.
+    """
+    if not machine.loaded:
+        return status
+    kept = within(load_checks(machine, response.configuration, loads))
+    return where(kept, status, where(abs(status - float(Status.OK)) < 0.5, int(Status.JOINT_LIMIT), status))
+
+
+def judged_at_rest(machine: Machine, response: Response) -> Response:
+    """Return the response of a machine at its pose with what its actuators carry at rest compared with their limits.
+
+    Nothing changes where the machine is not meant under its loads, or comes to no rest there.
+
+    Args:
+        machine: with its pose, limits and loads.
+        response: of it.
+
+    Raises:
+        InputError: as for `loaded_mechanism`.
+    """
+    if "actuators" not in rest_numbers(machine, ()):
+        return response
+    states = states_of_rest(machine, {}, 1)
+    if not len(states.rows):
+        return response
+    checks = load_checks(machine, response.configuration, [(spring, size[0]) for spring, size in states.loads])
+    passed = int(response.status) == Status.OK and not within(checks)
+    status = Status.JOINT_LIMIT if passed else response.status
+    return replace(response, status=status, checks=(*response.checks, *checks))
+
+
+def actuator_loads_at_rest(equations: Balance) -> list[tuple[Spring, Array]]:
+    """Return every actuator with the size of what it carries in a state, N or N·m [n]."""
+    mechanism = equations.mechanism
+    holding = total([terms.holding for terms in equations.legs])
+    units = [mechanism.force * (1.0 if spring.joint.point is None else mechanism.length) for spring in mechanism.driven]
+    return [(spring, abs(load) * unit) for spring, load, unit in zip(mechanism.driven, holding.T, units, strict=False)]
+
+
+def greatest_loads(loads: Sequence[tuple[Spring, Scalar]]) -> dict[str, Scalar]:
+    """Return the greatest force of an actuated slide and moment of an actuated revolute, by quantity, over any scalars.
+
+    Args:
+        loads: size of what each actuator carries, N or N·m.
+
+    Returns:
+        By quantity; one is left out where the machine has no such actuator.
+    """
+    result: dict[str, Scalar] = {}
+    for spring, size in loads:
+        name = LOADS_OF_ACTUATORS[0 if spring.joint.point is None else 1]
+        result[name] = -smaller(-size, -result[name]) if name in result else size
+    return result
 
 
 def loaded_numbers(
@@ -144,8 +218,9 @@ def loaded_numbers(
     Returns:
         For each name its values [n] or [n x 6], SI, at the loaded tool point in base axes: "displacement" (rotation
         vector and displacement of the tool), "compliance" (diagonal), "stiffness" (diagonal), "slack" (how many
-        springs), "factor"; NaN where there is no state of rest that is stable. Those of `further` are left out if no
-        pose has a place. And `Status` codes [n].
+        springs), "factor", "actuator_force" and "actuator_moment" (the greatest); NaN where there is no state of rest
+        that is stable. Those of `further`, and the last two, are left out if no pose has a place. And `Status` codes
+        [n].
 
     Raises:
         InputError: as for `loaded_mechanism`.
@@ -176,4 +251,4 @@ def loaded_numbers(
     for name, values in numbers.items():
         whole = result.setdefault(name, np.full((count, *values.shape[1:]), np.nan))
         whole[states.rows] = values[judged.stable]
-    return result, states.status
+    return result | greatest_loads(states.loads), states.status

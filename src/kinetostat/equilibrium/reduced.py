@@ -23,11 +23,12 @@ from kinetostat.equilibrium.balance import LegTerms, leg_terms, placed_leg, plat
 from kinetostat.equilibrium.chains import Chain, together
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.motion import Array, Motions, cross, of_scalars, skew_of
-from kinetostat.equilibrium.numbers import FREE
+from kinetostat.equilibrium.numbers import FREE, borne, greatest_loads
 from kinetostat.equilibrium.solving import LONGEST_STEP
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
 from kinetostat.tolerances import AT_REST, UNRESISTED
 
@@ -50,6 +51,7 @@ class Rod:
         softness: sum of the compliances of its springs.
         given: by how much longer they would be free to be: what their preloads have stretched, less the rod's growth.
         sign: of the loads that it can carry, 0 for both.
+        driven: its springs that are actuators.
         rotor: inertia that its drive adds along it, as `Chain.rotors`.
     """
 
@@ -58,6 +60,7 @@ class Rod:
     softness: Scalar
     given: Scalar
     sign: float
+    driven: tuple[Spring, ...] = ()
     rotor: Scalar = 0.0
 
 
@@ -100,7 +103,9 @@ def cut(mechanism: Mechanism) -> Cut | None:
             rotors = [rotor for rotor in leg.rotors[0].tolist() if not is_zero(rotor)]
             if rotors and len(springs) > 1:
                 return None  # a rotor between two springs has a motion of its own
-            rods.append(Rod(*leg.rod, total(soft), total(given), signs[0] if signs else 0.0, total(rotors)))
+            driven = tuple(mechanism.driven[i] for i in leg.given if 0 <= i < len(mechanism.driven))
+            sign = signs[0] if signs else 0.0
+            rods.append(Rod(*leg.rod, total(soft), total(given), sign, driven, total(rotors)))
     return Cut(replace(mechanism, platform=together(masses)), carrier, tuple(rods))
 
 
@@ -132,6 +137,8 @@ class _Pull:
     Attributes:
         near, at: b and a.
         moment: a x b.
+        length: of it.
+        tension: with which it pulls.
         density: its tension over its length, c: it pulls with c (b - a), and that is all but for its stretching.
         stretching, elastic: k - c and k over the square of its length, with its stiffness k.
         slack: 1 where it carries nothing, else 0.
@@ -140,6 +147,8 @@ class _Pull:
     near: Vector
     at: Vector
     moment: Vector
+    length: Scalar
+    tension: Scalar
     density: Scalar
     stretching: Scalar
     elastic: Scalar
@@ -167,7 +176,7 @@ def _pull(rod: Rod, platform: Motions | None) -> _Pull:
         tension, stiffness, slack = (where(carries, *both) for both in ((tension, 0.0), (stiffness, 0.0), (0.0, 1.0)))
     density, shrink = tension * (1.0 / length), 1.0 / square
     stretching, elastic = (stiffness - density) * shrink, stiffness * shrink
-    return _Pull(near, at, at.cross(near), density, stretching, elastic, slack)
+    return _Pull(near, at, at.cross(near), length, tension, density, stretching, elastic, slack)
 
 
 def _pulled(pulls: Sequence[_Pull]) -> tuple[Array, Array]:
@@ -205,6 +214,7 @@ class Place:
 
     Attributes:
         platform: where it is.
+        pulls: of the rods.
         terms: of the carrier.
         rates: change of what is left, by the coordinates [coordinates x coordinates].
         elastic: the part of it that springs make.
@@ -212,6 +222,7 @@ class Place:
     """
 
     platform: Motions
+    pulls: tuple[_Pull, ...]
     terms: LegTerms
     rates: Array
     elastic: Array
@@ -234,7 +245,7 @@ def place_of(machine: Cut, coordinates: Row) -> Place:
     springs = terms.carrying[0][:, None] * np.eye(carrier.size)
     rates = springs + terms.geometric[0] + twists.T @ (fall - change)[0] @ twists
     elastic = springs + twists.T @ _stretched(pulls, [pull.elastic for pull in pulls]) @ twists
-    return Place(platform, terms, rates, elastic, total([pull.slack for pull in pulls]))
+    return Place(platform, tuple(pulls), terms, rates, elastic, total([pull.slack for pull in pulls]))
 
 
 def _stretched(pulls: Sequence[_Pull], weights: Row) -> Array:
@@ -253,7 +264,12 @@ def cut_machine(machine: Machine, varying: Collection[str] = ()) -> Cut | None:
         return None
     joints = solve_joints(machine) if machine.family.chains else None
     with np.errstate(all="ignore"):
-        return cut(mechanism_of(machine, respond(machine, joints), joints))
+        machine_cut = cut(mechanism_of(machine, respond(machine, joints), joints))
+    if machine_cut is None or not machine.loaded:
+        return machine_cut
+    carrier, driven = machine_cut.carrier, machine_cut.mechanism.driven
+    known = all(driven[n] in carrier.springs for n in carrier.given if 0 <= n < len(driven))
+    return machine_cut if known else None  # no coordinate says what a rigid actuator carries
 
 
 def reduced_machine(machine: Machine, response: Response, joints: Joints | None) -> "Reduced":
@@ -267,7 +283,7 @@ def reduced_machine(machine: Machine, response: Response, joints: Joints | None)
     machine_cut = cut(mechanism_of(machine, response, joints, None))
     if machine_cut is None:
         raise ValueError("loops that rods do not cut have no equations over scalars")
-    return Reduced(machine_cut, machine.family.components)
+    return Reduced(machine, machine_cut, machine.family.components)
 
 
 @dataclass(frozen=True)
@@ -275,10 +291,12 @@ class Reduced:
     """Equilibrium of a machine in the coordinates of its carrier.
 
     Attributes:
-        cut: the machine.
+        machine: whose equations they are.
+        cut: it, with its loops cut.
         components: of twists that it has.
     """
 
+    machine: Machine
     cut: Cut
     components: tuple[int, ...]
 
@@ -298,13 +316,13 @@ class Reduced:
         near = square < LONGEST_STEP**2
         return [where(near, a + b, math.nan) for a, b in zip(coordinates, step, strict=True)], square
 
-    def numbers(self, coordinates: Row, wanted: Collection[str], status: Scalar) -> tuple[dict[str, Any], Scalar]:
+    def numbers(self, coordinates: Row, wanted: Collection[str], response: Response) -> tuple[dict[str, Any], Scalar]:
         """The numbers of the loaded state, see `numbers.loaded_numbers`.
 
         Args:
             coordinates: of the state, up to a last step.
             wanted: which of the numbers are needed.
-            status: of the pose without loads.
+            response: of the pose without loads.
 
         Returns:
             The numbers by name, and the status of the pose: NOT_CONVERGED where this is not surely a stable state of
@@ -327,9 +345,14 @@ class Reduced:
         if "factor" in wanted:
             result["factor"], sure = tangent.factor()
             good = good & sure
-        code = where(good, int(Status.OK), int(Status.NOT_CONVERGED))
+        at_rest: Scalar = int(Status.OK)
+        if "actuators" in wanted:
+            loads = tangent.actuator_loads()
+            result |= greatest_loads(loads)
+            at_rest = borne(self.machine, response, loads, at_rest)
+        code = where(good, at_rest, int(Status.NOT_CONVERGED))
         for kept in sorted(set(Status) - set(FREE)):
-            code = where(abs(status - float(kept)) < 0.5, int(kept), code)
+            code = where(abs(response.place_status - float(kept)) < 0.5, int(kept), code)
         return result, code
 
 
@@ -341,7 +364,7 @@ class Tangent:
     """How a machine resists at a place, and Newton's step from there."""
 
     def __init__(self, machine: Cut, place: Place) -> None:
-        self.place = place
+        self.place, self.mechanism, self.carrier, self.rods = place, machine.mechanism, machine.carrier, machine.rods
         self._symmetric = all(is_zero(part) for part in machine.mechanism.wrench[0, :3].tolist())
         self._factors = eliminated(place.rates.tolist(), self._symmetric)
         self.step: Row = self._factors.solve((-place.terms.left[0]).tolist())
@@ -365,6 +388,22 @@ class Tangent:
             ratio = ratio * square + coefficient
         turned = [sine * ratio + part for sine, part in zip(sines, moved[:3], strict=True)]
         return [*turned, *(shift + moved[3:] + cross(moved[:3], shift))], square < LARGEST_TURN**2
+
+    def actuator_loads(self) -> list[tuple[Spring, Scalar]]:
+        """Every actuator with the size of what it carries after the step, N or N·m."""
+        mechanism, carrier, terms = self.mechanism, self.carrier, self.place.terms
+        twist, force = (terms.rates[0] @ of_scalars(self.step)[0]).tolist(), mechanism.force[0]
+        loads = []
+        for rod, pull in zip(self.rods, self.place.pulls, strict=True):
+            along = total([a * b for a, b in zip(pull.line, twist, strict=True)])
+            stretched = pull.tension + pull.elastic * pull.length * along
+            loads += [(spring, abs(stretched) * force) for spring in rod.driven]
+        for number, spring in enumerate(carrier.springs):
+            if spring is not None and spring.actuated:
+                load = terms.loads[0, number] + terms.carrying[0, number] * self.step[number]
+                turning = spring.joint.point is not None
+                loads.append((spring, abs(load) * (force * mechanism.length[0] if turning else force)))
+        return loads
 
     def compliance(self) -> list[Row]:
         """C at the loaded tool point [6][6], 0 where it is round-off."""

@@ -28,12 +28,13 @@ LOAD_STEPS = (1, 8, 64)
 
 
 class Rest(IntEnum):
-    """Whether a machine comes to rest under its loads."""
+    """Whether a machine comes to rest under its loads, and within its limits."""
 
     OK = 0
     NO_REST = 1
     UNSTABLE = 2
     UNDECIDED = 3
+    JOINT_LIMIT = 4
 
     @property
     def word(self) -> str:

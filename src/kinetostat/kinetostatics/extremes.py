@@ -107,8 +107,12 @@ def longest_leg(response: Response) -> Scalar:
 def actuator_load(response: Response, sliding: bool) -> Scalar:
     """Greatest force (N) of an actuated slide, or moment (N·m) of an actuated revolute, under the load of the machine.
 
-    Load in a spring: xi_e times w. NaN where the machine has no such actuator.
+    Load in a spring: xi_e times w; of a machine that is meant under its loads, what it carries at rest. NaN where the
+    machine has no such actuator, and where the state of rest has not been computed.
     """
+    if response.meant_loaded:
+        at_rest = response.loaded or {}
+        return at_rest.get("actuator_force" if sliding else "actuator_moment", math.nan)
     loads = actuator_loads(response.configuration, response.statics, response.load)
     return -_least([-load for spring, load in loads if (spring.joint.point is None) is sliding])
 

@@ -4,7 +4,7 @@ Source: theory section 10. At the tool point, base axes.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal, TypeAlias
@@ -25,7 +25,8 @@ from kinetostat.kinetostatics.extremes import (
     shortest_leg,
 )
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.limits import LIMITS
+from kinetostat.machine.limits import LIMITS, limits_loads
+from kinetostat.machine.machine import Machine
 from kinetostat.tolerances import UNMOVED_TOOL
 
 MODES = 6
@@ -63,11 +64,6 @@ class MapQuantity:
     whole: bool = False
     modal: bool = False
     cut: bool = False
-
-    @property
-    def stateful(self) -> bool:
-        """Whether it needs more of a pose than its linear response: a state of rest, or natural vibrations."""
-        return bool(self.loaded) or self.modal
 
 
 def _compliance(response: Response, i: int, j: int) -> Scalar:
@@ -255,6 +251,32 @@ QUANTITIES = {
     )
 }
 """Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., singularity_margin, ..."""
+
+LOADS_OF_ACTUATORS = ("actuator_force", "actuator_moment")
+"""Quantities that are about the machine at rest if it is meant so, and to first order about the free one else."""
+
+
+def rest_numbers(machine: Machine, names: Iterable[str]) -> set[str]:
+    """Return which numbers of the machine at rest (`equilibrium.numbers`) some quantities need; none if they need none.
+
+    Where a machine is meant under its loads, so are the loads of its actuators; and if limits bound these, every pose
+    is judged by them, whatever quantity it is asked for.
+
+    Args:
+        machine: with its limits, and its state.
+        names: of quantities.
+    """
+    names = list(names)
+    wanted = {QUANTITIES[name].loaded for name in names} - {""}
+    carries = limits_loads(machine.tables["limits"]) or any(name in LOADS_OF_ACTUATORS for name in names)
+    return wanted | {"actuators"} if machine.loaded and carries else wanted
+
+
+def needs_state(machine: Machine, names: Iterable[str]) -> bool:
+    """Whether quantities need more of a pose than its linear response: a state of rest, or natural vibrations."""
+    names = list(names)
+    return bool(rest_numbers(machine, names)) or any(QUANTITIES[name].modal for name in names)
+
 
 GROUPS = {
     "compliance": tuple(f"compliance_{name}" for name in COMPONENTS),

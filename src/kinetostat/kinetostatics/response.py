@@ -20,7 +20,8 @@ from kinetostat.kinematics.limits import Check, geometric_checks, load_checks, w
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_statics, stiffness_matrix
 from kinetostat.machine.leg import Joint, LegScrews, Spring, reciprocal_wrenches
-from kinetostat.machine.limits import is_set
+from kinetostat.machine.limits import limits_loads
+from kinetostat.machine.loads import load_on_platform
 from kinetostat.machine.machine import Configuration, Machine, springs
 from kinetostat.machine.mass import moving_mass
 from kinetostat.spec.renamed import renamed_property
@@ -42,13 +43,15 @@ class Response:
         singularity_margin: 0 at a singularity, at most 1 (dimensionless): the least of the legs' and the platform's
             (theory section 2).
         status: a `Status` code.
-        load: the wrench of the machine's table [load], at T, base axes (N·m, N).
+        load: all loads on the platform with its weight, at T, base axes (N·m, N).
         checks: the limits of the machine that are set, each with what it is compared with.
         mass: of what moves, as far as it is known, kg.
         joint_status: `Status` code of the joints alone, before the pose is judged.
         place_status: as `status`, but a singular pose may count as OK: loads can hold a machine there.
         frequencies: the lowest natural frequencies, Hz, where they have been computed.
         cutting_pressure: of the machine's table [cutting], N/m².
+        meant_loaded: whether the machine is meant at rest under its loads (`Machine.loaded`): its actuators then carry
+            what they carry there, and limits of their loads are judged there.
         softest: the least real part of the receptance across the cut, m/N, where it has been computed.
         loaded: numbers of the loaded state (`equilibrium.numbers`), where they have been computed.
     """
@@ -68,6 +71,7 @@ class Response:
     joint_status: Scalar = int(Status.OK)
     place_status: Scalar = int(Status.OK)
     loaded: Mapping[str, Any] | None = None
+    meant_loaded: bool = False
     frequencies: Sequence[Scalar] | None = None
     cutting_pressure: Scalar = 0.0
     softest: Scalar | None = None
@@ -107,7 +111,7 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
         compliance_matrix(statics),
         singularity_margin,
         pose_status(joints.status, reached, singularity_margin, within(geometric), within(loaded), statics.doubt),
-        machine.load_at(configuration.platform),
+        load_on_platform(machine, configuration.platform),
         (*geometric, *loaded),
         moving_mass(machine, configuration),
         joints.status,
@@ -119,6 +123,7 @@ def respond(machine: Machine, joints: Joints | None = None) -> Response:
             within(loaded),
             statics.doubt if loaded else 0.0,
         ),
+        meant_loaded=machine.loaded,
     )
 
 
@@ -198,12 +203,15 @@ def actuator_loads(configuration: Configuration, statics: Statics, load: Wrench)
 def actuator_checks(machine: Machine, configuration: Configuration, statics: Statics) -> list[Check]:
     """Compare the loads of the actuators with their limits; nothing to compare without a load or a limit.
 
+    A machine that is meant under its loads is judged where it is at rest (`equilibrium.numbers`), not here.
+
     Args:
         machine: with [limits] and [load].
         configuration, statics: of it at its pose.
     """
-    limits, load = machine.tables["limits"], machine.load_at(configuration.platform)
-    limited = is_set(limits.actuator_force) or is_set(limits.actuator_moment)
-    if not limited or all(is_zero(component) for component in load.components()):
+    if machine.loaded or not limits_loads(machine.tables["limits"]):
+        return []
+    load = load_on_platform(machine, configuration.platform)
+    if all(is_zero(component) for component in load.components()):
         return []
     return load_checks(machine, configuration, actuator_loads(configuration, statics, load))

@@ -90,7 +90,12 @@ class Load:
     force: Force = (0.0, 0.0, 0.0)
     gravity: Annotated[
         tuple[float, float, float],
-        Quantity("acceleration", "along x, y, z: pulls at all masses of a loaded machine", count=3, apart=True),
+        Quantity(
+            "acceleration",
+            "along x, y, z: pulls at the platform and, under load, at all links",
+            count=3,
+            apart=True,
+        ),
     ] = (0.0, 0.0, 0.0)
     gravity_angle: Annotated[float, Quantity("angle", "by which gravity is turned about gravity_axis")] = 0.0
     gravity_axis: Annotated[

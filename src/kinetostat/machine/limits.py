@@ -304,6 +304,11 @@ def limits_set(limits: object) -> list[Limit]:
     return [limit for limit in LIMITS.values() if is_set(getattr(limits, limit.name))]
 
 
+def limits_loads(limits: object) -> bool:
+    """Whether a table [limits] bounds the loads of actuators, so that a pose is judged by them."""
+    return any(limit.about is About.LOAD for limit in limits_set(limits))
+
+
 def unlimited(limits: object) -> str:
     """What an answer must say that rests on no limit: a sentence, or nothing where the table [limits] sets one."""
     return "" if limits_set(limits) else "No limits are set: strokes, joint angles and loads are not checked."

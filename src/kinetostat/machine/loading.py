@@ -20,8 +20,8 @@ from kinetostat.machine.catalogue import families, family_named
 from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_inertia
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.limits import check_limits, unloaded_parts
+from kinetostat.machine.loads import family_with_loads
 from kinetostat.machine.machine import Family, Machine, Written
-from kinetostat.machine.named_loads import family_with_loads
 from kinetostat.machine.orientation import ANGLES, form_of, make_room, orientation_schema, with_angles
 from kinetostat.machine.parameters import POSE, check_contrast, find, with_values
 from kinetostat.machine.rigidities import resolve

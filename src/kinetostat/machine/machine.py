@@ -334,21 +334,6 @@ class Machine(Immutable):
         return [(Vector(*table.point), _wrench(table)) for table in tables]
 
     @property
-    def pushed(self) -> bool:
-        """Whether its file gives a wrench on the platform, in [load] or in a table [load.NAME], that is not zero."""
-        wrenches = [self.load, *(wrench for _, wrench in self.named_loads)]
-        return any(any(wrench.components()) for wrench in wrenches)
-
-    def load_at(self, platform: Displacement) -> Wrench:
-        """All loads on the platform together, at the tool point, base axes (N·m, N)."""
-        load, tool = self.load, self.tool_point(platform)
-        for point, wrench in self.named_loads:
-            arm = platform.apply(point) - tool
-            moment = load.rotational + wrench.rotational + arm.cross(wrench.translational)
-            load = Wrench(moment, load.translational + wrench.translational)
-        return load
-
-    @property
     def reference(self) -> str:
         """What K, C and the load are given at: "tool point T" if the file has a tool, else "platform point P"."""
         return "tool point T" if any(self.tables["tool"].offset) else "platform point P"

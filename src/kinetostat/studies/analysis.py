@@ -26,6 +26,7 @@ from kinetostat.kinetostatics.internal import InternalLoads, internal_loads
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.limits import unlimited
+from kinetostat.machine.loads import loads_left_out
 from kinetostat.machine.machine import Configuration, Machine, springs
 from kinetostat.machine.mass import Mass, moving_masses
 from kinetostat.machine.parameters import parameters, values, with_values
@@ -220,6 +221,10 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     choice(axes, AXES, "axes")
     joints = solve_joints(machine) if machine.family.chains else None
     response = respond(machine, joints)
+    if machine.loaded:
+        from kinetostat.equilibrium.numbers import judged_at_rest  # most machines are not; it takes as long as the rest
+
+        response = judged_at_rest(machine, response)
     status = Status(int(response.status))
     configuration = response.configuration
     # Other poses tell what sort of singularity it is; they cost three more ways from the home pose, and reach has none.
@@ -370,7 +375,9 @@ def _message(
     if load and load.unheld:
         sentences.append(load.unheld)
     sentences = sentences or [Status.OK.sentence]
-    return " ".join([*sentences, unlimited(machine.tables["limits"])]).strip()
+    uncounted = "" if machine.loaded else loads_left_out(machine, response.configuration)
+    more = (uncounted, unlimited(machine.tables["limits"]))
+    return " ".join([*sentences, *(sentence for sentence in more if sentence)])
 
 
 def as_json(analysis: Analysis, along: Sequence[Along] = (), requirements: Sequence[object] = ()) -> dict[str, Any]:

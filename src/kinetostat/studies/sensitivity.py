@@ -14,7 +14,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Array, Table
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS, QUANTITIES, needs_state, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.common_tables import OF_VIBRATIONS
 from kinetostat.machine.machine import Machine
@@ -188,7 +188,7 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     refuse_loaded(machine, names)
     refuse_absent(machine, names)
     here = values(machine)
-    candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(p, names, here)]
+    candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(machine, p, names, here)]
     by = [p.path for p in candidates if not math.isinf(here[p.path])]
     # One point with the pose as it is: any coordinate of it can be the column that a batch must have.
     column = next(path for path in here if path.startswith("pose."))
@@ -199,7 +199,7 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     response = respond(machine)
     length = float(response.configuration.length)
     indices = tuple(
-        _without_round_off(name, value, response)
+        _without_round_off(machine, name, value, response)
         for name, value in zip(names, answer.values[:, 0].tolist(), strict=True)
     )
     slopes = dict(zip(by, answer.gradients[:, :, 0].T.tolist(), strict=True))
@@ -213,10 +213,10 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     return Sensitivity(machine, status, status.sentence, names, indices, length, shown, quiet, skipped)
 
 
-def _without_round_off(name: str, value: float, response: Response) -> float:
+def _without_round_off(machine: Machine, name: str, value: float, response: Response) -> float:
     """An index, set to zero where it is an entry of C or K that is only round-off: of a rigid or a free direction."""
     about = QUANTITIES[name].components
-    if not about or not math.isfinite(value) or QUANTITIES[name].stateful:
+    if not about or not math.isfinite(value) or needs_state(machine, [name]):
         return value
     matrix = response.compliance if name.startswith("compliance") else response.stiffness
     shrink = 1.0 / float(response.configuration.length)
@@ -229,10 +229,10 @@ def _without_round_off(name: str, value: float, response: Response) -> float:
     return value if present and abs(value) * arms[first] * arms[last] > ROUND_OFF_OF_ENTRY * compared else 0.0
 
 
-def _decides(parameter: Parameter, names: Sequence[str], here: Mapping[str, float]) -> bool:
+def _decides(machine: Machine, parameter: Parameter, names: Sequence[str], here: Mapping[str, float]) -> bool:
     """Whether any of the quantities may depend on a parameter."""
     path, wanted = parameter.path, [QUANTITIES[name] for name in names]
-    loaded, modal = any(quantity.loaded for quantity in wanted), any(quantity.modal for quantity in wanted)
+    loaded, modal = bool(rest_numbers(machine, names)), any(quantity.modal for quantity in wanted)
     if path.startswith(NEVER) or (path.startswith(OF_VIBRATIONS) and not modal):
         return False
     if parameter.quantity.kind == "inertia":
@@ -242,6 +242,8 @@ def _decides(parameter: Parameter, names: Sequence[str], here: Mapping[str, floa
         return here[path] != 0.0  # a link or rotor without mass has no motion of its own
     if loaded:
         return not path.startswith(NOT_EVEN_LOADED)
+    if any(name in LOADS_OF_ACTUATORS for name in names) and path.startswith(("load.", "tool.")):
+        return not path.startswith(NOT_EVEN_LOADED)  # to first order, actuators carry the loads and the platform
     if ".centre_of_mass." in path or (modal and path.startswith("tool.")):
         return modal
     return not path.startswith(WITHOUT_INFLUENCE) and ("mass" in names or not massive)

@@ -18,14 +18,16 @@ from kinetostat.equilibrium.buckling import Strut, struts
 from kinetostat.equilibrium.limit import limit_of
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.motion import Array
-from kinetostat.equilibrium.numbers import loaded_mechanism
+from kinetostat.equilibrium.numbers import actuator_loads_at_rest, loaded_mechanism
 from kinetostat.equilibrium.shape import loaded_links
 from kinetostat.equilibrium.solving import Rest, at_rest, solve, with_share
 from kinetostat.equilibrium.tangent import compliance, elastic_stiffness, inverse, stability
 from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinematics.limits import Check, load_checks, why_beyond, within
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.deflected import DeflectedLink
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.limits import About
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.mass import located_members
 from kinetostat.spec.arguments import checked
@@ -68,7 +70,8 @@ class LoadedState(Immutable):
 
     Attributes:
         machine: at the pose that it has without loads.
-        rest: whether it comes to rest, and whether it stays there: with stable springs, and struts that do not bend.
+        rest: whether it comes to rest, and whether it stays there: with stable springs, and struts that do not bend;
+            then whether it keeps to its limits, those of the loads of its actuators at rest among them.
         message: what is special about it, or why there is no state of rest.
         components: names of rows and columns: rx ry rz x y z, or rz x y.
         displacement: rotation vector (rad) and displacement of the tool point (m), from the unloaded pose.
@@ -192,10 +195,12 @@ def _state(machine: Machine, response: Response, equations: Balance, pressed: tu
     states = _springs(equations)
     slack = tuple(dict.fromkeys(state.leg for state in states if state.slack))
     moving = moving_legs(equations, judged)
-    passed = [why_not(machine, response, [])] if int(response.status) == Status.JOINT_LIMIT else []
+    checks = _limits_at_rest(machine, response, equations)
+    stays = judged.stable and not any(strut.bends_away for strut in pressed)
+    passed = [] if within(checks) else [why_beyond(checks, machine.display)]
     return LoadedState(
         machine,
-        Rest.OK if judged.stable and not any(strut.bends_away for strut in pressed) else Rest.UNSTABLE,
+        Rest.UNSTABLE if not stays else Rest.JOINT_LIMIT if passed else Rest.OK,
         " ".join([about_rest(machine, equations, judged, slack, pressed), *passed]),
         machine.family.component_names,
         _in_si(mechanism, equations.state.platform.amounts()[0], parts),
@@ -212,6 +217,13 @@ def _state(machine: Machine, response: Response, equations: Balance, pressed: tu
         float(np.abs(equations.left).max() / max(_largest_wrench(equations), 1e-300)),
         loaded_links(equations, response.configuration.legs, response.reference),
     )
+
+
+def _limits_at_rest(machine: Machine, response: Response, equations: Balance) -> list[Check]:
+    """The limits of geometry as they are at the pose, and those of the loads of actuators with what these carry."""
+    loads = [(spring, float(size[0])) for spring, size in actuator_loads_at_rest(equations)]
+    at_the_pose = [check for check in response.checks if check.limit.about is not About.LOAD]
+    return [*at_the_pose, *load_checks(machine, response.configuration, loads)]
 
 
 def _largest_wrench(equations: Balance) -> float:

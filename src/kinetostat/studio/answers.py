@@ -12,6 +12,7 @@ import numpy as np
 
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Array, Axis, Grid
+from kinetostat.equilibrium.numbers import judged_at_rest
 from kinetostat.kinematics.singularity import free_twist
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -69,7 +70,7 @@ class Picture:
 
 def picture(request: PictureRequest) -> Picture:
     """Draw the machine at its pose; at a singular pose, together with the motion that stays free."""
-    response = respond(request.machine)
+    response = judged_at_rest(request.machine, respond(request.machine))
     status = Status(int(response.status))
     if status is not Status.OK and not _drawable(status, response):
         return Picture(status, None)

@@ -121,7 +121,7 @@ def platform_matrix(machine: Machine, response: Response) -> list[Row]:
 def _platform_inertia(machine: Machine, response: Response) -> list[Row]:
     """The mass matrix of platform and payload by a twist of the tool point, base axes, SI [6][6]."""
     result: list[Row] = [[0.0 for _ in range(6)] for _ in range(6)]
-    for weight in platform_weights(machine, response):
+    for weight in platform_weights(machine, response.configuration.platform):
         x, y, z = (weight.point - response.reference).components()
         mass, (xx, yy, zz, xy, xz, yz) = weight.mass, weight.inertia
         turning = [

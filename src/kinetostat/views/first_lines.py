@@ -29,7 +29,7 @@ def first_lines(analysis: Analysis) -> list[tuple[str, str]]:
     if analysis.singularity_margin is not None:
         lines.append(("Margin", margins(analysis)))
     if analysis.load:
-        lines.append(("Load", _loaded(analysis, analysis.load)))
+        lines.append(("To first order" if analysis.machine.loaded else "Load", _loaded(analysis, analysis.load)))
     return lines
 
 

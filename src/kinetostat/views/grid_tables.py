@@ -17,7 +17,7 @@ from kinetostat.studies.grid.grid import failures, field_of
 from kinetostat.studies.grid.stored_grid import Extremes, StoredGrid
 from kinetostat.studies.workspace.region import FEWEST_CELLS
 from kinetostat.studies.workspace.verdicts import INSIDE, phrase
-from kinetostat.studies.workspace.workspace import Workspace
+from kinetostat.studies.workspace.workspace import LEFT_OUT, Workspace
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 from kinetostat.views.tables import numeric_table
 
@@ -157,6 +157,8 @@ def _summary(workspace: Workspace) -> Iterator[str]:
         yield "The machine keeps to the assembly mode of its home pose, the one in which its legs are written down."
     if not workspace.limits:
         yield unlimited(Limits())
+    if LEFT_OUT in workspace.dataset.attrs:
+        yield str(workspace.dataset.attrs[LEFT_OUT])
     if not workspace.exists:
         yield "No pose of the box is in the workspace; the table shows why."
     elif workspace.connected is None:

@@ -18,6 +18,7 @@ from kinetostat.display import number, with_unit
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.equilibrium.motion import Array
 from kinetostat.kinematics.status import Status
+from kinetostat.machine.loads import loads_left_out, loads_platform
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
@@ -271,7 +272,7 @@ class _Work:
     def _spread(self, model: ErrorModel) -> Spread:
         length = float(self.machine.configure((0.0,) * _joints(self.machine)).length)
         rates = _clean(model.rates(), length)
-        inputs = inputs_of(self.parts, rates, model.load, length, others=self.many and self.machine.pushed)
+        inputs = inputs_of(self.parts, rates, model.load, length, others=self.many and loads_platform(self.machine))
         zeros = [place for place, error in enumerate(model.errors) if error.group == "zeros"]
         names = self.machine.family.component_names
         measures, self.freedoms, self.parasitic = measures_of(rates[:, :, zeros], names, self.along, length)
@@ -372,7 +373,8 @@ def _message(answer: Budget) -> str:
     if answer.pressed:
         some = f" ({len(answer.sometimes)} of them at some poses only)" if answer.sometimes else ""
         sentences.append(f"The load presses {len(answer.pressed)} joints to one end of their clearance{some}.")
-    return " ".join(sentences)
+    uncounted = loads_left_out(answer.machine, answer.machine.configure((0.0,) * _joints(answer.machine)))
+    return " ".join([*sentences, uncounted]).strip()
 
 
 def _uncorrected(answer: Budget, pose: int) -> str:

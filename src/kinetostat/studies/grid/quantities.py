@@ -2,15 +2,17 @@
 
 import difflib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.equilibrium.reduced import cut_machine
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
+from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import LIMITS, About
+from kinetostat.machine.loads import loads_platform
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.mass import moving_masses
 from kinetostat.machine.parameters import Parameter
@@ -73,7 +75,7 @@ def without_derivatives(machine: Machine, names: Sequence[str], varied: Sequence
     across = [name for name in known if QUANTITIES[name].cut]
     if across:
         return across[0]
-    loaded = [name for name in known if QUANTITIES[name].loaded]
+    loaded = [name for name in known if rest_numbers(machine, [name])]
     return loaded[0] if loaded and cut_machine(machine, varied) is None else None
 
 
@@ -115,12 +117,12 @@ def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Param
     wanted = [name for name in names if QUANTITIES[name].needs]
     if not wanted:
         return
-    response = respond(machine)
+    response = replace(respond(machine), meant_loaded=False)  # whether there are such parts needs no state of rest
     for name in wanted:
         if np.isnan(QUANTITIES[name].value(response)) and response.status == Status.OK:
             lacking = QUANTITIES[name].needs
             raise InputError(f'"{name}" has no meaning here: {machine.name} lacks {lacking}; leave it out.')
-    loaded = machine.pushed or any(parameter.path.startswith("load.") for parameter in varied)
+    loaded = loads_platform(machine) or any(parameter.path.startswith("load.") for parameter in varied)
     for name in UNDER_LOAD:
         if name in names and not loaded:
             raise InputError(

@@ -15,6 +15,9 @@ import xarray as xr
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import Cells
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.limits import limits_loads
+from kinetostat.machine.loads import loads_left_out
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.arguments import checked
@@ -35,6 +38,8 @@ BORDER = "border_"
 BORDER_MEANING = "share of the step to the next node at which the verdict changes, along"
 HOME_MODE = "that of the home pose"
 """The assembly mode in which machines written leg by leg are evaluated; families state theirs by their formulas."""
+LEFT_OUT = "loads_left_out"
+"""Attribute with the sentence about loads that a workspace with limited actuators does not count."""
 MOST_DEMANDS = 200_000
 """Inside nodes at which lengths, angles and loads are computed; of more nodes, evenly chosen ones."""
 
@@ -234,7 +239,9 @@ def _labelled(
         wanted[f"{BORDER}{dim}"] = (dims, edge, {"long_name": f"{BORDER_MEANING} {dim}", "units": "1"})
     pose = {path: float(value) for path, value in values(judge.machine).items() if path.startswith("pose.")}
     mode = {} if judge.machine.family.chains is None else {"assembly_mode": HOME_MODE}
-    return wanted.assign_attrs({**figures, "volume_method": METHOD, **mode, **pose})
+    uncounted = "" if judge.machine.loaded else loads_left_out(judge.machine, respond(judge.machine).configuration)
+    left_out = {LEFT_OUT: uncounted} if uncounted and limits_loads(judge.machine.tables["limits"]) else {}
+    return wanted.assign_attrs({**figures, "volume_method": METHOD, **mode, **left_out, **pose})
 
 
 def as_json(workspace: Workspace) -> dict[str, Any]:
@@ -265,6 +272,7 @@ def as_json(workspace: Workspace) -> dict[str, Any]:
             },
             "assembly_mode": dataset.attrs.get("assembly_mode"),
             "limits": list(workspace.limits),
+            LEFT_OUT: dataset.attrs.get(LEFT_OUT, ""),
             "nodes": workspace.nodes,
             "connected": workspace.connected,
             "singularities_divide": workspace.singularities_divide,

@@ -120,7 +120,7 @@ def load_section(analysis: Analysis, pictures: Shown) -> Section:
     if pictures.factor is not None:
         caption = f"The load, and the deflected shape (red), {pictures.factor:,.6g} times as large as it is."
         blocks.append(Figure(caption, pictures.deflected(), SHARE))
-    return Section("Load case", tuple(blocks))
+    return Section("Load case, to first order" if analysis.machine.loaded else "Load case", tuple(blocks))
 
 
 def workspace_section(answers: Answers) -> Section:
