@@ -7,7 +7,7 @@ from kinetostat import analyze
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.loaded import NUMPY_FROM, Way, loaded_fill
 from kinetostat.engine.points import Table
-from kinetostat.equilibrium.reduced import cut_machine
+from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import bundled
 from machines import load_without_limits

@@ -17,8 +17,8 @@ from kinetostat.engine.form import Form, Kind, angles, form_of, joint_columns, o
 from kinetostat.engine.interpreter import Interpreted
 from kinetostat.engine.kernel import Fill, closes_inside, falling_back, program_columns
 from kinetostat.engine.trace import Array, Body, Codes, Runnable
+from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.numbers import check_loads, loaded_numbers
-from kinetostat.equilibrium.reduced import cut_machine
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond

@@ -1,16 +1,14 @@
 """Equilibrium in the coordinates of one leg, over scalars: what machine code does for many poses, and derivatives.
 
-Loops are cut at the rods: a leg that only carries a force between two joints is a spring between two points and has no
-unknowns. What remains is one chain that carries the platform, the leg that is none of these, or six free motions, and
-its coordinates are all the unknowns. Machines with more such legs, and what is chosen by inequalities, are left to
-`solving`, and so are poses at which these steps do not end at rest.
+Loops are cut at the rods (`cut`), so that the coordinates of one chain are all the unknowns. Machines that cannot be
+cut, and what is chosen by inequalities, are left to `solving`; so are poses at which these steps do not end at rest.
 
 Source: theory (44). Units, axes and origin are those of `mechanism`.
 """
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,114 +18,24 @@ from kinetostat.algebra.solve import Eliminated, Row, eliminated
 from kinetostat.algebra.symmetric import POSITIONS, greatest_eigenvalue
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.equilibrium.balance import LegTerms, leg_terms, placed_leg, platform_load
-from kinetostat.equilibrium.chains import Chain, together
-from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
+from kinetostat.equilibrium.cut import Cut, Rod, cut
+from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.motion import Array, Motions, cross, of_scalars, skew_of
 from kinetostat.equilibrium.numbers import FREE, borne, greatest_loads
 from kinetostat.equilibrium.solving import LONGEST_STEP
-from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.closure import Joints
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
 from kinetostat.tolerances import AT_REST, UNRESISTED
 
-TENSIONS = ("load.min_tension", "load.max_tension")
-"""Leaf paths of what makes preloads a choice."""
 LARGEST_TURN = 0.2
 """Sine of the turn of the platform up to which the series of the arc sine keeps all digits."""
 ARC_SINE = (1.0, 1 / 6, 3 / 40, 15 / 336, 105 / 3456, 945 / 42240, 10395 / 599040, 135135 / 9676800)
 """Coefficients of asin(s) / s in powers of s²."""
 SURE = 1e-9
 """Share of a diagonal entry below which its pivot says too little about stability."""
-
-
-@dataclass(frozen=True)
-class Rod:
-    """A leg as a spring between two points; of its springs in a row, all carry the same.
-
-    Attributes:
-        near, far: its ends in the free state, on the base and on the platform [1 x 3].
-        softness: sum of the compliances of its springs.
-        given: by how much longer they would be free to be: what their preloads have stretched, less the rod's growth.
-        sign: of the loads that it can carry, 0 for both.
-        driven: its springs that are actuators.
-        rotor: inertia that its drive adds along it, as `Chain.rotors`.
-    """
-
-    near: Array
-    far: Array
-    softness: Scalar
-    given: Scalar
-    sign: float
-    driven: tuple[Spring, ...] = ()
-    rotor: Scalar = 0.0
-
-
-@dataclass(frozen=True)
-class Cut:
-    """A mechanism whose loops are cut at rods.
-
-    Attributes:
-        mechanism: with the masses of rods on its platform.
-        carrier: the chain that carries the platform.
-        rods: that hold it.
-    """
-
-    mechanism: Mechanism
-    carrier: Chain
-    rods: tuple[Rod, ...]
-
-
-def cut(mechanism: Mechanism) -> Cut | None:
-    """Cut the loops of a mechanism; None if legs that are no rods close some, or its form does not allow it."""
-    chains = [leg for leg in mechanism.legs if leg.rod is None]
-    carrier = chains[0] if chains else _free_motions(mechanism)
-    if len(chains) > 1 or carrier.sign.any() or carrier.idle.any() or any(leg.hinged.any() for leg in mechanism.legs):
-        return None
-    rods, masses = [], [mechanism.platform]
-    for leg in mechanism.legs:
-        if leg.rod is None:
-            continue
-        slides = [n for n in range(leg.twists.shape[1]) if all(is_zero(c) for c in leg.twists[0, n, :3].tolist())]
-        springs = [leg.coordinate[n] for n in slides if leg.coordinate[n] >= 0]
-        if not springs:
-            return None  # nothing of it deflects
-        heavy = [i for i, carried in enumerate(leg.masses.carried) if carried > slides[0]]
-        masses.append(leg.masses.of(heavy))
-        if all(leg.springs[number] is not None for number in springs):
-            soft = [1.0 / leg.stiffness[0, number] for number in springs]
-            given = [a * leg.preload[0, number] for a, number in zip(soft, springs, strict=True)]
-            given += [-mechanism.growth[0, n] for n in (i - len(mechanism.actuators) for i in leg.given) if n >= 0]
-            signs = [float(leg.sign[number]) for number in springs if leg.sign[number]]
-            rotors = [rotor for rotor in leg.rotors[0].tolist() if not is_zero(rotor)]
-            if rotors and len(springs) > 1:
-                return None  # a rotor between two springs has a motion of its own
-            driven = tuple(mechanism.driven[i] for i in leg.given if 0 <= i < len(mechanism.driven))
-            sign = signs[0] if signs else 0.0
-            rods.append(Rod(*leg.rod, total(soft), total(given), sign, driven, total(rotors)))
-    return Cut(replace(mechanism, platform=together(masses)), carrier, tuple(rods))
-
-
-def _free_motions(mechanism: Mechanism) -> Chain:
-    """A chain without springs in all motions that there are: slides first, so that turns are about the tool point."""
-    ways = mechanism.ways.T[::-1].astype(object)
-    size = len(ways)
-    nothing = np.zeros((1, size))
-    return Chain(
-        "platform",
-        ways[None],
-        tuple(range(size)),
-        (-1,) * size,
-        (None,) * size,
-        nothing,
-        nothing,
-        nothing[0],
-        np.zeros((1, size, size)),
-        together([]),
-        nothing,
-        nothing,
-    )
 
 
 @dataclass(frozen=True)
@@ -255,21 +163,6 @@ def _stretched(pulls: Sequence[_Pull], weights: Row) -> Array:
         pairs = zip(pulls, weights, strict=True)
         result[i, j] = result[j, i] = total([pull.line[i] * pull.line[j] * weight for pull, weight in pairs])
     return result
-
-
-def cut_machine(machine: Machine, varying: Collection[str] = ()) -> Cut | None:
-    """Cut the loops of a machine, if that can be done wherever its varying parameters (leaf paths) are."""
-    load = machine.tables["load"]
-    if any(path in varying or math.isfinite(getattr(load, path.partition(".")[2])) for path in TENSIONS):
-        return None
-    joints = solve_joints(machine) if machine.family.chains else None
-    with np.errstate(all="ignore"):
-        machine_cut = cut(mechanism_of(machine, respond(machine, joints), joints))
-    if machine_cut is None or not machine.loaded:
-        return machine_cut
-    carrier, driven = machine_cut.carrier, machine_cut.mechanism.driven
-    known = all(driven[n] in carrier.springs for n in carrier.given if 0 <= n < len(driven))
-    return machine_cut if known else None  # no coordinate says what a rigid actuator carries
 
 
 def reduced_machine(machine: Machine, response: Response, joints: Joints | None) -> "Reduced":

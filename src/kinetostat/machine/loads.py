@@ -74,7 +74,7 @@ def platform_masses(machine: Machine, platform: Displacement) -> list[PlatformMa
 
     Args:
         machine: with its table [tool].
-        platform: where it is.
+        platform: where it is, base frame.
     """
     tool = machine.tables["tool"]
     payload = machine.tool_point(platform) + platform.rotation.apply(Vector(*tool.payload_centre))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.equilibrium.reduced import cut_machine
+from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import respond

@@ -1,0 +1,128 @@
+"""Machines whose loops are cut at rods: a leg that only carries a force between two joints is a spring between points.
+
+What remains is one chain that carries the platform: the one leg that is not a rod, or six free motions. Its coordinates are
+all the unknowns of `reduced`. Machines with several legs that are not rods cannot be cut.
+
+Source: theory (44). Units, axes and origin are those of `mechanism`.
+"""
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinetostat.algebra.scalar import Scalar, is_zero, total
+from kinetostat.equilibrium.chains import Chain, together
+from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
+from kinetostat.equilibrium.motion import Array
+from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.leg import Spring
+from kinetostat.machine.machine import Machine
+
+TENSIONS = ("load.min_tension", "load.max_tension")
+"""Leaf paths of what makes preloads a choice."""
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A leg as a spring between two points; of its springs in a row, all carry the same.
+
+    Attributes:
+        near, far: its ends in the free state, on the base and on the platform [1 x 3].
+        softness: sum of the compliances of its springs.
+        given: by how much longer they would be free to be: what their preloads have stretched, less the rod's growth.
+        sign: of the loads that it can carry, 0 for both.
+        driven: its springs that are actuators.
+        rotor: inertia that its drive adds along it, as `Chain.rotors`.
+    """
+
+    near: Array
+    far: Array
+    softness: Scalar
+    given: Scalar
+    sign: float
+    driven: tuple[Spring, ...] = ()
+    rotor: Scalar = 0.0
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A mechanism whose loops are cut at rods.
+
+    Attributes:
+        mechanism: with the masses of rods on its platform.
+        carrier: the chain that carries the platform.
+        rods: that hold it.
+    """
+
+    mechanism: Mechanism
+    carrier: Chain
+    rods: tuple[Rod, ...]
+
+
+def cut(mechanism: Mechanism) -> Cut | None:
+    """Cut the loops of a mechanism; None if legs that are no rods close some, or its form does not allow it."""
+    chains = [leg for leg in mechanism.legs if leg.rod is None]
+    carrier = chains[0] if chains else _free_motions(mechanism)
+    if len(chains) > 1 or carrier.sign.any() or carrier.idle.any() or any(leg.hinged.any() for leg in mechanism.legs):
+        return None
+    rods, masses = [], [mechanism.platform]
+    for leg in mechanism.legs:
+        if leg.rod is None:
+            continue
+        slides = [n for n in range(leg.twists.shape[1]) if all(is_zero(c) for c in leg.twists[0, n, :3].tolist())]
+        springs = [leg.coordinate[n] for n in slides if leg.coordinate[n] >= 0]
+        if not springs:
+            return None  # nothing of it deflects
+        heavy = [i for i, carried in enumerate(leg.masses.carried) if carried > slides[0]]
+        masses.append(leg.masses.of(heavy))
+        if all(leg.springs[number] is not None for number in springs):
+            soft = [1.0 / leg.stiffness[0, number] for number in springs]
+            given = [a * leg.preload[0, number] for a, number in zip(soft, springs, strict=True)]
+            given += [-mechanism.growth[0, n] for n in (i - len(mechanism.actuators) for i in leg.given) if n >= 0]
+            signs = [float(leg.sign[number]) for number in springs if leg.sign[number]]
+            rotors = [rotor for rotor in leg.rotors[0].tolist() if not is_zero(rotor)]
+            if rotors and len(springs) > 1:
+                return None  # a rotor between two springs has a motion of its own
+            driven = tuple(mechanism.driven[i] for i in leg.given if 0 <= i < len(mechanism.driven))
+            sign = signs[0] if signs else 0.0
+            rods.append(Rod(*leg.rod, total(soft), total(given), sign, driven, total(rotors)))
+    return Cut(replace(mechanism, platform=together(masses)), carrier, tuple(rods))
+
+
+def _free_motions(mechanism: Mechanism) -> Chain:
+    """A chain without springs in all motions that there are: slides first, so that turns are about the tool point."""
+    ways = mechanism.ways.T[::-1].astype(object)
+    size = len(ways)
+    nothing = np.zeros((1, size))
+    return Chain(
+        "platform",
+        ways[None],
+        tuple(range(size)),
+        (-1,) * size,
+        (None,) * size,
+        nothing,
+        nothing,
+        nothing[0],
+        np.zeros((1, size, size)),
+        together([]),
+        nothing,
+        nothing,
+    )
+
+
+def cut_machine(machine: Machine, varying: Collection[str] = ()) -> Cut | None:
+    """Cut the loops of a machine, if that can be done wherever its varying parameters (leaf paths) are."""
+    load = machine.tables["load"]
+    if any(path in varying or math.isfinite(getattr(load, path.partition(".")[2])) for path in TENSIONS):
+        return None
+    joints = solve_joints(machine) if machine.family.chains else None
+    with np.errstate(all="ignore"):
+        machine_cut = cut(mechanism_of(machine, respond(machine, joints), joints))
+    if machine_cut is None or not machine.loaded:
+        return machine_cut
+    carrier, driven = machine_cut.carrier, machine_cut.mechanism.driven
+    known = all(driven[n] in carrier.springs for n in carrier.given if 0 <= n < len(driven))
+    return machine_cut if known else None  # no coordinate says what a rigid actuator carries
