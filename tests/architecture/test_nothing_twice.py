@@ -42,7 +42,7 @@ def taken_from_others():
             elif (
                 isinstance(node, ast.Constant)
                 and isinstance(node.value, str)
-                and re.fullmatch(r"\w+(\.\w+)?", node.value)
+                and re.fullmatch(r"\w+(\.\w+)*", node.value)
             ):
                 read |= set(node.value.split("."))
     return imported, read

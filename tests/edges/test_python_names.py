@@ -18,6 +18,7 @@ from typing import get_type_hints
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 from report_pages import Page, no_pictures
 
 import kinetostat
@@ -58,11 +59,19 @@ def signature(name):
     if inspect.isclass(thing):
         return f"class {name}"
     (function,) = ast.parse(textwrap.dedent(inspect.getsource(inspect.unwrap(thing)))).body
-    return f"{name}({ast.unparse(function.args)}) -> {ast.unparse(function.returns)}"
+    returned = ast.unparse(function.returns).strip("'")  # a class that importing the function does not import
+    return f"{name}({ast.unparse(function.args)}) -> {returned}"
 
 
 def test_the_names_are_those_of_the_file():
     assert SNAPSHOT.read_text().splitlines() == [signature(name) for name in sorted(kinetostat.__all__)]
+
+
+def test_plot_and_save_cost_as_little_as_analyze_before_they_are_used():
+    code = "from kinetostat import plot, save; import sys; print([m for m in %r if m in sys.modules])"
+    heavy = ("matplotlib", "xarray", "rich", "numpy", "kinetostat.studies.analysis")
+    done = subprocess.run([sys.executable, "-c", code % (heavy,)], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
 
 
 def test_every_name_has_its_type_for_editors():
@@ -178,7 +187,9 @@ def test_an_answer_introduces_itself_in_a_line(found, name):
 def answer_classes():
     """The classes of ours that public functions return."""
     functions = [getattr(kinetostat, name) for name in kinetostat.__all__]
-    returned = [get_type_hints(inspect.unwrap(one)).get("return") for one in functions if not inspect.isclass(one)]
+    drawn = {"Figure": Figure}  # importing `plot` does not import matplotlib
+    functions = [inspect.unwrap(function) for function in functions if not inspect.isclass(function)]
+    returned = [get_type_hints(function, localns=drawn).get("return") for function in functions]
     return {one for one in returned if is_dataclass(one)}
 
 

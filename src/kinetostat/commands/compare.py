@@ -126,7 +126,7 @@ def _validate(options: argparse.Namespace) -> int:
 
     def show(console: "Console") -> None:
         for validation in validations:
-            print_validation(console, validation, AGREED)
+            print_validation(console, validation)
 
     agreed = all(validation.difference <= AGREED for validation in validations)
     return give(options, agreed, lambda: [as_json(validation) for validation in validations], show)
@@ -160,9 +160,9 @@ def _validate_measured(options: argparse.Namespace, machine: "Machine") -> int:
     )
     written = []
     if options.output:
-        from kinetostat.views.measured_figure import measured_figure
+        from kinetostat.views.measured_figure import measured_figures
 
         written = [options.output / "measured.json"]
         write_json(written[0], as_json(answer))
-        written += write_figures(options, {"measured": lambda: measured_figure(answer)})
+        written += write_figures(options, measured_figures(answer))
     return give(options, answer.agrees, lambda: as_json(answer), lambda show: print_measured(show, answer), written)

@@ -116,9 +116,9 @@ def _map(options: argparse.Namespace) -> int:
 
 def _carrying(options: argparse.Namespace) -> int:
     from kinetostat.spec.errors import InputError
-    from kinetostat.studies.carrying import as_json, carrying_legs
+    from kinetostat.studies.carrying import as_dataset, as_json, carrying_legs
     from kinetostat.studies.storage import write_dataset
-    from kinetostat.views.carrying_views import carrying_map, print_carrying
+    from kinetostat.views.carrying_views import carrying_figures, print_carrying
 
     if options.quantities or options.workers or options.cluster or options.resume:
         raise InputError(
@@ -131,9 +131,8 @@ def _carrying(options: argparse.Namespace) -> int:
     written = []
     if options.output:
         written.append(options.output / "carrying.nc")
-        write_dataset(written[0], answer.dataset)
-        if answer.is_map:
-            written += write_figures(options, {"carrying": lambda: carrying_map(answer)})
+        write_dataset(written[0], as_dataset(answer))
+        written += write_figures(options, dict(zip(["carrying"], carrying_figures(answer).values(), strict=False)))
     return give(
         options, bool(answer.sets), lambda: as_json(answer), lambda console: print_carrying(console, answer), written
     )

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
     from kinetostat.studies.guidelines.guidelines import Guidelines
     from kinetostat.studies.sensitivity import Sensitivity
-    from kinetostat.views.figures import Drawings
 
 
 def add_influence_commands(commands: "Commands") -> None:
@@ -73,12 +72,11 @@ def _sensitivity(options: argparse.Namespace) -> int:
 def _write_sensitivity(options: argparse.Namespace, result: "Sensitivity") -> list[Path]:
     from kinetostat.studies.sensitivity import as_json
     from kinetostat.studies.storage import write_json
-    from kinetostat.views.influence_figures import sensitivity_figure
+    from kinetostat.views.influence_figures import sensitivity_figures
 
     written = [options.output / "sensitivity.json"]
     write_json(written[0], as_json(result))
-    # If no parameter has an influence, there is nothing to draw.
-    drawings: Drawings = {"sensitivity": lambda: sensitivity_figure(result)} if result.parameters else {}
+    drawings = dict(zip(["sensitivity"], sensitivity_figures(result).values(), strict=False))
     return written + write_figures(options, drawings)
 
 

@@ -53,11 +53,11 @@ def analyze_loaded(options: argparse.Namespace, machine: "Machine") -> int:
 
 def _drawn(options: argparse.Namespace, state: "LoadedState") -> list[Path]:
     """Write the figures of a loaded machine, if a folder is given and it is at rest."""
-    if not options.output or not state.displacement:
+    if not options.output:
         return []
-    from kinetostat.views.loaded_figures import load_figure, shape_figure
+    from kinetostat.views.loaded_figures import loaded_figures
 
-    return write_figures(options, {"shape": lambda: shape_figure(state), "growing-load": lambda: load_figure(state)})
+    return write_figures(options, {name.replace(" ", "-"): draw for name, draw in loaded_figures(state).items()})
 
 
 def add_command_command(commands: "Commands") -> None:

@@ -1,6 +1,6 @@
 """Machines whose loops are cut at rods: a leg that only carries a force between two joints is a spring between points.
 
-What remains is one chain that carries the platform: the one leg that is not a rod, or six free motions. Its coordinates are
+What remains is one chain that carries the platform: the leg that is not a rod, or six free motions. Its coordinates are
 all the unknowns of `reduced`. Machines with several legs that are not rods cannot be cut.
 
 Source: theory (44). Units, axes and origin are those of `mechanism`.

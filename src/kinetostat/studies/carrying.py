@@ -110,3 +110,8 @@ def as_json(carrying: Carrying) -> dict[str, Any]:
     """The sets of legs that carry, with the share of the points of each, and the grid of places in this list."""
     points = zip(carrying.sets, carrying.points, strict=True)
     return {**of_grid(carrying.dataset), "sets": [{"legs": list(legs), "points": count} for legs, count in points]}
+
+
+def as_dataset(answer: Carrying) -> xr.Dataset:
+    """Return what a NetCDF file of the answer holds."""
+    return answer.dataset

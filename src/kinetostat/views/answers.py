@@ -1,174 +1,176 @@
 """Tables, figures, data and files of each kind of result: one row a kind. Nothing is drawn here.
 
-`plot`, `save` and notebooks look up here what they can show.
+`plot`, `save` and notebooks look up here what they can show. A row names functions, whose modules are imported when
+something of this kind is shown, so that the list costs nothing.
 """
 
+import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import xarray as xr
-from matplotlib.figure import Figure
-from rich.console import Console
-
-from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.machine.machine import Machine
-from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.studies import analysis, assembly, carrying, command, sensitivity, under_load, vibration
-from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.assembly import Forward
-from kinetostat.studies.budget import data as budget_data
-from kinetostat.studies.budget.budget import Budget
-from kinetostat.studies.carrying import Carrying
-from kinetostat.studies.command import Command
-from kinetostat.studies.comparison import designs
-from kinetostat.studies.comparison.designs import Comparison
-from kinetostat.studies.correction import table
-from kinetostat.studies.correction.table import CorrectionTable
-from kinetostat.studies.grid import grid
-from kinetostat.studies.guidelines import sentences
-from kinetostat.studies.guidelines.guidelines import Guidelines
-from kinetostat.studies.identification import identification
-from kinetostat.studies.identification.identification import Identification
-from kinetostat.studies.measured import comparison as measured
-from kinetostat.studies.measured.comparison import MeasuredComparison
-from kinetostat.studies.optimisation import result_data
-from kinetostat.studies.optimisation.result import Result
-from kinetostat.studies.sensitivity import Sensitivity
 from kinetostat.studies.storage import write_bytes, write_dataset, write_json, write_text
-from kinetostat.studies.under_load import LoadedState
-from kinetostat.studies.vibration import Vibration
-from kinetostat.studies.workspace import workspace
-from kinetostat.studies.workspace.workspace import Workspace
-from kinetostat.tolerances import AGREED
-from kinetostat.validation import comparison as validation
-from kinetostat.validation.comparison import Validation
-from kinetostat.views import optimisation_figures, workspace_figures
-from kinetostat.views.analysis_tables import print_analysis
-from kinetostat.views.assembly_tables import print_forward
-from kinetostat.views.budget_figures import budget_figures
-from kinetostat.views.budget_tables import print_budget
-from kinetostat.views.carrying_views import carrying_map, print_carrying
-from kinetostat.views.comparison_figure import comparison_figure
-from kinetostat.views.comparison_tables import print_comparison, print_validation
-from kinetostat.views.correction_tables import print_corrections
-from kinetostat.views.drawing import three_views
-from kinetostat.views.figures import FORMATS, Drawings, contour_maps, curves, save_figure
-from kinetostat.views.grid_tables import print_dataset, print_workspace
-from kinetostat.views.identification_figures import identification_figures
-from kinetostat.views.identification_tables import print_identification
-from kinetostat.views.influence_figures import guideline_figures, sensitivity_figure
-from kinetostat.views.influence_tables import print_guidelines, print_sensitivity
-from kinetostat.views.loaded_figures import load_figure, shape_figure
-from kinetostat.views.loaded_tables import print_command, print_loaded
-from kinetostat.views.measured_figure import measured_figure
-from kinetostat.views.measured_tables import print_measured
-from kinetostat.views.optimisation_tables import print_result
-from kinetostat.views.picture import Picture, machine_picture
-from kinetostat.views.scene.glb import glb
-from kinetostat.views.scene.machine_scene import scene_of
-from kinetostat.views.tables import print_machine
-from kinetostat.views.vibration_figures import vibration_figures
-from kinetostat.views.vibration_tables import print_vibration
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from rich.console import Console
+
+    from kinetostat.views.figures import Drawings
 
 
 @dataclass(frozen=True)
 class Kind:
-    """How results of one kind are shown.
+    """How results of one kind are shown; functions and classes are named "module.function", modules in this package.
 
     Attributes:
         type: class of the results.
-        tell: prints a result of this kind on a console.
-        figures: gives the functions that draw them, by name; the most telling one first.
-        data: gives a result as plain data; None where it is kept in another way.
+        printer: prints a result on a console.
+        drawn: gives the functions that draw its figures, by name, the most telling one first; empty if there are none.
+        plain: gives a result as plain data; empty where it is kept in another way.
+        files: what is in a file of another format, a text, bytes or a dataset, by suffix.
     """
 
-    type: type
-    tell: Callable[[Console, Any], None]
-    figures: Callable[[Any], Drawings] = lambda _: {}
-    data: Callable[[Any], dict[str, Any]] | None = None
+    type: str
+    printer: str
+    drawn: str = ""
+    plain: str = ""
+    files: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Name of the class."""
+        return self.type.rpartition(".")[2]
+
+    def tell(self, console: "Console", answer: object) -> None:
+        """Print a result of this kind."""
+        _function(self.printer)(console, answer)
+
+    def figures(self, answer: object) -> "Drawings":
+        """Return the functions that draw a result, by name; the most telling one first."""
+        drawings: Drawings = _function(self.drawn)(answer) if self.drawn else {}
+        return drawings
 
 
-def _views(machine: Machine) -> Drawings:
-    return {"views": partial(three_views, machine, machine.name)}
-
-
-def _names(dataset: xr.Dataset) -> list[str]:
-    return [str(name) for name in dataset.data_vars if name in QUANTITIES]
-
-
-def _grid_figures(dataset: xr.Dataset) -> Drawings:
-    """Return curves over one field, or contours over two; a grid of more fields has no picture."""
-    draw = {1: curves, 2: contour_maps}.get(dataset["status"].ndim)
-    return {"map": partial(draw, dataset, _names(dataset), dataset.attrs["machine"])} if draw else {}
-
-
-def _workspace_figures(workspace: Workspace) -> Drawings:
-    drawn = workspace_figures.pictures(
-        workspace.dataset, workspace.verdicts, workspace.conditions, workspace.dataset.attrs["machine"]
-    )
-    return {name.removeprefix("-") or "region": figure for name, figure in drawn.items()}
-
-
-def _sensitivity_figures(sensitivity: Sensitivity) -> Drawings:
-    return {"influences": partial(sensitivity_figure, sensitivity)} if sensitivity.parameters else {}
-
-
-def _loaded_figures(state: LoadedState) -> Drawings:
-    """Return the curve over the growing load, and the shape; a machine without rest has neither."""
-    drawn: Drawings = {"growing load": partial(load_figure, state), "shape": partial(shape_figure, state)}
-    return drawn if state.displacement else {}
+def _function(path: str) -> Callable[..., Any]:
+    module, _, name = path.rpartition(".")
+    function: Callable[..., Any] = getattr(import_module(f"kinetostat.{module}"), name)
+    return function
 
 
 KINDS = (
-    Kind(Machine, print_machine, _views),
-    Kind(Analysis, print_analysis, data=analysis.as_json),
-    Kind(Forward, print_forward, data=assembly.as_json),
-    Kind(LoadedState, print_loaded, _loaded_figures, under_load.as_json),
-    Kind(Vibration, print_vibration, vibration_figures, vibration.as_json),
-    Kind(Command, print_command, data=command.as_json),
-    Kind(CorrectionTable, print_corrections, data=table.as_json),
     Kind(
-        Carrying,
-        print_carrying,
-        lambda answer: {"map": partial(carrying_map, answer)} if answer.is_map else {},
-        carrying.as_json,
+        "machine.machine.Machine",
+        "views.tables.print_machine",
+        "views.drawing.machine_figures",
+        files={
+            ".toml": "machine.saving.as_file",
+            ".png": "views.picture.machine_picture",
+            ".glb": "views.scene.glb.machine_glb",
+        },
+    ),
+    Kind("studies.analysis.Analysis", "views.analysis_tables.print_analysis", plain="studies.analysis.as_json"),
+    Kind("studies.assembly.Forward", "views.assembly_tables.print_forward", plain="studies.assembly.as_json"),
+    Kind(
+        "studies.under_load.LoadedState",
+        "views.loaded_tables.print_loaded",
+        "views.loaded_figures.loaded_figures",
+        "studies.under_load.as_json",
     ),
     Kind(
-        xr.Dataset,
-        lambda console, dataset: print_dataset(console, dataset, _names(dataset)),
-        _grid_figures,
-        grid.as_json,
+        "studies.vibration.Vibration",
+        "views.vibration_tables.print_vibration",
+        "views.vibration_figures.vibration_figures",
+        "studies.vibration.as_json",
     ),
-    Kind(Workspace, print_workspace, _workspace_figures, workspace.as_json),
-    Kind(Sensitivity, print_sensitivity, _sensitivity_figures, sensitivity.as_json),
-    Kind(Identification, print_identification, identification_figures, identification.as_json),
-    Kind(Guidelines, print_guidelines, guideline_figures, sentences.as_json),
-    Kind(Budget, print_budget, budget_figures, budget_data.as_json),
+    Kind("studies.command.Command", "views.loaded_tables.print_command", plain="studies.command.as_json"),
     Kind(
-        Comparison,
-        print_comparison,
-        lambda comparison: {"comparison": partial(comparison_figure, comparison)},
-        designs.as_json,
+        "studies.correction.table.CorrectionTable",
+        "views.correction_tables.print_corrections",
+        plain="studies.correction.table.as_json",
     ),
     Kind(
-        MeasuredComparison,
-        print_measured,
-        lambda answer: {"measured": partial(measured_figure, answer)},
-        measured.as_json,
+        "studies.carrying.Carrying",
+        "views.carrying_views.print_carrying",
+        "views.carrying_views.carrying_figures",
+        "studies.carrying.as_json",
+        {".nc": "studies.carrying.as_dataset"},
     ),
-    Kind(Result, print_result, optimisation_figures.pictures, result_data.as_json),
     Kind(
-        Validation,
-        lambda console, result: print_validation(console, result, AGREED),
-        data=validation.as_json,
+        "xarray.Dataset",
+        "views.grid_tables.print_grid",
+        "views.figures.grid_figures",
+        "studies.grid.grid.as_json",
+        {".nc": "studies.grid.grid.as_dataset"},
+    ),
+    Kind(
+        "studies.workspace.workspace.Workspace",
+        "views.grid_tables.print_workspace",
+        "views.workspace_figures.workspace_figures",
+        "studies.workspace.workspace.as_json",
+        {".nc": "studies.workspace.workspace.as_dataset"},
+    ),
+    Kind(
+        "studies.sensitivity.Sensitivity",
+        "views.influence_tables.print_sensitivity",
+        "views.influence_figures.sensitivity_figures",
+        "studies.sensitivity.as_json",
+    ),
+    Kind(
+        "studies.identification.identification.Identification",
+        "views.identification_tables.print_identification",
+        "views.identification_figures.identification_figures",
+        "studies.identification.identification.as_json",
+    ),
+    Kind(
+        "studies.guidelines.guidelines.Guidelines",
+        "views.influence_tables.print_guidelines",
+        "views.influence_figures.guideline_figures",
+        "studies.guidelines.sentences.as_json",
+    ),
+    Kind(
+        "studies.budget.budget.Budget",
+        "views.budget_tables.print_budget",
+        "views.budget_figures.budget_figures",
+        "studies.budget.data.as_json",
+        {".csv": "studies.budget.data.contributions_csv", ".nc": "studies.budget.data.as_dataset"},
+    ),
+    Kind(
+        "studies.comparison.designs.Comparison",
+        "views.comparison_tables.print_comparison",
+        "views.comparison_figure.comparison_figures",
+        "studies.comparison.designs.as_json",
+    ),
+    Kind(
+        "studies.measured.comparison.MeasuredComparison",
+        "views.measured_tables.print_measured",
+        "views.measured_figure.measured_figures",
+        "studies.measured.comparison.as_json",
+    ),
+    Kind(
+        "studies.optimisation.result.Result",
+        "views.optimisation_tables.print_result",
+        "views.optimisation_figures.pictures",
+        "studies.optimisation.result_data.as_json",
+    ),
+    Kind(
+        "validation.comparison.Validation",
+        "views.comparison_tables.print_validation",
+        plain="validation.comparison.as_json",
     ),
 )
 """All kinds of results that Python and notebooks show."""
+
+
+def _is(answer: object, path: str) -> bool:
+    """Whether an object is of a class; its module has been imported if there is an object of it."""
+    module, _, name = path.rpartition(".")
+    home = sys.modules.get(f"kinetostat.{module}") or sys.modules.get(module)
+    return home is not None and isinstance(answer, getattr(home, name))
 
 
 def kind_of(answer: object) -> Kind:
@@ -177,9 +179,9 @@ def kind_of(answer: object) -> Kind:
     Raises:
         InputError: it is not a result of kinetostat.
     """
-    kind_of_answer = next((kind for kind in KINDS if isinstance(answer, kind.type)), None)
-    if kind_of_answer is None or (isinstance(answer, xr.Dataset) and "status" not in answer):
-        known = ", ".join(kind.type.__name__ for kind in KINDS)
+    kind_of_answer = next((kind for kind in KINDS if _is(answer, kind.type)), None)
+    if kind_of_answer is None or (kind_of_answer.name == "Dataset" and "status" not in answer):  # type: ignore[operator]
+        known = ", ".join(kind.name for kind in KINDS)
         raise InputError(
             f"An object of type {type(answer).__name__} is not a result of kinetostat; give one of: {known}."
         )
@@ -187,7 +189,7 @@ def kind_of(answer: object) -> Kind:
 
 
 @checked
-def plot(answer: object, which: str | None = None) -> Figure:
+def plot(answer: object, which: str | None = None) -> "Figure":
     """Draw a figure of a result; a notebook displays it, `save` writes it.
 
     Args:
@@ -207,6 +209,7 @@ def plot(answer: object, which: str | None = None) -> Figure:
 
 
 Writer = Callable[[Path], None]
+FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
 
 
 @checked
@@ -232,29 +235,20 @@ def save(what: object, path: str | Path) -> Path:
 
 def _writers(what: object) -> dict[str, Writer]:
     """Return the ways to write it, by suffix."""
-    match what:
-        case Figure():
-            return dict.fromkeys((f".{name}" for name in FORMATS), lambda path: save_figure(what, path))
-        case Picture():
-            return {".png": lambda path: write_bytes(path, what)}
-        case Machine():
-            return {
-                ".toml": lambda path: write_text(path, as_file(what)),
-                ".png": lambda path: write_bytes(path, machine_picture(what)),
-                ".glb": lambda path: write_bytes(path, glb(scene_of(what))),
-            }
-    data = kind_of(what).data
-    if data is None:
-        raise InputError(
-            f"A result of type {type(what).__name__} has no file format; save its tables or figures instead."
-        )
-    written: dict[str, Writer] = {".json": lambda path: write_json(path, data(what))}
-    match what:
-        case xr.Dataset():
-            written[".nc"] = lambda path: write_dataset(path, what)
-        case Workspace() | Carrying():
-            written[".nc"] = lambda path: write_dataset(path, what.dataset)
-        case Budget():
-            written[".csv"] = lambda path: write_text(path, budget_data.contributions_csv(what))
-            written[".nc"] = lambda path: write_dataset(path, budget_data.as_dataset(what))
+    if _is(what, "matplotlib.figure.Figure"):
+        return dict.fromkeys(FIGURE_SUFFIXES, partial(_function("views.figures.save_figure"), what))
+    if _is(what, "views.picture.Picture"):
+        return {".png": partial(_write, what)}
+    kind = kind_of(what)
+    written: dict[str, Writer] = {}
+    if kind.plain:
+        written[".json"] = lambda path: write_json(path, _function(kind.plain)(what))
+    for suffix, content in kind.files.items():
+        written[suffix] = lambda path, content=content: _write(_function(content)(what), path)  # type: ignore[misc]
     return written
+
+
+def _write(content: Any, path: Path) -> None:
+    """Write a text, bytes or a dataset."""
+    write = write_text if isinstance(content, str) else write_bytes if isinstance(content, bytes) else write_dataset
+    write(path, content)

@@ -1,6 +1,7 @@
 """Which legs carry over a grid, as a table of the sets of legs and as a map of their regions. Nothing is computed."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import matplotlib as mpl
 import numpy as np
@@ -13,6 +14,7 @@ from kinetostat.studies.carrying import Carrying
 from kinetostat.studies.grid.grid import field_of
 from kinetostat.views.figures import (
     STYLE,
+    Drawings,
     axis_values,
     fill_regions,
     fix_layout,
@@ -73,3 +75,8 @@ def carrying_map(carrying: Carrying) -> Figure:
         set_title(figure, f"{dataset.attrs['machine']}: legs that carry")
         fix_layout(figure)
     return figure
+
+
+def carrying_figures(carrying: Carrying) -> Drawings:
+    """Return the map of which legs carry; a grid over one field has none."""
+    return {"map": partial(carrying_map, carrying)} if carrying.is_map else {}

@@ -3,6 +3,7 @@
 import math
 import string
 from collections.abc import Sequence
+from functools import partial
 
 import matplotlib as mpl
 import numpy as np
@@ -14,7 +15,7 @@ from kinetostat.display import Display
 from kinetostat.studies.comparison.design_rows import Row
 from kinetostat.studies.comparison.designs import Comparison
 from kinetostat.studies.setting import frame_of
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, set_title
+from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, set_title
 
 WIDE = 30.0
 """An axis is logarithmic if the largest bar exceeds the least by more than this factor."""
@@ -132,3 +133,8 @@ def _colour(i: int) -> str:
 
 def _short(label: str) -> str:
     return label if len(label) <= LONGEST else f"{label[: LONGEST - 1]}…"
+
+
+def comparison_figures(comparison: Comparison) -> Drawings:
+    """Return designs side by side as the one figure that they have."""
+    return {"comparison": partial(comparison_figure, comparison)}

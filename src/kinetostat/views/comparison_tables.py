@@ -14,6 +14,7 @@ from kinetostat.display import Display, number
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.studies.comparison.design_rows import Better, Row
 from kinetostat.studies.comparison.designs import Comparison, SoftDirection
+from kinetostat.tolerances import AGREED
 from kinetostat.validation.comparison import Validation, frequency_difference
 from kinetostat.views.analysis_tables import matrix_table
 from kinetostat.views.tables import numeric_table, readable, text_table
@@ -128,8 +129,8 @@ def _contributions(attribution: SoftDirection | None) -> str:
     return f"{attribution.direction}: {', '.join(parts)}"
 
 
-def print_validation(console: Console, validation: Validation, agreed: float) -> None:
-    """Ours, theirs, the difference by block, and a verdict: it agrees where no block differs by more than `agreed`."""
+def print_validation(console: Console, validation: Validation) -> None:
+    """Ours, theirs, the difference by block, and a verdict: it agrees where no block differs by more than `AGREED`."""
     family = validation.machine.family
     console.print(
         Text.assemble(
@@ -147,8 +148,8 @@ def print_validation(console: Console, validation: Validation, agreed: float) ->
     console.print(trial_table(validation))
     if validation.frequencies:
         console.print(frequency_table(validation))
-    verdict = "agree" if validation.difference <= agreed else "DIFFER"
-    largest = f"the largest relative difference is {validation.difference:.1e}, allowed is {agreed:g}"
+    verdict = "agree" if validation.difference <= AGREED else "DIFFER"
+    largest = f"the largest relative difference is {validation.difference:.1e}, allowed is {AGREED:g}"
     console.print(f"The two {verdict}: {largest}.", highlight=False)
 
 

@@ -14,7 +14,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.tolerances import SAME_TO_THE_EYE
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, set_title
+from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, set_title
 
 VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
 MARGIN = 0.12
@@ -128,3 +128,8 @@ def loop(points: Loop) -> Loop:
 def flat(points: Loop, across: str, up: str) -> tuple[list[float], list[float]]:
     """Return the coordinates of points along two axes, mm."""
     return [MILLIMETRES * getattr(p, across) for p in points], [MILLIMETRES * getattr(p, up) for p in points]
+
+
+def machine_figures(machine: Machine) -> Drawings:
+    """Return the front, side and plan view of a machine as the one figure that it has."""
+    return {"views": partial(three_views, machine, machine.name)}

@@ -36,6 +36,16 @@ def print_dataset(console: Console, dataset: xr.Dataset, names: Sequence[str]) -
     print_failures(console, dataset)
 
 
+def print_grid(console: Console, dataset: xr.Dataset) -> None:
+    """Print a dataset with all its quantities, see `print_dataset`."""
+    print_dataset(console, dataset, quantities_of(dataset))
+
+
+def quantities_of(dataset: xr.Dataset) -> list[str]:
+    """Return the names of the quantities of a dataset."""
+    return [str(name) for name in dataset.data_vars if name in QUANTITIES]
+
+
 def print_failures(console: Console, dataset: xr.Dataset) -> None:
     """Print how many points of a grid have no result, and why."""
     _print_failures(console, failures(dataset), dataset["status"].size)

@@ -186,3 +186,8 @@ def _curves(panel: Axes, guidelines: Guidelines, element: Element, limits: np.nd
     panel.set(xscale="log", ylim=(0.0, 104.0), xlabel=unit, ylabel="stiffness, % of that with\na rigid element")
     panel.set_title(element.name, parse_math=False)
     panel.margins(x=0.0)
+
+
+def sensitivity_figures(sensitivity: Sensitivity) -> Drawings:
+    """Return the table of influences as a figure; none where no parameter has an influence."""
+    return {"influences": partial(sensitivity_figure, sensitivity)} if sensitivity.parameters else {}

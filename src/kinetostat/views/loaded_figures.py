@@ -1,6 +1,7 @@
 """Pictures of a machine under load: its shape over the unloaded one, and the curve while the load grows."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import matplotlib as mpl
@@ -16,7 +17,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.under_load import LoadedState, load_curve
 from kinetostat.views.drawing import flat, loop, views_of
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, look_of, note_setting, set_title
+from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, look_of, note_setting, set_title
 from kinetostat.views.lettering import width_of
 from kinetostat.views.loaded_tables import leg_loads
 from kinetostat.views.scene.analysis_overlays import exaggerated, exaggeration_of, motions_of
@@ -184,3 +185,9 @@ def _curves(panel: Axes, share: Array, curves: dict[str, Array], label: str) -> 
 def _first_order(panel: Axes, share: Array, values: Sequence[float], scale: Scale) -> None:
     for colour, value in zip(COLOURS, values, strict=False):
         panel.plot(share, value * scale.factor * share / 100.0, color=colour, linewidth=0.6)
+
+
+def loaded_figures(state: LoadedState) -> Drawings:
+    """Return the curve over the growing load, and the shape; a machine without rest has neither."""
+    drawn: Drawings = {"growing load": partial(load_figure, state), "shape": partial(shape_figure, state)}
+    return drawn if state.displacement else {}

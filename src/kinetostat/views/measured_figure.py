@@ -3,13 +3,15 @@
 Nothing is computed here.
 """
 
+from functools import partial
+
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
 from kinetostat.studies.measured.comparison import COVER, MeasuredComparison
 from kinetostat.studies.setting import setting_of
-from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, note_setting, set_title
 from kinetostat.views.measured_tables import WORDS
 
 MOST_ROWS = 60
@@ -50,3 +52,8 @@ def measured_figure(answer: MeasuredComparison) -> Figure:
         note_setting(figure, setting_of(answer.machine), "grey: explained by uncertainties")
         fix_layout(figure)
     return figure
+
+
+def measured_figures(answer: MeasuredComparison) -> Drawings:
+    """Return the comparison with a measured stiffness as the one figure that it has."""
+    return {"measured": partial(measured_figure, answer)}

@@ -24,7 +24,7 @@ from kinetostat.studies.workspace.borders import depth
 from kinetostat.studies.workspace.conditions import Condition
 from kinetostat.studies.workspace.region import surface
 from kinetostat.studies.workspace.verdicts import BEYOND, FAILS, INSIDE, LIMIT, PLAIN, phrase
-from kinetostat.studies.workspace.workspace import BORDER, SOFTEST
+from kinetostat.studies.workspace.workspace import BORDER, SOFTEST, Workspace
 from kinetostat.views.figures import (
     COLOURS,
     STYLE,
@@ -260,3 +260,9 @@ def _lit(triangles: Array) -> Array:
     sizes = np.linalg.norm(normals, axis=1, keepdims=True)
     facing = (normals / np.where(sizes > 0.0, sizes, 1.0)) @ (LIGHT / np.linalg.norm(LIGHT))
     return np.asarray(0.76 + 0.24 * facing)[:, None]
+
+
+def workspace_figures(workspace: Workspace) -> Drawings:
+    """Return the pictures of a workspace by name; its region over two coordinates is "region"."""
+    drawn = pictures(workspace.dataset, workspace.verdicts, workspace.conditions, workspace.dataset.attrs["machine"])
+    return {name.removeprefix("-") or "region": figure for name, figure in drawn.items()}

@@ -198,3 +198,8 @@ def as_json(dataset: xr.Dataset) -> dict[str, Any]:
             "status": words,
         }
     )
+
+
+def as_dataset(dataset: xr.Dataset) -> xr.Dataset:
+    """Return what a NetCDF file of a grid holds: the grid itself."""
+    return dataset

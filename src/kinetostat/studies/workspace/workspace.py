@@ -279,3 +279,8 @@ def as_json(workspace: Workspace) -> dict[str, Any]:
             "demands": workspace.demands,
         }
     )
+
+
+def as_dataset(workspace: Workspace) -> xr.Dataset:
+    """Return what a NetCDF file of the workspace holds."""
+    return workspace.dataset

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kinetostat.machine.machine import Machine
+from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.mesh import mesh_of
 from kinetostat.views.scene.solids import LOOKS, Look, Scene, Shape, Solid, columns_of, linear
 
@@ -119,3 +121,8 @@ def _packed(document: dict[str, Any], data: bytes) -> bytes:
     text += b" " * (-len(text) % ALIGNED)
     chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def machine_glb(machine: Machine) -> bytes:
+    """Write the solids of a machine at its pose as glTF; see `glb`."""
+    return glb(scene_of(machine))
