@@ -1,8 +1,8 @@
 """What holds for the whole suite: profiles of Hypothesis, markers of slow files, the option that rewrites pages.
 
 The default profile draws the same examples on every run, so that a failure is never a matter of luck, and reports the
-first one it meets. CI runs the laws, which draw random machines, with `--hypothesis-profile=fresh` as well, whose
-examples are new every time; `--hypothesis-profile=explore` looks long for new counter-examples, and for the least.
+first one it meets. CI runs all tests with `--hypothesis-profile=fresh`, whose examples are new every time;
+`--hypothesis-profile=explore` looks long for new counter-examples, and for the least.
 """
 
 import gc
@@ -82,11 +82,10 @@ MARKED = re.compile(rf"mark\.(?:slow|{'|'.join(MARKERS)})\b")
 
 LAWS = "property"
 """The folder of the laws: its tests that draw examples are marked so. What draws none is the same in every profile."""
-SLOW_ONES = ("slow", "slow or laws")
 
 
 def pytest_ignore_collect(collection_path, config):
-    """Leave out, before it is imported, a file of which `-m "not slow"`, `-m slow` or CI would choose no test.
+    """Leave out, before it is imported, a file of which `-m "not slow"` or `-m slow` would choose no test.
 
     Every process of the tests imports every file, and JAX, engines and the studio with them: that takes longer than
     many a test. A file that is named on the command line is always read.
@@ -96,9 +95,7 @@ def pytest_ignore_collect(collection_path, config):
         return None
     if expression == "not slow":
         return True if collection_path.stem in BY_FILE else None
-    if expression not in SLOW_ONES or collection_path.stem in BY_FILE:
-        return None
-    if expression != "slow" and collection_path.parent.name == LAWS:
+    if expression != "slow" or collection_path.stem in BY_FILE:
         return None
     return None if MARKED.search(collection_path.read_text("utf-8")) else True
 
