@@ -7,6 +7,7 @@ import difflib
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, Protocol, TypeVar
 
 from kinetostat.algebra.scalar import Scalar
@@ -15,6 +16,8 @@ from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, leaves, quantities
 from kinetostat.units import KINDS, RIGID, UnitError
 
+KEPT = 64
+"""Families whose parameters are kept: machines leg by leg have one each."""
 FULL_TURN = 2.0 * math.pi
 BEYOND = 100.0
 """How many times the longest of all other lengths a length may be."""
@@ -121,14 +124,21 @@ def dimension(path: str) -> str:
     return shown(path).replace(".", "_")
 
 
-def parameters(family: HasFields) -> Iterator[Parameter]:
+def parameters(family: HasFields) -> tuple[Parameter, ...]:
     """All parameters of a family: every field, and every entry of fields that hold several."""
-    for table, fields in family.every_table.items():
+    return _parameters(tuple(family.every_table.items()))
+
+
+@lru_cache(KEPT)
+def _parameters(tables: tuple[tuple[str, type], ...]) -> tuple[Parameter, ...]:
+    known = []
+    for table, fields in tables:
         for name, quantity in quantities(fields).items():
             paths = tuple(leaves(f"{table}.{name}", quantity))
-            yield Parameter(f"{table}.{name}", quantity, paths)
+            known.append(Parameter(f"{table}.{name}", quantity, paths))
             if quantity.count is not None:
-                yield from (Parameter(path, quantity, (path,)) for path in paths)
+                known += [Parameter(path, quantity, (path,)) for path in paths]
+    return tuple(known)
 
 
 def find(family: HasFields, text: str) -> Parameter:

@@ -1,4 +1,4 @@
-"""Where a machine rings, which parts do it, and how its tool feels a varying force: the natural vibrations at its pose.
+"""Natural frequencies and modes of a machine at its pose, and how its tool responds to a varying force.
 
 The equations are in `vibration`; the command is `modes`.
 """
@@ -62,7 +62,7 @@ SMALL = 1e-6
 """Size of the motion by which shapes are read off the exact motions of the links, rad or in machine lengths."""
 MOST_SHOWN = 12
 """Modes that are shown; higher ones add to the response all the same."""
-NOTHING_RINGS = "Nothing rings: all that could move is rigid."
+NOTHING_RINGS = "There are no natural frequencies: all that could move is rigid."
 TOO_DIFFERENT = (
     "Nothing can be said about vibrations at this pose: the softest motion is so much softer than the others, more "
     'than 1e12 times, that round-off hides it. Write "rigid" for springs that are meant to be, or make the softest '
@@ -92,7 +92,7 @@ class Mode:
         tool: twist of the tool point, base axes, in motions whose mass is 1 kg: components of the machine, rad and m
             per root of a kg·m².
         direction: name of the component in which the tool moves most, turns counted at the machine's length.
-        modal_mass: of that component, kg or kg·m²: what would ring there alone, with `modal_stiffness`.
+        modal_mass: of that component, kg or kg·m²: a mass on a spring of `modal_stiffness` has the same frequency.
         modal_stiffness: N/m or N·m/rad.
         effective_mass: share of all moving mass that answers when the base shakes along x, y, z.
         strain: share of the strain energy of each spring, and of the loads, by name; they add up to 1.
@@ -205,9 +205,9 @@ def modes(machine: Machine) -> Vibration:
     Raises:
         InputError: nothing says a mass, or rotors have an inertia and nothing says how far they turn.
     """
-    refuse_unknown_mass(machine, "modes")
     joints = solve_joints(machine) if machine.family.chains else None
     response = respond(machine, joints)
+    refuse_unknown_mass(machine, "modes", response.configuration)
     names, status = machine.family.component_names, Status(int(response.status))
     if status is not Status.OK and not (machine.loaded and status in HELD_BY_LOADS):
         return Vibration(machine, status, why_not(machine, response, []), names)
@@ -246,7 +246,7 @@ def _vibration(machine: Machine, response: Response, equations: Balance, solutio
 
 
 def _message(machine: Machine, response: Response, shown: Sequence[Mode]) -> str:
-    """Say where the machine rings first, how the tool moves there, and which springs deform.
+    """Say what the first natural frequency is, how the tool moves at it, and which springs deform.
 
     Modes of equal frequency are told together: which motions of their plane are shown is arbitrary, their sum is not.
     """
@@ -258,7 +258,7 @@ def _message(machine: Machine, response: Response, shown: Sequence[Mode]) -> str
     springs = largest_contributors(*parts_and_kinds(springs_of(response.configuration), together))
     ways = _motions(_directions(machine, first, float(response.configuration.length)))
     in_modes = f", in {len(first)} modes" if len(first) > 1 else ""
-    text = f"It rings first at {machine.display.show(lowest, 'Hz')}{in_modes}: the tool {ways}."
+    text = f"The first natural frequency is {machine.display.show(lowest, 'Hz')}{in_modes}: the tool {ways}."
     return f"{text} The strain energy is mainly in {springs}." if springs else text
 
 

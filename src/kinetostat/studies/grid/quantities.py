@@ -13,7 +13,7 @@ from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import LIMITS, About
 from kinetostat.machine.loads import loads_platform
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.mass import moving_masses
 from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.errors import InputError, several
@@ -112,7 +112,7 @@ def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Param
     """
     weighing = [name for name in names if name == "mass" or QUANTITIES[name].modal]
     if weighing and not any(KINDS[parameter.quantity.kind].heavy for parameter in varied):
-        refuse_unknown_mass(machine, weighing[0])
+        refuse_unknown_mass(machine, weighing[0], respond(machine).configuration)
     _refuse_unknown_cut(machine, names, [parameter.path for parameter in varied])
     wanted = [name for name in names if QUANTITIES[name].needs]
     if not wanted:
@@ -131,17 +131,18 @@ def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Param
             )
 
 
-def refuse_unknown_mass(machine: Machine, what: str) -> None:
+def refuse_unknown_mass(machine: Machine, what: str, configuration: Configuration) -> None:
     """Refuse what needs masses where the machine has none.
 
     Args:
         machine: as its file has it.
         what: needs them, as people wrote it.
+        configuration: of the machine at its pose.
 
     Raises:
         InputError: says what to give.
     """
-    masses = moving_masses(machine, respond(machine).configuration)
+    masses = moving_masses(machine, configuration)
     tool, drives = machine.tables["tool"], machine.tables["drives"]
     turning = [tool.payload, drives.rotor_inertia, *tool.inertia, *tool.payload_inertia]
     vibrates = what != "mass" and any(turning)

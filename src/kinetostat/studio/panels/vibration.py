@@ -211,7 +211,7 @@ class VibrationPanel(Panel):
 
 
 def about(new: Ringing) -> str:
-    """Say where the machine rings first and why, what moves, and how it is damped."""
+    """Say what the first natural frequency is and why, what moves, and how it is damped."""
     answer = new.answer
     if not answer.modes:
         return paragraph(answer.message, "lead")
