@@ -105,8 +105,8 @@ tenth of a picometre of a metre, and what round-off leaves of a rigid machine.""
 BALANCED = 1e-9
 """Share of the load that may be left over where tensions are chosen: least squares keep some twelve digits."""
 STIFFEST_LEG = 1e6
-"""Stiffness of a leg, in units of the typical one of the machine's springs, beyond which it counts as rigid where legs
-are eliminated: the sum of all legs keeps ten digits."""
+"""Stiffness of a leg, in units of the typical one of the machine's springs, and beside the softest direction of all
+legs together, beyond which it counts as rigid where legs are eliminated: the sum of all legs keeps ten digits."""
 UNRESISTED = 1e-12
 """Share of the largest singular value or stiffness below which a motion meets no condition, or no spring."""
 

@@ -117,7 +117,7 @@ def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Arr
         if part.motions.shape[2]:
             resisted = back @ (force[part.rows] - whole @ motion)
             bent = back @ geometric[part.rows] @ part.motions
-            motion = motion + part.motions @ _balanced_motion(_springs(equations, part), bent, resisted)
+            motion = motion + part.motions @ _balanced_motion(spring_factor(equations, part), bent, resisted)
         wrenches = np.swapaxes(part.inverse, 1, 2) @ (whole @ motion - force[part.rows])
         result[part.rows[:, None], moving], result[part.rows[:, None], carried] = motion, wrenches
     return result
@@ -131,7 +131,7 @@ def _places(equations: Balance) -> tuple[Rows, Rows]:
     return np.setdiff1d(every, carried), carried
 
 
-def _springs(equations: Balance, part: Admissible) -> Array:
+def spring_factor(equations: Balance, part: Admissible) -> Array:
     """Upper triangular R with R^T R the stiffness of the springs over the admissible motions [k x m x m]."""
     size = equations.mechanism.ways.shape[1]
     stiff = [terms.carrying[part.rows] for terms in equations.legs]
@@ -147,10 +147,15 @@ def _springs(equations: Balance, part: Admissible) -> Array:
     return np.asarray(np.linalg.qr(np.concatenate(rows, axis=1), mode="r"))
 
 
+def holds_all(springs: Array) -> npt.NDArray[np.bool_]:
+    """Whether springs, given by their triangular factor R [k x m x m], hold every admissible motion [k]."""
+    sizes = np.abs(np.diagonal(springs, axis1=1, axis2=2))
+    return np.asarray(sizes.min(axis=1) > UNRESISTED * sizes.max(axis=1))
+
+
 def _balanced_motion(springs: Array, bent: Array, force: Array) -> Array:
     """The motions y with (R^T R + G) y = f: by R where springs hold every motion, else as one matrix."""
-    sizes = np.abs(np.diagonal(springs, axis1=1, axis2=2))
-    holds = sizes.min(axis=1) > UNRESISTED * sizes.max(axis=1)
+    holds = holds_all(springs)
     result = np.zeros_like(force)
     if holds.any():
         inverse = np.linalg.inv(springs[holds])

@@ -154,7 +154,8 @@ def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
     """Solve the linear equations at a state for right sides [n x unknowns x k].
 
     Each leg is eliminated by itself, so that it is a stiffness to the platform. A leg with rigid parts only has none,
-    and then the equations are solved over the motions that keep all legs closed.
+    and beside a leg that is much stiffer, what resists softly loses its digits. Such poses are solved over the motions
+    that keep all legs closed.
 
     Args:
         equations: at the state.
@@ -163,7 +164,7 @@ def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
     """
     size, starts = equations.mechanism.ways.shape[1], equations.starts
     whole, total = equations.platform_rates(loaded), right[:, :size]
-    parts = []
+    parts, stiffest = [], np.zeros(len(right))
     for number, (start, end) in enumerate(pairwise(starts)):
         pushed = np.zeros((len(right), end - start, size))
         pushed[:, -size:] = np.eye(size)
@@ -177,6 +178,14 @@ def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
         if not (np.abs(stiffness) < STIFFEST_LEG).all():
             return solve_over_admissible(equations, right, loaded)
         parts.append(part)
+        stiffest = np.maximum(stiffest, np.abs(stiffness).max(axis=(1, 2)))
         whole, total = whole + stiffness, total - part[:, -size:, :-size]
     twist = finite_solution(whole, total)
-    return np.concatenate([twist, *(part[:, :, :-size] + part[:, :, -size:] @ twist for part in parts)], axis=1)
+    result = np.concatenate([twist, *(part[:, :, :-size] + part[:, :, -size:] @ twist for part in parts)], axis=1)
+    sound = np.flatnonzero(np.isfinite(whole).all(axis=(1, 2)))
+    softest = np.linalg.svd(whole[sound], compute_uv=False)[:, -1]
+    rows = sound[stiffest[sound] > STIFFEST_LEG * softest]
+    if len(rows):
+        there = balance(equations.mechanism.taken(rows), equations.state.taken(rows))
+        result[rows] = solve_over_admissible(there, right[rows], loaded)
+    return result

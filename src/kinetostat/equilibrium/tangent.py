@@ -15,7 +15,15 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.equilibrium.admissible import admissible, gaps_of, starts_of, tangent_matrices, within
+from kinetostat.equilibrium.admissible import (
+    admissible,
+    gaps_of,
+    holds_all,
+    spring_factor,
+    starts_of,
+    tangent_matrices,
+    within,
+)
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.motion import Array, skew_of
 from kinetostat.equilibrium.solving import solve
@@ -117,12 +125,13 @@ def stabilities(equations: Balance) -> Stabilities:
         here, allowed = part.rows, part.motions
         if not allowed.size:  # nothing can move at all
             continue
-        stiff, turning = (within(part[here], allowed) for part in (elastic, geometric))
-        stable[here] = np.linalg.eigvalsh(stiff + turning)[:, 0] > 0.0
-        least, springs = np.linalg.eigh(stiff)
-        holds = least[:, 0] > UNRESISTED * least[:, -1]
-        half = springs / np.sqrt(np.where(holds[:, None], least, 1.0))[:, None]
+        stiff, turning = (within(matrix[here], allowed) for matrix in (elastic, geometric))
+        springs = spring_factor(equations, part)
+        holds = holds_all(springs)
+        half = np.linalg.inv(np.where(holds[:, None, None], springs, np.eye(springs.shape[1])))
         shares, turns = np.linalg.eigh(-np.swapaxes(half, 1, 2) @ turning @ half)
+        # Where springs hold every motion, those much softer than others would be lost in the sum of both matrices.
+        stable[here] = np.where(holds, shares[:, -1] < 1.0, np.linalg.eigvalsh(stiff + turning)[:, 0] > 0.0)
         grows = holds & (shares[:, -1] > UNRESISTED)
         factors[here] = np.where(grows, 1.0 / np.where(grows, shares[:, -1], 1.0), np.where(holds, np.inf, np.nan))
         moved = (allowed @ half @ turns[:, :, -1:])[:, :, 0]

@@ -123,6 +123,7 @@ def _shared(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) 
     sharing: list[tuple[Twist, ...]] = []
     flexibility: list[Twist] = []
     motions: list[Motion] = []
+    sizes: list[Scalar] = []
     for leg, mode in zip(balanced, modes, strict=True):
         taken = sum(len(shares) for shares in sharing)
         shares = tuple(Twist(Vector(*row[:3]), Vector(*row[3:])) for row in rows[taken : taken + len(mode.wrenches)])
@@ -131,7 +132,34 @@ def _shared(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) 
         flexibility += felt
         # Springs in series: the fewest shares of C are those of the leg's modes; otherwise one per spring.
         motions += zip(*((shares, mode.compliance) if _in_series(leg) else (felt, leg.compliance)), strict=True)
+        sizes += mode.amount_squares() if _in_series(leg) else leg.load_squares
+    if redundant:
+        motions = _without_unfelt(motions, sizes, [twist for shares in sharing for twist in shares], length)
     return _Shared(modes, sharing, flexibility, motions, singularity_margin, doubt)
+
+
+def _without_unfelt(
+    motions: Sequence[Motion], sizes: Sequence[Scalar], sharing: Sequence[Twist], length: Scalar
+) -> list[Motion]:
+    """The motions without those that no load of the platform makes: what is left of them is round-off.
+
+    Where rigid parts take every load, elastic ones beside them feel nothing, and C must be exactly 0.
+
+    Args:
+        motions: twists, which are loads per unit platform wrench, and compliances.
+        sizes: of each, the square of what a unit of a leg's wrenches can load it with.
+        sharing: amounts of the legs' wrenches per unit platform wrench, as twists.
+        length: m; moments are compared with forces through it.
+    """
+    scales = _squares(reciprocal(length))
+
+    def square(twist: Twist) -> Scalar:
+        return total([c * c * scale for c, scale in zip(twist.components(), scales, strict=True)])
+
+    greatest = ROUND_OFF_OF_COMPLIANCE * total([square(twist) for twist in sharing])
+    return [
+        (twist, where(square(twist) > size * greatest, s, 0.0)) for (twist, s), size in zip(motions, sizes, strict=True)
+    ]
 
 
 def _in_series(leg: LegScrews) -> bool:

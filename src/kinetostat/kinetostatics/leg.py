@@ -13,7 +13,7 @@ from kinetostat.algebra.screw import Screw, Wrench
 from kinetostat.algebra.solve import complement, conjugate, dual_basis
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.machine.leg import LegScrews
-from kinetostat.tolerances import DEPENDENT_LOADS
+from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT_LOADS
 
 AnyScrew = TypeVar("AnyScrew", bound=Screw)
 
@@ -191,9 +191,13 @@ def leg_resistance(leg: LegScrews) -> Resistance:
         return Resistance(in_modes, [(wrench, reciprocal(d)) for wrench, d in pairs])
     rigid = [(wrench, where(d > 0.0, 0.0, INFINITE)) for wrench, d in pairs]
     # As many springs as wrenches: where their loads are independent, b_e is exact even for rigid and free springs. A
-    # dependent set falls back on the modes, pose by pose, by a choice instead of a branch.
-    sizes = [reciprocal(sqrt(total([c * c for c in row]))) for row in leg.loads]
+    # dependent set, or one with a load that is round-off, falls back on the modes, pose by pose, by a choice instead
+    # of a branch.
+    squares = [total([c * c for c in row]) for row in leg.loads]
+    sizes = [reciprocal(sqrt(square)) for square in squares]
     unload, sine = dual_basis([_unit(row) for row in leg.loads])
+    for square, possible in zip(squares, leg.load_squares, strict=True):
+        sine = where(square > CLOSING_ROUND_OFF * CLOSING_ROUND_OFF * possible, sine, 0.0)
     apart = sine > DEPENDENT_LOADS
     springwise = [combine(leg.wrenches, row) * size for row, size in zip(unload, sizes, strict=True)]
     shares = [

@@ -7,6 +7,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from kinetostat.algebra.scalar import Scalar
+from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinetostatics.assembly import Statics
 from kinetostat.kinetostatics.leg import AnyScrew
@@ -38,12 +40,27 @@ def clean_matrix(rows: Sequence[Sequence[float]], share: float = ROUND_OFF_OF_EN
 
 
 def clean_statics(statics: Statics) -> Statics:
-    """The same statics with exact zeros where a component of a screw is only round-off."""
+    """The same statics with exact zeros where a component of a screw is only round-off.
+
+    What K and C are summed of is cleaned together: a component that is small beside the others of a soft direction may
+    be all that couples it with a stiff one.
+    """
     length = statics.length
     return replace(
         statics,
         flexibility=tuple(clean_screw(twist, 1.0 / length) for twist in statics.flexibility),
         resistance=tuple(clean_screw(wrench, length) for wrench in statics.resistance),
-        motions=tuple((clean_screw(twist, 1.0 / length), s) for twist, s in statics.motions),
-        actions=tuple((clean_screw(wrench, length), k) for wrench, k in statics.actions),
+        motions=_clean_sum(statics.motions, 1.0 / length),
+        actions=_clean_sum(statics.actions, length),
     )
+
+
+def _clean_sum(shares: Sequence[tuple[AnyScrew, Scalar]], length: float) -> tuple[tuple[AnyScrew, Scalar], ...]:
+    """Screws with their weights, with zeros in components that are round-off in every screw of the sum."""
+    cleaned = [clean_screw(screw, length).components() for screw, weight in shares if weight > 0.0]
+    reached = [any(components) for components in zip(*cleaned, strict=True)] or [False] * SIZE
+    result = []
+    for screw, weight in shares:
+        kept = [float(c) if there else 0.0 for c, there in zip(screw.components(), reached, strict=True)]
+        result.append((type(screw)(Vector(*kept[:3]), Vector(*kept[3:])), weight))
+    return tuple(result)

@@ -12,6 +12,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, reciprocal, sqrt
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.machine.leg import Joint, Turn
+from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Closure, Step
 from kinetostat.tolerances import NO_LINK, PARALLEL_AXES
 
@@ -100,7 +101,11 @@ def _between(first: Turn, whole: Turn) -> Turn:
 
 def closed_form(name: str, steps: Sequence[Step]) -> ParallelAxes | None:
     """Recognise the closed form of a leg at the home pose, if it has one; its numbers must be floats."""
-    movers = [step.element.mover for step in steps if step.moves and hasattr(step.element, "mover")]
+    moving = [step.element for step in steps if step.moves]
+    # The far side of a parallelogram slides along the axes at the home pose, and on a circle away from it.
+    if any(isinstance(element, Parallelogram) for element in moving):
+        return None
+    movers = [element.mover for element in moving]
     turning = [i for i, joint in enumerate(movers) if joint.point is not None]
     sliding = [i for i, joint in enumerate(movers) if joint.point is None]
     if len(turning) != 3 or len(sliding) > 1 or any(joint.pitch for joint in movers):
