@@ -134,6 +134,15 @@ def test_the_slope_of_the_greatest_load_is_that_of_differences(state):
         assert slopes[path] == pytest.approx(slope, rel=1e-6)
 
 
+def test_sensitivities_of_a_limited_machine_do_not_need_its_rest():
+    """Limits judge the pose; the legs of this machine have no derivatives at rest, which its compliance does not ask."""
+    machine = load(TELESCOPE)
+    assert sensitivity(machine, ["compliance_z"]).parameters
+    overloaded = sensitivity(load(TELESCOPE, ["limits.actuator_force=5 kN"]), ["compliance_z"])
+    assert overloaded.status is Status.JOINT_LIMIT
+    assert "limits.actuator_force" in overloaded.message
+
+
 def test_what_an_answer_to_first_order_leaves_out_is_said(capsys):
     heavy = ["hexapod", "--set", "load.gravity=[0, 0, -9.81]", "--set", "linear_density.legs=5 kg/m"]
     main(["analyze", *heavy])

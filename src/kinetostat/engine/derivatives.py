@@ -189,7 +189,9 @@ class _Routes:
         self._form, self._fixed = form_of(machine, varying, self._differentiated)
         self._angles = angles(machine)
         self._modes = modes
-        self._loaded = bool(rest_numbers(machine, [name for objective in weights for name, _ in objective]))
+        self._loaded = bool(
+            rest_numbers(machine, [name for objective in weights for name, _ in objective], limited=False)
+        )
 
     def direct(self, closed: bool = False) -> Fill:
         """Return the fill by a single program, in which the family places the joints or `closed` forms give them."""
@@ -327,7 +329,11 @@ def _program(
     modes: int,
 ) -> _Program:
     """Return the program of the objectives and their derivatives, or without weights that of the closing equations."""
-    formula = objectives_of(kind, form, weights, paths, closed, modes) if weights else equations_of(kind, form, paths)
+    formula = (
+        objectives_of(kind, form, weights, paths, closed, modes, limited=False)
+        if weights
+        else equations_of(kind, form, paths)
+    )
     count, inputs = len(formula.body.results), len(formula.inputs)
     if not native:
         return _Program(Interpreted(formula.body, formula.inputs), count, inputs)

@@ -159,6 +159,7 @@ def objectives_of(
     paths: Sequence[str] = (),
     closed: bool = False,
     modes: int = 0,
+    limited: bool = True,
 ) -> Formula:
     """Trace weighted sums of quantities as functions of the parameters; NaN where the status is not OK.
 
@@ -170,13 +171,14 @@ def objectives_of(
         closed: whether joints are computed inside the program, in closed form. Otherwise their coordinates and a
             status are further columns, unless the family places the joints itself. If quantities are about the machine
             under load, coordinates of its state follow, see `step_of`.
+        limited: whether the limits of a machine meant under its loads judge its points at rest.
         modes: how many modes are known, as further columns (`vibration.slopes`); 0 to solve for frequencies inside.
     """
     given = traced(kind, form)
     joints, columns = _joints(given, closed)
     response = respond(given.machine, joints)
     coordinates: tuple[Traced, ...] = ()
-    wanted = rest_numbers(given.machine, [name for weights in objectives for name, _ in weights])
+    wanted = rest_numbers(given.machine, [name for weights in objectives for name, _ in weights], limited)
     if wanted:
         equations = reduced_machine(given.machine, response, joints)
         coordinates = _inputs(given.graph, equations.size)

@@ -256,7 +256,7 @@ LOADS_OF_ACTUATORS = ("actuator_force", "actuator_moment")
 """Quantities that are about the machine at rest if it is meant so, and to first order about the free one else."""
 
 
-def rest_numbers(machine: Machine, names: Iterable[str]) -> set[str]:
+def rest_numbers(machine: Machine, names: Iterable[str], limited: bool = True) -> set[str]:
     """Return which numbers of the machine at rest (`equilibrium.numbers`) some quantities need; none if they need none.
 
     Where a machine is meant under its loads, so are the loads of its actuators; and if limits bound these, every pose
@@ -265,17 +265,23 @@ def rest_numbers(machine: Machine, names: Iterable[str]) -> set[str]:
     Args:
         machine: with its limits, and its state.
         names: of quantities.
+        limited: whether poses are judged by limits; derivatives are not.
     """
     names = list(names)
     wanted = {QUANTITIES[name].loaded for name in names} - {""}
-    carries = limits_loads(machine.tables["limits"]) or any(name in LOADS_OF_ACTUATORS for name in names)
+    bounded = limited and limits_loads(machine.tables["limits"])
+    carries = bounded or any(name in LOADS_OF_ACTUATORS for name in names)
     return wanted | {"actuators"} if machine.loaded and carries else wanted
 
 
-def needs_state(machine: Machine, names: Iterable[str]) -> bool:
-    """Whether quantities need more of a pose than its linear response: a state of rest, or natural vibrations."""
+def needs_state(machine: Machine, names: Iterable[str], limited: bool = True) -> bool:
+    """Whether quantities need more of a pose than its linear response: a state of rest, or natural vibrations.
+
+    Args:
+        machine, names, limited: see `rest_numbers`.
+    """
     names = list(names)
-    return bool(rest_numbers(machine, names)) or any(QUANTITIES[name].modal for name in names)
+    return bool(rest_numbers(machine, names, limited)) or any(QUANTITIES[name].modal for name in names)
 
 
 GROUPS = {

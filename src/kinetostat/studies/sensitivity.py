@@ -13,6 +13,7 @@ import numpy as np
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Array, Table
+from kinetostat.equilibrium.numbers import judged_at_rest
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS, QUANTITIES, needs_state, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
@@ -187,6 +188,9 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
         raise InputError("quantities names none; give at least one quantity or group.")
     refuse_loaded(machine, names)
     refuse_absent(machine, names)
+    response = judged_at_rest(machine, respond(machine))
+    if int(response.status) == Status.JOINT_LIMIT:
+        return Sensitivity(machine, Status.JOINT_LIMIT, analyze(machine).message)
     here = values(machine)
     candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(machine, p, names, here)]
     by = [p.path for p in candidates if not math.isinf(here[p.path])]
@@ -196,7 +200,6 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     status = Status(int(answer.status[0]))
     if status is not Status.OK:
         return Sensitivity(machine, status, FAR_AWAY if status is Status.NOT_CONVERGED else analyze(machine).message)
-    response = respond(machine)
     length = float(response.configuration.length)
     indices = tuple(
         _without_round_off(machine, name, value, response)
@@ -216,7 +219,7 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
 def _without_round_off(machine: Machine, name: str, value: float, response: Response) -> float:
     """An index, set to zero where it is an entry of C or K that is only round-off: of a rigid or a free direction."""
     about = QUANTITIES[name].components
-    if not about or not math.isfinite(value) or needs_state(machine, [name]):
+    if not about or not math.isfinite(value) or needs_state(machine, [name], limited=False):
         return value
     matrix = response.compliance if name.startswith("compliance") else response.stiffness
     shrink = 1.0 / float(response.configuration.length)
@@ -232,7 +235,7 @@ def _without_round_off(machine: Machine, name: str, value: float, response: Resp
 def _decides(machine: Machine, parameter: Parameter, names: Sequence[str], here: Mapping[str, float]) -> bool:
     """Whether any of the quantities may depend on a parameter."""
     path, wanted = parameter.path, [QUANTITIES[name] for name in names]
-    loaded, modal = bool(rest_numbers(machine, names)), any(quantity.modal for quantity in wanted)
+    loaded, modal = bool(rest_numbers(machine, names, limited=False)), any(quantity.modal for quantity in wanted)
     if path.startswith(NEVER) or (path.startswith(OF_VIBRATIONS) and not modal):
         return False
     if parameter.quantity.kind == "inertia":

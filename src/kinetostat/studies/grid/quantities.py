@@ -75,7 +75,7 @@ def without_derivatives(machine: Machine, names: Sequence[str], varied: Sequence
     across = [name for name in known if QUANTITIES[name].cut]
     if across:
         return across[0]
-    loaded = [name for name in known if rest_numbers(machine, [name])]
+    loaded = [name for name in known if rest_numbers(machine, [name], limited=False)]
     return loaded[0] if loaded and cut_machine(machine, varied) is None else None
 
 
