@@ -135,7 +135,7 @@ def test_the_slope_of_the_greatest_load_is_that_of_differences(state):
 
 
 def test_sensitivities_of_a_limited_machine_do_not_need_its_rest():
-    """Limits judge the pose; the legs of this machine have no derivatives at rest, which its compliance does not ask."""
+    """Limits judge the pose; its compliance needs no derivatives at rest, which such legs do not have."""
     machine = load(TELESCOPE)
     assert sensitivity(machine, ["compliance_z"]).parameters
     overloaded = sensitivity(load(TELESCOPE, ["limits.actuator_force=5 kN"]), ["compliance_z"])
