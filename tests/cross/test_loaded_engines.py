@@ -16,6 +16,7 @@ from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.mass import located_members
 from kinetostat.validation import exudyn_machine
+from kinetostat.validation.as_written import drawing
 from kinetostat.validation.comparison import KNOWN
 from kinetostat.validation.exudyn_modes import modal_frequencies, weigh
 from kinetostat.validation.pieces import bodies_before
@@ -208,7 +209,7 @@ def test_frequencies_about_the_loaded_state_are_those_of_exudyn(what):
     joints = solve_joints(machine) if machine.family.chains else None
     loaded = frequencies(at_rest(mechanism_of(machine, respond(machine, joints), joints)).balance)[0]
     engine = Engine(machine)
-    weigh(engine.model, engine.platform, machine, engine.response, engine.joints)
+    weigh(engine.model, engine.platform, machine, drawing(machine, engine.response, engine.joints))
     engine.model.system.Assemble()
     engine.start = engine.model.system.systemData.GetODE2Coordinates()
     engine.displacement(wrench_of(machine))

@@ -17,6 +17,7 @@ from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.leg import Joint, Spring
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.mass import located_members
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.tolerances import COINCIDENT, COINCIDENT_HINGES
@@ -57,8 +58,9 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
     machine = analysis.machine
     joints = solve_joints(machine) if machine.family.chains else None
     response = respond(machine, joints)
-    carried, armatures = tuple(on_platform(machine, response)), _rotors(machine, model)
-    heavy = _on_bodies(model, response, links(machine, response, joints), armatures)
+    carried, armatures = tuple(on_platform(machine, response.configuration.platform)), _rotors(machine, model)
+    members = located_members(machine, response.configuration, None if joints is None else joints.coordinates)
+    heavy = _on_bodies(model, response, links(members, response.configuration), armatures)
     known = sum(part.mass for parts in (carried, *heavy.values()) for part in parts)
     if known == 0.0:
         raise InputError(

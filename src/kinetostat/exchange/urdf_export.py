@@ -105,7 +105,9 @@ class _Tree:
             machine: with its masses.
             response, joints: of it; joints of a machine written leg by leg.
         """
-        parts: dict[str, list[Heavy]] = {PLATFORM: [part for part in on_platform(machine, response) if part.mass]}
+        parts: dict[str, list[Heavy]] = {
+            PLATFORM: [part for part in on_platform(machine, response.configuration.platform) if part.mass]
+        }
         left: list[Heavy] = []
         names = [leg.name for leg in response.configuration.legs]
         free = next((i for i, leg in enumerate(response.configuration.legs) if leg.number is None), 0)

@@ -33,6 +33,7 @@ from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.rounding import clean_matrix
 from kinetostat.tolerances import AGREED, ROUND_OFF_OF_ENTRY
 from kinetostat.validation.answer import Answer, block_differences, difference
+from kinetostat.validation.as_written import drawing
 from kinetostat.vibration.modes import frequencies
 
 Array = npt.NDArray[np.float64]
@@ -224,9 +225,11 @@ def validate(machine: Machine, engine: str | None = None) -> Validation:
         InputError: if there is no such engine, no compliance to compare, or a part that the engine cannot have.
     """
     chosen = choose(engine)
-    response = respond(machine)
+    joints = solve_joints(machine) if machine.family.chains else None
+    response = respond(machine, joints)
     ours = _our_compliance(response)
-    answer = chosen.solve(response.configuration, response.reference)
+    drawn = drawing(machine, response, joints)
+    answer = chosen.solve(drawn.configuration, drawn.reference)
     length = float(response.configuration.length)
     uncertainty = _uncertainty(answer, ours, length)
     trusted = max(ROUND_OFF_OF_ENTRY, uncertainty if uncertainty < AGREED else 0.0)

@@ -7,11 +7,12 @@ machine is built is `exudyn_machine`'s business; here masses are added and the e
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.kinematics.closure import Joints, solve_joints
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.tolerances import IDLE_MOTION, MASSLESS_MODE
+from kinetostat.validation.as_written import Drawing, drawing
 from kinetostat.validation.exudyn_bodies import Body, Multibody
 from kinetostat.validation.exudyn_machine import build, settings_of
 from kinetostat.validation.masses import has_rotors, links, on_platform, rotor_inertia
@@ -31,28 +32,29 @@ def frequencies(machine: Machine) -> Array:
     """
     joints = solve_joints(machine) if machine.family.chains else None
     response = respond(machine, joints)
-    struts = not has_rotors(machine)
-    model, _ = build(response.configuration, response.reference)
+    drawn, struts = drawing(machine, response, joints), not has_rotors(machine)
+    model, _ = build(drawn.configuration, drawn.reference)
     model.system.Assemble()
     unit = float(np.max(np.abs(model.system.ComputeLinearizedSystem(settings_of(model))[1])))
-    model, platform = build(response.configuration, response.reference, unit, struts=struts)
-    weigh(model, platform, machine, response, joints)
+    model, platform = build(drawn.configuration, drawn.reference, unit, struts=struts)
+    weigh(model, platform, machine, drawn)
     model.system.Assemble()
     return modal_frequencies(model)
 
 
-def weigh(model: Multibody, platform: Body, machine: Machine, response: Response, joints: Joints | None) -> None:
+def weigh(model: Multibody, platform: Body, machine: Machine, drawn: Drawing) -> None:
     """Add the masses of platform, payload and links to the bodies of a machine.
 
     Args:
         model, platform: as `exudyn_machine.build` returns them.
-        machine, response, joints: of the pose; joints of a machine written leg by leg.
+        machine: says what its platform, payload and rotors weigh.
+        drawn: its legs and links at the pose.
     """
-    for part in on_platform(machine, response):
+    for part in on_platform(machine, drawn.configuration.platform):
         model.weigh(platform, part.mass, part.centre, part.inertia)
     if has_rotors(machine):
-        turn_rotors(model, machine, response.configuration)
-    for link in links(machine, response, joints, struts=not has_rotors(machine)):
+        turn_rotors(model, machine, drawn.configuration)
+    for link in links(drawn.members, drawn.configuration, struts=not has_rotors(machine)):
         carriers = [model.chains[link.leg][number] for number in link.bodies]
         if len(carriers) == 1:
             model.weigh(carriers[0], link.mass, link.points[0], link.inertia)

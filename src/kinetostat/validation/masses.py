@@ -4,18 +4,15 @@ Knows no engine, and no mass matrix: it reads masses, centres, inertias and ends
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar
-from kinetostat.algebra.vector import Vector
-from kinetostat.kinematics.closure import Joints
-from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.machine import Machine, Member
-from kinetostat.machine.mass import located_members
+from kinetostat.algebra.vector import Displacement, Vector
+from kinetostat.machine.machine import Configuration, Machine, Member
 from kinetostat.validation.pieces import array, bodies_before, columns
 
 Array = npt.NDArray[np.float64]
@@ -57,17 +54,17 @@ class HeavyLink:
     inertia: Array
 
 
-def on_platform(machine: Machine, response: Response) -> Iterator[Heavy]:
+def on_platform(machine: Machine, place: Displacement) -> Iterator[Heavy]:
     """Give the platform with its tool, and the payload, as far as they have a mass.
 
     Args:
         machine: with the table [tool].
-        response: of it, at its pose.
+        place: of the platform at its pose.
     """
-    tool, place = machine.tables["tool"], response.configuration.platform
+    tool = machine.tables["tool"]
     axes = columns(place.rotation)
     centre = place.apply(Vector(*tool.centre_of_mass))
-    payload = response.reference + place.rotation.apply(Vector(*tool.payload_centre))
+    payload = place.apply(Vector(*tool.offset)) + place.rotation.apply(Vector(*tool.payload_centre))
     parts = (tool.mass, centre, tool.inertia), (tool.payload, payload, tool.payload_inertia)
     for mass, point, entries in parts:
         inertia = axes @ matrix_of(entries) @ axes.T
@@ -75,20 +72,18 @@ def on_platform(machine: Machine, response: Response) -> Iterator[Heavy]:
             yield Heavy(float(mass), array(point), inertia)
 
 
-def links(machine: Machine, response: Response, joints: Joints | None, struts: bool = True) -> Iterator[HeavyLink]:
+def links(members: Iterable[Member], configuration: Configuration, struts: bool = True) -> Iterator[HeavyLink]:
     """Give the links that have a mass; without the leg in its name, a link is in the leg that has no actuator.
 
     Args:
-        machine: says how heavy its links are.
-        response: of it, at its pose.
-        joints: of a machine written leg by leg.
+        members: the links, with both ends of each.
+        configuration: the legs in which they are.
         struts: whether struts are single pieces of their legs, see `pieces`.
 
     Raises:
         InputError: if a link has its mass within a part that another program cannot cut.
     """
-    configuration = response.configuration
-    for link in located_members(machine, configuration, None if joints is None else joints.coordinates):
+    for link in members:
         if not link.mass:
             continue
         number, leg = next(
