@@ -135,12 +135,12 @@ def _home(machine: Machine) -> dict[str, Array]:
 
 
 def _gap(target: Motions, end: Motions, length: float) -> float:
-    """How far the end of a leg is from its target, rad or in units of the length."""
+    """Distance of the end of a leg from its target, rad or in units of the length."""
     return float(np.abs(scaled(logarithm(target @ end.inverse()), length)).max())
 
 
 def _driven(model: ErrorModel, values: Array, links: Errors) -> tuple[Motions, list[Array]]:
-    """Where the platform is with actuators as drawn, and where all joints then are, actuators with their errors."""
+    """Place the platform with actuators as drawn, and all joints with it, actuators with their errors."""
     state = model.closed_with(values)
     coordinates = [
         followed(row, state.platform, model.rows.length, errors)
@@ -227,7 +227,7 @@ def _softer(leg: Leg, element: Element, softer: dict[str, float]) -> Element:
 
 
 def _commands(model: ErrorModel, values: Array, coordinates: list[Array]) -> tuple[dict[str, float], ...]:
-    """What is to be commanded there, where actuators really stand, and the senses of their counts, by "leg joint"."""
+    """Coordinates to command there, those at which actuators really stand, and the senses of their counts, by joint."""
     known = {error.path: value for error, value in zip(model.errors, values, strict=True)}
     commands, stands, senses = {}, {}, {}
     for row, joints in zip(model.rows.legs, coordinates, strict=True):

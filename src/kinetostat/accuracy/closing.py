@@ -100,7 +100,7 @@ def followed(row: Row, target: Motions, length: float, errors: dict[int, Array] 
 
 @dataclass(frozen=True)
 class Holding:
-    """How the legs hold the platform at a state, theory (46).
+    """Wrenches by which the legs hold the platform at a state, theory (46).
 
     Attributes:
         wrenches: for each leg, a basis of what it carries at the tool point [n x 6 x m], moments over the length.
@@ -152,7 +152,7 @@ def _units(row: Row, length: float) -> Array:
 
 
 def freed(rows: Rows, places: Sequence[Place], tool: Array, chosen: Sequence[tuple[int, ...]]) -> list[Screws]:
-    """What moves freely in each leg at its place, at tool points [n x 3]; `chosen` as of `Screws`."""
+    """Free screws of each leg at its place, at tool points [n x 3]; `chosen` as of `Screws`."""
     every = zip(rows.legs, places, chosen, strict=True)
     return [Screws(free_screws(row, rows, at, tool), which) for row, at, which in every]
 
@@ -183,7 +183,7 @@ def _guide(rows: Rows, tool: Array) -> Array:
 
 
 def _by_energy(every: Array, wrenches: Sequence[Array], soft: Sequence[Array]) -> Array:
-    """How a redundant machine shares misfits [n x 6 x wrenches]: with the least energy, theory (47)."""
+    """Shares of the misfits of a redundant machine [n x 6 x wrenches], of least energy, theory (47)."""
     count, size = every.shape[0], every.shape[2]
     weights = np.zeros((count, size, size))
     start = 0
@@ -213,7 +213,7 @@ def _solved(matrices: Array, right: Array) -> Array:
 
 @dataclass(frozen=True)
 class State:
-    """Where a machine with errors is.
+    """Place of a machine with errors.
 
     Attributes:
         platform: displacement of the platform from its home place.

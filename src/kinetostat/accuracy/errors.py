@@ -63,7 +63,7 @@ class Insertion:
     factor: Callable[[Array], Array] | None = None
 
     def amount(self, coordinates: Array) -> Array:
-        """What its twist is multiplied by [n], at coordinates of the leg [n x coordinates]."""
+        """Factor of its twist [n], at coordinates of the leg [n x coordinates]."""
         return np.ones(len(coordinates)) if self.factor is None else self.factor(coordinates)
 
 

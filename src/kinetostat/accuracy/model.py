@@ -36,7 +36,7 @@ PLACED = (Status.OK, Status.JOINT_LIMIT)
 
 @dataclass(frozen=True)
 class Flexible:
-    """How a spring moves the tool at n poses.
+    """Motion of the tool at n poses by the compliance of a spring.
 
     Attributes:
         twist: of the tool per unit of its deformation, at the tool point, base axes, SI [n x 6].
@@ -94,7 +94,7 @@ class ErrorModel:
 
     @property
     def drawn(self) -> State:
-        """Where the drawn machine is at the poses."""
+        """Places of the drawn machine at the poses."""
         return self._drawn
 
     @property
@@ -121,7 +121,7 @@ class ErrorModel:
         return errors
 
     def closed_with(self, values: Array) -> State:
-        """Where all legs are with errors [errors], theory (48)."""
+        """Place all legs with errors [errors], theory (48)."""
         return self._closed(np.asarray(values, dtype=float))
 
     def taken(self, rows: npt.NDArray[np.int64]) -> "ErrorModel":
@@ -137,7 +137,7 @@ class ErrorModel:
         return replace(self, _drawn=drawn, _flexible=flexible, _soft=soft, _latest={}, **parts)
 
     def rates(self, rows: npt.NDArray[np.int64] | None = None, values: Array | None = None) -> Array:
-        """How the tool moves per unit of each error, actuators held, theory (46).
+        """Motion of the tool per unit of each error, with the actuators held, theory (46).
 
         Args:
             rows: numbers of the poses; all if None.
@@ -154,7 +154,7 @@ class ErrorModel:
         return self._rates_at(self._closed(values), self.inserted(values))
 
     def displaced(self, values: Array) -> tuple[Array, Codes]:
-        """Where the tool comes to with errors of any size, theory (48); compliances add to first order.
+        """Displacement of the tool by errors of any size, theory (48); compliances add to first order.
 
         Args:
             values: of the errors, SI [errors], or others at each pose [n x errors].
@@ -166,7 +166,7 @@ class ErrorModel:
         return self._moved(self._closed(values), self._each(values))
 
     def linearised(self, values: Array, wanted: Collection[int]) -> tuple[Array, Array]:
-        """What `displaced` and `rates` give at errors [errors], in one go [n x 6], [n x 6 x errors].
+        """Compute `displaced` and `rates` at errors [errors] in one go [n x 6], [n x 6 x errors].
 
         Args:
             values: of the errors, SI.
@@ -185,7 +185,7 @@ class ErrorModel:
         return np.where(np.isin(status, PLACED)[:, None], moved, np.nan), status
 
     def compliance(self, wrenches: Array) -> Array:
-        """How the tool deflects under wrenches per relative error of each spring's compliance [n x 6 x springs].
+        """Deflection of the tool under wrenches per relative error of each spring's compliance [n x 6 x springs].
 
         Args:
             wrenches: at the tool point, base axes, N·m and N [n x 6]; the sum over all springs is the deflection.
@@ -200,7 +200,7 @@ class ErrorModel:
         return platform.point(np.broadcast_to(self._tool_home, (len(self), 3)))
 
     def _closed(self, values: Array) -> State:
-        """Where all legs are with errors; those of the last values are kept, because a fit asks for them again."""
+        """Place all legs with errors; the places for the last values are kept, because a fit asks for them again."""
         key = np.asarray(values, dtype=float).tobytes()
         if key not in self._latest:
             errors = self.inserted(values)
@@ -235,14 +235,14 @@ class ErrorModel:
 
 
 def _brought_back(wrenches: Array, place: Motions) -> Array:
-    """What wrenches at the base origin [n x 6 x m] do on screws fixed in a body: the transposed adjoint."""
+    """Work of wrenches at the base origin [n x 6 x m] on screws fixed in a body: the transposed adjoint."""
     moments, forces = np.swapaxes(wrenches[:, :3], 1, 2), np.swapaxes(wrenches[:, 3:], 1, 2)
     moments = moments + cross(forces, place.translation[:, None])
     return np.concatenate([np.swapaxes(part @ place.rotation, 1, 2) for part in (moments, forces)], axis=1)
 
 
 def _beside(wrenches: Array, error: Array | None) -> Array:
-    """What wrenches [n x 6 x m] do on the screws by which exp(e) moves on the left per unit added to e [n x 6], small.
+    """Work of wrenches [n x 6 x m] on the screws by which exp(e) moves on the left per unit added to e [n x 6], small.
 
     With B the transposed bracket of e it is 1 + B / 2 + B^2 / 6.
     """
@@ -253,7 +253,7 @@ def _beside(wrenches: Array, error: Array | None) -> Array:
 
 
 def _bracket(screw: Array, wrenches: Array) -> Array:
-    """What wrenches [n x 6 x m] do on the brackets of a screw [n x 6] with others."""
+    """Work of wrenches [n x 6 x m] on the brackets of a screw [n x 6] with others."""
     moments, forces = np.swapaxes(wrenches[:, :3], 1, 2), np.swapaxes(wrenches[:, 3:], 1, 2)
     turning, moving = screw[:, None, :3], screw[:, None, 3:]
     parts = cross(moments, turning) + cross(forces, moving), cross(forces, turning)
@@ -318,7 +318,7 @@ def error_model(
 
 
 def _displacement(rows: Rows, response: Response, count: int) -> tuple[Motions, Array]:
-    """How the platform is displaced from its home place, and its axes as columns [n x 3 x 3]."""
+    """Displacement of the platform from its home place, and its axes as columns [n x 3 x 3]."""
     placement = response.configuration.platform
     axes = (placement.rotation.x, placement.rotation.y, placement.rotation.z)
     turned = np.stack([stacked(axis.components(), count) for axis in axes], axis=2)
@@ -338,7 +338,7 @@ def _check(rows: Rows, coordinates: Sequence[Array], actuators: Array, status: C
 
 
 def _independent(row: Row, rows: Rows) -> tuple[int, ...]:
-    """Which of the free screws of a leg are independent, wherever it is; it carries six wrenches less these."""
+    """Choose the free screws of a leg that are independent wherever it is; it carries six wrenches less these."""
     coordinates = places_of(row, rows.length)
     return independent(free_screws(row, rows, placed(row, coordinates, {}), np.zeros((len(coordinates), 3))))
 

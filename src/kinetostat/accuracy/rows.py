@@ -22,15 +22,15 @@ from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Configuration, Machine
 
 SAMPLES, TURN, TRAVEL = 40, 0.35, 0.15
-"""How many random places of a leg tell what depends on what by form, and how far its joints go there: rad, and shares
+"""Number of random configurations of a leg at which ranks are taken, and how far its joints go there: rad, and shares
 of the machine's length."""
 CENTRES = {2: "universal", 3: "ball"}
-"""What revolutes in a row through one point are called, by how many they are."""
+"""Names of revolutes in a row through one point, by their number."""
 
 
 @dataclass(frozen=True)
 class Drive:
-    """How an actuator's coordinate follows from the joint's.
+    """Coordinate of an actuator as a function of the joint's.
 
     Attributes:
         number: of the actuator in the machine.
@@ -93,7 +93,7 @@ class Row:
 
     @property
     def size(self) -> int:
-        """How many coordinates it has."""
+        """Number of its coordinates."""
         return len(self.slides)
 
     @cached_property
@@ -236,7 +236,7 @@ def _kind(joint: Joint) -> str:
 
 
 def _about_one_point(elements: Sequence[Element]) -> int:
-    """How many revolutes at the head of a chain turn about one point and have one name; at least 1, at most 3."""
+    """Count the revolutes at the head of a chain that turn about one point and have one name: 1 to 3."""
     first, count = elements[0], 1
     if not (isinstance(first, Joint) and _kind(first) == "revolute"):
         return 1

@@ -1,4 +1,4 @@
-"""What moves freely in a leg at many places, and the wrenches that it carries there. No leg is followed here.
+"""Free screws of a leg at many places, and the wrenches that it carries there. No leg is followed here.
 
 Which freedoms are independent is a matter of the leg's form. Where it is known, an orthogonal basis of these gives the
 wrenches, and with them the least steps follow from linear equations; places at which freedoms are nearly dependent are
@@ -37,7 +37,7 @@ def moved_to(twists: Array, point: Array) -> Array:
 
 
 def independent(screws: Array) -> tuple[int, ...]:
-    """Which of the screws of a leg do not follow from those before them.
+    """Choose the screws of a leg that do not follow from those before them.
 
     Args:
         screws: at random places, where nothing is dependent but by form [n x 6 x k].
@@ -57,7 +57,7 @@ def independent(screws: Array) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Screws:
-    """What moves freely in a leg at n places.
+    """Screws of the free motions of a leg at n places.
 
     Attributes:
         screws: in units of the length [n x 6 x k]; results are NaN where they are not finite.

@@ -45,7 +45,7 @@ def shared_errors(machine: Machine, rows: Rows) -> list[Source]:
 
 
 def _insertions(rows: Rows, more: Rows, less: Rows, step: float) -> Iterator[Insertion]:
-    """What the legs get per unit of a number, from the machine with more and less of it."""
+    """Change of the legs per unit of a number, from the machine with more and less of it."""
     home = Motions(more.rotation[None], more.point[None]) @ Motions(less.rotation[None], less.point[None]).inverse()
     platform = logarithm(home)[0] / step
     for number, row in enumerate(rows.legs):

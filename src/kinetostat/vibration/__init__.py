@@ -1,1 +1,1 @@
-"""How machines vibrate about a state: masses, modes, and the motion of the tool that a varying force makes."""
+"""Vibration about a state: masses, modes, and the motion of the tool under a varying force."""

@@ -19,12 +19,12 @@ from kinetostat.equilibrium.chains import Chain, Masses
 from kinetostat.equilibrium.motion import Array, Motions, cross, skew_of
 
 TENSOR_ROWS = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
-"""Where the rows of an inertia tensor are among xx, yy, zz, xy, xz, yz."""
+"""Places of the rows of an inertia tensor among xx, yy, zz, xy, xz, yz."""
 
 
 @dataclass(frozen=True)
 class PartRates:
-    """How a mass moves by the rates of some coordinates.
+    """Motion of a mass by the rates of some coordinates.
 
     Attributes:
         moving: velocity of its point [n x 3 x coordinates].
@@ -47,7 +47,7 @@ def tensor_of(masses: Masses, number: int, motion: Motions) -> Array | None:
 
 
 def leg_rates(leg: Chain, placed: Placed) -> list[PartRates]:
-    """How each mass of a leg moves by the rates of the leg's coordinates."""
+    """Motion of each mass of a leg by the rates of the leg's coordinates."""
     follows = leg.follows(leg.coordinate, leg.size)
     rates = []
     for number, carried in enumerate(leg.masses.carried):
@@ -60,7 +60,7 @@ def leg_rates(leg: Chain, placed: Placed) -> list[PartRates]:
 
 
 def platform_rates(masses: Masses, platform: Motions) -> list[PartRates]:
-    """How each mass of the platform moves by its twist, at the origin."""
+    """Motion of each mass of the platform by its twist, at the origin."""
     rates = []
     for number in range(len(masses.carried)):
         at = platform.point(masses.point[:, number])

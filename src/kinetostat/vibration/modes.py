@@ -29,7 +29,7 @@ WELL = 0.1
 
 @dataclass(frozen=True)
 class Drive:
-    """How the spring of an actuator deflects.
+    """Deflection of the spring of an actuator in each mode.
 
     Attributes:
         name: of the actuator.
@@ -61,7 +61,7 @@ class Modes:
 
     @property
     def ringing(self) -> int:
-        """How many have mass, and so a frequency."""
+        """Number of modes that have mass, and so a frequency."""
         return int((self.squares > 0.0).sum())
 
     @property
@@ -188,7 +188,7 @@ def _allowed(
 
 
 def _places(basis: Sequence[Array]) -> Iterator[npt.NDArray[np.int64]]:
-    """Where the motions of the platform, and then of each leg, are among all."""
+    """Places of the motions of the platform, and then of each leg, among all."""
     common = basis[0].shape[2]
     end = common
     yield np.arange(common)

@@ -1,4 +1,4 @@
-"""How the tool moves under a force that varies as a sine: its receptance, and the cut that it makes unstable.
+"""Motion of the tool under a force that varies as a sine: its receptance, and the cut that it makes unstable.
 
 All motions of the modes carry their part, those without mass as springs do; so the receptance at no frequency is the
 compliance.
@@ -30,12 +30,12 @@ TRIED = 200
 LEAST_RATIO = 1e-9
 """Damping ratio below which a peak is as sharp as this one: then it has no least real part that means anything."""
 BANDWIDTHS = 6.0
-"""How far about a mode, in multiples of its half-power bandwidth."""
+"""Distance from a mode's frequency, in multiples of its half-power bandwidth."""
 
 
 @dataclass(frozen=True)
 class Damper:
-    """What takes energy out of the modes.
+    """Damping of the modes.
 
     Attributes:
         friction: of joints and rotors, and Rayleigh's damping, between the modes [m x m], s.
@@ -97,7 +97,7 @@ def along(receptances: Complex, direction: Array) -> Complex:
 
 @dataclass(frozen=True)
 class Softest:
-    """Where the real part of a receptance is least.
+    """Least real part of a receptance, and its frequency.
 
     Attributes:
         frequency: Hz.

@@ -1,4 +1,4 @@
-"""Which parts make a vibration: shares of its strain energy by spring, of its kinetic energy by part, of all mass.
+"""Parts in a vibration: shares of its strain energy by spring, of its kinetic energy by part, of all mass.
 
 The strain energy of each motion is one half in units of the mechanism, its kinetic energy too: shares add up to 1.
 

@@ -86,12 +86,12 @@ class Vibrating:
 
     @property
     def sizes(self) -> list[int]:
-        """How many coordinates the platform has, and each leg."""
+        """Number of coordinates of the platform, and of each leg."""
         return [self.mechanism.ways.shape[1], *(leg.size for leg in self.mechanism.legs)]
 
     @property
     def columns(self) -> int:
-        """How many columns `mode_columns` makes of it."""
+        """Number of columns that `mode_columns` makes of it."""
         return 1 + self.most * (1 + sum(self.sizes) + self.sizes[0] * len(self.mechanism.legs))
 
     def squares(self, columns: Sequence[Scalar]) -> list[Scalar]:

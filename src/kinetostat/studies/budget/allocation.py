@@ -53,7 +53,7 @@ class Allocation(Immutable):
 
 
 def reach_of(inputs: Inputs, measures: Measures, measure: str) -> dict[str, Array]:
-    """How far the limits of each part move the tool by themselves, m [n x parts], for both ways to add them up.
+    """Motion of the tool by the limits of each part alone, m [n x parts], for both ways to add them up.
 
     A joint that a load presses counts with its whole clearance.
     """

@@ -293,7 +293,7 @@ def _clean(rates: Array, length: float) -> Array:
 
 
 def _joints(machine: Machine) -> int:
-    """How many joint coordinates its family is placed by."""
+    """Number of joint coordinates by which its family is placed."""
     return machine.chains().size if machine.family.chains else 0
 
 

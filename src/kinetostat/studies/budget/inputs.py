@@ -55,7 +55,7 @@ class Inputs:
 
     @property
     def size(self) -> int:
-        """How many variables there are."""
+        """Number of variables."""
         return len(self.owner)
 
     def machines(self, count: int, seed: int) -> Iterator[Array]:

@@ -13,7 +13,7 @@ from kinetostat.studies.budget.spread import Measures
 from kinetostat.tolerances import NO_FREEDOM
 
 PARASITIC = "parasitic "
-"""How the names of measures begin that are about what no actuator corrects."""
+"""Prefix of the measures of what no actuator corrects."""
 
 
 def measures_of(

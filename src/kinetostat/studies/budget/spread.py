@@ -1,4 +1,4 @@
-"""What independent errors make of the error of the tool: first order, worst case, and percentiles of drawn machines.
+"""Error of the tool by independent errors: to first order, worst case, and percentiles of drawn machines.
 
 Everything here is about measures: rows of numbers that are linear in the twist of the tool, and lengths of some rows.
 

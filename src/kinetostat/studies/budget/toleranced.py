@@ -1,4 +1,4 @@
-"""Which errors of a machine the lines of [tolerances] are about, and how far each may go. Nothing is solved here.
+"""Errors of a machine that the lines of [tolerances] are about, each with its limit. Nothing is solved here.
 
 A line is about a group of errors, or about a path in which * stands for anything. Where two lines are about the same
 number, the later one holds.
