@@ -31,6 +31,10 @@ SEEN_IN_DOUBLES = 1e-12
 file are rounded to doubles, and 1e-16 of the softest direction is 1e-10 of one 1e12 times as stiff."""
 
 
+REPORTED = 100
+"""Machines after which the script says how far it is."""
+
+
 @dataclass(frozen=True)
 class Verdict:
     """How far kinetostat is from the exact engine.
@@ -141,12 +145,13 @@ def main() -> None:
             if verdict.agreed:
                 path.unlink()
             else:
-                print(
-                    f"  {path} {verdict.status.word}",
-                    {k: f"{v:.1e}" for k, v in verdict.differences.items()},
-                    flush=True,
-                )
-        print(f"{mechanism}: {dict(counts)}", {name: f"{value:.1e}" for name, value in worst.items()}, flush=True)
+                print(f"  {path} {verdict.status.word}", rounded(verdict.differences), flush=True)
+            if sum(counts.values()) % REPORTED == 0:
+                print(f"{mechanism}: {dict(counts)}", rounded(worst), flush=True)
+
+
+def rounded(values: Mapping[str, float]) -> dict[str, str]:
+    return {name: f"{value:.1e}" for name, value in values.items()}
 
 
 if __name__ == "__main__":

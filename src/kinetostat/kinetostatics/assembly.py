@@ -134,16 +134,17 @@ def _shared(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) 
         motions += zip(*((shares, mode.compliance) if _in_series(leg) else (felt, leg.compliance)), strict=True)
         sizes += mode.amount_squares() if _in_series(leg) else leg.load_squares
     if redundant:
-        motions = _without_unfelt(motions, sizes, [twist for shares in sharing for twist in shares], length)
+        motions = _unless_unfelt(motions, sizes, [twist for shares in sharing for twist in shares], length)
     return _Shared(modes, sharing, flexibility, motions, singularity_margin, doubt)
 
 
-def _without_unfelt(
+def _unless_unfelt(
     motions: Sequence[Motion], sizes: Sequence[Scalar], sharing: Sequence[Twist], length: Scalar
 ) -> list[Motion]:
-    """The motions without those that no load of the platform makes: what is left of them is round-off.
+    """The motions, without compliances if no load of the platform makes any of them but by round-off.
 
-    Where rigid parts take every load, elastic ones beside them feel nothing, and C must be exactly 0.
+    Where rigid parts take every load, elastic ones beside them feel nothing, and C must be exactly 0. A single one that
+    is small beside others may be what a soft leg carries, and stays.
 
     Args:
         motions: twists, which are loads per unit platform wrench, and compliances.
@@ -157,9 +158,10 @@ def _without_unfelt(
         return total([c * c * scale for c, scale in zip(twist.components(), scales, strict=True)])
 
     greatest = ROUND_OFF_OF_COMPLIANCE * total([square(twist) for twist in sharing])
-    return [
-        (twist, where(square(twist) > size * greatest, s, 0.0)) for (twist, s), size in zip(motions, sizes, strict=True)
-    ]
+    felt: Scalar = 0.0
+    for (twist, s), size in zip(motions, sizes, strict=True):
+        felt = larger(felt, where(square(twist) > size * greatest, where(s > 0.0, 1.0, 0.0), 0.0))
+    return [(twist, where(felt > 0.5, s, 0.0)) for twist, s in motions]
 
 
 def _in_series(leg: LegScrews) -> bool:
