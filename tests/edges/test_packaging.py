@@ -19,6 +19,7 @@ from kinetostat.commands.common import DONE
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+EXTRAS = PROJECT["optional-dependencies"]
 SOURCES = {str(p.relative_to(ROOT / "src")) for p in (ROOT / "src/kinetostat").rglob("*") if p.is_file()}
 SOURCES = {name for name in SOURCES if "__pycache__" not in name}
 
@@ -105,18 +106,19 @@ def test_the_image_rests_on_a_pinned_slim_python():
     assert f"Programming Language :: Python :: 3.{minor[1]}" in PROJECT["classifiers"]
 
 
-def test_what_the_image_installs_is_pinned_by_hash():
-    """The hashes are those of the versions pinned for everybody; what core and studio ask for is among them."""
-    text = (ROOT / "pins.txt").read_text("utf-8")
+@pytest.mark.parametrize(("file", "extras"), [("pins.txt", ["studio"]), ("pins-all.txt", EXTRAS)])
+def test_what_is_installed_is_pinned_by_hash(file, extras):
+    """The hashes are those of the versions pinned for everybody; what core and extras ask for is among them."""
+    text = (ROOT / file).read_text("utf-8")
     entries = re.split(r"\n(?=\w)", re.sub(r"^#.*\n", "", text, flags=re.MULTILINE))
-    pinned = dict(re.match(r"([\w.-]+)==([^ ;]+)", entry).groups() for entry in entries)
+    pinned = {re.match(r"([\w.-]+)==([^ ;]+)", entry).groups() for entry in entries}
     constraints = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["uv"]["constraint-dependencies"]
-    assert pinned.items() <= dict(line.partition(";")[0].strip().split("==") for line in constraints).items()
+    assert pinned <= {tuple(line.partition(";")[0].strip().split("==")) for line in constraints}
     assert all(re.search(r"--hash=sha256:[0-9a-f]{64}", entry) for entry in entries)
     assert "://" not in text
-    direct = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["studio"]]
-    assert {re.match(r"[\w-]+", line)[0].lower() for line in direct} <= {*pinned}
-    assert "--require-hashes" in arguments("RUN")[1]
+    direct = [*PROJECT["dependencies"], *(line for extra in extras for line in EXTRAS[extra])]
+    assert {re.match(r"[\w-]+", line)[0].lower() for line in direct} <= {name for name, _ in pinned}
+    assert "--require-hashes --requirement /wheels/pins.txt" in arguments("RUN")[1]
 
 
 def test_the_image_runs_without_rights():
