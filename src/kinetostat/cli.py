@@ -271,10 +271,10 @@ def _check(options: argparse.Namespace) -> int:
     from kinetostat.spec.document import exists
     from kinetostat.studies.analysis import analyze
     from kinetostat.studies.bundled import is_study
-    from kinetostat.studies.study_folder import holds_study
+    from kinetostat.studies.folder_check import has_checks
     from kinetostat.views.tables import print_machine, terminal
 
-    if exists(Path(options.machine)) and holds_study(Path(options.machine)):
+    if exists(Path(options.machine)) and has_checks(Path(options.machine)):
         return _check_folder(Path(options.machine))
     if is_study(options.machine):
         return _check_study(options)

@@ -57,6 +57,7 @@ def test_poses_of_a_file_and_grids_become_files(tmp_path, capsys):
     assert "everywhere" in text
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         "budget.json", "contributions.csv", "poses.csv", "budget.nc", "budget-contributions.png", "budget-curves.png",
+        "kinetostat.sha256",
     }  # fmt: skip
     rows = list(csv.DictReader((tmp_path / "out" / "poses.csv").read_text().splitlines()))
     assert [row["status"] == "ok" for row in rows] == [True, True, False]

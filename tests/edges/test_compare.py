@@ -115,7 +115,7 @@ def test_files_are_designs_too(tmp_path, capsys):
     assert "geometry.base_radius" in said
     assert "Largest contributions" in said
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"compare.json", "compare.png"}
+    assert names == {"compare.json", "compare.png", "kinetostat.sha256"}
     told = json.loads((tmp_path / "out" / "compare.json").read_text("utf-8"))
     soft, stiff = told["rows"][0]["values"][1:]
     assert stiff == pytest.approx(soft / 2)

@@ -9,7 +9,10 @@ from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
 from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
+from kinetostat.studies.file_list import LIST
 from kinetostat.studies.grid import grid
+from kinetostat.studies.study_folder import noted, read_question
+from refusals import refused
 from studies import SMALL
 
 GRID = [
@@ -135,7 +138,118 @@ def test_a_folder_from_before_checksums_is_read_and_said(kind, undisturbed, tmp_
         records = [json.loads(line) for line in ([text] if name == "study.json" else text.splitlines())]
         old = [{k: v for k, v in r.items() if k not in ("check", "checksums", "data", "layout")} for r in records]
         (folder / name).write_text("".join(f"{json.dumps(record)}\n" for record in old))
+    (folder / LIST).unlink()
     assert main(["check", str(folder)]) == DONE
     assert "without checksums" in capsys.readouterr().out
     assert again(kind, folder) == DONE
     assert "without checksums" in capsys.readouterr().err
+
+
+SMALL_COMMANDS = {
+    "search": None,
+    "grid": None,
+    "map": ["map", "delta", "--over", "x=-1 cm:1 cm:5", "--over", "y=-1 cm:1 cm:5", "--json", "-o"],
+    "workspace": ["workspace", "planar-3rpr", "--over", "x=-5 cm:5 cm:5", "--over", "y=-5 cm:5 cm:5", "--json", "-o"],
+}
+"""Commands that fill a folder; those of the first two are in `undisturbed`."""
+
+
+@pytest.fixture(scope="module")
+def finished(undisturbed):
+    """A folder of each command."""
+    for kind, command in SMALL_COMMANDS.items():
+        if command:
+            assert main([*command, str(undisturbed / kind)]) in (DONE, NO_ANSWER)
+    return undisturbed
+
+
+def once_more(kind, folder):
+    return main([*SMALL_COMMANDS[kind], str(folder)]) if SMALL_COMMANDS[kind] else again(kind, folder)
+
+
+@pytest.mark.parametrize("kind", SMALL_COMMANDS)
+@pytest.mark.parametrize("damage", ["flipped", "cut", "removed"])
+def test_no_file_of_a_finished_folder_is_damaged_unseen(kind, damage, finished, tmp_path, capsys):
+    """Each file in turn; the same command then writes what it had written."""
+    names = sorted(path.name for path in (finished / kind).iterdir())
+    assert LIST in names
+    for name in names:
+        folder = shutil.copytree(finished / kind, tmp_path / name / kind)
+        if damage == "removed":
+            (folder / name).unlink()
+        else:
+            (flipped if damage == "flipped" else cut)(folder / name, 0.5)
+        capsys.readouterr()
+        code = main(["check", str(folder)])
+        said = capsys.readouterr()
+        if name == "study.json":
+            assert damage != "removed" or name in said.err
+            continue
+        if damage == "removed" and name == LIST:  # no other file knows of it
+            assert (code, "cannot be seen" in said.out) == (DONE, True) if kind in FILES else code == BAD_INPUT
+            continue
+        assert code == NO_ANSWER, (name, said)
+        assert name in said.err
+        if (kind, name, damage) == ("grid", "map.nc", "removed"):
+            assert "Remove the folder" in said.err
+            continue
+        once_more(kind, folder)
+        assert main(["check", str(folder)]) == DONE, name
+        for other in names:
+            if not other.endswith(("l", LIST)):
+                assert (folder / other).read_bytes() == (finished / kind / other).read_bytes(), (name, other)
+
+
+@pytest.mark.parametrize("kind", FILES)
+@pytest.mark.parametrize("listed", [True, False])
+def test_a_finished_history_that_lost_its_end_is_seen_wherever_it_ends(kind, listed, undisturbed, tmp_path, capsys):
+    """Also in a folder without a list of its files: its result shows that it was finished."""
+    folder = shutil.copytree(undisturbed / kind, tmp_path / kind)
+    history = (folder / "history.jsonl").read_bytes()
+    if not listed:
+        (folder / LIST).unlink()
+    ends = [i for i, byte in enumerate(history) if byte == ord("\n")]
+    places = {0, 1, len(history) // 2, *(i + d for i in ends for d in (0, 1))} - {len(history)}
+    for place in sorted(places):
+        (folder / "history.jsonl").write_bytes(history[:place])
+        if place or listed or kind == "grid":
+            assert main(["check", str(folder)]) == NO_ANSWER, place
+            assert "damaged or lost" in capsys.readouterr().err or not place
+    assert again(kind, folder) == DONE
+    assert main(["check", str(folder)]) == DONE
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_no_bit_of_a_line_of_the_history_is_flipped_unseen(kind, undisturbed, tmp_path):
+    history = (undisturbed / kind / "history.jsonl").read_bytes()
+    first, rest = history[: history.index(b"\n") + 1], history[history.index(b"\n") + 1 :]
+    whole = noted(undisturbed / kind)[0]
+    for bit in range(8 * len(first)):
+        line = bytearray(first)
+        line[bit // 8] ^= 1 << bit % 8
+        (tmp_path / "history.jsonl").write_bytes(bytes(line) + rest)
+        records = noted(tmp_path)[0]
+        assert all(record in whole for record in records)
+        assert len(records) < len(whole), bit
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_no_bit_of_the_question_is_flipped_unseen(kind, undisturbed, tmp_path):
+    question = (undisturbed / kind / "study.json").read_bytes()
+    for bit in range(0, 8 * len(question), 37):
+        text = bytearray(question)
+        text[bit // 8] ^= 1 << bit % 8
+        (tmp_path / "study.json").write_bytes(text)
+        with refused():
+            read_question(tmp_path)
+
+
+def test_a_report_in_a_finished_folder_is_listed_too(finished, tmp_path, capsys):
+    folder = shutil.copytree(finished / "map", tmp_path / "map")
+    report = folder / "report.html"
+    omitted = [word for part in ("maps", "guidelines", "sensitivity", "validation") for word in ("--without", part)]
+    assert main(["report", "planar-3rpr", *omitted, "-o", str(report)]) == DONE
+    assert main(["check", str(folder)]) == DONE
+    flipped(report, 0.7)
+    assert main(["check", str(folder)]) == NO_ANSWER
+    assert "report.html" in capsys.readouterr().err

@@ -159,7 +159,7 @@ def test_a_folder_gets_figure_and_data(tmp_path, capsys):
     folder = tmp_path / "new"
     assert main(["sensitivity", "planar-3rpr", "-o", str(folder), "--formats", "svg,png"]) == 0
     names = sorted(path.name for path in folder.iterdir())
-    assert names == [f"sensitivity.{suffix}" for suffix in ("json", "png", "svg")]
+    assert names == ["kinetostat.sha256", *(f"sensitivity.{suffix}" for suffix in ("json", "png", "svg"))]
     written = json.loads((folder / "sensitivity.json").read_text("utf-8"))
     assert [*written["indices"]] == ["compliance_rz", "compliance_x", "compliance_y"]
     assert "geometry.base_radius" in (folder / "sensitivity.svg").read_text("utf-8")

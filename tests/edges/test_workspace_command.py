@@ -52,7 +52,7 @@ def test_json_is_all_that_is_printed(capsys):
 def test_it_writes_data_and_pictures(arguments, pictures, tmp_path, capsys):
     assert main([*arguments, "-o", str(tmp_path / "out"), "--formats", "png,svg"]) == DONE
     names = {f"workspace{name}.{suffix}" for name in pictures for suffix in ("png", "svg")}
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"workspace.nc", *names}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"workspace.nc", "kinetostat.sha256", *names}
     text = capsys.readouterr().out.replace("\n", "")
     assert all(name in text for name in names)
 

@@ -151,7 +151,7 @@ def test_a_model_that_is_too_stiff_is_told_by_how_much(tmp_path, capsys):
     assert "to 24 %" in shown
     assert "off by 0.32" in shown
     assert "below 0.01 %" in shown
-    assert {p.name for p in folder.iterdir()} == {"measured.json", "measured.png"}
+    assert {p.name for p in folder.iterdir()} == {"measured.json", "measured.png", "kinetostat.sha256"}
     record = json.loads((folder / "measured.json").read_text())
     assert record["entries"][0]["model_error_between"] == pytest.approx([5.64e6, 9.64e6], rel=1e-3)
     answer = validate_measured(load("hexapod"), path)

@@ -246,7 +246,7 @@ def give(
     written: "Sequence[Path]" = (),
     message: str = "",
 ) -> int:
-    """Print a result and the files that were written.
+    """Print a result and the files that were written, and list these in their folder.
 
     Args:
         options: of the command; with `--json` the result is printed as data.
@@ -259,6 +259,7 @@ def give(
     Returns:
         The exit code.
     """
+    list_written(getattr(options, "output", None), written)
     if options.json:
         print_json(as_data())
     elif message and not answered:
@@ -272,16 +273,35 @@ def give(
     return DONE if answered else NO_ANSWER
 
 
-def note_damage(folder: Path, repaired: str, unchecked: bool) -> None:
+def list_written(output: object, written: "Sequence[Path]") -> None:
+    """Note the checksums of written files in their folder, if it is the output or has such a list already.
+
+    Args:
+        output: of the command, a folder or something else.
+        written: the files.
+    """
+    if not written:
+        return
+    from kinetostat.studies.file_list import LIST
+    from kinetostat.studies.storage import list_files
+
+    for folder in {path.parent for path in written}:
+        if folder == output or (folder / LIST).exists():
+            list_files(folder, written)
+
+
+def note_damage(folder: Path, repaired: str, unchecked: bool, changed: "Sequence[str]") -> None:
     """Print on stderr what was damaged in the folder of a study and has been computed again.
 
     Args:
         folder: of the study.
         repaired: what it was, in words; empty if nothing was damaged.
         unchecked: whether the folder was begun without checksums.
+        changed: names of its files that were missing or not as they had been written, and have been written again.
     """
-    if repaired:
-        print(f'kinetostat: "{folder}" had been damaged; computed again: {repaired}.', file=sys.stderr)
+    parts = [part for part in (repaired, *changed) if part]
+    if parts:
+        print(f'kinetostat: "{folder}" had been damaged; computed again: {", ".join(parts)}.', file=sys.stderr)
     if unchecked:
         print(
             f'kinetostat: "{folder}" was begun without checksums, by an earlier version; damage in it cannot be seen.',

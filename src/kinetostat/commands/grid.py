@@ -11,6 +11,7 @@ from kinetostat.commands.common import (
     DISPLACED,
     add_command,
     give,
+    list_written,
     load_machine,
     note_damage,
     progress_bar,
@@ -211,18 +212,22 @@ def _draw(options: argparse.Namespace, dataset: "xr.Dataset", stem: str, title: 
 
 def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
     from kinetostat.engine.chunks import hired
+    from kinetostat.studies.file_list import differing
     from kinetostat.studies.grid.stored_grid import answer_into
 
+    changed = differing(options.output)
     try:
         with hired(_crew(options)) as compute, progress_bar("computing") as progress:
             stored = answer_into(question, options.output, stem, progress, compute, options.resume)
     except KeyboardInterrupt:
         return stopped(f"the results so far are in {options.output}; the same command continues from there.")
-    note_damage(options.output, stored.repaired, stored.unchecked)
+    note_damage(options.output, stored.repaired, stored.unchecked, changed)
     from kinetostat.studies.grid.stored_grid import summary_json
+    from kinetostat.studies.study_folder import HISTORY, QUESTION
     from kinetostat.views.grid_tables import print_stored
 
     drawn = [] if options.json or len(question.dims) > 2 else _draw_thinned(options, stored.path)
+    list_written(options.output, [options.output / name for name in (QUESTION, HISTORY)])
     return give(
         options,
         bool(stored.tally.answered),

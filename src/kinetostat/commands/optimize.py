@@ -8,6 +8,7 @@ from kinetostat.commands.common import (
     NO_ANSWER,
     add_command,
     judged,
+    list_written,
     no_answer,
     note_damage,
     print_json,
@@ -73,6 +74,7 @@ def _search(options: argparse.Namespace, least: int = 1) -> "Result":
     """Search with a progress bar; into the folder if there is one."""
     from kinetostat.spec.document import exists
     from kinetostat.spec.errors import InputError
+    from kinetostat.studies.file_list import differing
     from kinetostat.studies.optimisation.problem import load_problem
     from kinetostat.studies.optimisation.search import optimize, stored_problem
     from kinetostat.studies.study_folder import holds_study
@@ -88,6 +90,7 @@ def _search(options: argparse.Namespace, least: int = 1) -> "Result":
         raise InputError("--resume continues the search in a folder; name the folder with -o.")
     if len(problem.objectives) < least:
         raise InputError("a Pareto front needs two objectives or more; for one, use `kinetostat optimize`.")
+    options.changed = differing(options.output) if options.output else []
     with search_bar("searching") as update:
         return optimize(
             problem,
@@ -106,12 +109,14 @@ def _report(options: argparse.Namespace, result: "Result") -> int:
         log = result.log
         repaired = "nothing but its history" if log.cleaned else ""
         repaired = f"{log.repaired:,} of {len(log.steps):,} steps" if log.repaired else repaired
-        note_damage(options.output, repaired, log.unchecked)
+        note_damage(options.output, repaired, log.unchecked, options.changed)
     written = write_result(result, options.output) if options.output else []
     if result.solved and options.output:
         from kinetostat.views.optimisation_figures import pictures
 
-        written += write_figures(options, pictures(result))
+        figures = write_figures(options, pictures(result))
+        list_written(options.output, figures)
+        written += figures
     if not result.solved:
         return NO_ANSWER if options.json else no_answer(message(result))
     if not options.json:

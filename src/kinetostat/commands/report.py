@@ -11,6 +11,7 @@ from kinetostat.commands.common import (
     add_command,
     as_wanted,
     give,
+    list_written,
     load_machine,
     no_answer,
     progress_bar,
@@ -131,6 +132,7 @@ def _report(options: argparse.Namespace) -> int:
             write_report(answers, wanted, named, subject.inputs, path, progress)
     if answers.analysis.status is not Status.OK:
         return no_answer(answers.analysis.message)
+    list_written(None, [path])
     print_written(terminal(), [path])
     return DONE if all(verdict.met for verdict in answers.requirements) else NO_ANSWER
 
@@ -175,6 +177,7 @@ def _reproduce(options: argparse.Namespace) -> int:
         reproduction = reproduce(progress)
     with search_bar("drawing") as drawing:
         written = write_all(reproduction, options.output, options.formats, drawing)
+    list_written(options.output, written)
     return give(
         options,
         reproduction.explained,

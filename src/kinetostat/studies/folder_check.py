@@ -1,31 +1,54 @@
-"""The folder of a long study against its checksums: is what was written still there, bit for bit? Mends nothing."""
+"""A folder against the checksums of what was written into it: is all of it still there, bit for bit? Mends nothing."""
 
 from dataclasses import dataclass
+from math import ceil
 from pathlib import Path
 
+from kinetostat.studies.file_list import LIST, differing, is_damaged, listed
 from kinetostat.studies.grid.stored_grid import LAYOUT, damaged_chunks
 from kinetostat.studies.optimisation.search import ROWS
 from kinetostat.studies.result_file import RowFile, frame_is_whole
-from kinetostat.studies.study_folder import DATA, HISTORY, Record, has_checksums, noted, read_question
+from kinetostat.studies.study_folder import (
+    DATA,
+    HISTORY,
+    Record,
+    has_checksums,
+    holds_study,
+    in_use,
+    noted,
+    read_question,
+)
+
+RESULT = "result.json"
+"""File that a search writes last but for tables and figures."""
+
+
+def has_checks(folder: Path) -> bool:
+    """Whether a folder can be checked: it is that of a long study, or has a list of its files."""
+    return holds_study(folder) or (folder / LIST).exists()
 
 
 @dataclass(frozen=True)
-class FolderCheck:
-    """What became of a folder.
+class StepsCheck:
+    """What became of the steps of a search, or of the chunks of a grid.
 
     Attributes:
         parts: "chunks" of a grid, or "steps" of a search.
         intact: how many of them are as they were written.
-        damaged: how many are not; the same command, or `optimize FOLDER`, computes them again.
+        damaged: how many are not, or have been lost; the same command, or `optimize FOLDER`, computes them again.
+        missing: how many are still to be computed, since the study was stopped.
         frame: whether names, attributes and coordinates of a grid's file are as they were written.
         checked: whether there are checksums; without them only missing data is seen.
+        removed: whether a grid's file is no longer there.
     """
 
     parts: str
     intact: int
     damaged: int
+    missing: int
     frame: bool
     checked: bool
+    removed: bool = False
 
     @property
     def whole(self) -> bool:
@@ -35,44 +58,99 @@ class FolderCheck:
     @property
     def sentence(self) -> str:
         """The result in words."""
+        missing = f" {self.missing:,} are still to be computed." if self.missing else ""
+        if not self.whole:
+            frame = "" if self.frame else " The structure of its file is damaged."
+            return f"{self.damaged:,} {self.parts} are damaged or lost, {self.intact:,} are there.{frame}"
         if not self.checked:
             return (
                 f"{self.intact:,} {self.parts} are there; the folder was begun without checksums, by an earlier "
-                "version, so damage in them cannot be seen."
+                f"version, so damage in them cannot be seen.{missing}"
             )
-        if self.whole:
-            return f"{self.intact:,} {self.parts} are there, and all of them are as they were written."
-        frame = "" if self.frame else " The structure of its file is damaged."
-        return (
-            f"{self.damaged:,} {self.parts} are damaged, {self.intact:,} are as they were written.{frame} Give the "
-            "command of this study again: it computes what is damaged."
-        )
+        return f"{self.intact:,} {self.parts} are there, and all of them are as they were written.{missing}"
+
+
+@dataclass(frozen=True)
+class FolderCheck:
+    """What became of a folder.
+
+    Attributes:
+        steps: of its long study; None if it has none.
+        files: how many are listed; None if there is no list.
+        changed: names of listed files that are missing or not as they were written, the list itself among them.
+    """
+
+    steps: StepsCheck | None
+    files: int | None
+    changed: tuple[str, ...]
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is damaged."""
+        return not self.changed and (self.steps is None or self.steps.whole)
+
+    @property
+    def sentence(self) -> str:
+        """The result in words."""
+        sentences = [self.steps.sentence] if self.steps else []
+        if self.changed:
+            sentences.append(f"Missing, damaged or changed since: {', '.join(self.changed)}.")
+        elif self.files:
+            sentences.append(f"All {self.files:,} files that {LIST} lists are as they were written.")
+        elif self.steps and not self.steps.missing:
+            sentences.append(f"There is no {LIST}, so damage in files of results cannot be seen.")
+        if self.steps and self.steps.removed:
+            sentences.append("Remove the folder, and give the command of this study again.")
+        elif not self.whole:
+            sentences.append("Give the command of this study again: it computes and writes what is damaged.")
+        return " ".join(sentences)
 
 
 def check_folder(folder: Path) -> FolderCheck:
-    """Compare everything in the folder of a long study with the checksums that were noted with it.
+    """Compare everything in a folder with the checksums that were written with it.
 
     Args:
-        folder: of a grid or a search; another process may be at work in it.
+        folder: of a grid or a search, in which another process may be at work, or with a list of files.
 
     Raises:
         InputError: its question cannot be read.
     """
+    changed = (LIST,) if is_damaged(folder) else tuple(differing(folder))
+    sums = listed(folder)
+    return FolderCheck(_steps(folder) if holds_study(folder) else None, None if sums is None else len(sums), changed)
+
+
+def _steps(folder: Path) -> StepsCheck:
+    """Compare the steps or chunks of a long study with what was noted about them."""
     question = read_question(folder)
     records = {record["chunk"]: record for record in noted(folder)[0]}
-    lines = (folder / HISTORY).read_bytes().count(b"\n") if (folder / HISTORY).exists() else 0
-    lost = max(lines - len(records), 0)
+    text = (folder / HISTORY).read_bytes() if (folder / HISTORY).exists() else b""
+    torn = bool(text) and not text.endswith(b"\n") and not in_use(folder)
+    broken = text.count(b"\n") + torn - len(records)
     if "optimisation" in question:
+        total = max((record.get("of", 0) for record in records.values()), default=0)
         damaged = _damaged_steps(folder, question, records)
-        return FolderCheck("steps", len(records) - damaged, damaged + lost, True, has_checksums(question))
+        return _counted("steps", len(records) - damaged, damaged + broken, total, (folder / RESULT).exists(), question)
     final = folder / str(question.get("file"))
     path = final if final.exists() else final.with_suffix(f".partial{final.suffix}")
     if LAYOUT not in question:
-        return FolderCheck("chunks", len(records), lost, True, False)
+        return StepsCheck("chunks", len(records), broken, 0, True, False)
+    layout, chunk = question[LAYOUT], question["chunk"]
     if not path.exists():
-        return FolderCheck("chunks", 0, len(records) + lost, False, True)
-    bad = len(damaged_chunks(path, question[LAYOUT], records, question["chunk"]))
-    return FolderCheck("chunks", len(records) - bad, bad + lost, frame_is_whole(path, question[LAYOUT]), True)
+        return StepsCheck("chunks", 0, len(records) + broken, 0, False, True, removed=True)
+    damaged = len(damaged_chunks(path, layout, records, chunk))
+    total = ceil(layout["points"] / chunk)
+    frame = frame_is_whole(path, layout)
+    return _counted("chunks", len(records) - damaged, damaged + broken, total, final.exists(), question, frame)
+
+
+def _counted(
+    parts: str, intact: int, damaged: int, total: int, finished: bool, question: Record, frame: bool = True
+) -> StepsCheck:
+    """The check of parts of which some are known to be damaged: of a finished study, those that lack are lost."""
+    lacking = max(total - intact - damaged, 0)
+    lost, missing = (lacking, 0) if finished else (0, lacking)
+    return StepsCheck(parts, intact, damaged + lost, missing, frame, has_checksums(question))
 
 
 def _damaged_steps(folder: Path, question: Record, records: dict[int, Record]) -> int:

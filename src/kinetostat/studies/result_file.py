@@ -150,12 +150,13 @@ def run_checksum(stream: BinaryIO, layout: Mapping[str, Any], run: range) -> str
     return result
 
 
-def copy_run(source: BinaryIO, layout: Mapping[str, Any], target: BinaryIO, run: range) -> None:
-    """Copy a run of points from a file to another one of the same layout."""
+def copy_run(
+    source: BinaryIO, layout: Mapping[str, Any], target: BinaryIO, layout_there: Mapping[str, Any], run: range
+) -> None:
+    """Copy a run of points from a file to another one, each with its layout."""
     for name, offset in layout["offsets"].items():
-        place = offset + run.start * _width(name)
-        source.seek(place)
-        target.seek(place)
+        source.seek(offset + run.start * _width(name))
+        target.seek(layout_there["offsets"][name] + run.start * _width(name))
         target.write(source.read(len(run) * _width(name)))
 
 

@@ -1,7 +1,8 @@
 """Writes all files of the program: whole or not at all, and never over anything but a plain file.
 
 A file is written in a temporary folder beside its place, `.kinetostat-...`, and then moved there. The process holds a
-lock on that folder. If the process is killed, the lock is released, and the next writer removes the folder.
+lock on that folder. If the process is killed, the lock is released, and the next writer removes the folder. What a
+command has written into a folder is listed there with checksums (`file_list`).
 """
 
 import errno
@@ -11,13 +12,14 @@ import shutil
 import stat
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, BinaryIO
 
 from kinetostat.spec.errors import InputError
+from kinetostat.studies.file_list import LIST, listed, sums_of, text_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,7 +100,32 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o644)
         with temporary.open("rb") as stream:
             os.fsync(stream.fileno())
+        if path.name != LIST:
+            _unlist(path)
         temporary.replace(place)
+
+
+def list_files(folder: Path, paths: Iterable[Path]) -> None:
+    """Add files to the list of their folder, as they are now.
+
+    Args:
+        folder: that commands have written files into.
+        paths: of files; those in other folders, or not there, are left out.
+
+    Raises:
+        InputError: the list cannot be written.
+    """
+    sums = {name: digest for name, digest in (listed(folder) or {}).items() if (folder / name).is_file()}
+    sums |= sums_of(folder, [path.name for path in paths if path.parent == folder])
+    if sums:
+        write_bytes(folder / LIST, text_of(sums))
+
+
+def _unlist(path: Path) -> None:
+    """Take a file out of the list of its folder, because it is about to change."""
+    sums = listed(path.parent)
+    if sums is not None and sums.pop(path.name, None):
+        write_bytes(path.parent / LIST, text_of(sums))
 
 
 @contextmanager

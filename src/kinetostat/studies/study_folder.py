@@ -9,12 +9,13 @@ import json
 import sys
 import time
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from kinetostat.spec.errors import InputError
+from kinetostat.studies.file_list import LIST
 from kinetostat.studies.storage import KEPT, settle, write_text, writing
 
 QUESTION, HISTORY = "study.json", "history.jsonl"
@@ -26,6 +27,11 @@ CHECK = "check"
 """Key of the checksum of a record, its last."""
 DATA = "data"
 """Key of the checksum of the numbers that a record is about."""
+
+VERSION = "kinetostat"
+"""Key of the version that began a folder; later ones go on with it."""
+CHECKED = "checksums"
+"""Key of a question whose folder has checksums."""
 
 Record = dict[str, Any]
 """What is noted about a chunk; "chunk" is its number."""
@@ -83,7 +89,7 @@ def read_question(folder: Path) -> Record:
 
 def has_checksums(question: Record) -> bool:
     """Tell whether the folder of a question was written with checksums; those of earlier versions were not."""
-    return bool(question.get("checksums"))
+    return bool(question.get(CHECKED))
 
 
 def checksum(data: bytes | memoryview, before: str = "0") -> str:
@@ -112,7 +118,15 @@ def _unsealed(text: bytes, least: Record | None = None) -> Record | None:
     if least is None and not (isinstance(record.get("chunk"), int) and record["chunk"] >= 0):
         return None
     check = record.pop(CHECK, None)
-    return record if check in (None, checksum(json.dumps(record).encode())) else None
+    if check is None:  # of an earlier version, unless the key itself is damaged
+        return None if {DATA, CHECKED} & record.keys() else record
+    return record if check == checksum(json.dumps(record).encode()) and text.strip() in _texts(record) else None
+
+
+def _texts(record: Record) -> Iterator[bytes]:
+    """The forms in which a record may stand in a file: one line of a history, or the lines of a question."""
+    yield json.dumps(_sealed(record)).encode()
+    yield json.dumps(_sealed(record), ensure_ascii=False, indent=1).encode()
 
 
 class StudyFolder:
@@ -128,14 +142,21 @@ class StudyFolder:
         self.damaged = 0
         self._history = history
 
-    def question(self, wanted: Record) -> Record | None:
+    def question(self, wanted: Record, restated: Callable[[Record], Record]) -> Record | None:
         """Return the question that this folder answers, or None where it has none yet; check that it is the wanted one.
+
+        Args:
+            wanted: the question that is asked.
+            restated: writes a stored question as this version would: earlier ones left out what is said today.
 
         Raises:
             InputError: it is another one, or cannot be read.
         """
         stored = read_question(self.path) if holds_study(self.path) else None
-        different = [key for key in wanted if stored is not None and wanted[key] != stored.get(key)]
+        if stored is None:
+            return None
+        known = restated(stored)
+        different = [key for key in wanted if key != VERSION and wanted[key] != known.get(key)]
         if different:
             raise InputError(
                 f'"{self.path}" holds another study (different: {", ".join(different)}); choose another folder with '
@@ -145,8 +166,13 @@ class StudyFolder:
 
     def begin(self, question: Record) -> None:
         """Note a new question, to which nothing is known yet."""
+        (self.path / LIST).unlink(missing_ok=True)
         self._history.truncate(0)
-        text = json.dumps(_sealed({**question, "checksums": "CRC-32"}), ensure_ascii=False, indent=1)
+        self.state(question)
+
+    def state(self, question: Record) -> None:
+        """Write the question of this folder."""
+        text = json.dumps(_sealed({**question, CHECKED: "CRC-32"}), ensure_ascii=False, indent=1)
         write_text(self.path / QUESTION, f"{text}\n")
 
     def records(self) -> dict[int, Record]:
@@ -164,6 +190,7 @@ class StudyFolder:
     def keep(self, records: Iterable[Record]) -> None:
         """Forget all that was noted but these records, where others are damaged."""
         kept = list(records)
+        (self.path / LIST).unlink(missing_ok=True)
         with writing(self.path / HISTORY, KEPT):
             self._history.truncate(0)
         for record in kept:
@@ -171,6 +198,7 @@ class StudyFolder:
 
     def note(self, record: Record) -> None:
         """Add a chunk that is done; when this returns it is on the disk."""
+        (self.path / LIST).unlink(missing_ok=True)
         with writing(self.path / HISTORY, KEPT):
             self._history.write(json.dumps(_sealed(record)).encode() + b"\n")
             settle(self._history)

@@ -15,7 +15,8 @@ from kinetostat.engine.batch import Evaluation, Progress, silent
 from kinetostat.engine.chunks import Compute, Work, here, in_chunks
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.machine.loading import as_toml
+from kinetostat.machine.loading import as_toml, build
+from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.grid.grid import ABOUT_STATUS, GridQuestion, about
 from kinetostat.studies.plain_data import as_answer
@@ -30,7 +31,7 @@ from kinetostat.studies.result_file import (
     run_checksum,
 )
 from kinetostat.studies.storage import settle, writing
-from kinetostat.studies.study_folder import DATA, Record, StudyFolder, holds_study, study_folder
+from kinetostat.studies.study_folder import DATA, Record, StudyFolder, holds_study, read_question, study_folder
 
 MOST_NUMBERS = 10_000_000_000
 """Points times quantities of one grid: 80 GB."""
@@ -160,7 +161,7 @@ def _taken_up(question: GridQuestion, study: StudyFolder, final: Path) -> tuple[
     """The work as the folder has it, or new work where it has none, and the layout of its file if it is known."""
     work = in_chunks(question.machine, question.grid, question.names)
     wanted = _as_record(question, final.name)
-    stored = study.question(wanted)
+    stored = study.question(wanted, _restated)
     if stored is None:
         layout = _create(question, final)
         study.begin({**wanted, "chunk": work.chunk, LAYOUT: layout})
@@ -185,11 +186,12 @@ def _without_damage(question: GridQuestion, study: StudyFolder, final: Path, wor
     if not whole:
         broken = final.with_suffix(f".damaged{final.suffix}")
         path.replace(broken)
-        _create(question, final)
+        fresh = _create(question, final)  # of an earlier version's file, another layout
         with writing(path), broken.open("rb") as source, _partial(final).open("r+b") as target:
             for number in records.keys() - damaged:
-                copy_run(source, layout, target, work.part(number))
+                copy_run(source, layout, target, fresh, work.part(number))
             settle(target)
+        study.state(read_question(study.path) | {LAYOUT: fresh})
     final.with_suffix(f".damaged{final.suffix}").unlink(missing_ok=True)
     if damaged or lost:
         study.keep(record for number, record in records.items() if number not in damaged)
@@ -234,11 +236,22 @@ def _as_record(question: GridQuestion, file: str) -> Record:
         "study": STUDY_VERSION,
         "kinetostat": attributes["kinetostat"],
         "file": file,
-        # How results are shown does not part a study from the one that it continues.
-        "machine": as_toml(replace(question.machine, display=ENGINEERING)),
+        "machine": _text_of(question.machine),
         "axes": axes,
         "quantities": list(question.names),
     }
+
+
+def _restated(stored: Record) -> Record:
+    """A stored question as this version writes it."""
+    if "machine" not in stored:
+        return stored
+    return {**stored, "machine": _text_of(build(stored["machine"], "study.json"))}
+
+
+def _text_of(machine: Machine) -> str:
+    """A machine as a question has it: how results are shown does not part a study from the one that it continues."""
+    return as_toml(replace(machine, display=ENGINEERING))
 
 
 def _compute_missing(

@@ -14,7 +14,9 @@ from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.ridges import ridge_sentences
 from kinetostat.studies.optimisation.robustness import Robustness
-from kinetostat.studies.storage import write_dataset, write_json, write_text
+from kinetostat.studies.optimisation.search import ROWS
+from kinetostat.studies.storage import list_files, write_dataset, write_json, write_text
+from kinetostat.studies.study_folder import HISTORY, QUESTION
 
 INFEASIBLE = "No feasible design was found: {}. Widen the bounds, ease the constraints, or change [poses]."
 
@@ -175,4 +177,5 @@ def write_result(result: Result, folder: Path) -> list[Path]:
     if result.solved:
         written.append(folder / "best.toml")
         write_text(written[-1], as_file(result.machine))
+    list_files(folder, [*written, *(folder / name for name in (QUESTION, HISTORY, ROWS))])
     return written

@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
+from kinetostat.display import ENGINEERING
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
@@ -192,11 +193,16 @@ def _take(method: Method, log: Log) -> None:
 def _take_up(problem: Problem, study: StudyFolder, log: Log) -> None:
     """Check that the folder holds this study, or begin it."""
     question = question_of(problem, log.width)
-    stored = study.question(question)
+    stored = study.question(question, _restated)
     if stored is None:
         (study.path / ROWS).unlink(missing_ok=True)
         study.begin(question | {"machine file": as_file(problem.machine)})
     log.unchecked = stored is not None and not has_checksums(stored)
+
+
+def _restated(stored: Record) -> Record:
+    """A stored question as this version writes it."""
+    return question_of(_problem_of(stored, "study.json"), stored["numbers in a row"])
 
 
 def stored_problem(folder: Path) -> Problem:
@@ -208,8 +214,12 @@ def stored_problem(folder: Path) -> Problem:
     question = read_question(folder)
     if not {"optimisation", "machine"} <= question.keys():
         raise InputError(f'"{folder}" is not the folder of an optimisation; give a study file, or such a folder.')
-    machine = build(question.get("machine file") or question["machine"], str(folder))
-    return problem_of(read_study(question["optimisation"], str(folder)), machine)
+    return _problem_of(question, str(folder))
+
+
+def _problem_of(question: Record, origin: str) -> Problem:
+    machine = build(question.get("machine file") or question["machine"], origin)
+    return problem_of(read_study(question["optimisation"], origin), machine)
 
 
 def begin_search(problem: Problem, folder: Path) -> None:
@@ -242,7 +252,8 @@ def question_of(problem: Problem, width: int) -> Record:
     question: dict[str, Any] = {
         "study": STUDY_VERSION,
         "kinetostat": version("kinetostat"),
-        "machine": as_toml(problem.machine),
+        # How results are shown does not part a study from the one that it continues.
+        "machine": as_toml(replace(problem.machine, display=ENGINEERING)),
         "optimisation": problem.study.model_dump(mode="json", by_alias=True, exclude_none=True),
         "numbers in a row": width,
     }
