@@ -124,7 +124,7 @@ def list_files(folder: Path, paths: Iterable[Path]) -> None:
 def _unlist(path: Path) -> None:
     """Take a file out of the list of its folder, because it is about to change."""
     sums = listed(path.parent)
-    if sums is not None and sums.pop(path.name, None):
+    if sums is not None and sums.pop(path.name, ""):
         write_bytes(path.parent / LIST, text_of(sums))
 
 
