@@ -239,7 +239,7 @@ def closed(
     Args:
         rows: the machine at its home place.
         start: joint coordinates, with the actuators where they stand, and the platform nearby.
-        errors: of each leg.
+        errors: the errors of each leg.
         tool_home: the tool point at the home place, m [3].
         chosen: see `freed`.
         soft: see `holding`.

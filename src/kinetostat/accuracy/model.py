@@ -39,8 +39,8 @@ class Flexible:
     """Motion of the tool at n poses by the compliance of a spring.
 
     Attributes:
-        twist: of the tool per unit of its deformation, at the tool point, base axes, SI [n x 6].
-        compliance: of it, m/N or rad/(N·m) [n].
+        twist: twist of the tool per unit of the deformation, at the tool point, base axes, SI [n x 6].
+        compliance: compliance of the spring, m/N or rad/(N·m) [n].
     """
 
     twist: Array

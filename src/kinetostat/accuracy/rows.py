@@ -141,7 +141,7 @@ class Rows:
     """A machine at its home place.
 
     Attributes:
-        legs: of it.
+        legs: the legs of the machine.
         configuration: the machine there.
         rotation, point: placement of the platform there: its axes as columns [3 x 3], and P, m [3].
         length: a characteristic length, m.

@@ -26,7 +26,7 @@ def shared_errors(machine: Machine, rows: Rows) -> list[Source]:
 
     Args:
         machine: with numbers.
-        rows: of it.
+        rows: the machine at its home place.
     """
     if machine.family.chains:
         return []

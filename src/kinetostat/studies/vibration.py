@@ -129,7 +129,7 @@ class Vibration(Immutable):
         uncounted: names of the parts whose mass nothing says.
         assumed: whether the damping ratio is `ASSUMED_RATIO` because the file says nothing about damping.
         solution: all modes as they were solved for, with those without mass; None where there are none.
-        damping: of them.
+        damping: the damping of the modes.
     """
 
     machine: Machine

@@ -57,7 +57,7 @@ def damper(equations: Balance, modes: Modes, ratio: float, per_mass: float, per_
 
     Args:
         equations: at the state.
-        modes: of it.
+        modes: the vibrations of the machine.
         ratio: damping ratio of every mode.
         per_mass, per_stiffness: Rayleigh's factors, 1/s and s.
     """
@@ -71,7 +71,7 @@ def receptance(modes: Modes, damping: Damper, frequencies: Array) -> Complex:
 
     Args:
         modes: at the pose.
-        damping: of them.
+        damping: the damping of the modes.
         frequencies: Hz [frequencies].
     """
     rates = 2.0 * np.pi * np.asarray(frequencies, dtype=float)[:, None]
@@ -141,7 +141,7 @@ def cut_receptances(machine: Machine, response: Response, count: int) -> Array:
 
     Args:
         machine: at n poses, with its tables [cutting] and [damping].
-        response: of it.
+        response: the response of the machine at its pose.
         count: of poses, n.
     """
     joints = solve_joints(machine) if machine.family.chains else None

@@ -69,7 +69,7 @@ def free_frequencies(machine: Machine, response: Response, joints: Joints | None
 
     Args:
         machine: with its masses; numbers of any kind.
-        response: of it.
+        response: the response of the machine at its pose.
         joints: coordinates that close its legs, if it is written leg by leg.
         sloped: whether derivatives will be taken.
     """
@@ -86,7 +86,7 @@ def pose_frequencies(machine: Machine, response: Response, count: int) -> Array:
 
     Args:
         machine: at n poses: with columns of them.
-        response: of it.
+        response: the response of the machine at its pose.
         count: of poses, n.
     """
     if not light(machine, response):
@@ -108,7 +108,7 @@ def platform_matrix(machine: Machine, response: Response) -> list[Row]:
 
     Args:
         machine: in which the platform alone is massive.
-        response: of it.
+        response: the response of the machine at its pose.
     """
     parts, length = machine.family.components, response.configuration.length
     units = [length if part in range(3) else 1.0 for part in range(6)]  # so that all rows are in m/N and kg

@@ -77,7 +77,7 @@ class Vibrating:
     """A machine with relaxed springs whose modes are known, over scalars.
 
     Attributes:
-        mechanism: of it.
+        mechanism: the machine as coordinates and masses.
         most: how many modes are known.
     """
 
@@ -139,7 +139,7 @@ def vibrating(machine: Machine, response: Response, joints: Joints | None, most:
 
     Args:
         machine: with its masses.
-        response: of it.
+        response: the response of the machine at its pose.
         joints: coordinates that close its legs, if it is written leg by leg.
         most: how many modes.
     """

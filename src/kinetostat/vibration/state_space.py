@@ -40,7 +40,7 @@ def state_space(modes: Modes, damping: Damper, inputs: Array, outputs: Array, co
 
     Args:
         modes: at the pose.
-        damping: of them.
+        damping: the damping of the modes.
         inputs: motion of each point and direction in which a force acts, in each mode [inputs x m], SI per root of a
             joule.
         outputs: likewise, motions that are looked at [outputs x m].

@@ -40,7 +40,7 @@ class Toleranced:
 
     Attributes:
         errors: their places in the error model.
-        path: of it, as a line may name it.
+        path: path of the number, as a line may name it.
         words: for people.
         kind: "length", "angle" or "ratio".
         group: of the errors.
