@@ -20,6 +20,7 @@ from kinetostat.machine.loading import build, bundled
 from kinetostat.machine.mass import located_members
 from kinetostat.machine.written import family, joints
 from kinetostat.machine.written.joints import JOINT_TYPES
+from kinetostat.validation import exudyn_machine
 from kinetostat.validation.as_written import drawing
 from kinetostat.validation.pieces import array
 
@@ -138,3 +139,14 @@ def places(part):
         return np.zeros(0)
     names = ("axis", "point", "start", "end", "near", "far", "side")
     return np.concatenate([array(v) for name in names if (v := getattr(joint, name, None)) is not None])
+
+
+def test_the_engine_prints_nothing_into_the_answer(capfd):
+    """It has advice for systems of more than 1000 coordinates, which had stood before the JSON of a large machine."""
+    machine = build((CASES / "every-joint-and-link.toml").read_text("utf-8"))
+    found = solve_joints(machine)
+    drawn = drawing(machine, respond(machine, found), found)
+    model, _ = exudyn_machine.build(drawn.configuration, drawn.reference)
+    model.system.Assemble()
+    model.system.ComputeLinearizedSystem(exudyn_machine.settings_of(model))
+    assert capfd.readouterr() == ("", "")

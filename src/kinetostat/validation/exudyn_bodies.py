@@ -48,6 +48,7 @@ class Multibody:
 
     def __init__(self, unit: float = 1.0, preloaded: bool = False) -> None:
         self.engine = import_module("exudyn")
+        self.engine.config.suppressWarnings = True  # it prints advice, which would stand in the JSON of a large machine
         self.items: Any = import_module("exudyn.itemInterface")
         self.container = self.engine.SystemContainer()
         self.system = self.container.AddSystem()
