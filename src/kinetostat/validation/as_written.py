@@ -20,6 +20,7 @@ from kinetostat.machine.machine import Configuration, Machine, Member, Plane
 from kinetostat.machine.mass import located_members
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import CLOSED
+from kinetostat.validation.family_legs import with_legs_of_file
 from kinetostat.validation.moving_legs import MovingLeg, apply, placement, turn, vector
 from kinetostat.validation.pieces import array, columns
 from kinetostat.validation.written_legs import written_legs
@@ -57,8 +58,9 @@ def drawing(machine: Machine, response: Response, joints: Joints | None) -> Draw
         InputError: if a leg as the file describes it does not reach the platform.
     """
     if joints is None:
-        members = located_members(machine, response.configuration, None)
-        return Drawing(response.configuration, response.reference, tuple(members))
+        placed = with_legs_of_file(machine, response.configuration)
+        at = placed.platform.apply(Vector(*machine.tables["tool"].offset))
+        return Drawing(placed, at, tuple(located_members(machine, placed, None)))
     ours = response.configuration
     target, length = _platform(machine, ours.platform), float(ours.length)
     home = placement(np.eye(3), np.array(machine.tables["platform"].point, dtype=float))
