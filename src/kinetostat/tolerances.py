@@ -156,6 +156,17 @@ EQUAL_DESIGNS = 1e-9
 EQUAL_ROUTES = 1e-9
 """Relative difference up to which machine code, NumPy and a single pose agree in the self-test."""
 
+# Identification
+
+FIT_SETTLED = 1e-10
+"""Relative change of the sum of squares, and of the unknowns, below which a fit has settled: a thousandth of what tells
+two fits apart, also where steps along a curved valley are many."""
+FIT_BEGUN = 1e-3
+"""The same of fits that only say how far the residuals spread, because the next one starts from there."""
+ROUND_OFF_OF_MEASUREMENT = 1e-9
+"""Residual, rad or as a share of the machine's length, up to which it may be round-off of the file or of the model: no
+value is an outlier by it, and no interval is shorter."""
+
 # Validation with independent engines
 
 AGREED = 1e-6

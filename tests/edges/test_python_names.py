@@ -193,6 +193,13 @@ def answer_classes():
     return {one for one in returned if is_dataclass(one)}
 
 
+def test_every_answer_about_a_machine_has_a_line_of_its_own():
+    """Not all of its fields, which fill a screen."""
+    for one in answer_classes():
+        if "machine" in one.__dataclass_fields__:
+            assert not hasattr(one.__repr__, "__wrapped__"), one  # as of a dataclass
+
+
 def test_docstrings_of_public_names_refer_to_nothing_that_is_not_public():
     trees = [ast.parse(path.read_text("utf-8")) for path in Path(kinetostat.__file__).parent.rglob("*.py")]
     ours = {one.name for tree in trees for one in tree.body if isinstance(one, ast.FunctionDef | ast.ClassDef)}

@@ -14,15 +14,19 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from kinetostat.algebra.vector import Displacement
 from kinetostat.kinematics.closing import ANGLES, Array, gaps_at, leg_ends, pose_of, squared_distance, stacked, units_of
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
+from kinetostat.machine.column import column
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, parameters, values, with_values
 from kinetostat.tolerances import CLOSED, NEWTON_SETTLED, ONE_PLACEMENT, UNDRIVEN
+
+Mask = npt.NDArray[np.bool_]
 
 MOST_ITERATIONS = 60
 """Of damped least squares: a start that has not arrived by then is in no solution's reach."""
@@ -69,10 +73,18 @@ class System(Protocol):
     actuators: Sequence[Actuator]
 
     def left(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
-        """What is left of the equations [n x m], and how the unknowns reduce it [n x m x unknowns]."""
+        """What is left of the equations [n x m], and how the unknowns reduce it [n x m x unknowns].
+
+        Args:
+            unknowns: [n x unknowns].
+            goal: coordinates of the actuators [actuators], or others in each row [n x actuators].
+        """
 
     def placements(self, unknowns: Array, goal: Array, /) -> list[Displacement]:
         """Where the platform is at unknowns [n x unknowns] and actuators [actuators]."""
+
+    def poses(self, unknowns: Array, goal: Array, /) -> dict[str, Array]:
+        """The coordinates of the machine's [pose], m and rad [n], at unknowns [n x unknowns]; goal as of `left`."""
 
     def mode(self, unknowns: Array, goal: Array) -> AssemblyMode:
         """What the unknowns [unknowns] of one solution mean; goal [actuators]."""
@@ -116,7 +128,8 @@ class ByPose:
         """See `System`; the rates [n x actuators x unknowns] are central differences, all of them in one batch."""
         count, size = unknowns.shape
         ways = FINEST * np.concatenate([np.zeros((1, size)), np.eye(size), -np.eye(size)])
-        off = self._off((unknowns[:, None] + ways).reshape(-1, size), goal).reshape(count, len(ways), -1)
+        goals = np.repeat(np.broadcast_to(goal, (count, goal.shape[-1])), len(ways), axis=0)
+        off = self._off((unknowns[:, None] + ways).reshape(-1, size), goals).reshape(count, len(ways), -1)
         rates = (off[:, size + 1 :] - off[:, 1 : size + 1]) / (2.0 * FINEST)
         return off[:, 0], np.swapaxes(rates, 1, 2)
 
@@ -125,15 +138,21 @@ class ByPose:
         poses = [dict(zip(self.kinds, row.tolist(), strict=True)) for row in unknowns * self.units]
         return [with_values(self.machine, pose).configure().platform for pose in poses]
 
+    def poses(self, unknowns: Array, _goal: Array) -> dict[str, Array]:
+        """See `System` [n x unknowns]; of angles that give one orientation, the smallest are chosen."""
+        columns = zip(self.kinds, (unknowns * self.units).T, strict=True)
+        result = {path.removeprefix(POSE): np.array(column) for path, column in columns}
+        for path in (path.removeprefix(POSE) for path, kind in self.kinds.items() if kind == "angle"):
+            result[path] = np.arctan2(np.sin(result[path]), np.cos(result[path]))
+        if set(ANGLES) <= result.keys():
+            turned = pose_of(self._placed(unknowns).configure().platform)
+            result |= {name: np.broadcast_to(turned[name], (len(unknowns),)) for name in ANGLES}
+        return result
+
     def mode(self, unknowns: Array, goal: Array) -> AssemblyMode:
-        """See `System` [unknowns]; of angles that give one orientation, the smallest are chosen."""
+        """See `System` [unknowns]."""
         (placement,) = self.placements(unknowns[None], goal)
-        pose = {path.removeprefix(POSE): float(q) for path, q in zip(self.kinds, unknowns * self.units, strict=True)}
-        angles = [path.removeprefix(POSE) for path, kind in self.kinds.items() if kind == "angle"]
-        pose |= {name: float(np.arctan2(np.sin(pose[name]), np.cos(pose[name]))) for name in angles}
-        if set(ANGLES) <= pose.keys():
-            turned = pose_of(placement)
-            pose |= {name: float(turned[name]) for name in ANGLES}
+        pose = {name: float(entry[0]) for name, entry in self.poses(unknowns[None], goal).items()}
         return AssemblyMode(pose, placement, float(np.abs(self._off(unknowns[None], goal)).max(initial=0.0)))
 
     def by_pose(self, poses: Sequence[Mapping[str, float]], _goal: Array) -> list[bool]:
@@ -172,8 +191,8 @@ class LegByLeg:
         """All joint coordinates, m and rad [n x coordinates]."""
         joints = np.empty((len(unknowns), self.chains.size))
         joints[:, self.free] = unknowns * self.units
-        for actuator, coordinate in zip(self.driven, goal.tolist(), strict=True):
-            joints[:, actuator.place] = actuator.joint_coordinate(coordinate)
+        for actuator, coordinates in zip(self.driven, np.moveaxis(goal, -1, 0), strict=True):
+            joints[:, actuator.place] = actuator.joint_coordinate(coordinates)
         return joints
 
     def left(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
@@ -185,11 +204,16 @@ class LegByLeg:
         """See `System` [n x unknowns]."""
         return [leg_ends(self.chains, row.tolist())[0].platform for row in self._whole(unknowns, goal)]
 
+    def poses(self, unknowns: Array, goal: Array) -> dict[str, Array]:
+        """See `System` [n x unknowns]."""
+        joints = self._whole(unknowns, goal)
+        every = pose_of(leg_ends(self.chains, [column(c) for c in joints.T])[0].platform)
+        return {name: np.broadcast_to(every[name], (len(joints),)) for name in self.chains.pose}
+
     def mode(self, unknowns: Array, goal: Array) -> AssemblyMode:
         """See `System` [unknowns]."""
         joints, (placement,) = self._whole(unknowns[None], goal)[0], self.placements(unknowns[None], goal)
-        every = pose_of(placement)
-        pose = {name: float(every[name]) for name in self.chains.pose}
+        pose = {name: float(entry[0]) for name, entry in self.poses(unknowns[None], goal).items()}
         gap, _ = self.left(unknowns[None], goal)
         residual = float(np.abs(gap).max(initial=0.0))
         at = Joints(tuple(joints.tolist()), int(Status.OK))
@@ -261,48 +285,78 @@ def assembly_modes(system: System, goal: Array, starts: int, spread: float) -> l
     """
     around = np.random.default_rng(0).uniform(-spread, spread, (starts, system.here.size))
     with np.errstate(all="ignore"):
-        followed = _followed(system, goal)
-        first = [system.here] if followed is None else [followed, system.here]
+        ends, arrived = _followed(system, goal[None])
+        first = [*ends[arrived], system.here]
         unknowns, largest = _least_squares(system, np.concatenate([first, system.here + around]), goal)
     sound = unknowns[largest < CLOSED]
     places = system.placements(sound, goal)
     (here,) = system.placements(system.here[None], _coordinates(system))
     order = np.argsort([squared_distance(place, here, system.length) for place in places], kind="stable")
-    kept: list[int] = [] if followed is None else [0]
+    kept = [0] if arrived[0] else []
     for i in order.tolist():
         if all(squared_distance(places[i], places[k], system.length) > ONE_PLACEMENT**2 for k in kept):
             kept.append(i)
     modes = [system.mode(sound[i], goal) for i in kept]
     kinds = zip(modes, system.by_pose([mode.pose for mode in modes], goal) if modes else [], strict=True)
-    return [replace(mode, present=followed is not None and i == 0, by_pose=by) for i, (mode, by) in enumerate(kinds)]
+    return [replace(mode, present=bool(arrived[0]) and i == 0, by_pose=by) for i, (mode, by) in enumerate(kinds)]
 
 
 def _coordinates(system: System) -> Array:
     return np.array([actuator.coordinate for actuator in system.actuators], dtype=float)
 
 
-def _followed(system: System, goal: Array) -> Array | None:
-    """The solution to which the machine comes from its pose if all actuators move evenly; None past a singularity."""
-    start = _coordinates(system)
+def poses_at(system: System, goals: Array) -> tuple[dict[str, Array], Mask]:
+    """Find the poses of a machine at many coordinates of its actuators, all of them at once.
+
+    They are those to which it comes from its own pose if all actuators move evenly, or where a singularity is on the
+    way, those that a search from there comes to.
+
+    Args:
+        system: the equations of the machine.
+        goals: coordinates of its actuators [n x actuators], m and rad.
+
+    Returns:
+        Coordinates of its [pose], m and rad [n], and where there is such a pose [n].
+    """
+    with np.errstate(all="ignore"):
+        unknowns, arrived = _followed(system, goals)
+        lost = np.flatnonzero(~arrived)
+        if lost.size:
+            unknowns[lost], largest = _least_squares(system, np.tile(system.here, (len(lost), 1)), goals[lost])
+            arrived[lost] = largest < CLOSED
+        return system.poses(unknowns, goals), arrived
+
+
+def _followed(system: System, goals: Array) -> tuple[Array, Mask]:
+    """Follow a machine from its pose while all actuators move evenly to goals [n x actuators].
+
+    Returns:
+        The unknowns it comes to [n x unknowns], and whether it does without passing a singularity [n].
+    """
+    start, at = _coordinates(system), np.tile(system.here, (len(goals), 1))
     scale = np.array([system.length if actuator.slides else 1.0 for actuator in system.actuators])
-    if not np.isfinite(start).all():
-        return None
-    steps = int(np.clip(np.ceil(np.abs((goal - start) / scale).max(initial=0.0) / STRIDE), 1, MOST_STRIDES))
-    at, hand = system.here, 0.0
+    sound = np.asarray(np.isfinite(goals - start).all(axis=1))
+    way = np.where(sound[:, None], goals - start, 0.0)
+    steps = int(np.clip(np.ceil(np.abs(way / scale).max(initial=0.0) / STRIDE), 1, MOST_STRIDES))
+    hand = np.zeros(len(goals))
     for step in range(steps + 1):
-        unknowns, largest = _least_squares(system, at[None], start + (goal - start) * (step / steps))
-        rates = system.left(unknowns, goal)[1][0]
-        turn = float(np.sign(np.linalg.det(rates))) if rates.shape[0] == rates.shape[1] else 0.0
-        if largest[0] > CLOSED or np.abs(unknowns[0] - at).max(initial=0.0) > LEAP or turn * hand < 0.0:
-            return None
-        at, hand = unknowns[0], turn
-    return at
+        rows = np.flatnonzero(sound)
+        if not rows.size:
+            break
+        here = start + way[rows] * (step / steps)
+        unknowns, largest = _least_squares(system, at[rows], here)
+        rates = system.left(unknowns, here)[1]
+        turn = np.sign(np.linalg.det(rates)) if rates.shape[1] == rates.shape[2] else np.zeros(len(rows))
+        leap = np.abs(unknowns - at[rows]).max(axis=1, initial=0.0)
+        sound[rows] = (largest <= CLOSED) & (leap <= LEAP) & ~(turn * hand[rows] < 0.0)
+        at[rows], hand[rows] = unknowns, turn
+    return at, sound
 
 
 def _least_squares(system: System, starts: Array, goal: Array) -> tuple[Array, Array]:
     """Solve from many starts at once: unknowns [n x unknowns], and the largest of what is left of the equations [n]."""
-    best = starts.copy()
-    left, rates = system.left(best, goal)
+    best, goals = starts.copy(), np.broadcast_to(goal, (len(starts), goal.shape[-1]))
+    left, rates = system.left(best, goals)
     damping = np.full(len(best), FIRST_DAMPING)
     going = np.asarray(np.isfinite(left).all(axis=1) & np.isfinite(rates).all(axis=(1, 2)))
     for _ in range(MOST_ITERATIONS):
@@ -310,7 +364,7 @@ def _least_squares(system: System, starts: Array, goal: Array) -> tuple[Array, A
         if not active.size or not best.shape[1]:
             break
         moved = best[active] + _steps(left[active], rates[active], damping[active])
-        new_left, new_rates = system.left(moved, goal)
+        new_left, new_rates = system.left(moved, goals[active])
         better = (new_left**2).sum(axis=1) < (left[active] ** 2).sum(axis=1)
         better &= np.isfinite(new_rates).all(axis=(1, 2))
         won = active[better]

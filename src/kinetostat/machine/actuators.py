@@ -154,7 +154,7 @@ class JointActuator:
         angle = np.arctan2(amount.sine, amount.cosine) if isinstance(amount, Turn) else amount
         return Actuator(self.name, self.leg, self.meaning, self.offset + self.sign * angle, self.slides)
 
-    def joint_coordinate(self, coordinate: float) -> float:
+    def joint_coordinate(self, coordinate: Scalar) -> Scalar:
         """The joint coordinate (m or rad from the home pose) at a coordinate of the actuator."""
         return (coordinate - self.offset) * self.sign
 

@@ -1,10 +1,11 @@
 """The most likely values of unknowns, how sure they are, and which measured values do not belong: theory (64) to (66).
 
-Unknowns are counted in plausible sizes, so that metres and radians compare. A weak preference for zero decides what no
+Unknowns are counted in plausible sizes, so that metres and radians compare. A preference for zero decides what no
 measurement sees. Derivatives are exact (`observed`); nothing here knows machines.
 
-Source: theory (64)-(66). Reweighting: P. Holland and R. Welsch, 1977; deviation by the median: F. Hampel, 1974; linear
-least squares within bounds: `scipy.optimize.lsq_linear`.
+Source: theory (64)-(66). Least squares by trust regions: `scipy.optimize.least_squares` (M. Branch, T. Coleman and
+Y. Li, 1999); deviation by the median: F. Hampel, 1974; a loss whose scale shrinks: A. Blake and A. Zisserman, *Visual
+Reconstruction*, 1987.
 """
 
 from collections.abc import Callable
@@ -15,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.equilibrium.motion import Array
-from kinetostat.spec.errors import InputError
+from kinetostat.tolerances import FIT_BEGUN, FIT_SETTLED
 
 Mask = npt.NDArray[np.bool_]
 Tell = Callable[[int, int, str], None]
@@ -24,17 +25,21 @@ OUTLYING = 4.0
 """Standard deviations from which a value counts as an outlier: one of 16 000 good ones does."""
 MEDIAN = 1.4826
 """Standard deviation of normal values over the median of their sizes."""
-ROUNDS = 12
-"""Of setting outliers aside: they change no more before that."""
+ROUNDS = 20
+"""Number of fits at most in which the scale of residuals, outliers and unseen combinations settle: few need half."""
+SAME_SPREAD = 0.1
+"""Relative change of the spread of residuals below which it has settled."""
 UNSEEN = 1e-6
-"""Share of the best seen combination of unknowns below which one is not seen at all: round-off is 1e-9."""
+"""Share of the best seen combination of unknowns below which one is not seen at all: round-off is 1e-9. One that is
+seen less than it is preferred to be zero counts as unseen too."""
 SURELY = 1.959963984540054
 """Half of the 95 % interval of a normal value over its standard deviation."""
 FOLDS = 5
-REWEIGHTS, REWEIGHTED = 50, 1e-3
-"""How often values are weighted by their residuals at most, and the change, in standard deviations, that ends it."""
-STEPS, SMALL_STEP = 8, 1e-4
-"""Steps of Gauss and Newton at most, and the largest change of an unknown, in plausible sizes, that ends them."""
+FULL = 50.0
+"""The preference for zero in full over the weak one, for combinations that are not seen: with the weak one alone they
+would go where the curvature of the equations explains some of the noise."""
+MOST_EVALUATIONS = 500
+"""Steps of a fit at most: along a curved valley they are short."""
 
 
 class Question(Protocol):
@@ -55,10 +60,11 @@ class Wishes:
         sizes: plausible size of each unknown, SI [unknowns].
         priors: standard deviation of what is known of each before, about zero, SI; infinity for nothing [unknowns].
         bounds: largest size of each, SI; infinity without one [unknowns].
-        preferred: weight of zero for each, in standard deviations per plausible size: it decides what is hardly seen
-            and is not counted among what is known [unknowns].
+        preferred: weak preference for zero of each, in standard deviations per plausible size: it decides what is
+            hardly seen and is not counted among what is known [unknowns].
         robust: whether outliers are set aside.
         known: whether standard deviations of measurements are known.
+        resolution: residual, in standard deviations, up to which it may be round-off.
     """
 
     sizes: Array
@@ -67,6 +73,7 @@ class Wishes:
     preferred: Array
     robust: bool = True
     known: bool = True
+    resolution: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -76,13 +83,14 @@ class Fit:
     Attributes:
         values: SI [unknowns].
         covariance: SI [unknowns x unknowns], of what is seen.
-        sure: half of the 95 % interval of each, SI; infinity where a measurement sees it only in combinations that are
-            not seen [unknowns].
+        sure: half of the 95 % interval of each, SI, with what combinations that are not seen may add if they are of a
+            plausible size; infinity where it is seen only in such [unknowns].
         kept: rows that are not outliers [rows].
         before, after: residuals with all unknowns zero and with the values, in standard deviations [rows].
         rates: how residuals fall per plausible size of each unknown, with the values [rows x unknowns].
         scatter: standard deviation of the kept residuals over that expected.
-        seen: how strongly each combination is seen, standard deviations per plausible size, the best first [unknowns].
+        seen: how strongly each combination is seen, standard deviations per plausible size; those that count as seen
+            come first [unknowns].
         ways: these combinations as columns, in plausible sizes [unknowns x unknowns].
         rank: how many are seen.
         predicted: residuals of poses that took no part, in standard deviations [rows].
@@ -116,91 +124,128 @@ class Fit:
 def fitted(question: Question, groups: npt.NDArray[np.int64], wishes: Wishes, tell: Tell = lambda *_: None) -> Fit:
     """Find the most likely values of unknowns, theory (64).
 
+    Each fit is one of least squares by trust regions: a step is taken only where the residuals fall by about as much as
+    the rates foretell. Where outliers are set aside, Cauchy's loss comes first, with a scale that follows the spread of
+    the residuals down: values that do not belong then do not hold the fit where they happen to be small.
+
     Args:
         question: the residuals.
         groups: to which pose each row belongs; poses are left out together [rows].
         wishes: priors, bounds, and what to do with outliers.
         tell: receives how far the work is: rounds done, rounds at most, and a few words.
     """
-    start = np.zeros(len(wishes.sizes))
-    before = question.residuals(start)
-    kept = np.ones(len(before), dtype=bool)
-    values = _solved(question, wishes, kept, start, wishes.robust)
-    for turn in range(ROUNDS if wishes.robust else 0):
-        tell(turn, ROUNDS, f"{int((~kept).sum())} outliers")
-        left = question.residuals(values)
-        inside = np.abs(left) < OUTLYING * _spread(left, wishes.known)
-        if turn and (inside == kept).all():
-            break
-        kept = inside
-        values = _solved(question, wishes, kept, values, False)
-    after, rates = _linearised(question, values)
-    return _judged(before, after, rates * wishes.sizes, kept, values, groups, wishes)
+    values = np.zeros(len(wishes.sizes))
+    before, rates = _rates_at(question, values, wishes)
+    kept, after, spread = np.ones(len(before), dtype=bool), before, _spread(before, rates, wishes)
+    for squares in (False, True) if wishes.robust else (True,):
+        settled, rank = False, 0
+        for turn in range(ROUNDS):
+            if squares and wishes.robust:
+                inside = np.abs(after) < OUTLYING * spread
+                settled, kept = settled and bool((inside == kept).all()), inside
+            seen = _combinations(rates[kept], wishes, spread)
+            if settled and seen.rank == rank:
+                break
+            tell(turn, ROUNDS, f"{int((~kept).sum())} outliers")
+            values = _solved(question, wishes, kept, values, seen, np.inf if squares else spread)
+            after, rates = _rates_at(question, values, wishes)
+            last, spread, rank = spread, _spread(after, rates, wishes), seen.rank
+            settled = abs(spread - last) <= SAME_SPREAD * last
+    return _judged(before, after, rates, kept, values, groups, wishes)
 
 
-def _spread(residuals: Array, known: bool = False) -> float:
-    """Standard deviation of the greater part of residuals; at least 1 where their size is known."""
-    spread = MEDIAN * float(np.median(np.abs(residuals)))
-    return max(spread, 1.0) if known else max(spread, 1e-12)
-
-
-def _solved(question: Question, wishes: Wishes, kept: Mask, start: Array, robust: bool) -> Array:
-    weights = _prior(wishes)
-    most = wishes.bounds / wishes.sizes
-    units = start / wishes.sizes
-    for _ in range(STEPS):
-        after, rates = _linearised(question, units * wishes.sizes)
-        scale = _spread(after[kept], wishes.known) if robust else np.inf
-        step = _step(after[kept], (rates * wishes.sizes)[kept], weights, units, most, scale)
-        units = units + step
-        if np.abs(step).max(initial=0.0) < SMALL_STEP:
-            break
-    return np.asarray(units * wishes.sizes)
-
-
-def _linearised(question: Question, values: Array) -> tuple[Array, Array]:
+def _rates_at(question: Question, values: Array, wishes: Wishes) -> tuple[Array, Array]:
+    """The residuals [rows], and how they fall per plausible size of each unknown [rows x unknowns]."""
     after, rates = question.linearised(values)
-    if not (np.isfinite(after).all() and np.isfinite(rates).all()):
-        raise InputError(
-            "with the errors that would explain the measured values the legs of the machine cannot close. Check units "
-            "and signs of all columns, have the place of the measuring frame found too (--frame), or give --bound."
-        )
-    return after, rates
+    return after, rates * wishes.sizes
 
 
-def _step(after: Array, rates: Array, weights: Array, units: Array, most: Array, scale: float) -> Array:
-    """The step of Gauss and Newton from units, within bounds; `scale` is that of the loss, infinite of squares.
+def _spread(residuals: Array, rates: Array, wishes: Wishes) -> float:
+    """Standard deviation of the greater part of residuals, or more where these do not say it.
 
-    In the coordinates of an orthogonal basis, values are weighted again by their residuals until the step stays.
+    It is at least 1 where standard deviations are known, else what may be round-off, or where combinations are unseen,
+    what these may do. Values that no unknown changes, as the height of a planar machine, do not count.
     """
-    if np.isfinite(most).any():
-        from scipy.optimize import lsq_linear  # half a second to import: only for fits within bounds
-
-        weighted = np.sqrt(_trust(after, scale))
-        rows = np.concatenate([rates * weighted[:, None], np.diag(weights)])
-        wanted = np.concatenate([after * weighted + (rates * weighted[:, None]) @ units, np.zeros(len(units))])
-        return np.asarray(lsq_linear(rows, wanted, (-most, most)).x - units)
-    basis, triangle = np.linalg.qr(np.concatenate([rates, np.diag(weights)]))
-    wanted = np.concatenate([after, -weights * units])
-    turned = np.zeros(len(units))
-    for _ in range(REWEIGHTS if np.isfinite(scale) else 1):
-        trust = _trust((wanted - basis @ turned)[: len(after)], scale)
-        heavy = basis * np.concatenate([trust, np.ones(len(units))])[:, None]
-        new = np.linalg.solve(heavy.T @ basis, heavy.T @ wanted)
-        done, turned = np.abs(new - turned).max(initial=0.0) < REWEIGHTED, new
-        if done:
-            break
-    return np.asarray(np.linalg.solve(triangle, turned))
+    touched, least = rates.any(axis=1), 1.0
+    if not touched.any():
+        return least
+    if not wishes.known:
+        strengths = np.linalg.svd(rates, compute_uv=False)
+        hides = len(strengths) < rates.shape[1] or strengths[-1] <= UNSEEN * strengths[0]
+        least = max(wishes.resolution, UNSEEN * float(strengths[0]) if hides else 0.0)
+    return max(MEDIAN * float(np.median(np.abs(residuals[touched]))), least)
 
 
-def _trust(left: Array, scale: float) -> Array:
-    """The weights of residuals with Cauchy's loss."""
-    return np.asarray(1.0 / (1.0 + (left / scale) ** 2))
+@dataclass(frozen=True)
+class _Combinations:
+    """What the rates of measured values say about combinations of unknowns, in plausible sizes.
+
+    Attributes:
+        strengths: of each, standard deviations per plausible size; those that are seen come first [unknowns].
+        ways: the combinations as columns, orthonormal [unknowns x unknowns].
+        rank: how many are seen.
+        unit: the true standard deviation of measurements in those that residuals are counted in.
+        prior: rows that say what was known of the unknowns before [unknowns x unknowns].
+        preference: rows of the preference for zero [rows x unknowns].
+    """
+
+    strengths: Array
+    ways: Array
+    rank: int
+    unit: float
+    prior: Array
+    preference: Array
 
 
-def _prior(wishes: Wishes) -> Array:
-    """How many standard deviations a plausible size of each unknown is away from zero before anything is measured."""
-    return np.maximum(wishes.sizes / wishes.priors, wishes.preferred)
+def _combinations(rates: Array, wishes: Wishes, spread: float) -> _Combinations:
+    """Find which combinations are seen better than round-off and the weak preference for zero.
+
+    The preference is weak for these, and full for the others. Both, and what was known before, are in true standard
+    deviations: where nobody knows these of the measurements, they are those of the residuals.
+
+    Args:
+        rates: how the residuals fall per plausible size [rows x unknowns].
+        wishes: priors and preferences.
+        spread: of the residuals, in the standard deviations that they are counted in.
+    """
+    unit = 1.0 if wishes.known else spread
+    prior = unit * np.diag(wishes.sizes / wishes.priors)
+    _, sizes, ways = np.linalg.svd(np.concatenate([rates, prior]), full_matrices=False)
+    preferred = np.diag(unit * wishes.preferred)
+    least = np.maximum(UNSEEN * sizes[0], np.linalg.norm(ways @ preferred, axis=1))
+    order = np.argsort(sizes <= least, kind="stable")
+    rank = int((sizes > least).sum())
+    hidden = np.linalg.qr(preferred @ ways[order[rank:]].T)[0]
+    preference = np.concatenate([preferred, FULL * hidden.T @ preferred])
+    return _Combinations(sizes[order], ways[order].T, rank, unit, prior, preference)
+
+
+def _solved(question: Question, wishes: Wishes, kept: Mask, start: Array, seen: _Combinations, scale: float) -> Array:
+    """Fit values by least squares from a start; `scale` is that of Cauchy's loss, infinite for squares."""
+    from scipy.optimize import least_squares  # half a second to import
+
+    count, most = int(kept.sum()), wishes.bounds / wishes.sizes
+    known = np.concatenate([seen.prior, seen.preference])
+    # One residual that never changes: a fall of the sum of squares is small beside one squared standard deviation.
+    constant, still = np.array([seen.unit]), np.zeros((1, len(start)))
+
+    def residuals(units: Array) -> Array:
+        return np.concatenate([question.residuals(units * wishes.sizes)[kept], known @ units, constant])
+
+    def slopes(units: Array) -> Array:
+        return np.concatenate([-_rates_at(question, units * wishes.sizes, wishes)[1][kept], known, still])
+
+    def loss(squares: Array) -> Array:
+        measured, trust = np.arange(len(squares)) < count, 1.0 / (1.0 + squares)
+        plain = np.stack([squares, np.ones_like(squares), np.zeros_like(squares)])
+        return np.where(measured, np.stack([np.log1p(squares), trust, -(trust**2)]), plain)
+
+    form, precision = (loss, FIT_BEGUN) if np.isfinite(scale) else ("linear", FIT_SETTLED)
+    answer = least_squares(
+        residuals, start / wishes.sizes, slopes, (-most, most), loss=form, f_scale=min(scale, 1e300), ftol=precision,
+        xtol=precision, gtol=None, max_nfev=MOST_EVALUATIONS,
+    )  # fmt: skip
+    return np.asarray(answer.x * wishes.sizes)
 
 
 def _judged(
@@ -213,22 +258,21 @@ def _judged(
     wishes: Wishes,
 ) -> Fit:
     """Judge what has been found: covariance and intervals, theory (65), rank, and poses that took no part."""
-    prior = np.where(np.isfinite(wishes.priors), wishes.sizes / wishes.priors, 0.0)
-    whole = np.concatenate([rates[kept], np.diag(prior)])
-    _, sizes, ways = np.linalg.svd(whole, full_matrices=False)
-    seen = np.zeros(rates.shape[1])
-    seen[: len(sizes)] = sizes
-    rank = int((seen > UNSEEN * max(float(seen[0]), 1e-300)).sum())
+    seen = _combinations(rates[kept], wishes, _spread(after, rates, wishes))
+    rank, ways = seen.rank, seen.ways
     freedom = max(int(kept.sum()) - rank, 1)
     scatter = float(np.sqrt((after[kept] ** 2).sum() / freedom))
-    basis = ways[:rank].T / seen[:rank]
-    spread = 1.0 if wishes.known else scatter
+    basis = ways[:, :rank] / seen.strengths[:rank]
+    spread = 1.0 if wishes.known else max(scatter, wishes.resolution)
     covariance = spread**2 * basis @ basis.T * np.outer(wishes.sizes, wishes.sizes)
     factor = SURELY if wishes.known else _quantile(freedom)
-    mixed = np.linalg.norm(ways[rank:], axis=0) > np.sqrt(UNSEEN) if rank < len(ways) else np.zeros(len(values), bool)
-    sure = np.where(mixed, np.inf, factor * np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-    predicted = _left_out(after, rates, kept, groups, _prior(wishes))
-    return Fit(values, covariance, sure, kept, before, after, rates, scatter, seen, ways.T, rank, predicted)
+    hidden = ways[:, rank:]
+    likely = np.linalg.inv(hidden.T @ np.diag((FULL * wishes.preferred) ** 2) @ hidden)
+    unseen = np.sqrt(np.einsum("ui,ij,uj->u", hidden, likely, hidden)) * wishes.sizes
+    sure = np.hypot(factor * np.sqrt(np.diag(covariance)), SURELY * unseen)
+    sure[np.linalg.norm(hidden, axis=1) > np.sqrt(UNSEEN)] = np.inf
+    predicted = _left_out(after, rates, kept, groups, np.concatenate([seen.prior, seen.preference]))
+    return Fit(values, covariance, sure, kept, before, after, rates, scatter, seen.strengths, ways, rank, predicted)
 
 
 def _quantile(freedom: int) -> float:
@@ -238,14 +282,14 @@ def _quantile(freedom: int) -> float:
     return float(stdtrit(freedom, 0.975))
 
 
-def _left_out(after: Array, rates: Array, kept: Mask, groups: npt.NDArray[np.int64], prior: Array) -> Array:
+def _left_out(after: Array, rates: Array, kept: Mask, groups: npt.NDArray[np.int64], known: Array) -> Array:
     """Residuals of each fifth of the poses, predicted from the others: the fit to these is one linear step away."""
     result, fold = after.copy(), np.unique(groups, return_inverse=True)[1] % FOLDS
     for number in range(FOLDS):
         others, mine = kept & (fold != number), fold == number
         if not others.any() or not mine.any():
             continue
-        rows = np.concatenate([rates[others], np.diag(prior)])
-        step = np.linalg.lstsq(rows, np.concatenate([after[others], np.zeros(len(prior))]), rcond=None)[0]
+        rows = np.concatenate([rates[others], known])
+        step = np.linalg.lstsq(rows, np.concatenate([after[others], np.zeros(len(known))]), rcond=None)[0]
         result[mine] = after[mine] - rates[mine] @ step
     return result

@@ -28,6 +28,7 @@ from kinetostat.studies.identification.next_poses import (
 from kinetostat.studies.identification.observed import FRAME, TARGET, Observed, observed, place_unknown
 from kinetostat.studies.identification.unseen import Unseen, unseen_of
 from kinetostat.studies.plain_data import as_answer
+from kinetostat.tolerances import ROUND_OFF_OF_MEASUREMENT
 from kinetostat.units import KINDS, UnitError, parse
 
 USUAL = ("geometry", "zeros")
@@ -66,6 +67,12 @@ class Identification:
     sizes: Array
     unseen: tuple[Unseen, ...]
     next: NextPoses | None
+
+    def __repr__(self) -> str:
+        return (
+            f"<Identification of {self.machine.name!r}: {len(self.unknowns)} unknowns from {len(self.observed.value)} "
+            f"values, {self.fit.rank} combinations seen, {len(self.outliers)} outliers>"
+        )
 
     @property
     def unknowns(self) -> tuple[MachineError, ...]:
@@ -183,6 +190,7 @@ def identified(
         np.array([PLACED_ANYWHERE if u.group in ("frame", "target") else PREFERENCE for u in unknowns]),
         robust,
         data.known,
+        float((ROUND_OFF_OF_MEASUREMENT * np.where(seen.turns, 1.0, model.length) / seen.sigma).min(initial=np.inf)),
     )
     answer = fitted(seen, seen.pose, wishes, tell)
     hidden = tuple(unseen_of(seen, answer, sizes))

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.kinematics.forward import assembly_modes, system_of
+from kinetostat.kinematics.forward import poses_at, system_of
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
 from kinetostat.spec.errors import InputError, shorten
@@ -253,7 +253,7 @@ def _sigma(values: Mapping[str, Array], given: Mapping[str, Array], sigmas: Sigm
 
 
 def _from_actuators(machine: Machine, columns: Sequence[Column], where: Callable[[str, int], str]) -> dict[str, Array]:
-    """The poses of the drawn machine at given coordinates of its actuators, one after the other."""
+    """The poses of the drawn machine at given coordinates of its actuators."""
     system = system_of(machine)
     goals = np.tile([float(actuator.coordinate) for actuator in system.actuators], (len(columns[0].entries), 1))
     names = {key: n for n, a in enumerate(system.actuators) for key in (a.name, a.leg)}
@@ -264,10 +264,8 @@ def _from_actuators(machine: Machine, columns: Sequence[Column], where: Callable
             raise InputError(f"there is no column {column.name}; choose from {known}.")
         kind = system.actuators[names[name]].kind
         goals[:, names[name]] = _numbers(column, {name: kind}, where)
-    poses = []
-    for row, goal in enumerate(goals):
-        modes = assembly_modes(system, goal, 0, 0.0) if np.isfinite(goal).all() else []
-        if not modes:
-            raise InputError(f"{where('actuator', row)}: the drawn machine has no pose with these coordinates nearby.")
-        poses.append(modes[0].pose)
-    return {f"{POSE}{name}": np.array([pose[name] for pose in poses]) for name in poses[0]}
+    poses, placed = poses_at(system, goals)
+    if not placed.all():
+        row = int(np.argmin(placed))
+        raise InputError(f"{where('actuator', row)}: the drawn machine has no pose with these coordinates nearby.")
+    return {f"{POSE}{name}": values for name, values in poses.items()}

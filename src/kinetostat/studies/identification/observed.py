@@ -60,8 +60,16 @@ class Observed:
     sigma: Array
     value: Array
 
+    @property
+    def turns(self) -> npt.NDArray[np.bool_]:
+        """Which rows are angles [rows]."""
+        return np.isin([name.removeprefix("deflection.") for name in self.names], (*TURNED, *EULER))
+
     def residuals(self, values: Array) -> Array:
-        """What was measured less what the unknowns predict, over the standard deviations [rows]."""
+        """What was measured less what the unknowns predict, over the standard deviations [rows].
+
+        NaN where the legs do not close.
+        """
         predicted, _ = self._predict(values, False)
         return self._over_sigma(predicted)
 
@@ -72,9 +80,8 @@ class Observed:
 
     def _over_sigma(self, predicted: Array) -> Array:
         off = self.value - predicted
-        turns = np.isin(self.names, (*TURNED, *EULER))
-        off = np.where(turns, np.arctan2(np.sin(off), np.cos(off)), off)
-        return np.asarray(np.where(np.isfinite(off), off, FAR / self.sigma.min()) / self.sigma)
+        off = np.where(self.turns, np.arctan2(np.sin(off), np.cos(off)), off)
+        return np.asarray(off / self.sigma)
 
     def _of(self, values: Array, paths: Sequence[str]) -> Array:
         known = {unknown.path: value for unknown, value in zip(self.unknowns, values, strict=True)}

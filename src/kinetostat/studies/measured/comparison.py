@@ -97,6 +97,9 @@ class MeasuredComparison:
     source: str
     left_out: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        return f"<MeasuredComparison of {self.machine.name!r}: {len(self.rows)} values, agrees {self.agrees}>"
+
     @property
     def agrees(self) -> bool:
         """Whether the uncertainties explain all differences together."""
