@@ -16,7 +16,7 @@ from kinetostat.machine.loading import build, load
 from kinetostat.studies.optimisation.problem import load_problem
 from kinetostat.studio import serving
 from kinetostat.validation.comparison import validate
-from kinetostat.views import answers, figures
+from kinetostat.views import figures
 from kinetostat.views.report import writing
 from pages import KINDS, ROOT, blocks, commands, corrected, dialogues, missing, pages
 
@@ -141,7 +141,6 @@ def reader(tmp_path, monkeypatch, request):
     Reports are validated by PyNite: Exudyn takes more than a minute for the hexapod of README. `test_validation` asks
     both engines about that machine, and .ci/newcomer follows README as it stands.
     """
-    assert answers.FORMATS is figures.FORMATS, "files that are named have any format"
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(figures, "FORMATS", DrawnOnce(figures.FORMATS))
     monkeypatch.setattr(serving, "serve", lambda *_: None)
