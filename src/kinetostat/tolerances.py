@@ -213,6 +213,9 @@ the answer says so; of a thousand random poses none lies there."""
 UNREACHED_COMPONENT = 1e-18
 """Square of `CLOSING_ROUND_OFF`: share of the largest component of a screw, squared, below which a rigid or free spring
 does not reach the other one. Without it, round-off times infinity would make entries of K or C infinite."""
+UNFELT = 1e-11
+"""Share of the load that a spring can have per unit load of the platform below which what it adds to C is round-off:
+legs that share a load by least energy leave some 1e-12 of it in a spring that should feel nothing."""
 DEPENDENT_LOADS = 1e-12
 """Sine of the angle between the loads of a leg's springs below which they are dependent up to round-off."""
 DEPENDENT_WRENCHES = 1e-9

@@ -20,6 +20,7 @@ MENDED = {
     "soft-beside-stiff": "unstable without a load, and seven digits of the compliance were wrong",
     "delta-far-out": "said to be out of reach, by the closed form of a leg without its parallelogram",
     "coupled-by-little": "a small component of a soft direction had been taken for round-off",
+    "soft-but-held": "C had rotations of 1e-22: round-off of a motion that rigid parts hold, in a soft spring",
     "little-in-a-soft-leg": "the little that a soft leg carries had been taken for round-off",
     "ideal-links-agile-eye": "C was 1e33 times too small",
     "ideal-links-exechon": "C was 20 times too small",

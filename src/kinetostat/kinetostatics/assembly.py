@@ -16,7 +16,7 @@ from kinetostat.algebra.symmetric import POSITIONS, SIZE, Symmetric6
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.kinetostatics.leg import INFINITE, Action, Modes, combine, leg_modes, leg_resistance, modes_of, relaxed
 from kinetostat.machine.leg import LegScrews
-from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, UNREACHED_COMPONENT
+from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, UNFELT, UNREACHED_COMPONENT
 
 NO_MOTION = Twist(ZERO, ZERO)
 
@@ -44,6 +44,8 @@ class Statics:
             locked actuators.
         doubt: 1 where redundant legs are so nearly rigid against each other that nobody can say whether they are, and C
             depends on it; else 0.
+        round_off: the largest diagonal entry of C for rotations that round-off can make, rad/(N·m); for translations it
+            is that times the square of the length, m/N.
     """
 
     wrenches: tuple[tuple[Wrench, ...], ...]
@@ -57,6 +59,7 @@ class Statics:
     length: Scalar
     singularity_margin: Scalar
     doubt: Scalar = 0.0
+    round_off: Scalar = 0.0
 
 
 def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench] = ()) -> Statics:
@@ -84,6 +87,7 @@ def solve_statics(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
         length,
         shared.singularity_margin,
         shared.doubt,
+        shared.round_off,
     )
 
 
@@ -94,7 +98,8 @@ def compliance_of(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
         legs, guide: as for `solve_statics`.
         length: characteristic length, m.
     """
-    return without_round_off(weighted_sum(_shared(legs, length, guide).motions, reciprocal(length)), length)
+    shared = _shared(legs, length, guide)
+    return without_round_off(weighted_sum(shared.motions, reciprocal(length)), length, shared.round_off)
 
 
 @dataclass(frozen=True)
@@ -107,6 +112,7 @@ class _Shared:
     motions: Sequence[Motion]
     singularity_margin: Scalar
     doubt: Scalar
+    round_off: Scalar
 
 
 def _shared(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) -> _Shared:
@@ -133,35 +139,27 @@ def _shared(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) 
         # Springs in series: the fewest shares of C are those of the leg's modes; otherwise one per spring.
         motions += zip(*((shares, mode.compliance) if _in_series(leg) else (felt, leg.compliance)), strict=True)
         sizes += mode.amount_squares() if _in_series(leg) else leg.load_squares
-    if redundant:
-        motions = _unless_unfelt(motions, sizes, [twist for shares in sharing for twist in shares], length)
-    return _Shared(modes, sharing, flexibility, motions, singularity_margin, doubt)
+    loads = [(s, square) for (_, s), square in zip(motions, sizes, strict=True)]
+    round_off = _round_off(loads, len(wrenches), singularity_margin, length) if redundant else 0.0
+    return _Shared(modes, sharing, flexibility, motions, singularity_margin, doubt, round_off)
 
 
-def _unless_unfelt(
-    motions: Sequence[Motion], sizes: Sequence[Scalar], sharing: Sequence[Twist], length: Scalar
-) -> list[Motion]:
-    """The motions, without compliances if no load of the platform makes any of them but by round-off.
+def _round_off(
+    loads: Sequence[tuple[Scalar, Scalar]], wrenches: int, singularity_margin: Scalar, length: Scalar
+) -> Scalar:
+    """The largest diagonal entry of C for rotations that round-off in the loads of springs can make, rad/(N·m).
 
-    Where rigid parts take every load, elastic ones beside them feel nothing, and C must be exactly 0. A single one that
-    is small beside others may be what a soft leg carries, and stays.
+    Where rigid parts take a load, what is left of it in a soft spring beside them is round-off, and C must be 0.
 
     Args:
-        motions: twists, which are loads per unit platform wrench, and compliances.
-        sizes: of each, the square of what a unit of a leg's wrenches can load it with.
-        sharing: amounts of the legs' wrenches per unit platform wrench, as twists.
-        length: m; moments are compared with forces through it.
+        loads: of springs or modes, their compliances, and the squares of what a unit of a leg's wrenches loads them by.
+        wrenches: how many the legs carry.
+        singularity_margin: of them: it tells how much of each a unit load may need.
+        length: characteristic length, m.
     """
-    scales = _squares(reciprocal(length))
-
-    def square(twist: Twist) -> Scalar:
-        return total([c * c * scale for c, scale in zip(twist.components(), scales, strict=True)])
-
-    greatest = ROUND_OFF_OF_COMPLIANCE * total([square(twist) for twist in sharing])
-    felt: Scalar = 0.0
-    for (twist, s), size in zip(motions, sizes, strict=True):
-        felt = larger(felt, where(square(twist) > size * greatest, where(s > 0.0, 1.0, 0.0), 0.0))
-    return [(twist, where(felt > 0.5, s, 0.0)) for twist, s in motions]
+    apart = singularity_margin * length
+    amounts = float(SIZE * SIZE) / float(max(wrenches, 1)) * reciprocal(apart * apart)
+    return UNFELT * UNFELT * amounts * total([where(s < INFINITE, s, 0.0) * square for s, square in loads])
 
 
 def _in_series(leg: LegScrews) -> bool:
@@ -190,10 +188,11 @@ def compliance_matrix(statics: Statics) -> Symmetric6:
 
     Source: theory (6) and (10), eq. 21 extended to flexible links.
     """
-    return without_round_off(weighted_sum(statics.motions, reciprocal(statics.length)), statics.length)
+    whole = weighted_sum(statics.motions, reciprocal(statics.length))
+    return without_round_off(whole, statics.length, statics.round_off)
 
 
-def without_round_off(compliance: Symmetric6, length: Scalar) -> Symmetric6:
+def without_round_off(compliance: Symmetric6, length: Scalar, round_off: Scalar) -> Symmetric6:
     """C with exact zeros in the rows and columns of components that rigid parts hold.
 
     A component that nothing can move comes out as the square of round-off, and no inverse must be taken of that.
@@ -201,11 +200,13 @@ def without_round_off(compliance: Symmetric6, length: Scalar) -> Symmetric6:
     Args:
         compliance: C at any point (rad, m per N·m, N).
         length: characteristic length, m, through which rotations and translations compare.
+        round_off: of the loads of its springs, as in `Statics`.
     """
     area = length * length
     turns, moves = (total([compliance.entry(i, i) for i in rows]) for rows in (range(3), range(3, SIZE)))
     sizes = [turns + reciprocal(area) * moves, moves + area * turns]
     limits = [where(size < INFINITE, ROUND_OFF_OF_COMPLIANCE * size, 0.0) for size in sizes]
+    limits = [larger(limit, least) for limit, least in zip(limits, (round_off, area * round_off), strict=True)]
     moved = [compliance.entry(i, i) > limits[i // 3] for i in range(SIZE)]
     entries = []
     for entry, (i, j) in zip(compliance.upper, POSITIONS, strict=True):
