@@ -203,6 +203,11 @@ ZERO_PIVOT = 1e-100
 SINGULAR = 1e-6
 """Singularity margin below which a pose counts as singular: results have then lost six of their digits. A leg exactly
 at its limit comes out at the square root of a few units of round-off, 1e-8 to 3e-7, not at zero."""
+FREE_COMPONENT = 1e-5
+"""Component of a unit free twist below which it is none: a pose within `SINGULAR` of a singularity has free twists that
+are known to about as many digits."""
+MOST_LEG_CONTRAST = 1e12
+"""Condition number of a leg's flexibility beyond which the leg counts as rigid against some load, at singular poses."""
 CLOSING_ROUND_OFF = 1e-9
 """Share of a unit screw, or of the load that it can exert on a spring, below which the rest is round-off: legs close up
 to `CLOSED`, and their condition costs a digit. Away from home, rigid parts that hold the same motion differ by some

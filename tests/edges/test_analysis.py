@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.cli import main
+from kinetostat.commands.common import DONE, NO_ANSWER
+from kinetostat.machine.limits import LIMITS
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import with_values
 from kinetostat.studies.analysis import analyze, as_json
@@ -90,8 +92,14 @@ def test_json_has_its_shape_and_no_number_that_json_lacks(settings, status, word
 @pytest.mark.parametrize("state", [state for state, row in STATES.items() if row[1] != "ok"])
 def test_a_pose_without_answer_has_no_numbers(state):
     data = as_json(at(*STATES[state][0]))
-    answers = ("stiffness", "compliance", "stiffness_diagonal", "compliance_diagonal", "rank", "wrench_condition")
-    assert [data[key] for key in answers] == [None] * 6
+    answers = ("stiffness", "compliance", "stiffness_diagonal", "compliance_diagonal", "rank")
+    if data["stiffness"] is None:
+        assert [data[key] for key in answers] == [None] * 5
+    else:  # a singular pose, at which the legs hold the platform against some loads
+        assert data["status"] == "singular"
+        assert data["rank"] < 6
+        assert None in data["compliance_diagonal"]
+    assert data["wrench_condition"] is None
     assert data["attribution"] == []
     assert data["principal_compliances"] is None
 
@@ -223,3 +231,50 @@ def test_words_of_the_version_before_still_work_with_a_warning():
         assert data["mobility"][old] == data["mobility"][new]
         with pytest.warns(DeprecationWarning, match=new):
             assert getattr(analysis.mobility, old) == getattr(analysis.mobility, new)
+
+
+SINGULAR_POSES = {
+    "hexapod": ["--set", "pose.x=0", "--set", "pose.y=0", "--set", "pose.yaw=90 deg"],
+    "planar-3rpr": ["--set", "pose.angle=-10 deg", "--set", "pose.x=0", "--set", "pose.y=0"],
+}
+
+
+@pytest.mark.parametrize("axes", ["base", "platform"])
+@pytest.mark.parametrize("name", SINGULAR_POSES)
+def test_a_singular_pose_says_what_is_known(name, axes, capsys):
+    """K is that of poses beside it; C, where it is finite, is what a least-squares solution of K x = w says."""
+    unlimited = [word for limit in LIMITS for word in ("--set", f"limits.{limit}=none")]
+    pose = [*SINGULAR_POSES[name], *unlimited]
+    assert main(["analyze", name, *pose, "--axes", axes, "--json"]) == NO_ANSWER
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["status"] == "singular"
+    assert answer["platform"]["position"] is not None
+    (twist,) = answer["mobility"]["free_twists"]
+    beside = [word.replace("0 deg", "0.001 deg") for word in pose]
+    assert main(["analyze", name, *beside, "--axes", axes, "--json"]) == DONE
+    near = json.loads(capsys.readouterr().out)
+    stiffness = np.array(answer["stiffness"])
+    np.testing.assert_allclose(stiffness, near["stiffness"], rtol=1e-3, atol=1e-3 * np.abs(stiffness).max())
+    places = [["rx", "ry", "rz", "x", "y", "z"].index(component) for component in answer["components"]]
+    if axes == "base":
+        np.testing.assert_allclose(stiffness @ np.array(twist)[places], 0.0, atol=1e-8 * np.abs(stiffness).max())
+    free = [entry is None for entry in answer["compliance_diagonal"]]
+    assert any(free)
+    assert not all(free)
+    scale = np.array([0.1 if component.startswith("r") else 1.0 for component in answer["components"]])
+    solved = np.linalg.pinv(stiffness / np.outer(scale, scale), rcond=1e-9) / np.outer(scale, scale)
+    for i, row in enumerate(answer["compliance"]):
+        for j, entry in enumerate(row):
+            assert (entry is None) == (free[i] or free[j])
+            assert entry is None or entry == pytest.approx(solved[i, j], rel=1e-6, abs=1e-9 * np.abs(solved).max())
+    assert answer["rank"] == len(free) - 1
+
+
+def test_a_pose_beyond_a_limit_says_where_the_machine_stands(capsys):
+    assert main(["analyze", "hexapod", "--set", "limits.longest_leg=7 cm", "--json"]) == NO_ANSWER
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["status"] == "joint_limit"
+    assert answer["platform"]["position"] is not None
+    assert len(answer["actuators"]) == 6
+    assert answer["singularity_margin"] > 0.1
+    assert answer["stiffness"] is None

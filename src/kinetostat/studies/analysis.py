@@ -28,19 +28,19 @@ from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.limits import unlimited
 from kinetostat.machine.loads import loads_left_out
 from kinetostat.machine.machine import Configuration, Machine, springs
-from kinetostat.machine.mass import Mass, moving_masses
+from kinetostat.machine.mass import Mass
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.assembly import actuators_at
 from kinetostat.studies.attribution import Contribution, Softest, by_part, contributions, softest
 from kinetostat.studies.indices import Along, Indices, indices_json, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
 from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
 from kinetostat.studies.refusal import why_not
 from kinetostat.studies.rounding import clean_matrix, clean_statics
+from kinetostat.studies.unanswered import known_fields, standing_fields
 from kinetostat.tolerances import CLOSING_ROUND_OFF
 
 if TYPE_CHECKING:
@@ -62,13 +62,15 @@ class Analysis(Immutable):
 
     Attributes:
         machine: the machine, with its pose.
-        status: of the pose. Unless it is OK, only `machine`, `message`, `components` and `axes` have a content.
+        status: of the pose. Unless it is OK, attribution, indices and loads are unknown, and the rest only where the
+            machine has no place; K and C are known at singular poses as far as they are finite.
         message: what is special about the pose, or why it has no answer; one paragraph.
         components: names of the rows and columns of K and C: rx ry rz x y z, or rz x y of a planar machine.
         axes: "base" or "platform": the axes of K, C, the attribution, the indices and the load.
         platform: position of P, m, and rows of the rotation matrix of the platform, both in the base frame.
         stiffness: K [n x n], None where a direction is rigid (K has no finite value there).
         compliance: C [n x n], None where a direction is free.
+        finite_compliance: of a singular pose, C with NaN in the entries that are not finite; None at others.
         stiffness_diagonal, compliance_diagonal: their diagonals, infinity where rigid or free.
         rank: of C, or of K where a direction is free.
         rigid, free: names of the springs with infinite and with zero stiffness.
@@ -97,6 +99,7 @@ class Analysis(Immutable):
     platform: tuple[tuple[float, ...], Rows] | None = None
     stiffness: Rows | None = None
     compliance: Rows | None = None
+    finite_compliance: Rows | None = None
     stiffness_diagonal: tuple[float, ...] = ()
     compliance_diagonal: tuple[float, ...] = ()
     rank: int | None = None
@@ -230,9 +233,10 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     # Other poses tell what sort of singularity it is; they cost three more ways from the home pose, and reach has none.
     judged = status in (Status.OK, Status.SINGULAR)
     nearby = _nearby(machine, float(configuration.length)) if judged else []
-    if status is not Status.OK:
-        return Analysis(machine, status, why_not(machine, response, nearby), machine.family.component_names)
     turn = IDENTITY if axes == "base" else configuration.platform.rotation.inverse()
+    if status is not Status.OK:
+        message, known = why_not(machine, response, nearby), known_fields(machine, response, nearby, joints, turn)
+        return Analysis(machine, status, message, machine.family.component_names, axes, **known)
     # Screws are cleaned before they are turned, where an exact zero is easy to tell, and once more after it, because
     # turning adds round-off of its own.
     response = replace(response, statics=clean_statics(response.statics))
@@ -241,8 +245,7 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     kept = machine.family.components
     compliance_rows, stiffness_rows = _rows(compliance, kept), _rows(stiffness, kept)
     all_springs, length = springs(configuration), float(configuration.length)
-    rigid = tuple(spring.name for spring in all_springs if math.isinf(spring.stiffness))
-    free = tuple(spring.name for spring in all_springs if spring.stiffness == 0.0)
+    known = standing_fields(machine, response, joints)
     extremes = conditioning(response.legs, length, response.guide)
     load = load_case(response, statics, turn)
     indices = indices_of(stiffness_rows, compliance_rows, length, kept)
@@ -250,31 +253,23 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     return Analysis(
         machine,
         status,
-        _message(machine, response, rigid, free, stiffness_rows is not None, load),
+        _message(machine, response, known["rigid"], known["free"], stiffness_rows is not None, load),
         components=machine.family.component_names,
         axes=axes,
-        platform=_placement(configuration),
         stiffness=stiffness_rows,
         compliance=compliance_rows,
         stiffness_diagonal=tuple(stiffness.entry(i, i) for i in kept),
         compliance_diagonal=tuple(compliance.entry(i, i) for i in kept),
         rank=_rank(response, statics, compliance_rows is None),
-        rigid=rigid,
-        free=free,
         attribution=contributions(all_springs, statics, stiffness, compliance, kept),
         indices=indices,
         softest={name: direction for name, direction in weakest.items() if direction is not None},
         mobility=mobility(configuration, nearby, response.reference),
         internal_loads=internal_loads([leg.name for leg in configuration.legs], response.legs, length, response.guide),
         load=load,
-        masses=tuple(moving_masses(machine, configuration)),
-        actuators=actuators_at(machine, joints),
-        singularity_margin=float(response.singularity_margin),
-        leg_singularity_margin=min((float(leg.singularity_margin) for leg in response.legs), default=1.0),
-        platform_singularity_margin=float(response.statics.singularity_margin),
         wrench_condition=float(extremes[0] / extremes[-1]),
         jacobian_condition=_jacobian_condition(response, length),
-        characteristic_length=length,
+        **known,
     )
 
 
@@ -296,12 +291,6 @@ def _rows(matrix: Symmetric6, kept: tuple[int, ...]) -> Rows | None:
     """Return the rows and columns of the machine's components, without round-off, or None if an entry is not finite."""
     rows = [[float(matrix.entry(i, j)) for j in kept] for i in kept]
     return clean_matrix(rows) if all(math.isfinite(entry) for row in rows for entry in row) else None
-
-
-def _placement(configuration: Configuration) -> tuple[tuple[float, ...], Rows]:
-    turn = configuration.platform.rotation
-    rows = zip(*([float(c) for c in axis.components()] for axis in (turn.x, turn.y, turn.z)), strict=True)
-    return tuple(float(c) for c in configuration.platform.translation.components()), [list(row) for row in rows]
 
 
 def _nearby(machine: Machine, length: float) -> list[Configuration]:
@@ -396,7 +385,7 @@ def as_json(analysis: Analysis, along: Sequence[Along] = (), requirements: Seque
         "platform": {"position": position, "rotation": rotation},
         "tool_offset": machine.tables["tool"].offset,
         "stiffness": analysis.stiffness,
-        "compliance": analysis.compliance,
+        "compliance": analysis.compliance or analysis.finite_compliance,
         "stiffness_diagonal": analysis.stiffness_diagonal or None,
         "compliance_diagonal": analysis.compliance_diagonal or None,
         "rank": analysis.rank,

@@ -37,7 +37,7 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
         return why_beyond(response.checks, machine.display)
     if status is Status.UNDECIDED:
         return status.sentence
-    motion = _mobility(response, nearby)
+    motion = known_mobility(response, nearby)
     if motion and not nearby and _locked_joints(configuration) < motion.full_cycle:
         return _lacks_actuators(configuration, motion)
     names = [leg.name for leg in configuration.legs]
@@ -46,7 +46,7 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
     return f"The pose is singular{kind}. {reason}"
 
 
-def _mobility(response: Response, nearby: Sequence[Configuration]) -> Mobility | None:
+def known_mobility(response: Response, nearby: Sequence[Configuration]) -> Mobility | None:
     """What can move, and what sort of singularity it is; None where the joints have no place."""
     screws = [screw for leg in response.legs for screw in (*leg.passive, *leg.elastic, *leg.wrenches)]
     if not all(math.isfinite(c) for screw in screws for c in screw.components()):
