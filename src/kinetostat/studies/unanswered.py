@@ -84,9 +84,9 @@ def _matrices(machine: Machine, response: Response, turn: Rotation) -> dict[str,
     scaled = units[:, None] * whole[np.ix_(kept, kept)] * units
     scaled[np.abs(scaled) < ROUND_OFF_OF_ENTRY * np.abs(scaled).max()] = 0.0
     values, vectors = np.linalg.eigh(scaled)
-    held = values > SINGULAR**2 * values[-1]
-    free = np.abs(vectors[:, ~held]).max(axis=1, initial=0.0) > FREE_COMPONENT
-    compliance = units[:, None] * ((vectors[:, held] / values[held]) @ vectors[:, held].T) * units
+    resisted = values > SINGULAR**2 * values[-1]
+    free = np.abs(vectors[:, ~resisted]).max(axis=1, initial=0.0) > FREE_COMPONENT
+    compliance = units[:, None] * ((vectors[:, resisted] / values[resisted]) @ vectors[:, resisted].T) * units
     compliance[free, :] = compliance[:, free] = math.nan
     stiffness = (scaled / units[:, None] / units).tolist()
     diagonal = np.where(free, math.inf, np.diag(compliance))
@@ -95,7 +95,7 @@ def _matrices(machine: Machine, response: Response, turn: Rotation) -> dict[str,
         "stiffness_diagonal": tuple(stiffness[i][i] for i in range(len(kept))),
         "finite_compliance": clean_matrix(compliance.tolist()),
         "compliance_diagonal": tuple(float(entry) for entry in diagonal),
-        "rank": int(held.sum()),
+        "rank": int(resisted.sum()),
     }
 
 
