@@ -91,6 +91,7 @@ def test_no_fit_ends_above_a_trust_region_solver_that_starts_from_the_drawing(se
         assert objective <= other.cost * (1.0 + 1e-6)
         assert (~kept).sum() <= 1 + len(UNMOVED) * (seed % 2)
         assert answer.fit.scatter < 1.6
+        assert len(repr(answer.fit).splitlines()) == len(repr(answer).splitlines()) == 1
 
 
 def test_translations_alone_are_answered_and_the_answer_names_what_they_cannot_see(capsys):

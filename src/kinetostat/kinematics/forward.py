@@ -344,7 +344,7 @@ def _followed(system: System, goals: Array) -> tuple[Array, Mask]:
         if not rows.size:
             break
         here = start + way[rows] * (step / steps)
-        unknowns, largest = _least_squares(system, at[rows], here)
+        unknowns, largest = _least_squares(system, at[rows], here, NEWTON_SETTLED if step == steps else CLOSED)
         rates = system.left(unknowns, here)[1]
         turn = np.sign(np.linalg.det(rates)) if rates.shape[1] == rates.shape[2] else np.zeros(len(rows))
         leap = np.abs(unknowns - at[rows]).max(axis=1, initial=0.0)
@@ -353,8 +353,12 @@ def _followed(system: System, goals: Array) -> tuple[Array, Mask]:
     return at, sound
 
 
-def _least_squares(system: System, starts: Array, goal: Array) -> tuple[Array, Array]:
-    """Solve from many starts at once: unknowns [n x unknowns], and the largest of what is left of the equations [n]."""
+def _least_squares(system: System, starts: Array, goal: Array, settled: float = NEWTON_SETTLED) -> tuple[Array, Array]:
+    """Solve from many starts at once until no more than `settled` is left of any equation.
+
+    Returns:
+        Unknowns [n x unknowns], and the largest of what is left of the equations [n].
+    """
     best, goals = starts.copy(), np.broadcast_to(goal, (len(starts), goal.shape[-1]))
     left, rates = system.left(best, goals)
     damping = np.full(len(best), FIRST_DAMPING)
@@ -370,7 +374,7 @@ def _least_squares(system: System, starts: Array, goal: Array) -> tuple[Array, A
         won = active[better]
         best[won], left[won], rates[won] = moved[better], new_left[better], new_rates[better]
         damping[active] = np.clip(damping[active] * np.where(better, 0.1, 10.0), LEAST_DAMPING, MOST_DAMPING)
-        arrived = np.abs(left[active]).max(axis=1, initial=0.0) <= NEWTON_SETTLED
+        arrived = np.abs(left[active]).max(axis=1, initial=0.0) <= settled
         # Near a solution a step that no longer improves has reached round-off.
         close = np.abs(left[active]).max(axis=1, initial=0.0) < CLOSED
         going[active] = ~arrived & (better | ~close) & (damping[active] < MOST_DAMPING)

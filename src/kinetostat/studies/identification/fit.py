@@ -109,6 +109,9 @@ class Fit:
     rank: int
     predicted: Array
 
+    def __repr__(self) -> str:
+        return f"<Fit: {len(self.values)} values, {self.rank} combinations seen, scatter {self.scatter:.3g}>"
+
     @property
     def correlations(self) -> Array:
         """Of the unknowns [unknowns x unknowns]."""
