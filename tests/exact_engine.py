@@ -10,6 +10,7 @@ of the machine's size inside, in metres outside.
 
 import tomllib
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from functools import wraps
@@ -108,7 +109,8 @@ def orientation(roll: Any, pitch: Any, yaw: Any, kind: Any) -> Array:
 class Freedom:
     """A motion of a chain: about an axis, along it, or the swing of two bars.
 
-    `soft` is its compliance in SI (rad/(N m) or m/N) where a spring or servo holds it, None where it is passive.
+    `soft` is its compliance in SI (rad/(N m) or m/N) where a spring or servo holds it, None where it is passive; `name`
+    is that of its leg and joint.
     """
 
     kind: str
@@ -116,6 +118,7 @@ class Freedom:
     axis: Array
     soft: Decimal | None = None
     far: Array = None
+    name: str = ""
 
 
 @dataclass
@@ -154,6 +157,9 @@ class Machine:
         for joint, following in zip(leg["joints"], [*leg["joints"][1:], None], strict=True):
             seat = _seat(joint)
             moving = _freedoms(joint)
+            for freedom in moving:
+                if isinstance(freedom, Freedom):
+                    freedom.name = f"{leg['name']} {joint['name']}"
             travels = joint["type"] in ("prismatic", "cylindrical")
             chain += [*moving, *seat] if travels else [*seat, *moving]
             link = leg.get("links", {}).get(joint["joins"][1])
@@ -422,6 +428,31 @@ class Closed:
         values, right = np.linalg.svd(self._rates(self.nearly, {}))[1:]
         left, sizes, _ = np.linalg.svd(right[int((values > 1e-7).sum()) :, -6:].T)
         return left[:, : int((sizes > 1e-7).sum())]
+
+    def admissible(self) -> list[tuple[Array, dict[str, float]]]:
+        """Small motions that keep all legs closed while rigid springs are locked, whatever the pose gives; floats.
+
+        Returns:
+            Of each, the twist of the tool point, base axes, rad and m; and the motions of the sprung joints by name.
+        """
+        everywhere = [part for leg in self.machine.legs for part in leg if isinstance(part, Freedom)]
+        freely = copy(self)
+        freely.free = list(POSE)
+        unknown = np.array([*self.nearly[: len(everywhere)], *(float(self.pose[name]) for name in POSE)])
+        rates = freely._rates(unknown, {})
+        locked = [np.eye(rates.shape[1])[i] for i, part in enumerate(everywhere) if part.soft == 0]
+        values, right = np.linalg.svd(np.array([*rates, *locked]))[1:]
+        tool = (self.centre + self.turn @ self.machine.offset).astype(float)
+        first = freely._parts(unknown, {}, float)[0][0]
+        motions = []
+        for motion in right[int((values > 1e-7).sum()) :] * freely.units:
+            twist = np.zeros(6)
+            for (kind, point, axis, _), amount in zip(first.freedoms, motion, strict=False):
+                moved = [*axis, *cross(axis, tool - point)] if kind == "turn" else [0, 0, 0, *axis]
+                twist += amount * np.array(moved, dtype=float)
+            sprung = {part.name: float(c) for part, c in zip(everywhere, motion, strict=False) if part.soft is not None}
+            motions.append((twist, sprung))
+        return motions
 
     @exactly
     def _close(self, unknown: Array) -> None:

@@ -54,13 +54,14 @@ class Draw:
     """
 
     @exactly
-    def __init__(self, mechanism: str, seed: int) -> None:
+    def __init__(self, mechanism: str, seed: int, hinges: bool = True) -> None:
         name, self.freedoms = MECHANISMS[mechanism]
         self.random = np.random.default_rng([seed, *map(ord, mechanism)])
         tables = tomllib.loads((CASES / f"{name}.toml").read_text("utf-8"), parse_float=Decimal)
         self.turn = self._rotation() if self.random.random() < 0.7 else numbers(np.eye(3, dtype=int).tolist())
         self.scale = self._decimal(10 ** self.random.uniform(-1.5, 1.5)) if self.random.random() < 0.5 else Decimal(1)
         style = self.random.choice(["drives", "few", "many"])
+        self.hinges = hinges
         self.chance = {"drives": 0.0, "few": 0.2, "many": 0.7}[style]
         self.force = 10 ** self.random.uniform(4, 8)
         self.reach = float(self.scale) * 0.5
@@ -126,7 +127,7 @@ class Draw:
             joint["bar_stiffness"] = self._stiffness(False, self.chance) or "rigid"
         elif old.get("actuated"):
             joint |= {"actuated": True, "stiffness": self._stiffness(kind == "revolute", 0.8) or "rigid"}
-        elif kind == "revolute" and self.random.random() < 0.2 * self.chance:
+        elif kind == "revolute" and self.random.random() < 0.2 * self.chance * self.hinges:
             joint["stiffness"] = self._stiffness(True, 1.0)
         if self.random.random() < self.chance and kind != "parallelogram":
             joint |= self._bearings(joint)
