@@ -99,6 +99,9 @@ AT_REST = 1e-10
 """Motion in one of Newton's steps, rad or in units of the machine's length, below which steps converge quadratically or
 are round-off: the next one is the square of it."""
 
+NEARLY_AT_REST = 1e-6
+"""Step of a descent, in the same units, from which Newton's steps take over: half of the digits, as far as differences
+of a potential tell one state from another."""
 UNMOVED_TOOL = 1e-13
 """Displacement, rad or in units of the machine's length, below which the tool of a loaded machine has not moved: a
 tenth of a picometre of a metre, and what round-off leaves of a rigid machine."""

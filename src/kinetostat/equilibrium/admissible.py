@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.motion import Array
-from kinetostat.tolerances import CLOSING_ROUND_OFF, OPEN_BY_STEP, UNRESISTED
+from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT, OPEN_BY_STEP, UNRESISTED
 
 Rows = npt.NDArray[np.int64]
 
@@ -56,12 +56,13 @@ def gaps_of(equations: Balance) -> Array:
 
 @dataclass(frozen=True)
 class Admissible:
-    """Poses at which as many closing conditions A are independent: A = U diag(s) V^T, and what keeps A x = 0.
+    """Poses at which as many closing conditions A are independent, and what keeps A x = 0.
 
     Attributes:
         rows: of the poses [k].
-        motions: an orthonormal basis of the admissible motions, as columns [k x coordinates x m].
-        inverse: A+, of the independent conditions [k x coordinates x conditions].
+        motions: a basis of the admissible motions, as columns [k x coordinates x m].
+        inverse: A+, of the independent conditions [k x coordinates x conditions], with A A+ b = b for all gaps b that
+            can be closed.
     """
 
     rows: Rows
@@ -69,22 +70,50 @@ class Admissible:
     inverse: Array
 
 
-def admissible(conditions: Array, rows: Rows, gaps: Array) -> Iterator[Admissible]:
+def admissible(equations: Balance, conditions: Array, rows: Rows | None = None) -> Iterator[Admissible]:
     """Sort poses by the number of their independent conditions.
 
+    Where the coordinates of each leg follow from its end, the motions of the platform are a basis, in a hundredth of
+    the time. Elsewhere A = U diag(s) V^T gives an orthonormal one.
+
     Args:
-        conditions: A [n x conditions x coordinates].
-        rows: of the poses at which they are finite.
-        gaps: of the closing equations there [n].
+        equations: at the states.
+        conditions: A of them [n x conditions x coordinates].
+        rows: of the poses to be sorted; those at which the conditions are finite if None.
     """
+    rows = np.flatnonzero(np.isfinite(conditions).all(axis=(1, 2))) if rows is None else rows
+    following = _following(equations, conditions[rows], rows)
+    if following is not None:
+        yield following
+        rows = np.setdiff1d(rows, following.rows)
+    if not len(rows):
+        return
     left, values, right = np.linalg.svd(conditions[rows])
-    least = np.maximum(CLOSING_ROUND_OFF, OPEN_BY_STEP * gaps[rows])
+    least = np.maximum(CLOSING_ROUND_OFF, OPEN_BY_STEP * gaps_of(equations)[rows])
     ranks = (values > least[:, None] * values[:, :1]).sum(axis=1)
     for rank in np.unique(ranks):
         here = ranks == rank
         shrink = 1.0 / values[here, None, :rank]
         inverse = np.swapaxes(right[here, :rank], 1, 2) * shrink @ np.swapaxes(left[here, :, :rank], 1, 2)
         yield Admissible(rows[here], np.swapaxes(right[here, rank:], 1, 2), inverse)
+
+
+def _following(equations: Balance, conditions: Array, rows: Rows) -> Admissible | None:
+    """The motions of the platform, and of legs that follow it in one way each, where they surely do."""
+    size, starts = equations.mechanism.ways.shape[1], starts_of(equations)
+    if any(leg.size != size for leg in equations.mechanism.legs):
+        return None
+    inverse = np.zeros((len(rows), int(starts[-1]), conditions.shape[1]))
+    for number, (first, last) in enumerate(pairwise(starts)):
+        row = slice(size * number, size * (number + 1))
+        try:
+            inverse[:, first:last, row] = np.linalg.inv(conditions[:, row, first:last])
+        except np.linalg.LinAlgError:
+            return None
+    motions = -inverse @ conditions[:, :, :size]
+    motions[:, :size] = np.eye(size)
+    sure = np.abs(inverse).max(axis=(1, 2), initial=0.0) * DEPENDENT < 1.0
+    return Admissible(rows[sure], motions[sure], inverse[sure])
 
 
 def within(matrix: Array, allowed: Array) -> Array:
@@ -106,11 +135,11 @@ def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Arr
     """
     elastic, geometric, conditions = tangent_matrices(equations)
     geometric = geometric if loaded else np.zeros_like(geometric)
-    moving, carried = _places(equations)
+    moving, carried = places_of(equations)
     force, gap = right[:, moving], right[:, carried]
     sound = [np.isfinite(part).all(axis=(1, 2)) for part in (elastic, geometric, conditions, right)]
     result = np.full_like(right, np.nan)
-    for part in admissible(conditions, np.flatnonzero(np.all(sound, axis=0)), gaps_of(equations)):
+    for part in admissible(equations, conditions, np.flatnonzero(np.all(sound, axis=0))):
         whole = elastic[part.rows] + geometric[part.rows]
         motion = part.inverse @ gap[part.rows]
         back = np.swapaxes(part.motions, 1, 2)
@@ -123,7 +152,7 @@ def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Arr
     return result
 
 
-def _places(equations: Balance) -> tuple[Rows, Rows]:
+def places_of(equations: Balance) -> tuple[Rows, Rows]:
     """The places of the twist and all coordinates among the unknowns, and those of the wrenches of the legs."""
     ways, starts = equations.mechanism.ways.shape[1], equations.starts
     every = np.arange(starts[-1])

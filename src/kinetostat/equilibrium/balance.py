@@ -7,7 +7,7 @@ platform exerts on the legs. Nothing is solved here.
 Source: theory (35)-(38). Units, axes and origin are those of `mechanism`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,6 +52,22 @@ class State:
             tuple(values[rows] for values in self.coordinates),
             tuple(values[rows] for values in self.wrenches),
             self.amounts[rows],
+        )
+
+    def replaced(self, rows: npt.NDArray[np.int64], part: "State") -> "State":
+        """The state with that of some of the poses [rows] in its place; given amounts stay as they are."""
+
+        def put(old: Array, values: Array) -> Array:
+            result = np.array(old)
+            result[rows] = values
+            return result
+
+        here, there = self.platform, part.platform
+        return State(
+            Motions(put(here.rotation, there.rotation), put(here.translation, there.translation)),
+            tuple(map(put, self.coordinates, part.coordinates)),
+            tuple(map(put, self.wrenches, part.wrenches)),
+            self.amounts,
         )
 
 
@@ -181,18 +197,50 @@ def platform_load(mechanism: Mechanism, platform: Motions) -> tuple[Array, Array
     Forces keep their direction and go with their points; the moment keeps its axis.
     """
     count = len(mechanism.length)
-    others, masses = (np.swapaxes(p, 0, 1) for p in (mechanism.pushed, mechanism.platform.point))
-    points = [np.zeros((count, 3)), *others, *masses]
-    weights = mechanism.platform.mass.T[:, :, None] * mechanism.gravity[None]
-    forces = [mechanism.wrench[:, 3:], *np.swapaxes(mechanism.forces, 0, 1), *weights]
     wrench = np.concatenate([mechanism.wrench[:, :3], np.zeros((count, 3))], axis=1)
     change = np.zeros((count, 6, 6))
-    for point, force in zip(points, forces, strict=True):
+    for point, force in _platform_forces(mechanism):
         at, across = platform.point(point), skew_of(force)
         wrench = wrench + np.concatenate([cross(at, force), force], axis=1)
         turning = np.concatenate([across @ skew_of(at), -across], axis=2)
         change = change + np.concatenate([turning, 0.0 * turning], axis=1)
     return wrench, change
+
+
+def _platform_forces(mechanism: Mechanism) -> Iterator[tuple[Array, Array]]:
+    """The points of the platform at which forces act, in the free state, and these [n x 3]; the tool point first."""
+    others, masses = (np.swapaxes(p, 0, 1) for p in (mechanism.pushed, mechanism.platform.point))
+    weights = mechanism.platform.mass.T[:, :, None] * mechanism.gravity[None]
+    points = [np.zeros((len(mechanism.length), 3)), *others, *masses]
+    return zip(points, [mechanism.wrench[:, 3:], *np.swapaxes(mechanism.forces, 0, 1), *weights], strict=True)
+
+
+def potential(mechanism: Mechanism, state: State, before: Motions) -> Array:
+    """The potential of springs, weights and loads where all legs are closed, up to a constant [n].
+
+    Its slope is continuous where a spring that only pulls goes slack. The moment of the load keeps its axis, which no
+    potential does; what counts is its work on the way from the placement `before`, by a turn about one axis.
+
+    Source: theory section 12.
+    """
+    turn = logarithm(state.platform @ before.inverse())[:, :3]
+    result = -np.einsum("nc,nc->n", mechanism.wrench[:, :3], turn)
+    for point, force in _platform_forces(mechanism):
+        result -= np.einsum("nc,nc->n", force, state.platform.point(point) - point)
+    amounts = np.concatenate([state.amounts, mechanism.growth], axis=1)
+    for leg, coordinates in zip(mechanism.legs, state.coordinates, strict=True):
+        loads = leg.stiffness * coordinates + leg.preload
+        energy = 0.5 * (loads + leg.preload) * coordinates
+        if leg.sign.any():
+            stiffness = np.where(leg.sign == 0.0, 1.0, leg.stiffness)
+            energy = np.where(leg.sign == 0.0, energy, 0.5 * np.maximum(leg.sign * loads, 0.0) ** 2 / stiffness)
+        result += energy.sum(axis=1)
+        if leg.masses.carried:
+            placed = placed_leg(leg, coordinates, amounts).motions
+            for i, carried in enumerate(leg.masses.carried):
+                force, point = mechanism.gravity * leg.masses.mass[:, i, None], leg.masses.point[:, i]
+                result -= np.einsum("nc,nc->n", force, placed[carried].point(point) - point)
+    return result
 
 
 @dataclass(frozen=True)

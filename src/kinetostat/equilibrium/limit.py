@@ -7,13 +7,14 @@ other one is nearby, where it is not stable, or where the next one is a leap awa
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
-from kinetostat.equilibrium.balance import Balance, free_state
+from kinetostat.equilibrium.balance import Balance, State, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.motion import Array, logarithm
-from kinetostat.equilibrium.solving import newton, with_share
-from kinetostat.equilibrium.tangent import Stability, stabilities, stability
-from kinetostat.tolerances import AT_REST
+from kinetostat.equilibrium.solving import at_rest, newton, with_share
+from kinetostat.equilibrium.stability import Stability, stabilities, stability
+from kinetostat.tolerances import AT_REST, ZERO_PIVOT
 
 RATIO, CANDIDATES, FEW = 2.0, 14, 4
 """Steps of the loads that are tried together: all that is left of them, and each time by this ratio less; few of them
@@ -25,8 +26,8 @@ FINE = 1e-3
 MOST_ITERATIONS = 8
 """Of Newton's method in a step: where it needs more, the step is too long."""
 BENT = 0.5
-"""Share of its motion by which a step may miss what the tangent foresees: where it misses more, the state has snapped
-over, or the step is too long."""
+"""Share of its motion by which a step may miss what the tangents at its ends foresee: where it misses more, the state
+has snapped over, or the step is too long."""
 LONGEST = 0.3
 """Motion of the platform in a step, rad or in units of the machine's length."""
 
@@ -55,12 +56,28 @@ def limit_of(mechanism: Mechanism) -> Limit | None:
         mechanism: with all of its loads.
 
     Returns:
-        Where it stands last, share 1 if it stands under all of them; None if it stands under no share.
+        Where it stands last, share 1 if it stands under all of them; None if no share was found under which it
+        stands.
     """
     last = _standing(mechanism, np.zeros(1), None)
-    if last is None:
-        return None
-    whole = _standing(mechanism, _shares(0.0, FEW), last)  # as nearly every machine stands
+    reached = None if last is None else _limit_from(mechanism, last)
+    if reached is not None and reached.share > 0.0:
+        return reached
+    # Springs that only pull may hold nothing until a load tensions them: then it stands from some share on.
+    if not any(leg.sign.any() for leg in mechanism.legs):
+        return reached
+    shares = _shares(0.0, FEW)
+    solution = at_rest(with_share(mechanism.taken(np.zeros(FEW, dtype=np.int64)), shares, preload=1.0))
+    stands = np.flatnonzero(solution.settled & stabilities(solution.balance).stable)
+    if not len(stands):
+        return reached
+    equations = solution.at(stands[:1])
+    return _limit_from(mechanism, Limit(float(shares[stands[0]]), equations, stability(equations)))
+
+
+def _limit_from(mechanism: Mechanism, last: Limit) -> Limit:
+    """The last stable state while the loads grow from one under which the mechanism stands."""
+    whole = _standing(mechanism, _shares(last.share, FEW), last)  # as nearly every machine stands
     if whole is not None and whole.share == 1.0:
         return whole
     for _ in range(MOST_STEPS):
@@ -91,15 +108,29 @@ def _standing(mechanism: Mechanism, shares: Array, last: Limit | None) -> Limit 
         last: the state from which each of them is sought; the free state if None.
     """
     rows = np.zeros(len(shares), dtype=np.int64)
-    start = (free_state(mechanism) if last is None else last.balance.state).taken(rows)
-    loaded = with_share(mechanism.taken(rows), shares, preload=1.0)
-    first, solution = (newton(loaded, start, iterations) for iterations in (1, MOST_ITERATIONS))
-    foreseen, moved = (logarithm(s.balance.state.platform @ start.platform.inverse()) for s in (first, solution))
-    size, wrong = np.abs(moved).max(axis=1), np.abs(moved - foreseen).max(axis=1)
-    near = (size <= LONGEST) & (wrong <= BENT * size + AT_REST) | (last is None)
-    stands = solution.settled & near & stabilities(solution.balance).stable
+    every, start = mechanism.taken(rows), (free_state(mechanism) if last is None else last.balance.state).taken(rows)
+    loaded = with_share(every, shares, preload=1.0)
+    solution = newton(loaded, start, MOST_ITERATIONS)
+    stands = solution.settled & stabilities(solution.balance).stable
+    if last is not None:
+        stands &= _near(with_share(every, last.share, preload=1.0), start, loaded, solution.balance.state)
     count = int(np.cumprod(stands).sum())
     if not count:
         return None
     equations = solution.at(np.array([count - 1]))
     return Limit(float(shares[count - 1]), equations, stability(equations))
+
+
+def _near(before: Mechanism, start: State, after: Mechanism, end: State) -> npt.NDArray[np.bool_]:
+    """Whether states moved as the tangents at the start and at the end foresee, or as any mixture of both [n].
+
+    Where a cable goes slack on the way, the one holds up to there and the other one from there.
+    """
+    ahead, behind = (newton(loads, state, 1).balance.state for loads, state in ((after, start), (before, end)))
+    pairs = ((ahead, start), (end, behind), (end, start))
+    first, last, moved = (logarithm(a.platform @ b.platform.inverse()) for a, b in pairs)
+    across = last - first
+    share = ((moved - first) * across).sum(axis=1) / np.maximum((across * across).sum(axis=1), ZERO_PIVOT)
+    foreseen = first + np.clip(share, 0.0, 1.0)[:, None] * across
+    size, wrong = np.abs(moved).max(axis=1), np.abs(moved - foreseen).max(axis=1)
+    return np.asarray((size <= LONGEST) & (wrong <= BENT * size + AT_REST))

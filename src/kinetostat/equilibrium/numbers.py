@@ -14,7 +14,8 @@ from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.solving import at_rest
-from kinetostat.equilibrium.tangent import Stabilities, compliance, inverse, stabilities
+from kinetostat.equilibrium.stability import Stabilities, stabilities
+from kinetostat.equilibrium.tangent import compliance, inverse
 from kinetostat.equilibrium.tensions import tensioned
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints, solve_joints

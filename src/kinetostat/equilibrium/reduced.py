@@ -231,9 +231,10 @@ class Reduced:
             "compliance": [compliance[i][i] * units[i, i] for i in range(6)],
         }
         if "stiffness" in wanted:
-            parts = self.components
+            parts = [part for part in self.components if not is_zero(compliance[part][part])]
             stiffness, sure = _inverse_diagonal([[compliance[i][j] for j in parts] for i in parts], self.size)
-            by_part = {part: k * reciprocal(units[part, part]) for part, k in zip(parts, stiffness, strict=True)}
+            by_part = dict.fromkeys(self.components, math.inf)
+            by_part |= {part: k * reciprocal(units[part, part]) for part, k in zip(parts, stiffness, strict=True)}
             result["stiffness"], good = [by_part.get(part, math.nan) for part in range(6)], good & sure
         if "factor" in wanted:
             result["factor"], sure = tangent.factor()

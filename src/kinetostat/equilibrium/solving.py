@@ -1,4 +1,4 @@
-"""Solve for the state in which a mechanism is at rest: Newton's method, in steps of the load where it needs them.
+"""Solve for the state in which a mechanism is at rest: Newton's method, a descent or steps of the load where it fails.
 
 Source: theory section 12. Units, axes and origin are those of `mechanism`.
 """
@@ -13,8 +13,10 @@ import numpy.typing as npt
 
 from kinetostat.equilibrium.admissible import finite_solution, solve_over_admissible
 from kinetostat.equilibrium.balance import Balance, State, balance, free_state
+from kinetostat.equilibrium.descent import descent_from
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.motion import Array, Motions
+from kinetostat.equilibrium.motion import Array
+from kinetostat.equilibrium.stability import stabilities
 from kinetostat.tolerances import AT_REST, STIFFEST_LEG
 
 Rows = npt.NDArray[np.int64]
@@ -24,7 +26,7 @@ MOST_ITERATIONS = 25
 LONGEST_STEP = 0.2
 """Motion in one iteration, rad or in units of the machine's length: beyond it, the linear equations mean little."""
 LOAD_STEPS = (1, 8, 64)
-"""In how many steps the load is applied: in one, and in more where that does not converge."""
+"""In how many steps the load is applied: in one, and in more where that does not converge and no spring goes slack."""
 
 
 class Rest(IntEnum):
@@ -62,12 +64,18 @@ class Solution:
 def at_rest(mechanism: Mechanism, start: State | None = None) -> Solution:
     """Find the states of rest under the full load.
 
+    Newton's steps come first. Springs that carry loads of one sign only change the stiffness when they go slack, so
+    that these steps often end nowhere, or where the machine does not stay; then the potential is descended. Without
+    such springs, the load is applied in steps.
+
     Args:
         mechanism: with its load.
         start: a state nearby; the free state if None.
     """
     state = start or free_state(mechanism)
     reached = newton(mechanism, state)
+    if any(leg.sign.any() for leg in mechanism.legs):
+        return _by_descent(mechanism, state, reached)
     for steps in LOAD_STEPS[1:]:
         rows = np.flatnonzero(~reached.settled)
         if not len(rows):
@@ -81,6 +89,19 @@ def at_rest(mechanism: Mechanism, start: State | None = None) -> Solution:
                 break
         reached = _put(mechanism, reached, rows, solution)
     return reached
+
+
+def _by_descent(mechanism: Mechanism, start: State, reached: Solution) -> Solution:
+    """The states to which a descent leads where those that were reached are not at rest or not stable."""
+    rows = np.flatnonzero(~(reached.settled & stabilities(reached.balance).stable))
+    if not len(rows):
+        return reached
+    part = mechanism.taken(rows)
+    solution = newton(part, descent_from(part, start.taken(rows)))
+    better = solution.settled & (~reached.settled[rows] | stabilities(solution.balance).stable)
+    chosen = np.flatnonzero(better)
+    settled = Solution(solution.at(chosen), solution.settled[chosen])
+    return _put(mechanism, reached, rows[chosen], settled) if len(chosen) else reached
 
 
 def with_share(mechanism: Mechanism, share: float | Array, preload: float | None = None) -> Mechanism:
@@ -105,23 +126,9 @@ def with_share(mechanism: Mechanism, share: float | Array, preload: float | None
 
 def _put(mechanism: Mechanism, reached: Solution, rows: Rows, part: Solution) -> Solution:
     """The solution with some of its poses replaced."""
-    whole, new = reached.balance.state, part.balance.state
-
-    def put(old: Any, values: Any) -> Any:
-        result = old.copy()
-        result[rows] = values
-        return result
-
-    state = State(
-        Motions(
-            put(np.array(whole.platform.rotation), new.platform.rotation),
-            put(whole.platform.translation, new.platform.translation),
-        ),
-        tuple(map(put, whole.coordinates, new.coordinates)),
-        tuple(map(put, whole.wrenches, new.wrenches)),
-        whole.amounts,
-    )
-    return Solution(balance(mechanism, state), put(reached.settled, part.settled))
+    settled = reached.settled.copy()
+    settled[rows] = part.settled
+    return Solution(balance(mechanism, reached.balance.state.replaced(rows, part.balance.state)), settled)
 
 
 def newton(mechanism: Mechanism, state: State, iterations: int = MOST_ITERATIONS) -> Solution:

@@ -14,7 +14,7 @@ from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.commanding import commanded
 from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import loaded_mechanism
-from kinetostat.equilibrium.tangent import stabilities
+from kinetostat.equilibrium.stability import stabilities
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.forward import leg_names

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.buckling import Strut
 from kinetostat.equilibrium.limit import Limit, limit_of
-from kinetostat.equilibrium.tangent import Stability
+from kinetostat.equilibrium.stability import Stability
 from kinetostat.kinematics.singularity import describe
 from kinetostat.machine.machine import Machine
 
@@ -75,10 +75,10 @@ def how_it_gives_way(limit: Limit | None) -> str:
     """Say up to which share of its loads a machine stands, by which motion it gives way, and what is slack then.
 
     Args:
-        limit: of the machine; None if it stands under no share of its loads.
+        limit: of the machine; None if no share of its loads was found under which it stands.
     """
     if limit is None:
-        return "It stands under no share of it either."
+        return "No share of it was found under which it stands."
     mode = describe((limit.judged.mode * limit.balance.mechanism.twist_units[0]).tolist(), ("rad", "m"))
     slack, legs = _slack_legs(limit.balance), moving_legs(limit.balance, limit.judged)
     known = limit.judged.mode.any()

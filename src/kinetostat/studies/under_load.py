@@ -21,7 +21,8 @@ from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import actuator_loads_at_rest, loaded_mechanism
 from kinetostat.equilibrium.shape import loaded_links
 from kinetostat.equilibrium.solving import Rest, at_rest, solve, with_share
-from kinetostat.equilibrium.tangent import compliance, elastic_stiffness, inverse, stability
+from kinetostat.equilibrium.stability import stability
+from kinetostat.equilibrium.tangent import compliance, elastic_stiffness, inverse
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.limits import Check, load_checks, why_beyond, within
 from kinetostat.kinematics.status import PLACELESS, Status
@@ -79,7 +80,7 @@ class LoadedState(Immutable):
         springs: all that deform.
         slack_legs: names of the legs in which a spring is slack.
         elastic, tangent: stiffness of the springs alone where they are now, and that which further loads meet: with
-            what the loads do by turning; None where it is not finite.
+            what the loads do by turning; infinite where rigid parts hold a component, None where none is free of them.
         compliance: inverse of the tangent stiffness.
         factor: by which the loads may grow in proportion until the springs are unstable; infinite if no growth does
             it, None where springs alone hold nothing. Without a state of rest, the share of them up to which it stands.
@@ -178,10 +179,9 @@ def load_curve(machine: Machine, shares: Sequence[float] = SHARES) -> LoadCurve:
     moved, loads = [], []
     for share in shares:
         solution = at_rest(with_share(mechanism, share, preload=1.0), state)
-        state = solution.balance.state
-        springs = _springs(solution.balance)
-        known = 1.0 if solution.settled[0] else math.nan
-        moved.append([known * c for c in _in_si(mechanism, state.platform.amounts()[0], parts)])
+        springs, there = _springs(solution.balance), solution.balance.state
+        known, state = (1.0, there) if solution.settled[0] else (math.nan, state)
+        moved.append([known * c for c in _in_si(mechanism, there.platform.amounts()[0], parts)])
         loads.append([known * spring.load for spring in springs])
     return LoadCurve(np.array(shares), np.array(moved), tuple(s.name for s in springs), np.array(loads))
 
@@ -189,8 +189,9 @@ def load_curve(machine: Machine, shares: Sequence[float] = SHARES) -> LoadCurve:
 def _state(machine: Machine, response: Response, equations: Balance, pressed: tuple[Strut, ...]) -> LoadedState:
     mechanism, parts = equations.mechanism, list(machine.family.components)
     units, square = mechanism.twist_units[0], np.ix_(parts, parts)
-    soft = (compliance(equations) * mechanism.compliance_units)[0][square]
-    springs_alone = (elastic_stiffness(equations) / mechanism.compliance_units)[0][square]
+    compliances = compliance(equations)
+    soft = (compliances * mechanism.compliance_units)[0][square]
+    springs_alone = (elastic_stiffness(equations, compliances) / mechanism.compliance_units)[0][square]
     judged = stability(equations)
     states = _springs(equations)
     slack = tuple(dict.fromkeys(state.leg for state in states if state.slack))
@@ -269,14 +270,16 @@ def _in_si(mechanism: Mechanism, twist: Array, parts: list[int]) -> tuple[float,
 
 
 def _cleaned(stiffness: Array) -> list[list[float]] | None:
-    """A stiffness without round-off; None where an entry is not finite.
+    """A stiffness without round-off; None where no component has a finite one.
 
     Where springs hold nothing in a direction, its entries are round-off beside those of the others of their kind.
     """
-    if not np.isfinite(stiffness).all():
+    diagonal = np.abs(np.diag(stiffness))
+    free = np.isfinite(diagonal)
+    if not free.any() or not np.isfinite(stiffness[np.ix_(free, free)]).all():
         return None
     turning = np.arange(len(stiffness)) < (SIZE // 2 if len(stiffness) == SIZE else 1)
-    largest = np.sqrt([np.abs(np.diag(stiffness))[turning == kind].max() for kind in turning])
+    largest = np.sqrt([diagonal[free & (turning == kind)].max(initial=0.0) for kind in turning])
     negligible = np.abs(stiffness) < ROUND_OFF_OF_ENTRY * np.outer(largest, largest)
     return clean_matrix(np.where(negligible, 0.0, stiffness).tolist())
 

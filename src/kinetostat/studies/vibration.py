@@ -22,7 +22,7 @@ from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import loaded_mechanism
 from kinetostat.equilibrium.shape import loaded_links
 from kinetostat.equilibrium.solving import at_rest, with_share
-from kinetostat.equilibrium.tangent import stability
+from kinetostat.equilibrium.stability import stability
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.deflected import Deflection

@@ -1,0 +1,222 @@
+"""Descend to a state of rest where Newton's steps do not end: a trust region on the potential, with all legs closed.
+
+A cable that goes slack changes the stiffness at once, and Newton's steps then go back and forth, or out of reach. The
+potential itself has a continuous slope, because a slack spring has the energy 0 with the slope 0. So a step is taken
+only if it lowers the potential by a share of what a model foresees that knows which springs go slack or become taut on
+the way; else the next step is shorter. Such steps end where the slope is zero, from wherever they begin, unless the
+potential falls without end.
+
+Source: theory section 12. Units, axes and origin are those of `mechanism`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from kinetostat.equilibrium.admissible import (
+    Admissible,
+    admissible,
+    gaps_of,
+    places_of,
+    starts_of,
+    tangent_matrices,
+    within,
+)
+from kinetostat.equilibrium.balance import Balance, State, balance, potential
+from kinetostat.equilibrium.mechanism import Mechanism
+from kinetostat.equilibrium.motion import Array
+from kinetostat.tolerances import CLOSED, NEARLY_AT_REST, ZERO_PIVOT
+
+MOST_STEPS = 200
+"""Of a descent: nine in ten end within 30, and a machine that falls has then fallen by 40 of its lengths."""
+LONGEST_STEP = 0.2
+"""Radius of the trust region at most, rad and in units of the machine's length."""
+MOST_CLOSINGS = 6
+"""Corrections that close the legs after a step: where they need more, the step is too long."""
+BISECTIONS = 50
+"""Of the shift of the stiffness with which a step is as long as the radius."""
+MOST_SWITCHES = 8
+"""Of one-sided springs between carrying and slack within a step."""
+LEAST_SHARE, GOOD_SHARE = 0.1, 0.75
+"""Share of the foreseen fall of the potential from which a step is taken, and from which the radius may grow."""
+
+
+def descent_from(mechanism: Mechanism, start: State) -> State:
+    """Descend to where the slope of the potential is nearly zero, or as far as the steps go.
+
+    Args:
+        mechanism: with its load.
+        start: to begin with; its legs need not be closed.
+
+    Returns:
+        The states that were reached; Newton's method from there tells whether they are at rest.
+    """
+    state, closed = _closed_state(mechanism, start)
+    radius = np.full(len(mechanism.length), LONGEST_STEP)
+    rows = np.flatnonzero(closed)
+    for _ in range(MOST_STEPS):
+        if not len(rows):
+            break
+        part = mechanism.taken(rows)
+        step = _step(part, state.taken(rows), radius[rows])
+        before = step.equations.state
+        there, closed = _closed_state(part, step.equations.moved(step.unknowns))
+        fall = potential(part, before, before.platform) - potential(part, there, before.platform)
+        share = np.where(closed, fall, -1.0) / np.maximum(step.fall, ZERO_PIVOT)
+        lower = share > LEAST_SHARE
+        wider = np.where(share > GOOD_SHARE, np.maximum(radius[rows], 2.0 * step.size), radius[rows])
+        radius[rows] = np.where(lower, np.minimum(wider, LONGEST_STEP), 0.25 * step.size)
+        state = state.replaced(rows, before).replaced(rows[lower], there.taken(np.flatnonzero(lower)))
+        rows = rows[step.size > NEARLY_AT_REST]
+    return state
+
+
+def _closed_state(mechanism: Mechanism, state: State) -> tuple[State, npt.NDArray[np.bool_]]:
+    """Close the legs by small motions, and say where that was done [n]."""
+    for _ in range(MOST_CLOSINGS):
+        equations = balance(mechanism, state)
+        gaps = gaps_of(equations)
+        if not (gaps > CLOSED).any():
+            break
+        unknowns = np.zeros_like(equations.left)
+        moving, carried = places_of(equations)
+        for part in admissible(equations, tangent_matrices(equations)[2]):
+            shift = part.inverse @ equations.left[part.rows][:, carried, None]
+            unknowns[part.rows[:, None], moving] = -shift[:, :, 0]
+        state = equations.moved(np.where((gaps > CLOSED)[:, None], unknowns, 0.0))
+    return state, gaps <= CLOSED
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A step that a model of the potential foresees at closed states.
+
+    Attributes:
+        equations: there, with wrenches that balance all but the admissible motions.
+        unknowns: by which it changes them [n x unknowns].
+        size: of the admissible motion; NaN where it is not known [n].
+        fall: of the potential as the model foresees it [n].
+    """
+
+    equations: Balance
+    unknowns: Array
+    size: Array
+    fall: Array
+
+
+def _step(mechanism: Mechanism, state: State, radius: Array) -> _Step:
+    """The step within a radius [n] to a low value of the model at closed states."""
+    equations = balance(mechanism, state)
+    moving, carried = places_of(equations)
+    unknowns = np.zeros_like(equations.left)
+    size, fall = np.full((2, len(radius)), np.nan)
+    parts = list(admissible(equations, tangent_matrices(equations)[2]))
+    for part in parts:
+        left = equations.left[part.rows][:, moving, None]
+        unknowns[part.rows[:, None], carried] = (np.swapaxes(part.inverse, 1, 2) @ left)[:, :, 0]
+    equations = balance(mechanism, equations.moved(unknowns))
+    unknowns = np.zeros_like(unknowns)
+    for part in parts:
+        model = _model(equations, part)
+        step, fall[part.rows] = model.lowest_point(radius[part.rows])
+        known = np.linalg.norm(step, axis=1)
+        size[part.rows] = np.where(fall[part.rows] > 0.0, known, radius[part.rows])
+        unknowns[part.rows[:, None], moving] = (part.motions @ step[:, :, None])[:, :, 0]
+    return _Step(equations, unknowns, size, fall)
+
+
+@dataclass(frozen=True)
+class _Model:
+    """The potential near closed states over the admissible motions y: -f y + y K y / 2 and the one-sided springs.
+
+    Attributes:
+        stiffness: K, of everything but one-sided springs [n x m x m].
+        force: f, of everything but these [n x m].
+        lines: by which a unit of each motion stretches them [n x springs x m].
+        loads: that they would carry if they carried both ways, positive where they carry [n x springs].
+        springs: stiffness of them [n x springs].
+    """
+
+    stiffness: Array
+    force: Array
+    lines: Array
+    loads: Array
+    springs: Array
+
+    def change(self, step: Array) -> Array:
+        """How much higher the model is after a step [n x m] than before it [n]."""
+        smooth = -(self.force * step).sum(axis=1) + 0.5 * np.einsum("ni,nij,nj->n", step, self.stiffness, step)
+        before, after = (np.maximum(loads, 0.0) for loads in (self.loads, self.loads_after(step)))
+        return np.asarray(smooth + (0.5 * (after - before) * (after + before) / self.springs).sum(axis=1))
+
+    def loads_after(self, step: Array) -> Array:
+        """`loads` after a step [n x m]."""
+        return np.asarray(self.loads + self.springs * np.einsum("nsm,nm->ns", self.lines, step))
+
+    def lowest_point(self, radius: Array) -> tuple[Array, Array]:
+        """The lowest point that was met within a radius [n]: the step there [n x m], and the fall to it [n].
+
+        Each point is the least value for springs that carry or not as at the point before.
+        """
+        carries = self.loads >= 0.0
+        best, fall = np.zeros_like(self.force), np.zeros(len(radius))
+        for _ in range(MOST_SWITCHES):
+            springs = np.where(carries, self.springs, 0.0)
+            stiffness = self.stiffness + np.einsum("nsi,ns,nsj->nij", self.lines, springs, self.lines)
+            force = self.force - np.einsum("ns,nsi->ni", np.where(carries, self.loads, 0.0), self.lines)
+            step = least_within(stiffness, force, radius)
+            lower = -self.change(step)
+            best, fall = np.where((lower > fall)[:, None], step, best), np.maximum(lower, fall)
+            last, carries = carries, self.loads_after(step) >= 0.0
+            if (last == carries).all():
+                break
+        return best, fall
+
+
+def _model(equations: Balance, part: Admissible) -> _Model:
+    """The model over the admissible motions of some poses."""
+    legs, starts = equations.mechanism.legs, starts_of(equations)
+    elastic, geometric, _ = (matrix[part.rows] for matrix in tangent_matrices(equations))
+    left = equations.left[part.rows][:, places_of(equations)[0]]
+    lines, loads, springs = [], [], []
+    for leg, coordinates, start in zip(legs, equations.state.coordinates, starts, strict=False):
+        for i in np.flatnonzero(leg.sign):
+            loads.append((leg.sign[i] * (leg.stiffness[:, i] * coordinates[:, i] + leg.preload[:, i]))[part.rows])
+            springs.append(leg.stiffness[part.rows, i])
+            lines.append(leg.sign[i] * part.motions[:, start + i])
+            elastic[:, start + i, start + i] = 0.0
+            left[:, start + i] -= leg.sign[i] * np.maximum(loads[-1], 0.0)
+    force = -(np.swapaxes(part.motions, 1, 2) @ left[:, :, None])[:, :, 0]
+    columns = (np.stack(lines, axis=1), np.stack(loads, axis=1), np.stack(springs, axis=1))
+    return _Model(within(elastic + geometric, part.motions), force, *columns)
+
+
+def least_within(stiffness: Array, force: Array, radius: Array) -> Array:
+    """Where -f y + y K y / 2 is least among all y within a radius [n x m].
+
+    That is (K + s) y = f with the least shift s that leaves no negative eigenvalue and no longer y. Where the force is
+    at right angles to a direction in which the potential falls to both sides, y does not choose one.
+
+    Args:
+        stiffness: symmetric, of any sign [n x m x m].
+        force: [n x m].
+        radius: [n].
+
+    Source: J. Moré and D. Sorensen, "Computing a trust region step", SIAM J. Sci. Stat. Comput. 4, 1983.
+    """
+    values, vectors = np.linalg.eigh(stiffness)
+    parts = np.einsum("nij,ni->nj", vectors, force)
+    lower = np.maximum(0.0, -values[:, 0])
+    upper = lower + np.linalg.norm(parts, axis=1) / radius
+
+    def amounts(shift: Array) -> Array:
+        return parts / np.maximum(values + shift[:, None], ZERO_PIVOT)
+
+    inside = np.linalg.norm(amounts(lower), axis=1) <= radius
+    upper = np.where(inside, lower, upper)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (lower + upper)
+        short = np.linalg.norm(amounts(middle), axis=1) <= radius
+        lower, upper = np.where(short, lower, middle), np.where(short, middle, upper)
+    return np.einsum("nij,nj->ni", vectors, amounts(upper))
