@@ -76,6 +76,11 @@ NEGLIGIBLE_COMPONENT = 1e-9
 """Share of a screw's largest component below which another one is round-off and is not written out."""
 PARALLEL_AXES = 1e-12
 """Sine of the angle between axes up to which they are parallel as written in a file."""
+ONE_PLACE = 1e-12
+"""Share of the distance of joints from the origin of the base below which they lie at the platform point P: what is
+left of points that coincide, once they have been turned."""
+LEAST_LENGTH = 1e-15
+"""The same, m, where that point is the origin itself, as far as the machine knows: smaller than an atom."""
 NO_LINK = 1e-9
 """Length of a link, m, below which it has no direction."""
 

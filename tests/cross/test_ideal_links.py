@@ -33,6 +33,7 @@ TRUE = {
     "loaded-agile-eye": (3, {"ry": 1.66e-3}),
     "rank-of-c": (4, {}),
     "rigid-or-round-off": (5, {}),
+    "joints-at-one-point": (4, {"rx": 0.105, "y": 5.47e-10}),
 }
 """Rank of C, and diagonal entries of it (SI), by independent engines."""
 
@@ -62,9 +63,12 @@ def test_what_rigid_parts_hold_is_exactly_rigid(name):
     assert np.all(np.isinf(stiff) | (stiff < 1e20))
 
 
-@pytest.mark.parametrize("name", [name for name in TRUE if name != "rank-of-c"])
+@pytest.mark.parametrize("name", sorted(TRUE.keys() - {"rank-of-c", "joints-at-one-point"}))
 def test_the_loaded_machine_without_its_load_has_the_same_compliance(name):
-    """The tangent at rest is found over admissible motions, C by wrenches: two routes. rank-of-c has a free drive."""
+    """The tangent at rest is found over admissible motions, C by wrenches: two routes.
+
+    rank-of-c has a free drive; where joints meet in a point, displacements of 1e-12 m stand beside turns of 0.1 rad.
+    """
     machine = case(name)
     joints = solve_joints(machine)
     mechanism = with_share(mechanism_of(machine, respond(machine, joints), joints), 0.0)

@@ -227,6 +227,15 @@ def test_springs_of_a_matrix_without_rotations_or_translations(entries):
     assert end_compliance(found, X_AXIS) == pytest.approx(np.diag(entries) * 1e-6, rel=1e-9, abs=1e-18)
 
 
+def test_a_matrix_of_low_rank_has_no_springs_of_round_off():
+    """What a matrix of rank 3 leaves once its turns are subtracted is rigid, however unlike they are."""
+    draw = np.random.default_rng(1)
+    for contrast in (1.0, 1e-2, 1e-4):
+        for _ in range(50):
+            columns = draw.normal(size=(6, 3)) * [1.0, 1.0, contrast] * np.repeat([1e-3, 2e-4], 3)[:, None]
+            assert len(matrix_springs("link", columns @ columns.T, ZERO)) == 3
+
+
 @rigidities
 def test_a_beam_as_a_matrix_of_ones_own(rigidity):
     beam = Beam("beam", Vector(0.1, 0.2, 0.3), Vector(0.4, -0.2, 0.5), Z_AXIS, rigidity)

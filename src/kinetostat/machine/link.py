@@ -5,6 +5,7 @@ What a cross-section and a material make of a link is `cross_section`'s; where l
 Source: theory (17) and (18); Tables I and II of the paper for lumped joints. Points and axes are in the base frame.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -25,6 +26,7 @@ from kinetostat.algebra.vector import (
     rotation_along,
 )
 from kinetostat.machine.leg import RIGID, Joint, Spring
+from kinetostat.tolerances import ROUND_OFF_OF_COMPLEMENT
 
 NEGLIGIBLE = 1e-14
 """Share of its trace below which a block of a compliance counts as rigid: its entries are round-off."""
@@ -286,20 +288,23 @@ def matrix_springs(name: str, compliance: npt.ArrayLike, point: Vector) -> tuple
     matrix = np.asarray(compliance, dtype=float)
     turning, coupling, moving = matrix[:3, :3], matrix[3:, :3], matrix[3:, 3:]
     springs: list[tuple[Joint, float]] = []
-    for value, axis in _principal(turning, float(np.trace(turning))):
+    turns = _principal(turning, NEGLIGIBLE * float(np.trace(turning)))
+    for value, axis in turns:
         moved = coupling @ axis / value
         moving = moving - value * np.outer(moved, moved)
         pitch = float(axis @ moved)
         pitch = pitch if abs(pitch) > FLAT * np.linalg.norm(moved) else 0.0
         foot = point + Vector(*np.cross(axis, moved).tolist())
         springs.append((Joint(Vector(*axis.tolist()), foot, pitch=pitch), 1.0 / value))
-    for value, axis in _principal(moving, float(np.trace(matrix[3:, 3:]))):
+    # The root of the contrast of the turns is lost where their share in the motion is subtracted.
+    lost = math.sqrt(turns[0][0] / turns[-1][0]) if turns else 1.0
+    for value, axis in _principal(moving, ROUND_OFF_OF_COMPLEMENT * lost * float(np.trace(matrix[3:, 3:]))):
         springs.append((Joint(Vector(*axis.tolist())), 1.0 / value))
     return tuple(Spring(f"{name} mode {n}", joint, k, part=name) for n, (joint, k) in enumerate(springs, 1))
 
 
-def _principal(block: npt.NDArray[np.float64], size: float) -> list[tuple[float, npt.NDArray[np.float64]]]:
-    """Principal compliances of a block and their directions, the softest first, without those that are round-off."""
+def _principal(block: npt.NDArray[np.float64], least: float) -> list[tuple[float, npt.NDArray[np.float64]]]:
+    """Principal compliances of a block above the `least` and their directions, the softest first."""
     values, axes = np.linalg.eigh(block)
     pairs = zip(values[::-1].tolist(), axes.T[::-1], strict=True)
-    return [(value, axis) for value, axis in pairs if value > NEGLIGIBLE * size]
+    return [(value, axis) for value, axis in pairs if value > least]

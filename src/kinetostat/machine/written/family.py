@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import lru_cache, partial, reduce
 from typing import Any, cast
 
-from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total
+from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.machine.cross_section import least_bending_of, linear_density_of, rigidity_of
 from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Station, Turn, series
@@ -22,6 +22,7 @@ from kinetostat.machine.written.joints import JOINT_TYPES, departure, own_axis
 from kinetostat.machine.written.plan import NAME, SUMMARY, JointPlan, LegPlan, LinkPlan, Plan, literals
 from kinetostat.machine.written.struts import rod_of, with_rods
 from kinetostat.machine.written.tables import tables_of
+from kinetostat.tolerances import LEAST_LENGTH, ONE_PLACE
 
 KEPT = 64
 """Families that are kept, so that machines with one plan share tables, models of files, and compiled programs."""
@@ -243,8 +244,18 @@ def _section(leg: LegPlan, body: str) -> str:
 
 
 def _length(plan: Plan, tables: Mapping[str, Any]) -> Scalar:
-    """Root mean square distance of the joints from P at the home pose, m; 1 m where all are at P, as slides may be."""
+    """Root mean square distance of the joints from P at the home pose, m; 1 m where all are at P, as slides may be.
+
+    They are at P as well where their distance is the round-off of their coordinates: a length of that size would make
+    every rotation negligible beside every translation.
+    """
     centre = Vector(*tables["platform"].point)
-    arms = [Vector(*joint_numbers(leg, joint, tables).point) - centre for leg in plan.legs for joint in leg.joints]
+    points = [Vector(*joint_numbers(leg, joint, tables).point) for leg in plan.legs for joint in leg.joints]
+    arms = [point - centre for point in points]
     squares = total([arm.dot(arm) for arm in arms])
-    return 1.0 if is_zero(squares) else sqrt(squares * (1.0 / len(arms)))
+    if is_zero(squares):
+        return 1.0
+    count = float(len(arms))
+    from_origin = total([point.dot(point) for point in (*points, centre)])
+    apart = squares > ONE_PLACE * ONE_PLACE * from_origin + count * LEAST_LENGTH * LEAST_LENGTH
+    return where(apart, sqrt(squares * (1.0 / count)), 1.0)
