@@ -28,7 +28,7 @@ MARKERS = {
         "test_studio_vibration",
     ),
     "engines": ("test_validation", "test_mujoco", "test_loaded_engines", "test_vibration_engines"),
-    "attack": ("test_attack",),
+    "attack": ("test_attack", "test_judge"),
     "packaging": ("test_packaging",),
     "numbers": (
         "test_derivatives",

@@ -8,12 +8,17 @@ import tempfile
 import time
 import traceback
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
+from random import Random
 from typing import Any
 
+import grown_machines
 import numpy as np
+from hostile import toml
+from laws import Case, broken_law, response_of
 from tables import GOOD_ENTRIES, MACHINE
 
 from kinetostat.cli import main
@@ -39,6 +44,8 @@ LONGEST_MESSAGE = 4000
 CODES = {0, 1, 2}
 FEW = 16
 """Machines that are drawn of a budget."""
+SHARE_OF_JUDGES = 0.05
+"""Of the machines that close, those that are judged as all files are as well."""
 
 
 class TooLong(BaseException):
@@ -120,6 +127,29 @@ def machine_case(text: str) -> str | None:
     """A machine file: read, analysed, written, read again."""
     machine = build(text, "file.toml")
     return wrong_answer(machine) or _lost_in_writing(machine)
+
+
+def grown_case(rng: Random, answered: Counter[str]) -> str | None:
+    """A machine that closes: it is built, and where it has an answer, this answer keeps all laws.
+
+    Args:
+        rng: from which the machine and the laws that judge it are drawn.
+        answered: counts the parts of the machines that are answered, and the status of all.
+    """
+    document = grown_machines.machine(rng)
+    text = toml(document)
+    machine = build(text, "grown.toml")
+    response = response_of(machine)
+    status = Status(int(response.status))
+    answered[f"status {status.word}"] += 1
+    if status is not Status.OK:
+        return None if analyze(machine).message else f"status {status} without a reason"
+    answered.update(grown_machines.parts_of(document))
+    if rng.random() < SHARE_OF_JUDGES:
+        finding = wrong_answer(machine) or _lost_in_writing(machine)
+        if finding:
+            return finding
+    return broken_law(Case(document, machine, response, rng))
 
 
 def wrong_answer(machine: Machine) -> str | None:

@@ -1,10 +1,11 @@
 """Kill long commands at random moments, damage what they left, and go on: the end must be what it would have been.
 
-Each try runs in processes of its own, with other hash seeds, and compares the folder byte for byte with one that
-nothing disturbed.
+Each try runs in processes of its own, with other hash seeds, and compares all files of the folder byte for byte with
+those of one that nothing disturbed.
 """
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -13,35 +14,44 @@ import time
 from pathlib import Path
 from random import Random
 
-from tables import MACHINE, good_table
+from tables import MACHINE, POSE, good_table
 
 MEASURED = "measured.csv"
-"""Written beside the folder of a command, where it runs."""
+POSES = "poses.csv"
+"""Both are written beside the folder of a command."""
 SEARCH = ["--set", "optimizer.population=8", "--set", "optimizer.generations=6"]
 COMMANDS = {
-    "search of a family": ["optimize", "zhang-gosselin-2002", *SEARCH],
-    "search leg by leg": ["optimize", "tripteron-weight", *SEARCH],
-    "front": ["pareto", "zhang-gosselin-front", *SEARCH],
+    "search of a family": ["optimize", "zhang-gosselin-2002", *SEARCH, "-o", "."],
+    "search leg by leg": ["optimize", "tripteron-weight", *SEARCH, "-o", "."],
+    "front": ["pareto", "zhang-gosselin-front", *SEARCH, "-o", "."],
     "map": ["map", "zhang-gosselin-4dof", "--over", "x=-40 cm:40 cm:300", "--over", "z=40 cm:140 cm:300",
-            "--over", "theta5=-70 deg:-50 deg:60", "--quantity", "compliance_x"],
-    "budget": ["budget", "hexapod", "--tolerance", "joints=0.05 mm", "--samples", "500000"],
-    "identification": ["identify", MACHINE, MEASURED, "--fit", "zeros", "--fit", "gains"],
+            "--over", "theta5=-70 deg:-50 deg:60", "--quantity", "compliance_x", "-o", "."],
+    "map leg by leg": ["map", "tripteron", "--over", "x=20 cm:30 cm:180", "--over", "y=20 cm:30 cm:180",
+                       "--over", "z=20 cm:30 cm:160", "--quantity", "compliance_x", "-o", "."],
+    "workspace": ["workspace", "hexapod", "--set", "limits.longest_leg=20 cm", "--over", "x=-8 cm:8 cm:41",
+                  "--over", "y=-8 cm:8 cm:41", "--over", "z=10 cm:25 cm:41", "-o", "."],
+    "report": ["report", MACHINE, "--without", "validation", "-o", "report.html"],
+    "path": ["path", MACHINE, f"../{POSES}", "-o", "path.csv", "-o", "path.nc", "-o", "path.svg"],
+    "budget": ["budget", "hexapod", "--tolerance", "joints=0.05 mm", "--samples", "500000", "-o", "."],
+    "identification": ["identify", MACHINE, f"../{MEASURED}", "--fit", "zeros", "--fit", "gains", "-o", "."],
 }  # fmt: skip
-LASTING = (
-    "designs.bin", "history.jsonl", "study.json", "map.nc", "best.toml", "budget.json", "contributions.csv", "fit.json",
-    "machine.toml",
-)  # fmt: skip
-"""Files of a folder whose bytes are the same however often the work was stopped."""
+"""Long commands; each runs in the folder that is compared, with what it measures beside it."""
+TIMED = re.compile(rb'"(started|finished|seconds|duration|elapsed)[^"]*": [^,}\n]+')
+"""What a file says of the time that its work took."""
 
 
 def run(command: list[str], folder: Path, seed: int, wait: float | None = None) -> subprocess.CompletedProcess[str]:
     """Run a command into a folder; kill it -9 after `wait` seconds where that is given."""
     line = [sys.executable, "-c", "import sys; from kinetostat.cli import main; sys.exit(main())"]
-    (folder.parent / MEASURED).write_text(good_table())
+    folder.mkdir(exist_ok=True)
+    measured = good_table()
+    (folder.parent / MEASURED).write_text(measured)
+    poses = [",".join(row.split(",")[: len(POSE)]) for row in measured.splitlines()]
+    (folder.parent / POSES).write_text("\n".join(poses))
     environment = {**os.environ, "PYTHONHASHSEED": str(seed), "MPLBACKEND": "agg"}
     with subprocess.Popen(
-        [*line, *command, "-o", str(folder)],
-        env=environment, cwd=folder.parent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        [*line, *command],
+        env=environment, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         start_new_session=True,
     ) as process:  # fmt: skip
         if wait is not None:
@@ -62,10 +72,11 @@ def undisturbed(name: str, folder: Path) -> tuple[Path, float]:
     return folder / "whole", time.monotonic() - start
 
 
-def lines_of(folder: Path) -> dict[str, list[bytes]]:
-    """Contents of the files that last; a chunk that was damaged and computed again has its line at the end."""
-    whole = {name: (folder / name).read_bytes() for name in LASTING if (folder / name).exists()}
-    return {name: sorted(data.split(b"\n")) if name == "history.jsonl" else [data] for name, data in whole.items()}
+def contents(folder: Path) -> dict[str, list[bytes]]:
+    """All files of a folder; a chunk that was damaged and computed again has its line at the end of the history."""
+    files = {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    files = {name: TIMED.sub(b"", data) for name, data in files.items() if not name.endswith(".lock")}
+    return {name: sorted(data.split(b"\n")) if name == "history.jsonl" else [data] for name, data in files.items()}
 
 
 def kill_and_resume(rng: Random, name: str, whole: Path, seconds: float) -> str | None:
@@ -84,7 +95,9 @@ def kill_and_resume(rng: Random, name: str, whole: Path, seconds: float) -> str 
         left = [path.name for path in folder.iterdir() if path.name.startswith(".") and path.suffix != ".lock"]
         if left:
             return f"{name}: litter is left: {left}"
-        return None if lines_of(folder) == lines_of(whole) else f"{name}, damaged: {damage}: another result"
+        ours, theirs = contents(folder), contents(whole)
+        other = sorted(file for file in ours.keys() | theirs.keys() if ours.get(file) != theirs.get(file))
+        return f"{name}, damaged: {damage}: another result in {', '.join(other)}" if other else None
 
 
 def harm(rng: Random, folder: Path) -> str:

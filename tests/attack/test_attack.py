@@ -21,6 +21,7 @@ def test_what_is_spoilt_was_good(text):
 
 
 def test_hostile_files_and_command_lines_are_well_answered():
-    command = [sys.executable, str(Path(__file__).parent), "--files", "600", "--lines", "150", "--longest", "120"]
+    command = [sys.executable, str(Path(__file__).parent), "--files", "600", "--machines", "30"]
+    command += ["--lines", "150", "--longest", "120"]
     attack = subprocess.run(command, capture_output=True, text=True)
     assert attack.returncode == 0, attack.stdout + attack.stderr
