@@ -6,6 +6,8 @@ from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any, get_type_hints
 
+from matplotlib.figure import Figure
+
 import kinetostat
 
 
@@ -25,7 +27,8 @@ def reference(_folder: Path) -> str:
 def answers() -> list[type]:
     """The classes of ours that public functions return, and that have no public name of their own."""
     functions = (inspect.unwrap(getattr(kinetostat, name)) for name in kinetostat.__all__)
-    returned = {get_type_hints(one).get("return") for one in functions if inspect.isfunction(one)}
+    drawn = {"Figure": Figure}  # which the module of `plot` does not import
+    returned = {get_type_hints(one, localns=drawn).get("return") for one in functions if inspect.isfunction(one)}
     ours = (one for one in returned if is_dataclass(one) and one.__name__ not in kinetostat.__all__)
     return sorted(ours, key=lambda one: one.__name__)
 
