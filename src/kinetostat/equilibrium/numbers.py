@@ -161,18 +161,19 @@ def borne(machine: Machine, response: Response, loads: Sequence[tuple[Spring, Sc
 def judged_at_rest(machine: Machine, response: Response) -> Response:
     """Return the response of a machine at its pose with what its actuators carry at rest compared with their limits.
 
-    Nothing changes where the machine is not meant under its loads, or comes to no rest there.
+    Nothing changes where the machine is not meant under its loads, where it comes to no rest there, and where its loads
+    say too little: the answer about its rest says so.
 
     Args:
         machine: with its pose, limits and loads.
         response: of it.
-
-    Raises:
-        InputError: as for `loaded_mechanism`.
     """
     if "actuators" not in rest_numbers(machine, ()):
         return response
-    states = states_of_rest(machine, {}, 1)
+    try:
+        states = states_of_rest(machine, {}, 1)
+    except InputError:
+        return response
     if not len(states.rows):
         return response
     checks = load_checks(machine, response.configuration, [(spring, size[0]) for spring, size in states.loads])
