@@ -29,7 +29,7 @@ from numeric import lost
 Array = npt.NDArray[np.float64]
 Columns = dict[str, Array]
 
-UNLOADED = [quantity for quantity in QUANTITIES.values() if not quantity.stateful]
+UNLOADED = [quantity for quantity in QUANTITIES.values() if not (quantity.loaded or quantity.modal)]
 NAMES = tuple(quantity.name for quantity in UNLOADED)
 DIAGONALS = (*GROUPS["compliance"], *GROUPS["stiffness"])
 AGREEMENT = 5e-12

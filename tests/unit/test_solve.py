@@ -134,9 +134,12 @@ def sizes_of(columns):
     return np.maximum(np.square(columns).max(axis=1), 1e-60).tolist()
 
 
-@given(matrices(), st.integers(0, 6), st.lists(st.floats(-8, 8), min_size=6, max_size=6))
+@given(matrices(), st.integers(0, 6), st.lists(st.floats(-2, 2), min_size=6, max_size=6))
 def test_conjugate_finds_the_factors_and_the_rank(rows, deficit, exponents):
-    """A = A' L^T and A'^T S A' = diag(d), to rounding of the terms; columns that S does not tell apart have d = 0."""
+    """A = A' L^T and A'^T S A' = diag(d), to rounding of the terms; columns that S does not tell apart have d = 0.
+
+    What is less than 1e-9 of the size of its row counts as round-off, so that columns differ by less than that here.
+    """
     columns = np.array(rows) + 2.0 * np.eye(len(rows))
     rank = max(0, len(columns) - deficit)
     columns[:, rank:] = columns[:, :rank] @ np.ones((rank, len(columns) - rank))

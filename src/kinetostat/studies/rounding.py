@@ -56,11 +56,18 @@ def clean_statics(statics: Statics) -> Statics:
 
 
 def _clean_sum(shares: Sequence[tuple[AnyScrew, Scalar]], length: float) -> tuple[tuple[AnyScrew, Scalar], ...]:
-    """Screws with their weights, with zeros in components that are round-off in every screw of the sum."""
+    """Screws with their weights, with zeros in components that are round-off in every screw of the sum.
+
+    Where the weight is infinite, of a free or a rigid spring, a component that is round-off would become infinite: it
+    is zero there whatever the other screws are.
+    """
     cleaned = [clean_screw(screw, length).components() for screw, weight in shares if weight > 0.0]
     reached = [any(components) for components in zip(*cleaned, strict=True)] or [False] * SIZE
     result = []
     for screw, weight in shares:
+        if math.isinf(weight):
+            result.append((clean_screw(screw, length), weight))
+            continue
         kept = [float(c) if there else 0.0 for c, there in zip(screw.components(), reached, strict=True)]
         result.append((type(screw)(Vector(*kept[:3]), Vector(*kept[3:])), weight))
     return tuple(result)
