@@ -4,18 +4,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 from hypothesis import assume
 
 from kinetostat.algebra.screw import Screw, Twist, Wrench
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
+from kinetostat.arrays import Array, Mask
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.common_tables import Load, Tool
 from kinetostat.machine.limits import Limits
 from kinetostat.machine.machine import Configuration, Family, Machine
-
-Array = npt.NDArray[np.float64]
 
 U = float(np.finfo(float).eps)
 """Rounding unit of float64, 2.2e-16."""
@@ -170,7 +168,7 @@ def columns(screws: Sequence[Screw]) -> Array:
     return np.array([s.components() for s in screws], dtype=float).T
 
 
-def reached(screws: Sequence[Screw], length: float) -> npt.NDArray[np.bool_]:
+def reached(screws: Sequence[Screw], length: float) -> Mask:
     """Entries [6 x 6] to which some screws contribute beyond rounding; refuses doubtful machines.
 
     For twists `length` is that of the machine (m), for wrenches its inverse: then all six components compare.

@@ -3,13 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import block_diag, null_space
 
 from kinetostat.algebra.screw import Screw
+from kinetostat.arrays import Array
 from kinetostat.kinetostatics.response import Response
-
-Array = npt.NDArray[np.float64]
 
 
 def compliance(response: Response) -> Array:

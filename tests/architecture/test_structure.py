@@ -8,6 +8,7 @@ from graphlib import TopologicalSorter
 from source import PACKAGE, ROOT, imports, modules, wrong_in
 
 LAYERS = [
+    "arrays",
     "tolerances",
     "units",
     "display",
@@ -76,12 +77,11 @@ def test_there_is_no_import_cycle():
 
 
 def test_algebra_needs_only_the_standard_library_and_tolerances():
-    """Its scalars bring their own functions; only the column of numbers is NumPy's array."""
+    """Its scalars bring their own functions."""
     allowed = {"kinetostat.tolerances"}
 
     def outside(module):
         others = {name for name in imports(module) if not f"{name}.".startswith("kinetostat.algebra.")} - allowed
-        others -= {"numpy"} if module == "kinetostat.algebra.column" else set()
         return {name for name in others if name.split(".")[0] not in sys.stdlib_module_names}
 
     assert not wrong_in(outside, [m for m in modules() if layer(m) == "algebra"])

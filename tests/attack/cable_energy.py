@@ -5,8 +5,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from grown_legs import Array, rotation
+from grown_legs import rotation
 from scipy.optimize import minimize
+
+from kinetostat.arrays import Array
 
 Document = dict[str, Any]
 

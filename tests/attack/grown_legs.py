@@ -12,9 +12,8 @@ from random import Random
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from kinetostat.arrays import Array
 
 LEAST_SINE = 0.3
 """Sine of the angle that axes of one joint make at least."""

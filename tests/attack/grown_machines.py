@@ -14,8 +14,9 @@ from typing import Any
 
 import grown_legs as legs
 import numpy as np
-from grown_legs import Array, Drawn, Joint, Leg, Place
+from grown_legs import Drawn, Joint, Leg, Place
 
+from kinetostat.arrays import Array
 from kinetostat.machine.written.joints import JOINT_TYPES, needs_axis, stiffness_kind
 
 Document = dict[str, Any]

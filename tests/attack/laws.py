@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 from cable_energy import BALANCED, Energy, platform_displacement
-from grown_legs import LENGTH, Array
+from grown_legs import LENGTH
 from same_machines import in_other_units, quarter, reordered, turned, with_matrices
 
+from kinetostat.arrays import Array
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Table
 from kinetostat.equilibrium.solving import Rest

@@ -9,8 +9,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from grown_legs import Array, rotation, unit
+from grown_legs import rotation, unit
 
+from kinetostat.arrays import Array
 from kinetostat.machine.cross_section import MATERIALS
 from kinetostat.machine.written.joints import stiffness_kind
 

@@ -6,11 +6,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from kinetostat.algebra.scalar import cos, reciprocal, smaller, sqrt, where
 from kinetostat.algebra.symmetric import POSITIONS
+from kinetostat.arrays import Array, Codes
 from kinetostat.engine.batch import by_free_springs, evaluate
 from kinetostat.engine.kernel import slab_kernel
 from kinetostat.engine.native import Body, Program, host_lanes
@@ -26,7 +26,6 @@ from kinetostat.machine.parameters import with_values
 from machines import CASES, Case, every_machine, one_of_each, stiffness_paths
 from numeric import lost
 
-Array = npt.NDArray[np.float64]
 Columns = dict[str, Array]
 
 UNLOADED = [quantity for quantity in QUANTITIES.values() if not (quantity.loaded or quantity.modal)]
@@ -52,7 +51,7 @@ class Found:
     """
 
     values: Array
-    status: npt.NDArray[np.int8]
+    status: Codes
     lost: Array | float = 0.0
 
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from kinetostat.arrays import Array
 from kinetostat.kinetostatics.assembly import stiffness_coefficients
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import springs
-from numeric import Array, array
+from numeric import array
 
 FILE = Path(__file__).with_name("reference.json")
 COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")

@@ -17,7 +17,8 @@ from kinetostat.accuracy.rows import Row
 from kinetostat.accuracy.screws import scaled
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
-from kinetostat.equilibrium.motion import Array, Motions, exponential, logarithm, still
+from kinetostat.arrays import Array
+from kinetostat.equilibrium.motion import Motions, exponential, logarithm, still
 from kinetostat.kinematics.closing import pose_of, stacked
 from kinetostat.kinetostatics.response import compliance_at
 from kinetostat.machine.leg import Element, Joint, Leg, Spring

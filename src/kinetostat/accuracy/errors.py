@@ -18,7 +18,7 @@ from kinetostat.accuracy.closing import free_screws, placed
 from kinetostat.accuracy.rows import Row, Rows, Unit, places_of
 from kinetostat.accuracy.screws import Screws, independent, moved_to, scaled
 from kinetostat.algebra.vector import AXES, ZERO, Vector
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.link import Parallelogram
 from kinetostat.tolerances import NO_LINK, PARALLEL_AXES, SEEN_BY_LEG

@@ -18,7 +18,8 @@ from kinetostat.accuracy.errors import Insertion, MachineError, Source, errors_o
 from kinetostat.accuracy.rows import Row, Rows, places_of, rows_of
 from kinetostat.accuracy.screws import independent, scaled
 from kinetostat.accuracy.shared import shared_errors
-from kinetostat.equilibrium.motion import Array, Motions, cross
+from kinetostat.arrays import Array, Codes, Integers
+from kinetostat.equilibrium.motion import Motions, cross
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.forward import stand
@@ -29,7 +30,6 @@ from kinetostat.machine.parameters import POSE, with_values
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import ONE_PLACEMENT
 
-Codes = npt.NDArray[np.int64]
 PLACED = (Status.OK, Status.JOINT_LIMIT)
 """Statuses at which errors have a meaning."""
 
@@ -124,7 +124,7 @@ class ErrorModel:
         """Place all legs with errors [errors], theory (48)."""
         return self._closed(np.asarray(values, dtype=float))
 
-    def taken(self, rows: npt.NDArray[np.int64]) -> "ErrorModel":
+    def taken(self, rows: Integers) -> "ErrorModel":
         """The model at some of its poses [rows]."""
         drawn = State(
             Motions(self._drawn.platform.rotation[rows], self._drawn.platform.translation[rows]),
@@ -136,7 +136,7 @@ class ErrorModel:
         soft = tuple(s[rows] for s in self._soft)
         return replace(self, _drawn=drawn, _flexible=flexible, _soft=soft, _latest={}, **parts)
 
-    def rates(self, rows: npt.NDArray[np.int64] | None = None, values: Array | None = None) -> Array:
+    def rates(self, rows: Integers | None = None, values: Array | None = None) -> Array:
         """Motion of the tool per unit of each error, with the actuators held, theory (46).
 
         Args:

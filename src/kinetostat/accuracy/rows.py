@@ -15,7 +15,7 @@ import numpy as np
 
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.vector import ZERO, Vector
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array
 from kinetostat.machine.actuators import actuators_of, joint_actuators, senses_of
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram

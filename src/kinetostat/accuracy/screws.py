@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from kinetostat.equilibrium.motion import Array, cross
+from kinetostat.arrays import Array, Mask
+from kinetostat.equilibrium.motion import cross
 from kinetostat.tolerances import NEARLY_DEPENDENT, SEEN_BY_LEG
 
-Mask = npt.NDArray[np.bool_]
 SEEN = 1e-7
 """Least ratio of a singular value of joint screws to the largest one, with lengths in units of the machine's."""
 

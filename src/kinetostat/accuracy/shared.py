@@ -12,7 +12,8 @@ import numpy as np
 
 from kinetostat.accuracy.errors import Insertion, MachineError, Source
 from kinetostat.accuracy.rows import Rows, Unit, rows_of
-from kinetostat.equilibrium.motion import Array, Motions, logarithm
+from kinetostat.arrays import Array
+from kinetostat.equilibrium.motion import Motions, logarithm
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
 

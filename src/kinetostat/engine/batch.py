@@ -12,11 +12,11 @@ from functools import partial
 from itertools import islice
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Codes, Integers
 from kinetostat.engine.kernel import Fill, fill_some, slab_kernel
 from kinetostat.engine.loaded import Way, loaded_fill, way_of
-from kinetostat.engine.points import Array, Part, Points
+from kinetostat.engine.points import Part, Points
 from kinetostat.equilibrium.numbers import states_of_rest
 from kinetostat.kinematics.limits import Check, load_checks
 from kinetostat.kinematics.status import Status
@@ -34,8 +34,6 @@ NATIVE_SLAB = 32768
 
 Progress = Callable[[int, int], None]
 """Called with (points done, points in all) after each slab."""
-
-Codes = npt.NDArray[np.int8]
 
 
 def silent(_done: int, _total: int) -> None:
@@ -207,7 +205,7 @@ def responses(machine: Machine, points: Points) -> Response:
         return respond(with_values(machine, points.columns(0, points.size)))
 
 
-def first_limit_passed(machine: Machine, columns: Mapping[str, Array], fields: Sequence[str]) -> npt.NDArray[np.int64]:
+def first_limit_passed(machine: Machine, columns: Mapping[str, Array], fields: Sequence[str]) -> Integers:
     """Find the first limit, in the order of the checks, that each point passes: its index in `fields`, or -1.
 
     Args:

@@ -15,6 +15,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from kinetostat.arrays import Array, Codes
 from kinetostat.engine.batch import NATIVE_SLAB, Progress, available_cores, by_free_springs, in_slabs, silent
 from kinetostat.engine.form import Form, Kind, Weights, angles, equations_of, form_of, joint_columns, objectives_of
 from kinetostat.engine.gradient import with_gradients
@@ -22,7 +23,7 @@ from kinetostat.engine.interpreter import Interpreted
 from kinetostat.engine.kernel import Fill, closes_inside, falling_back, program_columns
 from kinetostat.engine.loaded import States
 from kinetostat.engine.points import Points
-from kinetostat.engine.trace import Array, Codes, Runnable
+from kinetostat.engine.trace import Runnable
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.machine.machine import Machine

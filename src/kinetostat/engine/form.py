@@ -11,7 +11,8 @@ from typing import TypeAlias
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, where
-from kinetostat.engine.trace import Array, Body, Graph, Operand, Traced
+from kinetostat.arrays import Array
+from kinetostat.engine.trace import Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.equilibrium.reduced import reduced_machine
 from kinetostat.kinematics.closing import closing_equations

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from kinetostat.arrays import Array, Codes
 from kinetostat.engine.gradient import TURN, active_nodes, parents, rule, share_of
-from kinetostat.engine.trace import Array, Body, Codes, Node, Operand, Traced, needed
+from kinetostat.engine.trace import Body, Node, Operand, Traced, needed
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     "add": np.add,

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from kinetostat.arrays import Array, Codes
 from kinetostat.engine.form import Form, Kind, angles, form_of, joint_columns, objectives_of, reduced
-from kinetostat.engine.trace import Array, Codes, Runnable
+from kinetostat.engine.trace import Runnable
 from kinetostat.kinematics.closure import solver_of, task_of
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine

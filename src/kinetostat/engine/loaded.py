@@ -13,10 +13,11 @@ from threading import Lock
 
 import numpy as np
 
+from kinetostat.arrays import Array, Codes
 from kinetostat.engine.form import Form, Kind, angles, form_of, joint_columns, objectives_of, step_of
 from kinetostat.engine.interpreter import Interpreted
 from kinetostat.engine.kernel import Fill, closes_inside, falling_back, program_columns
-from kinetostat.engine.trace import Array, Body, Codes, Runnable
+from kinetostat.engine.trace import Body, Runnable
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.numbers import check_loads, loaded_numbers
 from kinetostat.kinematics.status import Status

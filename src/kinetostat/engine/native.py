@@ -13,9 +13,9 @@ from typing import Any
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 import numpy as np
-import numpy.typing as npt
 
-from kinetostat.engine.trace import Array, Body, Codes, Condition, Node, Operand, Traced, needed
+from kinetostat.arrays import AnyArray, Array, Codes
+from kinetostat.engine.trace import Body, Condition, Node, Operand, Traced, needed
 
 
 class Program:
@@ -43,7 +43,7 @@ class Program:
         if count < self._lanes:
             self._run_few(fixed, columns, results, codes)
             return
-        arrays: list[npt.NDArray[Any]] = [*columns, results, codes]
+        arrays: list[AnyArray] = [*columns, results, codes]
         if any(array.strides[-1] != array.itemsize or array.shape[-1] != count for array in arrays):
             raise ValueError("columns, rows of results and codes must be contiguous and of one length")
         starts = np.array([_address(column) for column in columns], dtype=np.uintp)
@@ -60,7 +60,7 @@ class Program:
             results[:], codes[:] = padded[:, :count], all_codes[:count]
 
 
-def _address(array: npt.NDArray[Any]) -> int:
+def _address(array: AnyArray) -> int:
     return array.__array_interface__["data"][0]
 
 

@@ -9,9 +9,8 @@ from math import prod
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from kinetostat.arrays import Array
 
 
 class Points(Protocol):

@@ -6,18 +6,10 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from kinetostat.engine.batch import (
-    NATIVE_SLAB,
-    Codes,
-    Method,
-    available_cores,
-    by_free_springs,
-    in_slabs,
-    program_fill,
-)
+from kinetostat.arrays import Array, Codes
+from kinetostat.engine.batch import NATIVE_SLAB, Method, available_cores, by_free_springs, in_slabs, program_fill
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.loaded import loaded_fill, way_of
-from kinetostat.engine.points import Array
 from kinetostat.kinetostatics.quantities import needs_state
 from kinetostat.machine.machine import Machine
 

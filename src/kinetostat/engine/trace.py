@@ -9,13 +9,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn, Protocol, TypeAlias
 
-import numpy as np
-import numpy.typing as npt
-
+from kinetostat.arrays import Array, Codes
 from kinetostat.engine.trigonometry import cos_and_sin
 
-Array = npt.NDArray[np.float64]
-Codes = npt.NDArray[np.int8]
 Operand: TypeAlias = "Node | float"
 Bounds: TypeAlias = tuple[float, float]
 

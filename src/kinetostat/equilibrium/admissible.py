@@ -11,16 +11,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.motion import Array
 from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT, OPEN_BY_STEP, UNRESISTED
 
-Rows = npt.NDArray[np.int64]
 
-
-def starts_of(equations: Balance) -> npt.NDArray[np.int64]:
+def starts_of(equations: Balance) -> Integers:
     """The first place of each leg's coordinates, after those of the platform's twist, and the end of the last one's."""
     sizes = [leg.size for leg in equations.mechanism.legs]
     return equations.mechanism.ways.shape[1] + np.cumsum([0, *sizes])
@@ -65,12 +62,12 @@ class Admissible:
             can be closed.
     """
 
-    rows: Rows
+    rows: Integers
     motions: Array
     inverse: Array
 
 
-def admissible(equations: Balance, conditions: Array, rows: Rows | None = None) -> Iterator[Admissible]:
+def admissible(equations: Balance, conditions: Array, rows: Integers | None = None) -> Iterator[Admissible]:
     """Sort poses by the number of their independent conditions.
 
     Where the coordinates of each leg follow from its end, the motions of the platform are a basis, in a hundredth of
@@ -98,7 +95,7 @@ def admissible(equations: Balance, conditions: Array, rows: Rows | None = None) 
         yield Admissible(rows[here], np.swapaxes(right[here, rank:], 1, 2), inverse)
 
 
-def _following(equations: Balance, conditions: Array, rows: Rows) -> Admissible | None:
+def _following(equations: Balance, conditions: Array, rows: Integers) -> Admissible | None:
     """The motions of the platform, and of legs that follow it in one way each, where they surely do."""
     size, starts = equations.mechanism.ways.shape[1], starts_of(equations)
     if any(leg.size != size for leg in equations.mechanism.legs):
@@ -152,7 +149,7 @@ def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Arr
     return result
 
 
-def places_of(equations: Balance) -> tuple[Rows, Rows]:
+def places_of(equations: Balance) -> tuple[Integers, Integers]:
     """The places of the twist and all coordinates among the unknowns, and those of the wrenches of the legs."""
     ways, starts = equations.mechanism.ways.shape[1], equations.starts
     every = np.arange(starts[-1])
@@ -176,7 +173,7 @@ def spring_factor(equations: Balance, part: Admissible) -> Array:
     return np.asarray(np.linalg.qr(np.concatenate(rows, axis=1), mode="r"))
 
 
-def holds_all(springs: Array) -> npt.NDArray[np.bool_]:
+def holds_all(springs: Array) -> Mask:
     """Whether springs, given by their triangular factor R [k x m x m], hold every admissible motion [k]."""
     sizes = np.abs(np.diagonal(springs, axis1=1, axis2=2))
     return np.asarray(sizes.min(axis=1) > UNRESISTED * sizes.max(axis=1))

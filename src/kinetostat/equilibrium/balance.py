@@ -11,12 +11,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.chains import Chain
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.motion import (
-    Array,
     Motions,
     brackets,
     cross,
@@ -45,7 +44,7 @@ class State:
     wrenches: tuple[Array, ...]
     amounts: Array
 
-    def taken(self, rows: npt.NDArray[np.int64]) -> "State":
+    def taken(self, rows: Integers) -> "State":
         """The state at some of the poses [rows]."""
         return State(
             Motions(self.platform.rotation[rows], self.platform.translation[rows]),
@@ -54,7 +53,7 @@ class State:
             self.amounts[rows],
         )
 
-    def replaced(self, rows: npt.NDArray[np.int64], part: "State") -> "State":
+    def replaced(self, rows: Integers, part: "State") -> "State":
         """The state with that of some of the poses [rows] in its place; given amounts stay as they are."""
 
         def put(old: Array, values: Array) -> Array:

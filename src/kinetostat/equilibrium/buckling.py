@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinetostat.algebra.vector import Vector
+from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.motion import Array
 from kinetostat.machine.leg import Leg, Line
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Member

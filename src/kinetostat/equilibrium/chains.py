@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.vector import Vector
-from kinetostat.equilibrium.motion import Array, of_scalars
+from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.equilibrium.motion import of_scalars
 from kinetostat.machine.leg import Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Member
@@ -70,7 +70,7 @@ class Masses:
     uncoupled: Array
     inertia: Array
 
-    def taken(self, rows: npt.NDArray[np.int64]) -> "Masses":
+    def taken(self, rows: Integers) -> "Masses":
         """The masses at some of n poses [rows]."""
         return replace(self, **{name: getattr(self, name)[rows] for name in ("point", "mass", "uncoupled", "inertia")})
 
@@ -136,7 +136,7 @@ class Chain:
         return len(self.springs)
 
     @property
-    def hinged(self) -> npt.NDArray[np.bool_]:
+    def hinged(self) -> Mask:
         """Which coordinates are flexure hinges, which pull back to the home pose [coordinates]."""
         return np.array([spring is not None and not is_zero(spring.returns) for spring in self.springs], dtype=bool)
 

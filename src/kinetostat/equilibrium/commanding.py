@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import free_state
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.motion import Array, logarithm
+from kinetostat.equilibrium.motion import logarithm
 from kinetostat.equilibrium.solving import Solution, at_rest, solve
 from kinetostat.tolerances import COMMANDED, UNRESISTED
 

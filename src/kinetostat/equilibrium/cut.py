@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, total
+from kinetostat.arrays import Array
 from kinetostat.equilibrium.chains import Chain, together
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
-from kinetostat.equilibrium.motion import Array
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Spring

@@ -12,8 +12,8 @@ Source: theory section 12. Units, axes and origin are those of `mechanism`.
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Mask
 from kinetostat.equilibrium.admissible import (
     Admissible,
     admissible,
@@ -25,7 +25,6 @@ from kinetostat.equilibrium.admissible import (
 )
 from kinetostat.equilibrium.balance import Balance, State, balance, potential
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.motion import Array
 from kinetostat.tolerances import CLOSED, NEARLY_AT_REST, ZERO_PIVOT
 
 MOST_STEPS = 200
@@ -72,7 +71,7 @@ def descent_from(mechanism: Mechanism, start: State) -> State:
     return state
 
 
-def _closed_state(mechanism: Mechanism, state: State) -> tuple[State, npt.NDArray[np.bool_]]:
+def _closed_state(mechanism: Mechanism, state: State) -> tuple[State, Mask]:
     """Close the legs by small motions, and say where that was done [n]."""
     for _ in range(MOST_CLOSINGS):
         equations = balance(mechanism, state)

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
+from kinetostat.arrays import Array
 from kinetostat.equilibrium.chains import Chain, Units
-from kinetostat.equilibrium.motion import Array
 from kinetostat.machine.leg import Spring
 from kinetostat.spec.errors import InputError
 

@@ -7,11 +7,11 @@ other one is nearby, where it is not stable, or where the next one is a leap awa
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Mask
 from kinetostat.equilibrium.balance import Balance, State, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.motion import Array, logarithm
+from kinetostat.equilibrium.motion import logarithm
 from kinetostat.equilibrium.solving import at_rest, newton, with_share
 from kinetostat.equilibrium.stability import Stability, stabilities, stability
 from kinetostat.tolerances import AT_REST, ZERO_PIVOT
@@ -121,7 +121,7 @@ def _standing(mechanism: Mechanism, shares: Array, last: Limit | None) -> Limit 
     return Limit(float(shares[count - 1]), equations, stability(equations))
 
 
-def _near(before: Mechanism, start: State, after: Mechanism, end: State) -> npt.NDArray[np.bool_]:
+def _near(before: Mechanism, start: State, after: Mechanism, end: State) -> Mask:
     """Whether states moved as the tangents at the start and at the end foresee, or as any mixture of both [n].
 
     Where a cable goes slack on the way, the one holds up to there and the other one from there.

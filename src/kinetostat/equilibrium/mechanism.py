@@ -12,13 +12,13 @@ Source: theory (35).
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, is_zero, total
 from kinetostat.algebra.vector import Displacement
+from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.chains import Chain, Given, Masses, Units, Weight, chain_of
 from kinetostat.equilibrium.drives import with_drives
-from kinetostat.equilibrium.motion import Array, of_scalars
+from kinetostat.equilibrium.motion import of_scalars
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring, Turn
@@ -59,7 +59,7 @@ class Mechanism:
     force: Array
     weighs: bool
 
-    def taken(self, rows: npt.NDArray[np.int64]) -> "Mechanism":
+    def taken(self, rows: Integers) -> "Mechanism":
         """The mechanism at some of its poses [rows]."""
         return replace(
             self,
@@ -95,7 +95,7 @@ def _wrench_units(length: Array, force: Array) -> Array:
     return np.stack([force * length] * 3 + [force] * 3, axis=1)
 
 
-def _taken(leg: Chain, rows: npt.NDArray[np.int64]) -> Chain:
+def _taken(leg: Chain, rows: Integers) -> Chain:
     parts = {name: getattr(leg, name)[rows] for name in ("twists", "stiffness", "preload", "idle", "rotors", "dampers")}
     return replace(leg, masses=leg.masses.taken(rows), **parts)
 

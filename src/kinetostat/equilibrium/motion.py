@@ -11,13 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, cos, is_zero, sin
 from kinetostat.algebra.vector import Vector, rotation_along
+from kinetostat.arrays import Array
 from kinetostat.kinematics.closing import stacked
-
-Array = npt.NDArray[np.float64]
 
 NEXT, AFTER = [1, 2, 0], [2, 0, 1]
 """The axes that come next in turn, and after these."""

@@ -7,12 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, smaller, total, where
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
-from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.solving import at_rest
 from kinetostat.equilibrium.stability import Stabilities, stabilities
 from kinetostat.equilibrium.tangent import compliance, inverse
@@ -35,7 +34,7 @@ FREE = (Status.OK, Status.SINGULAR)
 
 def loaded_mechanism(
     machine: Machine, response: Response, joints: Joints | None, count: int = 1
-) -> tuple[Mechanism, npt.NDArray[np.bool_]]:
+) -> tuple[Mechanism, Mask]:
     """The mechanism of a machine with its loads, see `mechanism_of`, with the tensions that its file leaves open.
 
     Returns:
@@ -112,8 +111,8 @@ class States:
         loads: size of what each actuator carries, N or N·m [n]; NaN where the machine is not at rest.
     """
 
-    status: npt.NDArray[np.int64]
-    rows: npt.NDArray[np.int64]
+    status: Integers
+    rows: Integers
     equations: Balance | None = None
     judged: Stabilities | None = None
     loads: tuple[tuple[Spring, Array], ...] = ()
@@ -208,7 +207,7 @@ def greatest_loads(loads: Sequence[tuple[Spring, Scalar]]) -> dict[str, Scalar]:
 
 def loaded_numbers(
     machine: Machine, columns: Mapping[str, Array], count: int, further: Mapping[str, Further] | None = None
-) -> tuple[dict[str, Array], npt.NDArray[np.int64]]:
+) -> tuple[dict[str, Array], Integers]:
     """Find the loaded states at n poses.
 
     Args:

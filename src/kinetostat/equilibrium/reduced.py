@@ -17,10 +17,11 @@ from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, total, 
 from kinetostat.algebra.solve import Eliminated, Row, eliminated
 from kinetostat.algebra.symmetric import POSITIONS, greatest_eigenvalue
 from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import LegTerms, leg_terms, placed_leg, platform_load
 from kinetostat.equilibrium.cut import Cut, Rod, cut
 from kinetostat.equilibrium.mechanism import mechanism_of
-from kinetostat.equilibrium.motion import Array, Motions, cross, of_scalars, skew_of
+from kinetostat.equilibrium.motion import Motions, cross, of_scalars, skew_of
 from kinetostat.equilibrium.numbers import FREE, borne, greatest_loads
 from kinetostat.equilibrium.solving import LONGEST_STEP
 from kinetostat.kinematics.closure import Joints

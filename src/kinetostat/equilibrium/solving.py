@@ -9,17 +9,14 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.admissible import finite_solution, solve_over_admissible
 from kinetostat.equilibrium.balance import Balance, State, balance, free_state
 from kinetostat.equilibrium.descent import descent_from
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.stability import stabilities
 from kinetostat.tolerances import AT_REST, STIFFEST_LEG
-
-Rows = npt.NDArray[np.int64]
 
 MOST_ITERATIONS = 25
 """Of Newton's method for one step of the load."""
@@ -54,9 +51,9 @@ class Solution:
     """
 
     balance: Balance
-    settled: npt.NDArray[np.bool_]
+    settled: Mask
 
-    def at(self, rows: Rows) -> Balance:
+    def at(self, rows: Integers) -> Balance:
         """The equations at some of the poses [rows]."""
         return balance(self.balance.mechanism.taken(rows), self.balance.state.taken(rows))
 
@@ -124,7 +121,7 @@ def with_share(mechanism: Mechanism, share: float | Array, preload: float | None
     return replace(mechanism, legs=legs, **loads)
 
 
-def _put(mechanism: Mechanism, reached: Solution, rows: Rows, part: Solution) -> Solution:
+def _put(mechanism: Mechanism, reached: Solution, rows: Integers, part: Solution) -> Solution:
     """The solution with some of its poses replaced."""
     settled = reached.settled.copy()
     settled[rows] = part.settled

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Mask
 from kinetostat.equilibrium.admissible import (
     admissible,
     holds_all,
@@ -18,7 +18,6 @@ from kinetostat.equilibrium.admissible import (
     within,
 )
 from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.motion import Array
 from kinetostat.tolerances import UNRESISTED
 
 
@@ -44,7 +43,7 @@ class Stability:
 class Stabilities:
     """The same of n states of rest: arrays with the poses first."""
 
-    stable: npt.NDArray[np.bool_]
+    stable: Mask
     factor: Array
     mode: Array
     legs: Array
@@ -62,7 +61,7 @@ def stabilities(equations: Balance) -> Stabilities:
     elastic, geometric, conditions = tangent_matrices(equations)
     count, size = len(elastic), ways.shape[1]
     sound = np.isfinite(elastic + geometric).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
-    stable: npt.NDArray[np.bool_] = np.array(sound)
+    stable: Mask = np.array(sound)
     factors, modes = np.where(sound, np.inf, np.nan), np.zeros((count, starts[-1]))
     for part in admissible(equations, conditions, np.flatnonzero(sound)):
         here, allowed = part.rows, part.motions

@@ -10,10 +10,10 @@ matrix", J. Mechanical Design 124(1), 2002. Units are those of `mechanism`.
 """
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Mask
 from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.motion import Array, skew_of
+from kinetostat.equilibrium.motion import skew_of
 from kinetostat.equilibrium.solving import solve
 from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, UNRESISTED
 
@@ -54,7 +54,7 @@ def inverse(compliances: Array) -> Array:
     return _with_held(np.where(finite, np.linalg.inv(usable) / products, np.inf), fixed)
 
 
-def _with_held(stiffness: Array, fixed: npt.NDArray[np.bool_]) -> Array:
+def _with_held(stiffness: Array, fixed: Mask) -> Array:
     """A stiffness with infinite entries between components that are fixed, and 0 between these and the others."""
     either, both = fixed[:, :, None] | fixed[:, None], fixed[:, :, None] & fixed[:, None]
     return np.where(both, np.inf, np.where(either & np.isfinite(stiffness), 0.0, stiffness))

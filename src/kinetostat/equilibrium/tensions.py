@@ -10,15 +10,14 @@ Source: theory (42). Units, axes and origin are those of `mechanism`.
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Mask
 from kinetostat.equilibrium.balance import Balance, balance, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.motion import Array
 from kinetostat.tolerances import BALANCED, UNRESISTED
 
 
-def tensioned(mechanism: Mechanism, least: Array, most: Array) -> tuple[Mechanism, npt.NDArray[np.bool_]]:
+def tensioned(mechanism: Mechanism, least: Array, most: Array) -> tuple[Mechanism, Mask]:
     """Choose the preloads of all springs so that the machine is at rest at its pose.
 
     Args:

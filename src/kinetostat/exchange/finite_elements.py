@@ -9,17 +9,15 @@ from itertools import count
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.arrays import Array
 from kinetostat.exchange.formats import ascii_line
 from kinetostat.exchange.results import reference_point
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_text
 from kinetostat.tolerances import ROUND_OFF_OF_COUPLING
-
-Array = npt.NDArray[np.float64]
 
 DEGREES_OF_FREEDOM = ("x", "y", "z", "rx", "ry", "rz")
 """1 to 6 of a node in every finite-element program: kinetostat's rx ry rz x y z with the halves exchanged."""

@@ -12,9 +12,9 @@ from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.vector import Rotation, Vector
+from kinetostat.arrays import Array
 from kinetostat.kinematics.mobility import task_coordinates
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.common_tables import Load, Tool
@@ -291,7 +291,7 @@ def _parallelogram(element: Parallelogram) -> dict[str, Any]:
     return {"type": "parallelogram", **ends, "width": float(element.width), **bar}
 
 
-def compliance_at(springs: Sequence[Spring], point: Vector) -> npt.NDArray[np.float64]:
+def compliance_at(springs: Sequence[Spring], point: Vector) -> Array:
     """Return the sum of what springs between two bodies deflect at a point [6 x 6], base axes, rx ry rz x y z, SI.
 
     A file gives 0 where a link is rigid, and so it is where a spring's twist is only round-off, or less than a file may

@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array
 from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model, build
 from kinetostat.exchange.mjcf_pace import IMPEDANCE, LEAST_STEPS, Pace, pace_of
@@ -21,8 +21,6 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_text
 from kinetostat.validation.masses import Heavy
-
-Array = npt.NDArray[np.float64]
 
 THICKNESS = 0.008
 """Radius of a link in the picture, as a share of the machine's extent."""

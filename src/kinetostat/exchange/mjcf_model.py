@@ -9,16 +9,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.vector import Vector
+from kinetostat.arrays import Array
 from kinetostat.machine.leg import Joint, Leg, Spring
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration, Plane
 from kinetostat.tolerances import COINCIDENT_HINGES
 from kinetostat.validation.pieces import Piece, Strut, array, joint_of, moves_in, pieces
-
-Array = npt.NDArray[np.float64]
 
 MOST_FREEDOMS = 6
 """Degrees of freedom of one body."""

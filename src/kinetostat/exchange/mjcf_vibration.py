@@ -8,8 +8,8 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model
 from kinetostat.exchange.mjcf_pace import GYRATION, Pace, compliances, step_for
 from kinetostat.exchange.results import reference_point
@@ -32,8 +32,6 @@ from kinetostat.validation.masses import (
     together,
 )
 from kinetostat.validation.pieces import Piece, array, joint_of, pieces
-
-Array = npt.NDArray[np.float64]
 
 LIGHT = 2e-5
 """Mass of a body that has none, as a share of all known masses: the engine moves none without a mass."""

@@ -19,9 +19,9 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import SubElement
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.vector import Vector
+from kinetostat.arrays import Array
 from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.leg_by_leg import compliance_at
 from kinetostat.exchange.results import reference_point
@@ -38,8 +38,6 @@ from kinetostat.studies.storage import replacing
 from kinetostat.tolerances import COINCIDENT_HINGES
 from kinetostat.validation.masses import Heavy, matrix_of, on_platform, thin_rod, together
 from kinetostat.validation.pieces import array
-
-Array = npt.NDArray[np.float64]
 
 TIP = "_tip"
 """End of the name of the last link of a leg; what stands before it is the leg's."""

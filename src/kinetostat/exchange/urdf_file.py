@@ -12,15 +12,13 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array
 from kinetostat.machine.common_tables import is_tensor_of_body
 from kinetostat.machine.parameters import TENSOR
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.validation.masses import Heavy, matrix_of
-
-Array = npt.NDArray[np.float64]
 
 MOST_JOINTS = 2000
 """Most joints of a file: more is a mistake."""

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from kinetostat.arrays import Array
 from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.urdf_export import OPPOSITE, TIP
-from kinetostat.exchange.urdf_file import Array, FileJoint, FileLoop, UrdfFile, numbers, read
+from kinetostat.exchange.urdf_file import FileJoint, FileLoop, UrdfFile, numbers, read
 from kinetostat.kinematics.mobility import task_coordinates
 from kinetostat.machine.loading import build
 from kinetostat.machine.machine import Machine

@@ -12,16 +12,14 @@ from dataclasses import dataclass
 from math import isnan
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, cos, sin, smaller, sqrt
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector, rotation_x, rotation_y, rotation_z
+from kinetostat.arrays import Array
 from kinetostat.machine.column import column
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.machine import Chains, Closure, Configuration, Step
 from kinetostat.machine.written.family import place
-
-Array = npt.NDArray[np.float64]
 
 POINT, ANGLES = ("x", "y", "z"), ("roll", "pitch", "yaw")
 

@@ -10,17 +10,10 @@ Source: theory (22) for Newton's method, (23) for closed forms.
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, where
-from kinetostat.kinematics.closing import (
-    Array,
-    clearance,
-    leg_end,
-    platform_placement,
-    squared_distance,
-    stacked,
-)
+from kinetostat.arrays import Array, Codes
+from kinetostat.kinematics.closing import clearance, leg_end, platform_placement, squared_distance, stacked
 from kinetostat.kinematics.following import follow
 from kinetostat.kinematics.leg_gaps import free_coordinates, goal_of, problems_of, undetermined
 from kinetostat.kinematics.leg_span import too_far_or_near
@@ -30,8 +23,6 @@ from kinetostat.machine.column import column
 from kinetostat.machine.leg import Turn
 from kinetostat.machine.machine import Chains, Machine
 from kinetostat.tolerances import CLOSED
-
-Codes = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)

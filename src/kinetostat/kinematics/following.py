@@ -11,8 +11,8 @@ that are accepted by the contraction of Newton's method.
 
 import numpy as np
 
-from kinetostat.kinematics.closing import Array
-from kinetostat.kinematics.leg_gaps import Coordinates, Mask, Numbers, Problems, least_norm, stays_in_plane
+from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.kinematics.leg_gaps import Coordinates, Problems, least_norm, stays_in_plane
 from kinetostat.kinematics.status import Status
 from kinetostat.kinematics.ways import Plan, Way, rows_of, some, ways
 from kinetostat.machine.leg import rows_about_one_point
@@ -48,7 +48,7 @@ BALL_AXES = 3
 """Revolutes of a ball joint."""
 
 
-def follow(problems: Problems, goal: Coordinates) -> tuple[Array, Numbers]:
+def follow(problems: Problems, goal: Coordinates) -> tuple[Array, Integers]:
     """Solve problems by following their solutions from the home pose, by one way after the other.
 
     Args:

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.vector import Displacement
-from kinetostat.kinematics.closing import ANGLES, Array, gaps_at, leg_ends, pose_of, squared_distance, stacked, units_of
+from kinetostat.arrays import Array, Mask
+from kinetostat.kinematics.closing import ANGLES, gaps_at, leg_ends, pose_of, squared_distance, stacked, units_of
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
@@ -25,8 +25,6 @@ from kinetostat.machine.column import column
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, parameters, values, with_values
 from kinetostat.tolerances import CLOSED, NEWTON_SETTLED, ONE_PLACEMENT, UNDRIVEN
-
-Mask = npt.NDArray[np.bool_]
 
 MOST_ITERATIONS = 60
 """Of damped least squares: a start that has not arrived by then is in no solution's reach."""

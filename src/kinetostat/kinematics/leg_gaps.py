@@ -11,14 +11,13 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import Displacement, Vector
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.kinematics.closing import (
     ANGLES,
     POINT,
-    Array,
     leg_end,
     placement_of,
     rotation_between,
@@ -30,8 +29,6 @@ from kinetostat.machine.leg import Joint
 from kinetostat.machine.machine import Chains, Step
 from kinetostat.tolerances import LEAST_NORM_DAMPING, PARALLEL_AXES, UNDETERMINED
 
-Numbers = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.bool_]
 Coordinates = dict[str, Scalar]
 """Of the platform: x, y, z (m) and roll, pitch, yaw (rad), one entry per problem; a float where it is the same."""
 
@@ -48,9 +45,9 @@ class Build:
 
     elements: tuple[Any, ...]
     slides: Mask
-    places: Numbers
+    places: Integers
 
-    def steps(self, poses: Numbers, legs: Numbers) -> tuple[Step, ...]:
+    def steps(self, poses: Integers, legs: Integers) -> tuple[Step, ...]:
         """The elements of some legs at some poses, as one leg over columns.
 
         Args:
@@ -65,7 +62,7 @@ class Build:
 
 def builds_of(chains: Chains) -> list[Build]:
     """Sort the legs of a machine by their build."""
-    alike: dict[tuple[Any, ...], list[tuple[list[Any], Numbers]]] = {}
+    alike: dict[tuple[Any, ...], list[tuple[list[Any], Integers]]] = {}
     first = 0
     for steps in chains.legs:
         elements = [getattr(step.element, "joint", step.element) for step in steps if step.moves]
@@ -122,8 +119,8 @@ class Part:
     """
 
     build: Build
-    legs: Numbers
-    columns: Numbers
+    legs: Integers
+    columns: Integers
 
 
 @dataclass(frozen=True)
@@ -141,7 +138,7 @@ class Problems:
     """
 
     chains: Chains
-    poses: Numbers
+    poses: Integers
     parts: tuple[Part, ...]
     free: tuple[str, ...]
 
@@ -161,7 +158,7 @@ class Problems:
         point = {name: _at(getattr(self.chains.home.translation, name), self.poses) for name in POINT}
         return point | dict.fromkeys(ANGLES, 0.0)
 
-    def take(self, chosen: Numbers) -> "Problems":
+    def take(self, chosen: Integers) -> "Problems":
         """Some of them, by number."""
         parts = tuple(replace(part, legs=part.legs[chosen]) for part in self.parts)
         return replace(self, poses=self.poses[chosen], parts=parts)
@@ -239,7 +236,7 @@ class Problems:
         return rates
 
 
-def _at(scalar: Scalar, poses: Numbers) -> Scalar:
+def _at(scalar: Scalar, poses: Integers) -> Scalar:
     values = plain(scalar)
     return values[poses] if np.size(values) > 1 else float(np.ravel(values)[0])
 

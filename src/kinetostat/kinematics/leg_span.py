@@ -14,8 +14,9 @@ import numpy as np
 
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.vector import Vector
-from kinetostat.kinematics.closing import POINT, Array, placement_of
-from kinetostat.kinematics.leg_gaps import Coordinates, Mask, Problems
+from kinetostat.arrays import Array, Mask
+from kinetostat.kinematics.closing import POINT, placement_of
+from kinetostat.kinematics.leg_gaps import Coordinates, Problems
 from kinetostat.kinematics.ways import columns_of, rows_of, vector_of
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.link import Parallelogram

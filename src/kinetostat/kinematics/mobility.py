@@ -13,7 +13,8 @@ import numpy as np
 
 from kinetostat.algebra.screw import Screw
 from kinetostat.algebra.vector import Vector
-from kinetostat.kinematics.singularity import Array, columns
+from kinetostat.arrays import Array
+from kinetostat.kinematics.singularity import columns
 from kinetostat.machine.leg import Joint, Leg
 from kinetostat.machine.machine import Configuration
 from kinetostat.spec.renamed import former_names

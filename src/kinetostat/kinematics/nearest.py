@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinetostat.kinematics.closing import ANGLES, POINT, Array
-from kinetostat.kinematics.leg_gaps import Numbers, Problems, free_coordinates, least_norm, problems_of
+from kinetostat.arrays import Array, Integers
+from kinetostat.kinematics.closing import ANGLES, POINT
+from kinetostat.kinematics.leg_gaps import Problems, free_coordinates, least_norm, problems_of
 from kinetostat.machine.machine import Machine
 from kinetostat.tolerances import CLOSED, DEPENDENT, NEAREST_GAIN, NO_COORDINATE
 
@@ -61,7 +62,7 @@ class _Search:
 
     problems: Problems
     home: dict[str, float]
-    rows: Numbers
+    rows: Integers
     goal: Array
 
     def nearest(self) -> Array:

@@ -6,13 +6,11 @@ Source: theory (3) and sections 2 and 8; screws are at one reference point, in b
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.screw import COMPONENTS, Screw, Wrench
+from kinetostat.arrays import Array
 from kinetostat.machine.leg import LegScrews, Spring
 from kinetostat.tolerances import NEGLIGIBLE_COMPONENT, PURE_TRANSLATION
-
-Array = npt.NDArray[np.float64]
 
 
 def columns(screws: Sequence[Screw], rotational_scale: float, translational_scale: float) -> Array:

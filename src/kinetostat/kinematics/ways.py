@@ -15,8 +15,9 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Vector
-from kinetostat.kinematics.closing import ANGLES, POINT, Array, placement_of
-from kinetostat.kinematics.leg_gaps import Coordinates, Mask, Numbers, Problems
+from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.kinematics.closing import ANGLES, POINT, placement_of
+from kinetostat.kinematics.leg_gaps import Coordinates, Problems
 from kinetostat.machine.column import column, plain
 from kinetostat.machine.leg import Joint
 
@@ -26,7 +27,7 @@ Plan = Callable[[Problems, Coordinates], Way]
 """From problems and their goals to a way."""
 
 
-def some(coordinates: Coordinates, chosen: Numbers) -> Coordinates:
+def some(coordinates: Coordinates, chosen: Integers) -> Coordinates:
     """The coordinates of some problems, by number."""
     return {name: value if isinstance(value, float) else value[chosen] for name, value in coordinates.items()}
 

@@ -13,7 +13,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from kinetostat.kinetostatics.indices import PLANAR, SPATIAL, Array, Matrix, finite
+from kinetostat.arrays import Array
+from kinetostat.kinetostatics.indices import PLANAR, SPATIAL, Matrix, finite
 from kinetostat.tolerances import NO_UNIQUE_CENTRE
 
 Point: TypeAlias = list[float]

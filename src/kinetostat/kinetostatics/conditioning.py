@@ -10,7 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.kinetostatics.indices import SPATIAL, Array, Matrix, finite
+from kinetostat.arrays import Array
+from kinetostat.kinetostatics.indices import SPATIAL, Matrix, finite
 from kinetostat.tolerances import ROUND_OFF_OF_EIGENVALUE
 
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinetostat.kinetostatics.indices import Array, Matrix, finite
+from kinetostat.arrays import Array
+from kinetostat.kinetostatics.indices import Matrix, finite
 from kinetostat.spec.immutable import Immutable
 from kinetostat.tolerances import PURE_COUPLE, ZERO_EIGENSCREW
 

@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.symmetric import SIZE, Symmetric6
+from kinetostat.arrays import Array
 from kinetostat.kinetostatics.assembly import compliance_of, stiffness_coefficients, weighted_sum
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring
@@ -28,8 +28,6 @@ SECANTS = 12
 """Most steps of the search for the limit of rigidity: they converge faster than by halving, two to eight are needed."""
 SETTLED = 1e-12
 """Share of a factor below which a step of that search is its last: the next one would be round-off."""
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,10 @@ import numpy.typing as npt
 
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.arrays import Array
 from kinetostat.spec.immutable import Immutable
 from kinetostat.tolerances import AT_RIGHT_ANGLES, ROUND_OFF_OF_COMPLEMENT, ROUND_OFF_OF_EIGENVALUE
 
-Array: TypeAlias = npt.NDArray[np.float64]
 Matrix: TypeAlias = Symmetric6 | npt.ArrayLike
 Block: TypeAlias = Literal["rotation", "translation"]
 

@@ -11,14 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.screw import Wrench
+from kinetostat.arrays import Array, Integers
 from kinetostat.kinetostatics.leg import relaxed
 from kinetostat.machine.leg import LegScrews
 from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT_WRENCHES
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,7 @@ def _load_shares(legs: Sequence[LegScrews]) -> Array:
     return np.array(rows).reshape(len(rows), every)
 
 
-def _involved(names: Sequence[str], owners: npt.NDArray[np.int64], loads: Array) -> tuple[str, ...]:
+def _involved(names: Sequence[str], owners: Integers, loads: Array) -> tuple[str, ...]:
     """Names of the legs that carry a share of any of these loads."""
     if not loads.size:
         return ()

@@ -7,9 +7,9 @@ It is what parameters become in a batch of machines or poses. With it a formula 
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar
+from kinetostat.arrays import AnyArray
 
 _new = object.__new__
 
@@ -31,9 +31,9 @@ class Column:
     __slots__ = ("values",)
     __array_priority__ = 1000.0  # an array on the left leaves the operation to the column
 
-    values: npt.NDArray[Any]
+    values: AnyArray
 
-    def __init__(self, values: npt.NDArray[Any]) -> None:
+    def __init__(self, values: AnyArray) -> None:
         self.values = values
 
     def __add__(self, other: Scalar) -> Scalar:
@@ -108,7 +108,7 @@ class Column:
         """Shape of the array."""
         return self.values.shape
 
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]:
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> AnyArray:
         array = self.values if dtype is None else self.values.astype(dtype, copy=False)
         return array.copy() if copy else array
 
@@ -116,7 +116,7 @@ class Column:
         return _Functions
 
 
-def _wrap(values: npt.NDArray[Any]) -> Column:
+def _wrap(values: AnyArray) -> Column:
     """Make a column without the call of `__init__`, which would cost a tenth of the whole batch."""
     made = _new(Column)
     made.values = values

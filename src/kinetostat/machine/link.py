@@ -25,6 +25,7 @@ from kinetostat.algebra.vector import (
     Vector,
     rotation_along,
 )
+from kinetostat.arrays import Array
 from kinetostat.machine.leg import RIGID, Joint, Spring
 from kinetostat.tolerances import ROUND_OFF_OF_COMPLEMENT
 
@@ -303,7 +304,7 @@ def matrix_springs(name: str, compliance: npt.ArrayLike, point: Vector) -> tuple
     return tuple(Spring(f"{name} mode {n}", joint, k, part=name) for n, (joint, k) in enumerate(springs, 1))
 
 
-def _principal(block: npt.NDArray[np.float64], least: float) -> list[tuple[float, npt.NDArray[np.float64]]]:
+def _principal(block: Array, least: float) -> list[tuple[float, Array]]:
     """Principal compliances of a block above the `least` and their directions, the softest first."""
     values, axes = np.linalg.eigh(block)
     pairs = zip(values[::-1].tolist(), axes.T[::-1], strict=True)

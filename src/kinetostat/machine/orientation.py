@@ -10,15 +10,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.tolerances import NO_ANGLE_RATES, ROUNDED_ORIENTATION
 from kinetostat.units import UnitError
-
-Array = npt.NDArray[np.float64]
 
 ANGLES = ("roll", "pitch", "yaw")
 TILT = ("azimuth", "angle", "torsion")

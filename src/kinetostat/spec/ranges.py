@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.units import KINDS, UnitError, write
@@ -32,7 +32,7 @@ class Range:
     count: int
     logarithmic: bool
 
-    def values(self, quantity: Quantity) -> npt.NDArray[np.float64]:
+    def values(self, quantity: Quantity) -> Array:
         """The values in SI.
 
         Raises:

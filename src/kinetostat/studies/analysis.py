@@ -11,11 +11,11 @@ from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.screw import COMPONENTS, Screw
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import IDENTITY, Rotation
+from kinetostat.arrays import Array
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.mobility import Mobility, mobility
 from kinetostat.kinematics.singularity import actuator_jacobian, columns, conditioning, describe, independent
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Rows = list[list[float]]
-Array = npt.NDArray[np.float64]
 
 AXES = ("base", "platform")
 """Axes in which results are given."""

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.loaded import Way
-from kinetostat.engine.points import Array
 from kinetostat.equilibrium.numbers import states_of_rest
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond

@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array, Mask
 from kinetostat.kinematics.closing import pose_of
 from kinetostat.machine.changing import changed
 from kinetostat.machine.machine import Machine
@@ -56,7 +55,7 @@ class Command(Immutable):
     before: Array
     left: Array
     turned: Array
-    settled: npt.NDArray[np.bool_]
+    settled: Mask
     message: str
 
     @property
@@ -159,7 +158,7 @@ def answer_of(machine: Machine, poses: PoseColumns | None, answer: Driven) -> Co
     )
 
 
-def _message(machine: Machine, settled: npt.NDArray[np.bool_], before: Array, left: Array) -> str:
+def _message(machine: Machine, settled: Mask, before: Array, left: Array) -> str:
     known, show = int(settled.sum()), machine.display.show_deflection
     if not known:
         return "The machine comes to rest at none of these poses; reduce the load, or preload what only pulls."

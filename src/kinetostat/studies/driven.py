@@ -7,12 +7,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Mask
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.commanding import commanded
-from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import loaded_mechanism
 from kinetostat.equilibrium.stability import stabilities
 from kinetostat.kinematics.closing import stacked
@@ -53,7 +52,7 @@ class Driven:
     rates: Array
 
     @property
-    def settled(self) -> npt.NDArray[np.bool_]:
+    def settled(self) -> Mask:
         """Where the machine comes to rest [n]."""
         return np.asarray(np.isfinite(self.coordinates).all(axis=1))
 
@@ -66,7 +65,7 @@ class Driven:
         """The first so many poses, and the others."""
         return self._made(lambda values: values[:count]), self._made(lambda values: values[count:])
 
-    def where(self, settled: npt.NDArray[np.bool_]) -> "Driven":
+    def where(self, settled: Mask) -> "Driven":
         """The answer with NaN at all other poses [n]."""
         return self._made(lambda values: np.where(settled.reshape(-1, *[1] * (values.ndim - 1)), values, np.nan))
 

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinetostat.arrays import Array
 from kinetostat.display import Display
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.points import Array, Points, Table
+from kinetostat.engine.points import Points, Table
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine

@@ -17,9 +17,9 @@ from typing import Any, BinaryIO
 import h5netcdf
 import h5py
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from kinetostat.arrays import AnyArray
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.storage import KEPT, settle, writing
 from kinetostat.studies.study_folder import checksum
@@ -35,8 +35,6 @@ SHOWN = 400
 STATUS = "status"
 UNKNOWN = -1
 """Status of points that are not computed yet."""
-
-Array = npt.NDArray[Any]
 
 
 def check_space(folder: Path, points: int, quantities: int) -> None:
@@ -173,7 +171,7 @@ class ResultFile:
         self._path = path
         self._stream = path.open("r+b")
 
-    def write(self, start: int, values: Mapping[str, Array], status: Array) -> str:
+    def write(self, start: int, values: Mapping[str, AnyArray], status: AnyArray) -> str:
         """Write a run of points; when this returns it is on the disk.
 
         The status comes last, so that a point that has one is complete.
@@ -228,7 +226,7 @@ class RowFile:
     ) -> None:
         self._stream.close()
 
-    def read(self, start: int, count: int, check: str | None) -> Array | None:
+    def read(self, start: int, count: int, check: str | None) -> AnyArray | None:
         """Return some rows [count x width], from number `start` on; None if they are damaged or not there.
 
         Args:
@@ -242,7 +240,7 @@ class RowFile:
             return None
         return np.frombuffer(data, dtype=KIND).reshape(count, self._width).astype(float)
 
-    def write(self, start: int, rows: Array) -> str:
+    def write(self, start: int, rows: AnyArray) -> str:
         """Put rows at number `start`, and return their checksum; when this returns they are on the disk.
 
         Raises:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.arrays import Array
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.points import Array, Table
+from kinetostat.engine.points import Table
 from kinetostat.equilibrium.numbers import judged_at_rest
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS, QUANTITIES, needs_state, rest_numbers

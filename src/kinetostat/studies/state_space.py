@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.screw import Screw
 from kinetostat.algebra.vector import Rotation
+from kinetostat.arrays import Array
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.response import Response
@@ -24,8 +24,6 @@ from kinetostat.studies.assembly import actuators_at
 from kinetostat.studies.refusal import known_mobility
 from kinetostat.studies.rounding import clean_matrix
 from kinetostat.tolerances import FREE_COMPONENT, MOST_LEG_CONTRAST, ROUND_OFF_OF_ENTRY, SINGULAR
-
-Array = npt.NDArray[np.float64]
 
 
 def standing_fields(machine: Machine, response: Response, joints: Joints | None) -> dict[str, Any]:

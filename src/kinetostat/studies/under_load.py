@@ -13,11 +13,11 @@ import numpy as np
 from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
+from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import Balance, balance, free_state
 from kinetostat.equilibrium.buckling import Strut, struts
 from kinetostat.equilibrium.limit import limit_of
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import actuator_loads_at_rest, loaded_mechanism
 from kinetostat.equilibrium.shape import loaded_links
 from kinetostat.equilibrium.solving import Rest, at_rest, solve, with_share

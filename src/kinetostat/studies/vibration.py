@@ -15,10 +15,10 @@ import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS, Twist, Wrench
 from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.arrays import Array, Complex
 from kinetostat.equilibrium.admissible import starts_of
 from kinetostat.equilibrium.balance import Balance, balance, free_state
 from kinetostat.equilibrium.mechanism import mechanism_of
-from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.numbers import loaded_mechanism
 from kinetostat.equilibrium.shape import loaded_links
 from kinetostat.equilibrium.solving import at_rest, with_share
@@ -41,16 +41,7 @@ from kinetostat.studies.refusal import why_not
 from kinetostat.tolerances import EQUAL_FREQUENCIES
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.modes import modes as solved_modes
-from kinetostat.vibration.receptance import (
-    ASSUMED_RATIO,
-    Complex,
-    Damper,
-    Softest,
-    along,
-    damper,
-    least_real_part,
-    receptance,
-)
+from kinetostat.vibration.receptance import ASSUMED_RATIO, Damper, Softest, along, damper, least_real_part, receptance
 from kinetostat.vibration.shares import effective_masses, kinetic_shares, strain_shares
 
 if TYPE_CHECKING:

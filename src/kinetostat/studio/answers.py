@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from kinetostat.arrays import Array
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.points import Array, Axis, Grid
+from kinetostat.engine.points import Axis, Grid
 from kinetostat.equilibrium.numbers import judged_at_rest
 from kinetostat.kinematics.singularity import free_twist
 from kinetostat.kinematics.status import PLACELESS, Status

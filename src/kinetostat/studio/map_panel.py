@@ -11,8 +11,8 @@ import numpy as np
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
+from kinetostat.arrays import Array
 from kinetostat.display import Scale
-from kinetostat.engine.points import Array
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studio.answers import Ends, MapRequest, finite, map_quantities, quantity_map

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 from nicegui import events, ui
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.spec.document import text_of
 from kinetostat.spec.errors import InputError

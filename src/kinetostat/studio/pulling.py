@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kinetostat.algebra.vector import IDENTITY, Displacement, Rotation, Vector, rotation_along
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.machine.common_tables import OF_VIBRATIONS
 from kinetostat.machine.machine import Configuration, Machine

@@ -6,12 +6,11 @@ As the functions of `answers` these run in threads and touch no page. The formul
 from dataclasses import dataclass
 from typing import Any
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array, Complex
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.vibration import Vibration, frequency_range, modes
-from kinetostat.vibration.receptance import Complex
 from kinetostat.views.scene.analysis_overlays import swing_data
 from kinetostat.views.scene.proportions import Proportions
 

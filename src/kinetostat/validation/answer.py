@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array
 from kinetostat.tolerances import RIGID_BLOCK_OF_ENGINE
-
-Array = npt.NDArray[np.float64]
 
 ROTATIONS, TRANSLATIONS = slice(0, 3), slice(3, 6)
 

@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.vector import Displacement, Rotation, Vector
+from kinetostat.arrays import Array
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Turn
@@ -24,8 +24,6 @@ from kinetostat.validation.family_legs import with_legs_of_file
 from kinetostat.validation.moving_legs import MovingLeg, apply, placement, turn, vector
 from kinetostat.validation.pieces import array, columns
 from kinetostat.validation.written_legs import written_legs
-
-Array = npt.NDArray[np.float64]
 
 STEPS = 20
 """Steps of Newton's method from coordinates that should be those of the pose already."""

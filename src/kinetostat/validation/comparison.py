@@ -13,10 +13,10 @@ from itertools import zip_longest
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.vector import Vector
+from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import balance, free_state
 from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.solving import with_share
@@ -35,8 +35,6 @@ from kinetostat.tolerances import AGREED, ROUND_OFF_OF_ENTRY
 from kinetostat.validation.answer import Answer, block_differences, difference
 from kinetostat.validation.as_written import drawing
 from kinetostat.vibration.modes import frequencies
-
-Array = npt.NDArray[np.float64]
 
 INSTALL = "Install it with `{}`."
 

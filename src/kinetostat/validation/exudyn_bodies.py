@@ -10,9 +10,8 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from kinetostat.arrays import Array
 
 TRANSLATION_FIRST = [3, 4, 5, 0, 1, 2]
 """Where Exudyn's x y z rx ry rz are in kinetostat's rx ry rz x y z, and the other way round."""

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.vector import Vector
+from kinetostat.arrays import Array
 from kinetostat.machine.leg import Joint, Spring
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration, Plane
@@ -29,8 +29,6 @@ from kinetostat.validation.pieces import (
     pieces,
     section_axes,
 )
-
-Array = npt.NDArray[np.float64]
 
 SHARES = (1e-3, 1e-4, 1e-5)
 """How far finite loads move the platform: rad, or share of the machine's length."""

@@ -5,8 +5,8 @@ machine is built is `exudyn_machine`'s business; here masses are added and the e
 """
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Spring
@@ -17,8 +17,6 @@ from kinetostat.validation.exudyn_bodies import Body, Multibody
 from kinetostat.validation.exudyn_machine import build, settings_of
 from kinetostat.validation.masses import has_rotors, links, on_platform, rotor_inertia
 from kinetostat.validation.pieces import array, pieces
-
-Array = npt.NDArray[np.float64]
 
 
 def frequencies(machine: Machine) -> Array:

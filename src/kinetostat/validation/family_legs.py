@@ -10,16 +10,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.vector import AXES, Displacement, Rotation
+from kinetostat.arrays import Array
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parts import Arm
 from kinetostat.validation.moving_legs import apply, placement, turn, unit, vector
 from kinetostat.validation.pieces import array, columns
-
-Array = npt.NDArray[np.float64]
 
 X, Y, Z = np.eye(3)
 CRANKS = "-rus"

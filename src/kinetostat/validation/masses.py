@@ -8,14 +8,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Displacement, Vector
+from kinetostat.arrays import Array
 from kinetostat.machine.machine import Configuration, Machine, Member
 from kinetostat.validation.pieces import array, bodies_before, columns
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.vector import Vector
+from kinetostat.arrays import Array
 from kinetostat.machine.leg import Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Member
 from kinetostat.spec.errors import InputError
 from kinetostat.validation.pieces import array
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

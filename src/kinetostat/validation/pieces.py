@@ -10,17 +10,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.vector import Rotation, Vector
+from kinetostat.arrays import Array
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Beam, Parallelogram, Rigidity
 from kinetostat.machine.machine import Plane
 from kinetostat.machine.parts import Arm
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import COINCIDENT
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

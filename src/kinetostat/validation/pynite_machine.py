@@ -7,9 +7,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.vector import Vector
+from kinetostat.arrays import Array
 from kinetostat.machine.leg import Joint, Leg, Spring
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration
@@ -18,8 +18,6 @@ from kinetostat.tolerances import BLOCK_BEING_EXTRAPOLATED
 from kinetostat.validation.answer import Answer, Trial, difference
 from kinetostat.validation.pieces import Piece, Strut, array, columns, joint_of, pieces, section_axes
 from kinetostat.validation.pynite_members import Frame
-
-Array = npt.NDArray[np.float64]
 
 TRIALS = 10
 """Number of stiffnesses that are tried for rigid parts."""

@@ -10,11 +10,9 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array
 from kinetostat.tolerances import SAME_NODE
-
-Array = npt.NDArray[np.float64]
 
 STUB = 0.4
 """Length of the member that represents a joint, as a share of the machine's."""

@@ -11,8 +11,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array
 from kinetostat.machine.cross_section import linear_density_of, rigidity_of
 from kinetostat.machine.leg import Element, Joint, PartName, Spring
 from kinetostat.machine.link import Beam, Parallelogram, matrix_springs
@@ -21,7 +21,6 @@ from kinetostat.machine.written.joints import JOINT_TYPES
 from kinetostat.units import parse
 from kinetostat.validation.moving_legs import Body, MovingLeg, Part, joint_in, turn, unit, vector
 
-Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, Any]
 
 ORDER = {

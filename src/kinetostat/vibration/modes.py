@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.admissible import starts_of, tangent_matrices, within
 from kinetostat.equilibrium.balance import Balance, placed_leg
-from kinetostat.equilibrium.motion import Array, skew_of
+from kinetostat.equilibrium.motion import skew_of
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.tolerances import CLOSING_ROUND_OFF, EQUAL_STIFFNESSES, UNRESISTED
 from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
@@ -111,7 +111,7 @@ class Solved:
         shapes: [k x coordinates x m].
     """
 
-    rows: npt.NDArray[np.int64]
+    rows: Integers
     squares: Array
     shapes: Array
 
@@ -145,8 +145,8 @@ def solved(equations: Balance, shaped: bool = True) -> Iterator[Solved]:
 
 
 def _allowed(
-    conditions: Array, left_out: Array, starts: npt.NDArray[np.int64], rows: npt.NDArray[np.int64]
-) -> Iterator[tuple[npt.NDArray[np.int64], list[Array]]]:
+    conditions: Array, left_out: Array, starts: Integers, rows: Integers
+) -> Iterator[tuple[Integers, list[Array]]]:
     """Poses with as many motions that obey all conditions, and these leg by leg.
 
     A leg follows the platform by the least motion of its coordinates, and has motions of its own besides. What a leg
@@ -187,7 +187,7 @@ def _allowed(
         yield rows[here], [platform, *moved]
 
 
-def _places(basis: Sequence[Array]) -> Iterator[npt.NDArray[np.int64]]:
+def _places(basis: Sequence[Array]) -> Iterator[Integers]:
     """Places of the motions of the platform, and then of each leg, among all."""
     common = basis[0].shape[2]
     end = common
@@ -197,7 +197,7 @@ def _places(basis: Sequence[Array]) -> Iterator[npt.NDArray[np.int64]]:
         yield np.concatenate([np.arange(common), np.arange(begin, end)])
 
 
-def _within(matrix: Array, rows: npt.NDArray[np.int64], basis: Sequence[Array], starts: npt.NDArray[np.int64]) -> Array:
+def _within(matrix: Array, rows: Integers, basis: Sequence[Array], starts: Integers) -> Array:
     """The symmetric part of a matrix over all coordinates, which couples none of different legs, over the motions."""
     places = list(_places(basis))
     size = 1 + max(place.max(initial=-1) for place in places)
@@ -215,7 +215,7 @@ def _spread(combined: Array, basis: Sequence[Array]) -> Array:
     )
 
 
-def _factors(stiff: Array) -> tuple[npt.NDArray[np.bool_], Array]:
+def _factors(stiff: Array) -> tuple[Mask, Array]:
     """Whether matrices K are positive definite by a margin [k], and L^-1 of those that are, K = L L^T."""
     with suppress(np.linalg.LinAlgError):
         factors = np.linalg.inv(np.linalg.cholesky(stiff))

@@ -9,19 +9,16 @@ Source: theory (59) and (60); the limit of a cut, J. Tlusty and M. Polacek (1963
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Complex
 from kinetostat.equilibrium.balance import Balance, balance, free_state
 from kinetostat.equilibrium.mechanism import mechanism_of
-from kinetostat.equilibrium.motion import Array
 from kinetostat.equilibrium.solving import with_share
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
 from kinetostat.vibration.modes import Modes, damping_matrix, modes
-
-Complex = npt.NDArray[np.complex128]
 
 ASSUMED_RATIO = 0.02
 """Damping ratio of every mode where a file says nothing about damping: that of many machine tools."""

@@ -16,10 +16,11 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.algebra.solve import Row, eliminated
 from kinetostat.algebra.symmetric import eigenvalues
+from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import balance, free_state, placed_leg
 from kinetostat.equilibrium.cut import Cut, Rod, cut
 from kinetostat.equilibrium.mechanism import mechanism_of, platform_weights
-from kinetostat.equilibrium.motion import Array, of_scalars
+from kinetostat.equilibrium.motion import of_scalars
 from kinetostat.equilibrium.reduced import place_of, relative
 from kinetostat.equilibrium.solving import with_share
 from kinetostat.kinematics.closure import Joints, solve_joints

@@ -9,9 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from kinetostat.arrays import Array
 from kinetostat.equilibrium.admissible import starts_of, tangent_matrices
 from kinetostat.equilibrium.balance import Balance, placed_leg
-from kinetostat.equilibrium.motion import Array
 from kinetostat.vibration.inertia import energies, leg_rates, platform_rates
 from kinetostat.vibration.modes import Modes
 

@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.scalar import Scalar, total
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.admissible import starts_of, tangent_matrices
 from kinetostat.equilibrium.balance import Balance, balance, free_state, placed_leg
 from kinetostat.equilibrium.chains import Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
-from kinetostat.equilibrium.motion import Array, of_scalars, still
+from kinetostat.equilibrium.motion import of_scalars, still
 from kinetostat.equilibrium.solving import with_share
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinetostatics.response import Response, respond
@@ -64,7 +64,7 @@ def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
     return [mechanism.force, *np.ascontiguousarray(columns.reshape(count, -1).T)]
 
 
-def _spins(equations: Balance, rows: npt.NDArray[np.int64], forces: Array) -> npt.NDArray[np.bool_]:
+def _spins(equations: Balance, rows: Integers, forces: Array) -> Mask:
     """Whether forces on the coordinates [k x coordinates x m] would turn links that are kept from spinning [k]."""
     pairs = zip(equations.mechanism.legs, pairwise(starts_of(equations)), strict=True)
     turning = [np.swapaxes(leg.idle[rows], 1, 2) @ forces[:, first:last] for leg, (first, last) in pairs]

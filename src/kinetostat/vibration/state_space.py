@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array
 from kinetostat.tolerances import UNRESISTED
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.receptance import Damper

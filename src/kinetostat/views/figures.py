@@ -9,7 +9,6 @@ from typing import Any, TypeAlias
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -19,6 +18,7 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 
+from kinetostat.arrays import Array
 from kinetostat.display import Scale, number, with_unit
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.machine.parameters import entry_name, names_entries
@@ -66,7 +66,6 @@ FLAT = 1e-9
 MOST_COUNTS = 12
 """Whole numbers that have a colour each; more of them are drawn as contours."""
 
-Array = npt.NDArray[np.float64]
 Drawings: TypeAlias = dict[str, Callable[[], Figure]]
 """Functions that draw a figure, by its name: a figure that nobody asks for is never drawn."""
 Tell: TypeAlias = Callable[[int, int, str], None]

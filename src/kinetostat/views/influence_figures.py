@@ -10,12 +10,12 @@ from functools import partial
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from kinetostat.arrays import Array
 from kinetostat.kinetostatics.elements import Element
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.parameters import with_leg
@@ -78,7 +78,7 @@ def coloured_table(
     return figure
 
 
-def _draw_cells(panel: Axes, cells: npt.NDArray[np.float64], colours: str, label: str) -> None:
+def _draw_cells(panel: Axes, cells: Array, colours: str, label: str) -> None:
     sizes = np.abs(cells[np.isfinite(cells)])
     most = max(usual_range(sizes)[1] if sizes.size else 0.0, LEAST_SCALE)
     scale = Normalize(-most, most)

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.ticker import MaxNLocator
 
+from kinetostat.arrays import Array
 from kinetostat.views.usual_values import WIDE, usual_range
-
-Array = npt.NDArray[np.float64]
 
 LEVELS = 12
 """Bands of a map, about."""

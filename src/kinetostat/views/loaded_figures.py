@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from kinetostat.arrays import Array
 from kinetostat.display import Scale, number
-from kinetostat.engine.points import Array
 from kinetostat.kinetostatics.deflected import Deflection
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine

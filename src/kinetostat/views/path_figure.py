@@ -2,11 +2,10 @@
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array, Integers
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.studies.evaluation.evaluation import PoseAnswers
@@ -62,7 +61,7 @@ def _panel(panel: Axes, answers: PoseAnswers, curves: dict[str, Array], label: s
     panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def _shade(panel: Axes, numbers: npt.NDArray[np.int64]) -> None:
+def _shade(panel: Axes, numbers: Integers) -> None:
     """Shade runs of poses."""
     for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
         if len(run):

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from kinetostat.arrays import Float32s
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, several, shorten
@@ -25,7 +26,6 @@ from kinetostat.views.rendering.visibility import Body, Hits, hits_of
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.solids import LAYERS, LOOKS, Label, Scene
 
-Floats = NDArray[np.float32]
 Theme: TypeAlias = Literal["light", "dark"]
 
 FINER = 2
@@ -170,7 +170,7 @@ def _lights(layers: Sequence[Hits], ground: Ground, casters: Body, detail: int) 
     return [Light(*part) for part in zip(*parts, strict=True)]
 
 
-def _machine(layers: Sequence[Hits], lights: Sequence[Light], camera: Camera, brightness: float) -> Floats:
+def _machine(layers: Sequence[Hits], lights: Sequence[Light], camera: Camera, brightness: float) -> Float32s:
     """What is seen of the solids [height x width x 4]: sRGB from 0 to 1 times opacity, and opacity.
 
     The opaque layer comes first; translucent ones are laid over it where nothing opaque hides them.
@@ -189,7 +189,7 @@ def _machine(layers: Sequence[Hits], lights: Sequence[Light], camera: Camera, br
     return summed / np.float32(FINER**2)
 
 
-def _composed(machine: Floats, shadow: Floats, ink: Floats, paper: Paper, transparent: bool) -> NDArray[np.uint8]:
+def _composed(machine: Float32s, shadow: Float32s, ink: Float32s, paper: Paper, transparent: bool) -> NDArray[np.uint8]:
     """The machine over the grid, over the shadow, over the page [height x width x 4]."""
     shadow, ink = paper.shadow * shadow[..., None], paper.grid * ink[..., None]
     under = np.zeros(3, np.float32) if transparent else np.array(paper.color, np.float32)

@@ -1,7 +1,8 @@
 """The values of a map that matter to the eye: all but the few next to a singularity, where compliance has no bound."""
 
 import numpy as np
-import numpy.typing as npt
+
+from kinetostat.arrays import Array
 
 USUAL = (2.0, 98.0)
 """Percentiles between which values are usual."""
@@ -11,7 +12,7 @@ WIDE = 30.0
 """Ratio of the usual values of a map, if all are positive, from which its colours follow the logarithm."""
 
 
-def usual_range(values: npt.NDArray[np.float64]) -> tuple[float, float]:
+def usual_range(values: Array) -> tuple[float, float]:
     """Return the ends between which a map should resolve values: extremes only where they lie near all others.
 
     A map of 41 x 41 poses with a single pose next to a singularity would otherwise be of one colour.

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array
 from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.vibration import DRAWN, Vibration, frequency_range

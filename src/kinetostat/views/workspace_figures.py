@@ -18,6 +18,7 @@ from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy import ndimage
 
+from kinetostat.arrays import Array
 from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.studies.grid.grid import field_of
 from kinetostat.studies.workspace.borders import depth
@@ -28,7 +29,6 @@ from kinetostat.studies.workspace.workspace import BORDER, SOFTEST, Workspace
 from kinetostat.views.figures import (
     COLOURS,
     STYLE,
-    Array,
     Drawings,
     axis_values,
     fill_regions,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.budget.inputs import Inputs
 from kinetostat.studies.budget.spread import Measures

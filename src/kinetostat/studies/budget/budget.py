@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.accuracy.model import ErrorModel, error_model
+from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.display import number, with_unit
 from kinetostat.engine.batch import Progress, silent
-from kinetostat.equilibrium.motion import Array
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loads import loads_left_out, loads_platform
 from kinetostat.machine.machine import Machine
@@ -89,7 +88,7 @@ class Budget(Immutable):
     sometimes: tuple[str, ...]
     poses: PoseColumns | None
     question: GridQuestion | None
-    status: npt.NDArray[np.int64]
+    status: Integers
     measures: tuple[str, ...]
     units: tuple[str, ...]
     spread: Spread
@@ -105,7 +104,7 @@ class Budget(Immutable):
         return f"<Budget of {self.machine.name!r}: {len(self.parts)} tolerances, {len(self.status)} poses>"
 
     @property
-    def settled(self) -> npt.NDArray[np.bool_]:
+    def settled(self) -> Mask:
         """At which poses there is a result [n]."""
         return np.asarray(self.status == Status.OK)
 
@@ -250,16 +249,16 @@ class _Work:
     ) -> None:
         self.machine, self.lines, self.along, self.samples, self.seed = machine, lines, along, samples, seed
         self.parts: tuple[Toleranced, ...] = ()
-        self.many, self.pressed = many, list[npt.NDArray[np.bool_]]()
+        self.many, self.pressed = many, list[Mask]()
         self.measures: Measures | None = None
         self.inputs: Inputs | None = None
         self.freedoms, self.parasitic = 0, tuple[str, ...]()
-        self.spreads: list[tuple[npt.NDArray[np.bool_], Spread | None]] = []
+        self.spreads: list[tuple[Mask, Spread | None]] = []
         self.reach: list[dict[str, Array]] = []
         self.largest: Array | float = -np.inf
         self.squares: Array | float = 0.0
 
-    def add(self, columns: Mapping[str, Array], count: int) -> npt.NDArray[np.int64]:
+    def add(self, columns: Mapping[str, Array], count: int) -> Codes:
         """Add some poses; return their `Status` codes."""
         model = error_model(self.machine, columns, count)
         if not self.parts:
@@ -299,7 +298,7 @@ def _joints(machine: Machine) -> int:
 
 def _answer(
     work: _Work,
-    status: npt.NDArray[np.int64],
+    status: Integers,
     question: GridQuestion | None,
     columns: PoseColumns | None,
     exact: int,

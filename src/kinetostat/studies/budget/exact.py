@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinetostat.accuracy.model import ErrorModel, error_model
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.spec.errors import InputError

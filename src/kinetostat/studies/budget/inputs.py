@@ -12,11 +12,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.spec.tolerance_table import SIGMAS
 from kinetostat.studies.budget.toleranced import Toleranced
 from kinetostat.tolerances import NO_REACTION
@@ -44,14 +43,14 @@ class Inputs:
     """
 
     parts: tuple[Toleranced, ...]
-    owner: npt.NDArray[np.int64]
-    block: npt.NDArray[np.int64]
+    owner: Integers
+    block: Integers
     variance: Array
     columns: Array
     shift: Array
     errors: Array
     drawn: Array
-    pressed: npt.NDArray[np.bool_]
+    pressed: Mask
 
     @property
     def size(self) -> int:
@@ -83,7 +82,7 @@ class Inputs:
         return values.T
 
     @property
-    def together(self) -> list[npt.NDArray[np.int64]]:
+    def together(self) -> list[Integers]:
         """The variables of each block."""
         return [np.flatnonzero(self.block == number) for number in range(int(self.block.max(initial=-1)) + 1)]
 

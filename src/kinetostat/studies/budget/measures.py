@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array
 from kinetostat.studies.budget.spread import Measures
 from kinetostat.tolerances import NO_FREEDOM
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array
 from kinetostat.studies.budget.inputs import Inputs
 
 SHARE = 95.0

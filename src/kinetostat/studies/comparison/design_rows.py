@@ -8,8 +8,8 @@ from enum import StrEnum
 import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress
-from kinetostat.engine.points import Array
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine

@@ -12,7 +12,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array
 from kinetostat.tolerances import EXACT_LAW
 
 ANGLE = "load.gravity_angle"

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.points import Axis, Grid
-from kinetostat.equilibrium.motion import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.arguments import checked

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.orientation import ANGLE, ANGLES, PURE, angles_of, from_parts, numbers_for, part_of
 from kinetostat.machine.parameters import Parameter, find

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.engine.batch import Codes, Progress, evaluate, silent
-from kinetostat.engine.points import Array, Table
+from kinetostat.arrays import Array, Codes
+from kinetostat.engine.batch import Progress, evaluate, silent
+from kinetostat.engine.points import Table
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Mask
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.points import Array, Points
+from kinetostat.engine.points import Points
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
@@ -53,7 +53,7 @@ class Move:
         return greatest_of(self.percents)
 
 
-def moves_at(sensitivities: Sensitivity, compliant: npt.NDArray[np.bool_]) -> list[Move]:
+def moves_at(sensitivities: Sensitivity, compliant: Mask) -> list[Move]:
     """List what the parameters of the design do, the largest effect first; entries of one stiffness move together.
 
     Args:

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, responses
 from kinetostat.engine.points import Points
 from kinetostat.kinematics.status import Status
@@ -25,8 +25,6 @@ from kinetostat.tolerances import NO_ROLE
 
 EXCESS = 0.01
 """An element counts as rigid where its compliance adds less than this share to that of the machine with it rigid."""
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

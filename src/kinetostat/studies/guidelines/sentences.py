@@ -10,14 +10,14 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.display import number
 from kinetostat.kinetostatics.elements import LINKS_TOGETHER, Element
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines.guidelines import Guidelines
 from kinetostat.studies.guidelines.moves import Move
-from kinetostat.studies.guidelines.roles import EXCESS, Array, Roles
+from kinetostat.studies.guidelines.roles import EXCESS, Roles
 from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
 from kinetostat.tolerances import NO_ROLE
 
@@ -199,12 +199,12 @@ def _over(answer: Guidelines) -> Roles | None:
     return answer.everywhere if answer.everywhere is not None and answer.poses[0] else None
 
 
-def _share_of(true: npt.NDArray[np.bool_]) -> float:
+def _share_of(true: Mask) -> float:
     """Share of the poses at which all rows [rows x poses] are true."""
     return float(true.all(axis=0).mean())
 
 
-def _first(gains: Array) -> npt.NDArray[np.int64]:
+def _first(gains: Array) -> Integers:
     """Which element gains most [components x poses], the first of those that gain alike."""
     return np.asarray(np.nan_to_num(gains).round(6).argmax(axis=0))
 

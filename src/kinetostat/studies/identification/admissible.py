@@ -7,11 +7,10 @@ far each one goes, then in random directions. What is measured there is decided 
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Mask
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Table
-from kinetostat.equilibrium.motion import Array
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine
@@ -72,5 +71,5 @@ def _margins(machine: Machine, paths: list[str], places: Array) -> Array:
     """The singularity margin at poses [poses x coordinates]; 0 where one is out of reach or passes a limit."""
     columns = {path: np.ascontiguousarray(column) for path, column in zip(paths, places.T, strict=True)}
     answer = evaluate(machine, Table(columns), ["singularity_margin"])
-    inside: npt.NDArray[np.bool_] = np.asarray(answer.status == Status.OK)
+    inside: Mask = np.asarray(answer.status == Status.OK)
     return np.where(inside, answer.values["singularity_margin"], 0.0)

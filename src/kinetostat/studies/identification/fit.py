@@ -13,12 +13,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.tolerances import FIT_BEGUN, FIT_SETTLED
 
-Mask = npt.NDArray[np.bool_]
 Tell = Callable[[int, int, str], None]
 
 OUTLYING = 4.0
@@ -124,7 +122,7 @@ class Fit:
         return self.ways[:, self.rank :]
 
 
-def fitted(question: Question, groups: npt.NDArray[np.int64], wishes: Wishes, tell: Tell = lambda *_: None) -> Fit:
+def fitted(question: Question, groups: Integers, wishes: Wishes, tell: Tell = lambda *_: None) -> Fit:
     """Find the most likely values of unknowns, theory (64).
 
     Each fit is one of least squares by trust regions: a step is taken only where the residuals fall by about as much as
@@ -257,7 +255,7 @@ def _judged(
     rates: Array,
     kept: Mask,
     values: Array,
-    groups: npt.NDArray[np.int64],
+    groups: Integers,
     wishes: Wishes,
 ) -> Fit:
     """Judge what has been found: covariance and intervals, theory (65), rank, and poses that took no part."""
@@ -285,7 +283,7 @@ def _quantile(freedom: int) -> float:
     return float(stdtrit(freedom, 0.975))
 
 
-def _left_out(after: Array, rates: Array, kept: Mask, groups: npt.NDArray[np.int64], known: Array) -> Array:
+def _left_out(after: Array, rates: Array, kept: Mask, groups: Integers, known: Array) -> Array:
     """Residuals of each fifth of the poses, predicted from the others: the fit to these is one linear step away."""
     result, fold = after.copy(), np.unique(groups, return_inverse=True)[1] % FOLDS
     for number in range(FOLDS):

@@ -10,8 +10,8 @@ import numpy as np
 
 from kinetostat.accuracy.errors import MachineError
 from kinetostat.accuracy.model import ErrorModel, error_model
+from kinetostat.arrays import Array
 from kinetostat.display import number
-from kinetostat.equilibrium.motion import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several, shorten

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array
 from kinetostat.kinematics.forward import poses_at, system_of
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
@@ -19,8 +19,6 @@ from kinetostat.spec.fields import Quantity, quantities
 from kinetostat.studies.evaluation.columns import Column, read_columns
 from kinetostat.studies.evaluation.pose_file import columns_of
 from kinetostat.units import UnitError
-
-Array = npt.NDArray[np.float64]
 
 POSITION, TURNED, EULER = ("x", "y", "z"), ("rx", "ry", "rz"), ("roll", "pitch", "yaw")
 MEASURED = {

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinetostat.accuracy.model import PLACED, error_model
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.accuracy.errors import MachineError
 from kinetostat.accuracy.model import PLACED, ErrorModel
-from kinetostat.equilibrium.motion import Array, Motions, cross, exponential, logarithm
+from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.equilibrium.motion import Motions, cross, exponential, logarithm
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.identification.measurements import EULER, FAR, POSITION, TURNED, Measurements
 
@@ -53,15 +53,15 @@ class Observed:
     model: ErrorModel
     data: Measurements
     unknowns: tuple[MachineError, ...]
-    chosen: npt.NDArray[np.int64]
+    chosen: Integers
     frame: Motions
     names: tuple[str, ...]
-    pose: npt.NDArray[np.int64]
+    pose: Integers
     sigma: Array
     value: Array
 
     @property
-    def turns(self) -> npt.NDArray[np.bool_]:
+    def turns(self) -> Mask:
         """Which rows are angles [rows]."""
         return np.isin([name.removeprefix("deflection.") for name in self.names], (*TURNED, *EULER))
 

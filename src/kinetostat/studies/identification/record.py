@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 

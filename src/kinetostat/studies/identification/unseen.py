@@ -14,7 +14,8 @@ import numpy as np
 
 from kinetostat.accuracy.errors import Insertion, MachineError, effects
 from kinetostat.accuracy.rows import places_of
-from kinetostat.equilibrium.motion import Array, cross
+from kinetostat.arrays import Array
+from kinetostat.equilibrium.motion import cross
 from kinetostat.studies.identification.fit import Fit
 from kinetostat.studies.identification.observed import FRAME, TARGET, Observed
 from kinetostat.tolerances import SEEN_BY_LEG

@@ -14,7 +14,7 @@ from scipy.special import chdtrc
 
 from kinetostat.accuracy.model import PLACED, ErrorModel, error_model
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array
 from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond

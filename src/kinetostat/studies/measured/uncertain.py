@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.accuracy.built import compliances_as_built
 from kinetostat.accuracy.model import ErrorModel
-from kinetostat.equilibrium.motion import Array
+from kinetostat.arrays import Array, Integers
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.tolerance_table import SIGMAS
@@ -39,7 +38,7 @@ class Uncertain:
         source: where that is from, for people; empty where nothing is uncertain.
     """
 
-    places: npt.NDArray[np.int64]
+    places: Integers
     values: Array
     covariance: Array
     source: str

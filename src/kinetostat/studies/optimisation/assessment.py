@@ -9,9 +9,8 @@ from enum import IntEnum
 from itertools import product
 
 import numpy as np
-import numpy.typing as npt
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array, Codes, Integers
 from kinetostat.engine.population import Evaluator, Population
 from kinetostat.kinematics.status import Status
 from kinetostat.spec.immutable import Immutable
@@ -27,8 +26,6 @@ MOST_CORNERS = 12
 """Tolerances of which all combinations of ends are tried: 4096 machines."""
 SIGMAS = 3.0
 """Standard deviations of a normal distribution within the tolerance; what lies beyond is drawn at its end."""
-
-Codes = npt.NDArray[np.int8]
 
 
 class Verdict(IntEnum):
@@ -73,7 +70,7 @@ class Outcome(Immutable):
     violation: Array
     verdict: Codes
 
-    def chosen(self, numbers: npt.NDArray[np.int64]) -> "Outcome":
+    def chosen(self, numbers: Integers) -> "Outcome":
         """Of some designs."""
         return Outcome(*(getattr(self, name)[numbers] for name in vars(self)))
 

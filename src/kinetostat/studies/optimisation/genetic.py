@@ -17,9 +17,9 @@ from pymoo.operators.mutation.pm import mut_pm
 from pymoo.operators.survival.rank_and_crowding.metrics import get_crowding_function
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array, Integers
 from kinetostat.studies.optimisation.assessment import Assessor, Outcome, joined
-from kinetostat.studies.optimisation.log import Log, Rows, Step
+from kinetostat.studies.optimisation.log import Log, Step
 from kinetostat.studies.optimisation.problem import Problem
 
 CROSSED = 0.9
@@ -80,7 +80,7 @@ class Genetic:
             genes[0] = space.initial
         return genes
 
-    def _order(self, outcome: Outcome) -> tuple[Rows, Rows]:
+    def _order(self, outcome: Outcome) -> tuple[Integers, Integers]:
         """Place of each design among all, the best first, and the front that it is on."""
         signs = np.array([objective.sign for objective in self.problem.objectives])
         wanted = signs * outcome.objectives
@@ -99,7 +99,7 @@ class Genetic:
         place[order] = np.arange(len(order))
         return place, front
 
-    def _children(self, parents: Array, place: Rows, source: np.random.Generator) -> Array:
+    def _children(self, parents: Array, place: Integers, source: np.random.Generator) -> Array:
         """As many new designs as there are parents, none of them twice or one of the parents, as far as possible."""
         children = np.empty((0, parents.shape[1]))
         for _ in range(ATTEMPTS):
@@ -109,7 +109,7 @@ class Genetic:
                 break
         return children[: len(parents)] if len(children) else self._mated(parents, place, source)
 
-    def _mated(self, parents: Array, place: Rows, source: np.random.Generator) -> Array:
+    def _mated(self, parents: Array, place: Integers, source: np.random.Generator) -> Array:
         count, size = parents.shape
         couples = (count + 1) // 2
         rounds = [source.permutation(count) for _ in range(-(-4 * couples // count))]
@@ -146,7 +146,7 @@ class Genetic:
         return np.where(redrawn, drawn, mutated)
 
 
-def _new(fresh: Array, known: Array) -> Rows:
+def _new(fresh: Array, known: Array) -> Integers:
     """Which designs are neither known nor earlier in the list."""
     seen = {row.tobytes() for row in known}
     numbers = []

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array
 from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.log import Log, Step
 from kinetostat.studies.optimisation.problem import Problem

@@ -9,14 +9,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array, Integers
 from kinetostat.studies.optimisation.assessment import Outcome, joined
 from kinetostat.studies.optimisation.problem import Problem
 
-Rows = npt.NDArray[np.int64]
 """Numbers of designs in a log."""
 
 
@@ -33,7 +31,7 @@ class Step:
 
     genes: Array
     outcome: Outcome
-    kept: Rows
+    kept: Integers
     notes: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -78,15 +76,15 @@ class Log:
     __hash__ = None  # type: ignore[assignment]  # it grows
 
     @property
-    def kept(self) -> Rows:
+    def kept(self) -> Integers:
         """What the last step kept."""
         return np.array(self.steps[-1]["kept"], dtype=np.int64)
 
-    def genes(self, numbers: Rows | Sequence[int] | slice = slice(None)) -> Array:
+    def genes(self, numbers: Integers | Sequence[int] | slice = slice(None)) -> Array:
         """Genes of some designs."""
         return self.rows[numbers, : self._sizes[0]]
 
-    def outcome(self, numbers: Rows | Sequence[int] | slice = slice(None)) -> Outcome:
+    def outcome(self, numbers: Integers | Sequence[int] | slice = slice(None)) -> Outcome:
         """What some designs are worth."""
         _, objectives, constraints, violation, verdict = np.split(self.rows[numbers], self._sizes, axis=1)
         return Outcome(objectives, constraints, violation[:, 0], verdict[:, 0].astype(np.int8))
@@ -132,13 +130,13 @@ def record_of(log: Log, step: Step) -> dict[str, Any]:
     }
 
 
-def best_feasible(log: Log) -> Rows:
+def best_feasible(log: Log) -> Integers:
     """Return the number of the best design of a log; empty if it is not feasible."""
     first = log.kept[:1]
     return first if log.outcome(first).violation[0] == 0.0 else first[:0]
 
 
-def front_of(log: Log) -> Rows:
+def front_of(log: Log) -> Integers:
     """Return the Pareto-optimal designs among those that the search kept, ordered by the first objective."""
     outcome = log.outcome(log.kept)
     feasible = np.flatnonzero(outcome.violation == 0.0)
@@ -150,7 +148,7 @@ def front_of(log: Log) -> Rows:
     return log.kept[feasible][single][first[np.argsort(wanted[single][first, 0], kind="stable")]]
 
 
-def knee_of(log: Log, front: Rows) -> int:
+def knee_of(log: Log, front: Integers) -> int:
     """Which design of a front is its knee: the farthest from the plane through its ends, towards the better side.
 
     With each objective from 0 (its best on the front) to 1 (its worst), that is where their sum is least.

@@ -6,7 +6,7 @@ from math import prod
 
 import numpy as np
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find, values
 from kinetostat.spec.errors import InputError, shorten

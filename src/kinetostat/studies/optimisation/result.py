@@ -9,14 +9,15 @@ from functools import cached_property
 
 import numpy as np
 
+from kinetostat.arrays import Array, Integers
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.points import Array, Table
+from kinetostat.engine.points import Table
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.optimisation.assessment import Assessor, Outcome, Verdict
-from kinetostat.studies.optimisation.log import Log, Rows, best_feasible, front_of, knee_of
+from kinetostat.studies.optimisation.log import Log, best_feasible, front_of, knee_of
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.ridges import Ridge, at_bounds, find_ridges
 from kinetostat.studies.optimisation.robustness import Robustness, robustness_of
@@ -81,7 +82,7 @@ class Result(Immutable):
     problem: Problem
     log: Log
     initial: Outcome
-    front: Rows
+    front: Integers
     knee: int
     directions: tuple[Direction, ...] = ()
     influences: tuple[Influence, ...] = ()

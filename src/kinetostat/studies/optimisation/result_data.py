@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array
 from kinetostat.machine.saving import as_file
 from kinetostat.studies.optimisation.assessment import Outcome, Verdict
 from kinetostat.studies.optimisation.problem import Problem

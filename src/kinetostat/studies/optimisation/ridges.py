@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.slopes import Surveyor
 from kinetostat.studies.optimisation.terms import PoseTerm

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array
 from kinetostat.studies.optimisation.assessment import Assessor, Outcome, corners, deviations
 
 STREAM = 1

@@ -7,16 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.engine.population import Population, differentiate
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.optimisation.assessment import deviations
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.terms import Mask, PoseTerm, Term
-
-Rows = npt.NDArray[np.int64]
+from kinetostat.studies.optimisation.terms import PoseTerm, Term
 
 
 @dataclass(frozen=True)
@@ -58,13 +55,13 @@ class Local:
         shares = self.problem.robust.weights(at_machines, every, high_is_bad)
         return float(shares @ at_machines), shares @ np.array(slopes)
 
-    def worst(self, term: PoseTerm, most: int) -> Rows:
+    def worst(self, term: PoseTerm, most: int) -> Integers:
         """Return where a term is worst, the worst first: at most `most` indices into the flattened machines x poses."""
         at_poses = term.at_poses(self.values)
         badness = np.where(self.reached, at_poses if term.high_is_bad else -at_poses, -np.inf)
         return np.argsort(-badness, axis=None, kind="stable")[: min(most, int(self.reached.sum()))]
 
-    def pieces(self, term: PoseTerm, indices: Rows) -> tuple[Array, Array]:
+    def pieces(self, term: PoseTerm, indices: Integers) -> tuple[Array, Array]:
         """Return a term at indices of `worst` [pieces], and its derivatives by the genes there [pieces x genes]."""
         total = np.sum([weight * self.slopes[name] for name, weight in term.weights], axis=0)
         slopes = total.reshape(len(total), -1)[:, indices].T
@@ -85,7 +82,7 @@ class Surveyor:
         self._made = deviations(problem, problem.study.robustness.search_samples, 0) if robust else {}
 
     @property
-    def free(self) -> Rows:
+    def free(self) -> Integers:
         """Indices of the continuous variables among those searched."""
         return self._free
 

@@ -8,12 +8,9 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import AnyArray, Array, Mask
 from kinetostat.spec.errors import InputError, shorten
-
-Mask = npt.NDArray[np.bool_]
 
 _FORM = re.compile(r"percentile\s+(\d{1,2}(?:\.\d+)?|100)")
 WORST, MEAN = "worst", "mean"
@@ -74,7 +71,7 @@ class Aggregate:
         weights[order[high]] += float(part)
         return weights
 
-    def _between(self, count: npt.NDArray[Any], size: int) -> tuple[Any, Any, Any]:
+    def _between(self, count: AnyArray, size: int) -> tuple[Any, Any, Any]:
         """Places of the two neighbours in increasing order, those that do not count first, and the way between."""
         rank = np.minimum((size - count) + (self.share or 0.0) * np.maximum(count - 1, 0), size - 1)
         low = np.floor(rank).astype(int)

@@ -10,8 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
+from kinetostat.arrays import Array
 from kinetostat.display import ENGINEERING, Display
-from kinetostat.engine.points import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find, values
 from kinetostat.spec.errors import InputError, shorten

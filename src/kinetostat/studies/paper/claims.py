@@ -8,12 +8,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.arrays import AnyArray, Array
 from kinetostat.kinetostatics.elements import elements, rigid_from, with_links_together
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
@@ -219,16 +218,16 @@ def _link_length() -> Claim:
     )
 
 
-def _course(component: int, stiffness: npt.NDArray[np.float64]) -> str:
+def _course(component: int, stiffness: Array) -> str:
     """How one stiffness goes with the length of the links."""
     return f"K_{COMPONENTS[component]} ({' to '.join(f'{k:.4g}' for k in stiffness[:, component])})"
 
 
-def _count(flags: npt.NDArray[Any]) -> int:
+def _count(flags: AnyArray) -> int:
     return int(np.count_nonzero(flags))
 
 
-def _stiffness_over(settings: list[tuple[str, ...]]) -> npt.NDArray[np.float64]:
+def _stiffness_over(settings: list[tuple[str, ...]]) -> Array:
     return np.array([at(*setting).stiffness.diagonal() for setting in settings])
 
 

@@ -6,20 +6,17 @@ Each check is a statement that must vanish, its residual, and the tolerance with
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from kinetostat.algebra.symmetric import Symmetric6
+from kinetostat.arrays import AnyArray, Array
 from kinetostat.kinetostatics.assembly import flexible_stiffness
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.paper import printed
-
-Array = npt.NDArray[np.float64]
 
 STEP = 1e-6
 """Of central differences, rad and m: error about step² + rounding/step."""
@@ -93,7 +90,7 @@ def _off(actual: Array, expected: Array) -> float:
     return float(np.abs(actual - expected).max() / np.abs(expected).max())
 
 
-def _rank_excess(eigenvalues: npt.NDArray[Any], rank: int) -> float:
+def _rank_excess(eigenvalues: AnyArray, rank: int) -> float:
     """Zero where just `rank` eigenvalues are positive and the rest vanish beside them."""
     ordered = np.sort(eigenvalues)
     rest, least = np.abs(ordered[: 6 - rank]).max(), ordered[6 - rank]

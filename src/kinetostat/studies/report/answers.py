@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, evaluate, silent
-from kinetostat.engine.points import Array, Table
+from kinetostat.engine.points import Table
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.kinetostatics.response import respond

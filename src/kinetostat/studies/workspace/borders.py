@@ -6,15 +6,14 @@ pose lies, so that halving the step between two nodes again and again finds the 
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import AnyArray, Array, Codes, Float32s, Integers, Mask
 from kinetostat.engine.batch import NATIVE_FROM, evaluate
-from kinetostat.engine.points import Array, Axis, Table
+from kinetostat.engine.points import Axis, Table
 from kinetostat.studies.grid.grid import GridQuestion
-from kinetostat.studies.workspace.verdicts import Codes, Judge, Mask, Numbers, Poses
+from kinetostat.studies.workspace.verdicts import Judge, Poses
 
 HALVINGS = 7
 """Number of halvings. Seven give the border to a 128th of a step, finer than a printed line."""
@@ -23,10 +22,8 @@ SHOWN = 3
 NEAR = 1e-3
 """Least distance of a node from a border, in steps. At a distance of 0 a node would lie neither inside nor outside."""
 
-Shares = npt.NDArray[np.float32]
 
-
-def borders(judge: Judge, question: GridQuestion, verdict: Codes, home: Sequence[int]) -> list[Shares]:
+def borders(judge: Judge, question: GridQuestion, verdict: Codes, home: Sequence[int]) -> list[Float32s]:
     """Find the borders along the lines of the grid.
 
     Args:
@@ -60,7 +57,7 @@ def borders(judge: Judge, question: GridQuestion, verdict: Codes, home: Sequence
     return results
 
 
-def _halved(judge: Judge, axes: Sequence[Axis], nodes: Numbers, axis: Numbers, verdict: Codes) -> Array:
+def _halved(judge: Judge, axes: Sequence[Axis], nodes: Integers, axis: Integers, verdict: Codes) -> Array:
     """Halve the step from each node along its axis, and return the share of the step at which the verdict changes."""
     start = {path: a.values[nodes[:, k]] for k, a in enumerate(axes) for path in a.paths}
     step = {
@@ -79,11 +76,11 @@ def _halved(judge: Judge, axes: Sequence[Axis], nodes: Numbers, axis: Numbers, v
     return 0.5 * (low + high)
 
 
-def _chosen(poses: Poses, numbers: Numbers) -> Poses:
+def _chosen(poses: Poses, numbers: Integers) -> Poses:
     return {path: column[numbers] for path, column in poses.items()}
 
 
-def depth(region: Mask, shares: Sequence[Shares]) -> Array:
+def depth(region: Mask, shares: Sequence[Float32s]) -> Array:
     """Return how far inside a region each node lies, in steps: positive inside, negative outside, at most 1.
 
     Interpolated linearly between the nodes, the depth is zero on the borders. Where a straight border cuts two lines
@@ -109,7 +106,7 @@ def depth(region: Mask, shares: Sequence[Shares]) -> Array:
     return np.where(region, distance, -distance)
 
 
-def _neighbours(nodes: npt.NDArray[Any], k: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+def _neighbours(nodes: AnyArray, k: int) -> tuple[AnyArray, AnyArray]:
     """Return all nodes but the last along an axis, and all but the first: each node beside its next neighbour."""
     return nodes[_all_but(k, slice(None, -1))], nodes[_all_but(k, slice(1, None))]
 

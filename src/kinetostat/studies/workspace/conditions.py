@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array, Mask
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.renamed import current_name
@@ -44,7 +43,7 @@ class Condition:
     comparison: str
     value: float
 
-    def holds(self, values: Array) -> npt.NDArray[np.bool_]:
+    def holds(self, values: Array) -> Mask:
         """Where the quantity, given in SI, meets the condition; not where it is NaN."""
         return np.asarray(COMPARISONS[self.comparison](values, self.value))
 

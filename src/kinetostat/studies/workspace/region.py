@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from math import nan, prod, sqrt
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.engine.points import PER_CELL
 
 POWERS = {1: "", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶"}
@@ -51,11 +51,10 @@ class Volume:
         return self.value / self.box
 
 
-Points = npt.NDArray[np.bool_]
 METHOD = "stratified sampling, two random points in each cell of the grid; error from their differences"
 
 
-def estimate_volume(inside: Points, unknown: Points, sizes: Sequence[float], units: Sequence[str]) -> Volume:
+def estimate_volume(inside: Mask, unknown: Mask, sizes: Sequence[float], units: Sequence[str]) -> Volume:
     """Estimate the volume of a region from two independent, uniform random points in each cell of a grid.
 
     The mean over both points is unbiased for any region. Cells are independent, and the variance of the mean of two
@@ -86,8 +85,6 @@ def unit_product(units: Sequence[str]) -> str:
     return "·".join(f"{unit}{POWERS[count]}" for unit, count in Counter(units).items())
 
 
-Array = npt.NDArray[np.float64]
-
 CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 TETRAHEDRA = np.array([[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]])
 """Corners of the six tetrahedra about the diagonal of a cell."""
@@ -114,7 +111,7 @@ def surface(depth: Array, axes: Sequence[Array]) -> Array:
     return np.clip(start + (triangles - EVERYWHERE) * step, start, [axis[-1] for axis in axes])
 
 
-def _mixed_cells(field: Array) -> npt.NDArray[np.int64]:
+def _mixed_cells(field: Array) -> Integers:
     """Return the lowest corner of each cell through which the surface passes [n x 3]."""
     high = field > 0.0
     size = [n - 1 for n in field.shape]

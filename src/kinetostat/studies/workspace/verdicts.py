@@ -9,10 +9,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.engine.batch import first_limit_passed, limits_used
-from kinetostat.engine.points import Array
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.extremes import aspect
 from kinetostat.kinetostatics.response import respond
@@ -22,9 +21,6 @@ from kinetostat.studies.workspace.conditions import Condition
 from kinetostat.tolerances import SINGULAR
 from kinetostat.units import as_read
 
-Mask = npt.NDArray[np.bool_]
-Codes = npt.NDArray[np.int8]
-Numbers = npt.NDArray[np.int64]
 Poses = dict[str, Array]
 """Coordinates of poses by leaf path, SI."""
 
@@ -96,7 +92,7 @@ class Judge:
             good &= condition.holds(np.asarray(values[condition.quantity]))
         return good
 
-    def verdicts(self, status: Codes, values: Mapping[str, Any], poses: Callable[[Numbers], Poses]) -> Codes:
+    def verdicts(self, status: Codes, values: Mapping[str, Any], poses: Callable[[Integers], Poses]) -> Codes:
         """Judge poses; a verdict is a place in `labels`.
 
         Args:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from kinetostat.arrays import Codes, Float32s, Integers, Mask
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import Cells
 from kinetostat.kinematics.status import Status
@@ -27,10 +28,10 @@ from kinetostat.spec.renamed import former_names
 from kinetostat.studies.grid.axes import MOST_DIMENSIONS
 from kinetostat.studies.grid.grid import IN_MEMORY, GridQuestion, answer, field_of, grid_question
 from kinetostat.studies.plain_data import as_answer
-from kinetostat.studies.workspace.borders import Shares, borders
+from kinetostat.studies.workspace.borders import borders
 from kinetostat.studies.workspace.conditions import Condition, parse_condition
 from kinetostat.studies.workspace.region import METHOD, Volume, estimate_volume
-from kinetostat.studies.workspace.verdicts import INSIDE, Codes, Demand, Judge, Mask, Numbers, Poses, demands
+from kinetostat.studies.workspace.verdicts import INSIDE, Demand, Judge, Poses, demands
 
 SOFTEST = "least_translational_stiffness"
 """Quantity by which a workspace is coloured where no condition names another."""
@@ -158,7 +159,7 @@ def _check(question: GridQuestion) -> None:
         )
 
 
-def _poses(question: GridQuestion, numbers: Numbers) -> Poses:
+def _poses(question: GridQuestion, numbers: Integers) -> Poses:
     """Coordinates of some nodes by their number."""
     places = np.unravel_index(numbers, question.grid.shape)
     return {
@@ -215,7 +216,7 @@ def _extents(question: GridQuestion, inside: Mask) -> dict[str, tuple[float, flo
 
 
 def _labelled(
-    nodes: xr.Dataset, verdict: Codes, connected: Mask, judge: Judge, volume: Volume, edges: Sequence[Shares]
+    nodes: xr.Dataset, verdict: Codes, connected: Mask, judge: Judge, volume: Volume, edges: Sequence[Float32s]
 ) -> xr.Dataset:
     """The dataset of the nodes with verdicts, borders and volume."""
     dims = nodes["status"].dims

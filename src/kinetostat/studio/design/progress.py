@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from kinetostat.arrays import Array
 from kinetostat.display import Scale, number, with_unit
-from kinetostat.engine.points import Array
 from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.optimisation.log import best_feasible, front_of, knee_of

@@ -12,7 +12,7 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.engine.points import Array
+from kinetostat.arrays import Array, Complex
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.attribution import ranked
@@ -25,7 +25,6 @@ from kinetostat.studio.panels import Panel
 from kinetostat.studio.ringing import Ringing, SwingRequest, ringing, swing
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import bars, heading, paragraph, shown
-from kinetostat.vibration.receptance import Complex
 from kinetostat.views.analysis_tables import entry_unit
 from kinetostat.views.vibration_tables import LEAST_SHARE, MOST_PARTS, cut_by_table, damping_of, masses_of, percent
 

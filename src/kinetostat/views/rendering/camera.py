@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from kinetostat.arrays import Array
 
 VIEWS = {"iso": (1.0, -1.35, 0.75), "front": (0.0, -1.0, 0.02), "side": (1.0, 0.0, 0.02), "top": (0.0, -0.02, 1.0)}
 """Direction from the machine to the camera, base axes."""

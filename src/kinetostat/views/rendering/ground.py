@@ -4,14 +4,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
+from kinetostat.arrays import Array, Float32s
 from kinetostat.views.rendering.camera import Camera
 from kinetostat.views.rendering.light import Light, smooth_step
-
-Array = NDArray[np.float64]
-Floats = NDArray[np.float32]
 
 REACH = 1.7
 """Radius of the ground that is drawn, in diagonals of the machine."""
@@ -49,7 +46,7 @@ class Ground:
         return self.centre + np.stack([x.ravel(), y.ravel(), np.zeros(self.side**2)], axis=1)
 
 
-def veil_over(ground: Ground, light: Light, camera: Camera) -> tuple[Floats, Floats]:
+def veil_over(ground: Ground, light: Light, camera: Camera) -> tuple[Float32s, Float32s]:
     """Compute how the ground covers a background [height x width]: shares of shadow and of the grid's ink.
 
     Args:
@@ -73,14 +70,14 @@ def veil_over(ground: Ground, light: Light, camera: Camera) -> tuple[Floats, Flo
     return shadow.astype(np.float32), (_grid(at / step) * fade**1.5 * edge).astype(np.float32)
 
 
-def _missing(ground: Ground, light: Light) -> Floats:
+def _missing(ground: Ground, light: Light) -> Float32s:
     """Share of the light that shadows take away, on the map; smoothed, because single points are grainy."""
     present = SUN_SHARE * light.sun / light.sun.max() + (1.0 - SUN_SHARE) * light.sky / light.sky.max()
     missing = gaussian_filter(1.0 - present.reshape(ground.side, ground.side), 1.0)
     return np.maximum(missing - FAINT, 0.0) / (1.0 - FAINT)
 
 
-def _inside(share: Array) -> Floats:
+def _inside(share: Array) -> Float32s:
     """Rise from 0 at either edge of the picture to 1 well inside."""
     return smooth_step(np.minimum(share, 1.0 - share), 0.0, EDGE)
 

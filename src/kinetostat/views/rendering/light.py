@@ -12,17 +12,14 @@ from functools import partial
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kinetostat.arrays import Array, Float32s, Integers, Mask
 from kinetostat.engine.batch import available_cores
 from kinetostat.views.rendering.camera import axes_towards
 from kinetostat.views.rendering.visibility import Body, nearest_triangles
 from kinetostat.views.scene.solids import LOOKS, linear
 
-Array = NDArray[np.float64]
-Floats = NDArray[np.float32]
-Indices = NDArray[np.int64]
-Lamp: TypeAlias = tuple[Floats, Callable[[Floats, Floats], NDArray[np.bool_]]]
+Lamp: TypeAlias = tuple[Float32s, Callable[[Float32s, Float32s], Mask]]
 """Direction to a distant lamp, and whether it reaches points [3 x n] looked up aside by pixels of its map [2 x n]."""
 
 SUN = np.array((-0.55, -0.75, 1.5)) / math.sqrt(0.55**2 + 0.75**2 + 1.5**2)
@@ -66,9 +63,9 @@ class Light:
         openness: share of the sky before the surface that nothing hides.
     """
 
-    sun: Floats
-    sky: Floats
-    openness: Floats
+    sun: Float32s
+    sky: Float32s
+    openness: Float32s
 
 
 def light_on(points: Array, normals: Array, casters: Body, detail: int) -> Light:
@@ -108,16 +105,16 @@ def _lamp(casters: Body, centre: Array, radius: float, side: int, direction: Arr
     nearest[nearest == 0.0] = -np.inf  # no caster: lit at every depth
     turn, moved = axes.astype(np.float32), shift.astype(np.float32)[:, None]
 
-    def reaches(points: Floats, aside: Floats) -> NDArray[np.bool_]:
+    def reaches(points: Float32s, aside: Float32s) -> Mask:
         at = np.einsum("ij,jn->in", turn, points) + moved
         column, row = np.clip(at[:2] + aside, 0, side - 1).astype(np.int32)
-        lit: NDArray[np.bool_] = nearest[row * side + column] <= np.float32(4.0 * radius) - at[2]
+        lit: Mask = nearest[row * side + column] <= np.float32(4.0 * radius) - at[2]
         return lit
 
     return direction.astype(np.float32), reaches
 
 
-def _received(lamps: Sequence[Lamp], away: float, points: Floats, normals: Floats, aside: Floats) -> Floats:
+def _received(lamps: Sequence[Lamp], away: float, points: Float32s, normals: Float32s, aside: Float32s) -> Float32s:
     """Mean light of lamps on points [3 x n] lifted `away` (m) from their surface, with and without shadows [2 x n]."""
     lifted = points + normals * np.float32(away)
     light = np.zeros((2, points.shape[1]), np.float32)
@@ -147,7 +144,7 @@ def _sky_directions() -> Array:
     return np.column_stack([flat, np.sqrt(1.0 - np.sum(flat**2, axis=1))])
 
 
-def shaded(look: Indices, normals: Floats, to_eye: Floats, light: Light) -> Floats:
+def shaded(look: Integers, normals: Float32s, to_eye: Float32s, light: Light) -> Float32s:
     """Compute the colours [n x 3] (linear, 0 to 1) of points: paint and metal in a studio with soft boxes.
 
     Diffuse paint takes light from sun, sky and ground; shiny surfaces mirror the room and the main light. At the end
@@ -178,29 +175,29 @@ def shaded(look: Indices, normals: Floats, to_eye: Floats, light: Light) -> Floa
     return np.clip(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0.0, 1.0)
 
 
-def _room(direction: Floats, roughness: Floats) -> Floats:
+def _room(direction: Float32s, roughness: Float32s) -> Float32s:
     """Brightness [n x 1] of the room in a direction: walls, ground and soft boxes."""
     brightness = GROUND + (WALL - GROUND) * smooth_step(direction[:, 2:], -_blur(roughness), _blur(roughness))
     return sum((_box(direction, roughness, *box) for box in BOXES), start=brightness)
 
 
-def _box(direction: Floats, roughness: Floats, centre: Sequence[float], edge: float, power: float) -> Floats:
+def _box(direction: Float32s, roughness: Float32s, centre: Sequence[float], edge: float, power: float) -> Float32s:
     """Brightness [n x 1] of a soft box in a direction, the more blurred and the weaker the rougher the surface."""
     along, blur = direction @ np.array(centre, dtype=np.float32)[:, None], _blur(roughness)
     return power * smooth_step(along, edge - blur, edge + blur) * (1.0 - 0.45 * roughness)
 
 
-def _blur(roughness: Floats) -> Floats:
+def _blur(roughness: Float32s) -> Float32s:
     return 0.06 + 0.55 * roughness
 
 
-def smooth_step(value: Array | Floats, low: Array | Floats | float, high: Array | Floats | float) -> Floats:
+def smooth_step(value: Array | Float32s, low: Array | Float32s | float, high: Array | Float32s | float) -> Float32s:
     """Rise from 0 at `low` to 1 at `high`, level at both ends."""
     share = np.clip((value - low) / (high - low), 0.0, 1.0)
     return np.asarray(share * share * (3.0 - 2.0 * share))
 
 
-def encoded(light: Floats) -> Floats:
+def encoded(light: Float32s) -> Float32s:
     """Encode linear light, 0 to 1, as sRGB (IEC 61966-2-1)."""
     bright = 1.055 * np.maximum(light, 0.0031308) ** np.float32(1.0 / 2.4) - 0.055
     return np.where(light <= 0.0031308, 12.92 * light, bright)

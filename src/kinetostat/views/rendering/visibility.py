@@ -7,15 +7,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kinetostat.arrays import Array, Float32s, Integers
 from kinetostat.views.rendering.camera import Camera
 from kinetostat.views.scene.mesh import placed
 from kinetostat.views.scene.solids import LOOKS, Solid
-
-Array = NDArray[np.float64]
-Floats = NDArray[np.float32]
-Indices = NDArray[np.int64]
 
 ALIKE = 0.97
 """Cosine between normals above which samples of one pixel on one solid share their shading."""
@@ -59,13 +55,13 @@ class Hits:
         look: of the samples [s], numbers.
     """
 
-    nearness: Floats
-    pixel: Indices
-    sample: Indices
-    points: Floats
-    normals: Floats
-    to_eye: Floats
-    look: Indices
+    nearness: Float32s
+    pixel: Integers
+    sample: Integers
+    points: Float32s
+    normals: Float32s
+    to_eye: Float32s
+    look: Integers
 
 
 def hits_of(body: Body, camera: Camera, finer: int) -> Hits:
@@ -92,14 +88,14 @@ def hits_of(body: Body, camera: Camera, finer: int) -> Hits:
     )  # fmt: skip
 
 
-def _points(camera: Camera, nearness: Floats, pixel: Indices) -> tuple[Array, Array]:
+def _points(camera: Camera, nearness: Float32s, pixel: Integers) -> tuple[Array, Array]:
     """Where the rays through pixels end, base frame (m), and the rays."""
     x, y = np.asarray(pixel % camera.width + 0.5), np.asarray(pixel // camera.width + 0.5)
     rays = camera.rays(x, y)
     return camera.eye + rays / nearness[pixel, None], rays
 
 
-def normals_at(body: Body, triangle: Indices, points: Array) -> Array:
+def normals_at(body: Body, triangle: Integers, points: Array) -> Array:
     """Interpolate the unit normals of the corners at points [n x 3] (base frame, m) of triangles [n].
 
     The weight of a corner is the area of the triangle between the point and the other two corners. In space that holds
@@ -114,7 +110,7 @@ def normals_at(body: Body, triangle: Indices, points: Array) -> Array:
     return mixed / np.where(size > 0.0, size, 1.0)
 
 
-def _owners(pixel: Indices, solid: Indices, normals: Floats, width: int, finer: int) -> Indices:
+def _owners(pixel: Integers, solid: Integers, normals: Float32s, width: int, finer: int) -> Integers:
     """For each covered pixel, the one whose sample it shows: the first of its block if that is alike, else itself."""
     corner = pixel - pixel // width % finer * width - pixel % width % finer
     first = np.minimum(np.searchsorted(pixel, corner), len(pixel) - 1)
@@ -124,8 +120,8 @@ def _owners(pixel: Indices, solid: Indices, normals: Floats, width: int, finer: 
 
 
 def nearest_triangles(
-    pixels: Array, nearness: Array, triangles: Indices, width: int, height: int
-) -> tuple[Floats, Indices]:
+    pixels: Array, nearness: Array, triangles: Integers, width: int, height: int
+) -> tuple[Float32s, Integers]:
     """Find the nearest triangle in each pixel [height * width]: its nearness and number, 0 and -1 where there is none.
 
     Args:
@@ -144,8 +140,8 @@ def nearest_triangles(
 
 
 def _fragments(
-    pixels: Array, nearness: Array, triangles: Indices, width: int, height: int
-) -> Iterator[tuple[Indices, Array, Indices]]:
+    pixels: Array, nearness: Array, triangles: Integers, width: int, height: int
+) -> Iterator[tuple[Integers, Array, Integers]]:
     """Generate pixels, their nearness and their triangle, a pixel as often as triangles cover it, some at a time.
 
     Every triangle is cut into rows, and every row into pixels: long thin triangles have few pixels in a large box.
@@ -169,14 +165,14 @@ def _fragments(
         yield row * width + column, across * (column + 0.5) + down * (row + 0.5) + rest, kept[triangle]
 
 
-def _expanded(owners: Indices, starts: Indices, counts: Indices) -> tuple[Indices, Indices]:
+def _expanded(owners: Integers, starts: Integers, counts: Integers) -> tuple[Integers, Integers]:
     """Repeat each owner as often as it counts, with start, start + 1, ... beside it."""
     total = np.cumsum(counts)
     offsets = np.arange(total[-1] if len(total) else 0) - np.repeat(total - counts, counts)
     return np.repeat(owners, counts), np.repeat(starts, counts) + offsets
 
 
-def _spans(lines: Array, row: Indices, width: int) -> tuple[Indices, Indices]:
+def _spans(lines: Array, row: Integers, width: int) -> tuple[Integers, Integers]:
     """First and last pixel of triangles in rows; there is none where the last is before the first."""
     slope, rest = lines[0], lines[1] * (row + 0.5) + lines[2]
     with np.errstate(divide="ignore", invalid="ignore"):

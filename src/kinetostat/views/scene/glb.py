@@ -10,8 +10,8 @@ from collections.abc import Collection
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kinetostat.arrays import AnyArray
 from kinetostat.machine.machine import Machine
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.mesh import mesh_of
@@ -82,7 +82,7 @@ class _Buffer:
             ),
         }
 
-    def _append(self, array: NDArray[Any], kind: str, component: int, target: int, **more: Any) -> int:
+    def _append(self, array: AnyArray, kind: str, component: int, target: int, **more: Any) -> int:
         """Append data, and return the number of its accessor."""
         content = array.tobytes()
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(content), "target": target}

@@ -10,15 +10,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kinetostat.algebra.vector import Vector
+from kinetostat.arrays import Array, Integers
 from kinetostat.tolerances import NO_CIRCLE
 from kinetostat.views.scene.polygon import cut_in_triangles, edge_normals, narrowed
 from kinetostat.views.scene.solids import Extruded, Shape, Solid, Swept, Turned
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 AROUND = 40
 """Sides of a solid of revolution."""
@@ -44,7 +41,7 @@ class Mesh:
 
     points: Array
     normals: Array
-    triangles: Indices
+    triangles: Integers
 
     @property
     def volume(self) -> float:
@@ -133,11 +130,11 @@ def _bands(points: Array, normals: Array, closed: bool) -> Mesh:
     return _without_slivers(points.reshape(-1, 3), normals.reshape(-1, 3), _halved(quads))
 
 
-def _halved(quads: Indices) -> Indices:
+def _halved(quads: Integers) -> Integers:
     return np.concatenate([quads[:, [0, 1, 3]], quads[:, [1, 2, 3]]])
 
 
-def _without_slivers(points: Array, normals: Array, triangles: Indices) -> Mesh:
+def _without_slivers(points: Array, normals: Array, triangles: Integers) -> Mesh:
     """A mesh without triangles of which two corners coincide, and without points that are in no triangle."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     real = np.any(a != b, axis=1) & np.any(b != c, axis=1) & np.any(c != a, axis=1)

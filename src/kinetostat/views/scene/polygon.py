@@ -4,12 +4,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kinetostat.arrays import Array
 from kinetostat.views.scene.shapes import CORNER, ROUND
 from kinetostat.views.scene.solids import Point2
-
-Array = NDArray[np.float64]
 
 SHARPEST = 0.1
 """Least share of an edge's normal in the bisector of a corner: the tip of a needle is not drawn back without end."""
