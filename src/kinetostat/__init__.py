@@ -13,7 +13,7 @@ _HOMES = {
     "load": "kinetostat.machine.loading",
     "build": "kinetostat.machine.loading",
     "bundled": "kinetostat.machine.loading",
-    "changed": "kinetostat.machine.changing",
+    "changed": "kinetostat.machine.loading",
     "analyze": "kinetostat.studies.analysis",
     "forward": "kinetostat.studies.assembly",
     "under_load": "kinetostat.studies.under_load",

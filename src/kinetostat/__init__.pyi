@@ -5,9 +5,9 @@ from typing import Any
 from kinetostat.exchange.formats import export as export
 from kinetostat.kinematics.status import Status as Status
 from kinetostat.machine.catalogue import register as register
-from kinetostat.machine.changing import changed as changed
 from kinetostat.machine.loading import build as build
 from kinetostat.machine.loading import bundled as bundled
+from kinetostat.machine.loading import changed as changed
 from kinetostat.machine.loading import load as load
 from kinetostat.machine.machine import Machine as Machine
 from kinetostat.spec.errors import InputError as InputError

@@ -10,8 +10,7 @@ from kinetostat.accuracy.model import error_model
 from kinetostat.equilibrium.motion import exponential
 from kinetostat.exchange.leg_by_leg import built_text
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.changing import changed
-from kinetostat.machine.loading import build, load
+from kinetostat.machine.loading import build, changed, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.assembly import forward

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from kinetostat import analyze, build, bundled, command, evaluate, forward, save, sensitivity, under_load
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.exchange.leg_by_leg import document_of
-from kinetostat.machine.mass import located_members
+from kinetostat.machine.loads import located_members
 from kinetostat.views.notebook import html_of
 from machines import load_without_limits
 from refusals import refused

@@ -14,7 +14,7 @@ from kinetostat.equilibrium.solving import Rest, at_rest
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.mass import located_members
+from kinetostat.machine.loads import located_members
 from kinetostat.validation import exudyn_machine
 from kinetostat.validation.as_written import drawing
 from kinetostat.validation.comparison import KNOWN

@@ -18,7 +18,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine import rings
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.loading import build, bundled, load
-from kinetostat.machine.mass import located_members
+from kinetostat.machine.loads import located_members
 from kinetostat.machine.parameters import values
 from kinetostat.machine.written import family, joints
 from kinetostat.machine.written.joints import JOINT_TYPES

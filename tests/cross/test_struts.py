@@ -9,10 +9,9 @@ from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Table
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.loading import build
-from kinetostat.machine.mass import moving_mass
+from kinetostat.machine.loading import as_toml, build
+from kinetostat.machine.loads import moving_mass
 from kinetostat.machine.parameters import with_values
-from kinetostat.machine.saving import as_toml
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.sensitivity import sensitivity

@@ -9,8 +9,8 @@ from kinetostat.equilibrium.balance import balance, free_state
 from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.exchange.mjcf import text_of
 from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.loading import as_toml
 from kinetostat.machine.parameters import values
-from kinetostat.machine.saving import as_toml
 from kinetostat.validation.comparison import KNOWN, frequency_pairs, validate
 from kinetostat.vibration.modes import modes
 from machines import CASES, with_bodies

@@ -13,7 +13,8 @@ ANSWERS = """
 import hashlib, sys
 from pathlib import Path
 from kinetostat.cli import main
-from kinetostat.machine.loading import as_toml, bundled, load
+from kinetostat.machine.loading import bundled, load
+from kinetostat.machine.loading import as_toml
 print([hashlib.sha256(as_toml(machine).encode()).hexdigest() for machine in map(load, bundled())])
 for command in {commands}:
     assert main(command) == 0

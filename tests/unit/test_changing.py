@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from kinetostat.machine.changing import changed, rebuilt, related
-from kinetostat.machine.loading import load
+from kinetostat.machine.loading import changed, load, rebuilt, related
 from kinetostat.machine.parameters import read_numbers, values
 from refusals import refused
 

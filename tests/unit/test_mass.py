@@ -10,7 +10,7 @@ from kinetostat.engine.points import Table
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.catalogue import families
 from kinetostat.machine.loading import as_toml, build, bundled, load
-from kinetostat.machine.mass import PLATFORM, moving_masses
+from kinetostat.machine.loads import PLATFORM, moving_masses
 from kinetostat.spec.document import parse
 from kinetostat.spec.fields import quantities
 from kinetostat.studies.analysis import analyze

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from kinetostat.machine.changing import changed, rebuilt
-from kinetostat.machine.loading import as_toml, build, bundled, load
+from kinetostat.machine.loading import as_toml, build, bundled, changed, load, rebuilt
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.errors import InputError

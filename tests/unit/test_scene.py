@@ -11,8 +11,7 @@ from kinetostat.kinetostatics.deflected import deflected_links
 from kinetostat.kinetostatics.indices import Principal
 from kinetostat.kinetostatics.loading import deflection
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.changing import changed
-from kinetostat.machine.loading import load
+from kinetostat.machine.loading import changed, load
 from kinetostat.views.scene.analysis_overlays import Deflection, compliance_overlays, deflection_overlays
 from kinetostat.views.scene.anatomy import anatomy
 from kinetostat.views.scene.machine_scene import machine_scene

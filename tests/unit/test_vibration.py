@@ -12,10 +12,9 @@ from kinetostat.engine.points import Table
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.changing import changed
 from kinetostat.machine.link import Parallelogram
-from kinetostat.machine.loading import bundled, load
-from kinetostat.machine.mass import located_members
+from kinetostat.machine.loading import bundled, changed, load
+from kinetostat.machine.loads import located_members
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.grid.grid import evaluate_grid

@@ -2,8 +2,7 @@
 
 import pytest
 
-from kinetostat.machine.changing import changed
-from kinetostat.machine.loading import load
+from kinetostat.machine.loading import changed, load
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.grid.grid import evaluate_grid
 from kinetostat.studies.vibration import modes

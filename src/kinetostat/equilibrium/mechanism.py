@@ -22,9 +22,8 @@ from kinetostat.equilibrium.motion import of_scalars
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring, Turn
-from kinetostat.machine.loads import gravity_of, platform_masses
+from kinetostat.machine.loads import gravity_of, located_members, platform_masses, turned_tensor
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.mass import located_members, turned_tensor
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,8 @@ from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring
 from kinetostat.machine.limits import LIMITS, limits_set, unloaded_parts
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.loading import load
+from kinetostat.machine.loads import turned_tensor
 from kinetostat.machine.machine import Configuration, Machine
-from kinetostat.machine.mass import turned_tensor
 from kinetostat.machine.rods import driven_slides, rods
 from kinetostat.machine.written.plan import BASE, NAME, PLATFORM, SPATIAL_POSE
 from kinetostat.spec.document import Document, toml_key

@@ -15,7 +15,7 @@ import numpy as np
 
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model
 from kinetostat.exchange.results import reference_point
-from kinetostat.machine.mass import PLATFORM, Mass
+from kinetostat.machine.loads import PLATFORM, Mass
 from kinetostat.studies.analysis import Analysis
 from kinetostat.tolerances import RIGID_BLOCK, SOFT_CONSTRAINT
 from kinetostat.validation.masses import Heavy

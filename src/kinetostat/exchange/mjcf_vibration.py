@@ -16,8 +16,8 @@ from kinetostat.exchange.results import reference_point
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.leg import Joint, Spring
+from kinetostat.machine.loads import located_members
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.mass import located_members
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.tolerances import COINCIDENT, COINCIDENT_HINGES

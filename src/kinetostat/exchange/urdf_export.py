@@ -29,8 +29,8 @@ from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram
+from kinetostat.machine.loads import located_members
 from kinetostat.machine.machine import Configuration, Machine, Member
-from kinetostat.machine.mass import located_members
 from kinetostat.machine.written.plan import BASE, PLATFORM
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis

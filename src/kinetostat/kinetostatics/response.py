@@ -21,9 +21,8 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, solve_statics, stiffness_matrix
 from kinetostat.machine.leg import Joint, LegScrews, Spring, reciprocal_wrenches
 from kinetostat.machine.limits import limits_loads
-from kinetostat.machine.loads import load_on_platform
+from kinetostat.machine.loads import load_on_platform, moving_mass
 from kinetostat.machine.machine import Configuration, Machine, springs
-from kinetostat.machine.mass import moving_mass
 from kinetostat.spec.renamed import renamed_property
 from kinetostat.tolerances import SINGULAR
 

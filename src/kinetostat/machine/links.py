@@ -1,6 +1,6 @@
 """Links of a family that have a mass: what people call them, where their cross-section may stand, where they are.
 
-What they weigh together is `mass`' business; links of machines written leg by leg are in their files.
+What they weigh together is the business of `loads`; links of machines written leg by leg are in their files.
 
 Points are in the base frame.
 """

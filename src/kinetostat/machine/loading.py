@@ -1,4 +1,7 @@
-"""Files to machines: the bundled ones by name, any other by path, with overrides."""
+"""Files to machines and back: bundled ones by name, others by path, with overrides; machines with other numbers.
+
+A file for people, which keeps comments and order, is written by `saving`.
+"""
 
 import copy
 import difflib
@@ -15,16 +18,15 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from kinetostat.display import ENGINEERING, Display, read_display
-from kinetostat.machine import pickling as _pickling  # noqa: F401  # machines that are loaded can be pickled
 from kinetostat.machine.catalogue import families, family_named
 from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_inertia
+from kinetostat.machine.cross_section import resolve
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.limits import check_limits, unloaded_parts
 from kinetostat.machine.loads import family_with_loads
 from kinetostat.machine.machine import Family, Machine, Written
 from kinetostat.machine.orientation import ANGLES, form_of, make_room, orientation_schema, with_angles
-from kinetostat.machine.parameters import POSE, check_contrast, find, with_values
-from kinetostat.machine.rigidities import resolve
+from kinetostat.machine.parameters import POSE, Given, check_contrast, find, find_field, with_values
 from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
 from kinetostat.machine.written import family as written
@@ -131,7 +133,9 @@ def _whole_path(document: Document, name: str) -> str:
 
 STATE = "what is shown where no quantity is named: the free machine, or the machine at rest under its loads"
 KEYS = ("schema", "name", "family", "display", "sections", TABLE, TOLERANCES)
-"""What a file may hold at its top beside the tables of its family."""
+"""Keys of a file at its top beside the tables of its family."""
+INDEPENDENT = ("pose", "tool", "load")
+"""Tables whose numbers need only be checked by themselves."""
 
 
 def _build_family(document: Document, origin: str, settings: Sequence[str]) -> Machine:
@@ -293,6 +297,45 @@ def _quantity_lines(fields: type, table: Any, readable: bool) -> Iterator[str]:
         texts = [json.dumps(show(value)) for value in (values if quantity.count else (values,))]
         alone = quantity.count is None or (readable and not quantity.apart and len(set(texts)) == 1)
         yield f"{field} = {texts[0] if alone else '[' + ', '.join(texts) + ']'}"
+
+
+@checked
+def changed(machine: Machine, values: Mapping[str, Given]) -> Machine:
+    """The machine with some fields, or entries of fields, at other values, checked as a file would be.
+
+    Of the same family, so that what has been compiled for it is used again.
+
+    Args:
+        machine: which stays as it is.
+        values: by name of the field, in SI or as text with a unit; for a field with several entries one for all, or a
+            list or array of one for each; infinity is "rigid".
+
+    Raises:
+        InputError: an unknown field, no quantity, a value out of bounds, a list of the wrong length, or numbers that
+            contradict each other.
+    """
+    new = machine.with_values(values)
+    return rebuilt(new) if any(related(machine, name) for name in values) else new
+
+
+def related(machine: Machine, path: str) -> bool:
+    """Whether a field is checked against others: then `rebuilt` has the last word on a change."""
+    if form_of(path):
+        return False
+    parameter = find_field(machine.family, path)
+    table = parameter.path.split(".")[0]
+    written = machine.family.chains is not None and not parameter.quantity.stiff
+    return table == "limits" or (written and table not in INDEPENDENT)
+
+
+def rebuilt(machine: Machine) -> Machine:
+    """The machine as read from its own file, with every check that a file undergoes; takes some 50 ms leg by leg.
+
+    Raises:
+        InputError: its numbers contradict each other.
+    """
+    again = build(documents.parse(as_toml(machine), machine.name), machine.name)
+    return replace(again, written=machine.written)
 
 
 def template(family: str) -> str:

@@ -26,9 +26,8 @@ from kinetostat.kinetostatics.internal import InternalLoads, internal_loads
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.limits import unlimited
-from kinetostat.machine.loads import loads_left_out
+from kinetostat.machine.loads import Mass, loads_left_out
 from kinetostat.machine.machine import Configuration, Machine, springs
-from kinetostat.machine.mass import Mass
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice

@@ -14,7 +14,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Mask
 from kinetostat.kinematics.closing import pose_of
-from kinetostat.machine.changing import changed
+from kinetostat.machine.loading import changed
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
 from kinetostat.spec.arguments import checked

@@ -18,8 +18,8 @@ from kinetostat.arrays import Array
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.loads import moving_masses
 from kinetostat.machine.machine import Configuration, Machine, springs
-from kinetostat.machine.mass import moving_masses
 from kinetostat.studies.assembly import actuators_at
 from kinetostat.studies.refusal import known_mobility
 from kinetostat.studies.rounding import clean_matrix

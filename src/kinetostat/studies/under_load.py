@@ -29,8 +29,8 @@ from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.deflected import DeflectedLink
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.limits import About
+from kinetostat.machine.loads import located_members
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.mass import located_members
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.loaded_sentences import about_rest, moving_legs, why_no_rest, why_no_tensions

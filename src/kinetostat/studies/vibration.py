@@ -27,9 +27,9 @@ from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.deflected import Deflection
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.loads import moving_masses
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.machine import springs as springs_of
-from kinetostat.machine.mass import moving_masses
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable

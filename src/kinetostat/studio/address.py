@@ -12,9 +12,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from urllib.parse import quote, urlencode
 
-from kinetostat.machine.changing import changed, rebuilt
 from kinetostat.machine.common_tables import STATES
-from kinetostat.machine.loading import as_toml, build, bundled, load
+from kinetostat.machine.loading import as_toml, build, bundled, changed, load, rebuilt
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.spec.document import LARGEST_FILE

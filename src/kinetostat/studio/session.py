@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.changing import rebuilt, related
-from kinetostat.machine.loading import build, bundled, load
+from kinetostat.machine.loading import build, bundled, load, rebuilt, related
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, values
 from kinetostat.machine.saving import as_file

@@ -16,8 +16,8 @@ from kinetostat.arrays import Array
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Turn
+from kinetostat.machine.loads import located_members
 from kinetostat.machine.machine import Configuration, Machine, Member, Plane
-from kinetostat.machine.mass import located_members
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import CLOSED
 from kinetostat.validation.family_legs import with_legs_of_file

@@ -26,8 +26,8 @@ from kinetostat.equilibrium.solving import with_share
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.loads import PLATFORM, moving_masses
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.mass import PLATFORM, moving_masses
 from kinetostat.tolerances import UNRESISTED
 from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
 from kinetostat.vibration.modes import frequencies, hertz

@@ -1,11 +1,19 @@
-"""The families of machines in closed form: those whose modules are here, and those that other packages register."""
+"""The families of machines in closed form: those whose modules are here, and those that other packages register.
 
+A machine is pickled for other processes as numbers, with its family by name or by how it is made: functions and classes
+of a family are made while a program runs and cannot be pickled.
+"""
+
+import copyreg
 import importlib
 import pkgutil
+from collections.abc import Callable, Mapping
+from dataclasses import fields
 from functools import cache
 from importlib.metadata import entry_points
+from typing import Any
 
-from kinetostat.machine.machine import Family
+from kinetostat.machine.machine import Family, Machine
 from kinetostat.machine.written.plan import NAME
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
@@ -76,3 +84,39 @@ def register_installed() -> None:
     """Register the families that installed packages name as entry points; asked only where a name is not known."""
     for entry in entry_points(group=ENTRY_POINTS):
         register(entry.load())
+
+
+def _of_machine(machine: Machine) -> tuple[Any, ...]:
+    content = {field.name: getattr(machine, field.name) for field in fields(machine)}
+    return _machine, ({**content, "tables": {name: dict(vars(table)) for name, table in machine.tables.items()}},)
+
+
+def _machine(content: Mapping[str, Any]) -> Machine:
+    """Put a machine together again."""
+    known = content["family"].every_table
+    return Machine(**{**content, "tables": {name: known[name](**kept) for name, kept in content["tables"].items()}})
+
+
+def _of_family(family: Family) -> tuple[Any, ...]:
+    if family.recipe is not None:
+        return _made, family.recipe
+    if family_named(family.name) is not family:
+        raise InputError(f'family "{family.name}" cannot be pickled before it is registered; call register(family).')
+    return _named, (family.name,)
+
+
+def _made(recipe: Callable[..., Family], given: tuple[Any, ...]) -> Family:
+    """Make a family by its recipe."""
+    return recipe(*given)
+
+
+def _named(name: str) -> Family:
+    """Return the family of a name."""
+    family = family_named(name)
+    if family is None:
+        raise InputError(f'family "{name}" is not known in this program; register it before its machines are read.')
+    return family
+
+
+copyreg.pickle(Machine, _of_machine)
+copyreg.pickle(Family, _of_family)

@@ -8,12 +8,11 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import IDENTITY, Z_AXIS, Displacement, Vector, polar, ring
-from kinetostat.machine.crank import CrankLinks, place
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring, numbered
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm, BarPair, Translations
-from kinetostat.machine.rings import Rings, Three
+from kinetostat.machine.rings import CrankLinks, Rings, Three, place
 from kinetostat.spec.fields import Quantity, table
 
 LEGS = 3

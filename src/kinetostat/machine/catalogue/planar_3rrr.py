@@ -10,12 +10,11 @@ from typing import Annotated
 from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.vector import Z_AXIS, Vector
 from kinetostat.machine.catalogue.planar_3rpr import LEGS, Pose, placed
-from kinetostat.machine.crank import CrankLinks, place
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, PartName, Spring, numbered
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family, Plane
 from kinetostat.machine.parts import Arm, if_elastic, per_length
-from kinetostat.machine.rings import Three, ThreeLegs
+from kinetostat.machine.rings import CrankLinks, Three, ThreeLegs, place
 from kinetostat.spec.fields import Quantity, table
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Vector
-from kinetostat.machine.mass import turned_tensor
+from kinetostat.machine.loads import turned_tensor
 from kinetostat.machine.written.plan import Copies, JointPlan, LegPlan, Matrix
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.units import UnitError, parse

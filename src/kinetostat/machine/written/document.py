@@ -12,10 +12,9 @@ import numpy as np
 
 from kinetostat.machine.cross_section import MATERIALS, SHAPES
 from kinetostat.machine.series import is_series, parts
-from kinetostat.machine.written.bodies import check_chain
+from kinetostat.machine.written.checking import check_chain
 from kinetostat.machine.written.copies import KEYS, copied, copies_in
-from kinetostat.machine.written.directions import directed
-from kinetostat.machine.written.joints import JOINT_TYPES, ONE_FREEDOM, SEAT, needs_axis, stiffness_kind
+from kinetostat.machine.written.joints import JOINT_TYPES, ONE_FREEDOM, SEAT, directed, needs_axis, stiffness_kind
 from kinetostat.machine.written.plan import (
     BASE,
     CABLE,

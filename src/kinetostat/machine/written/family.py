@@ -14,8 +14,8 @@ from kinetostat.machine.cross_section import least_bending_of, linear_density_of
 from kinetostat.machine.leg import Element, Joint, Leg, PartName, Spring, Station, Turn, series
 from kinetostat.machine.link import Beam, any_up, lumped_springs, matrix_springs, seat_springs
 from kinetostat.machine.links import growth_of
+from kinetostat.machine.loads import turned_tensor
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
-from kinetostat.machine.mass import turned_tensor
 from kinetostat.machine.series import springs_in_a_row
 from kinetostat.machine.written.copies import direction_in, inertia_in, joint_numbers, matrix_in
 from kinetostat.machine.written.joints import JOINT_TYPES, departure, own_axis

@@ -9,10 +9,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, reciprocal
-from kinetostat.algebra.vector import AXES, Vector
+from kinetostat.algebra.vector import AXES, Z_AXIS, Vector
 from kinetostat.machine.leg import RIGID, Element, Joint, revolutes
-from kinetostat.machine.link import Parallelogram
+from kinetostat.machine.link import Parallelogram, any_up
+from kinetostat.spec.errors import choice
 from kinetostat.spec.fields import Field, Quantity
+from kinetostat.units import UnitError, parse
 
 AXIS = Field(
     Quantity("direction", "direction of the joint, of any length, base axes at the home pose", count=3, apart=True)
@@ -248,3 +250,46 @@ def stiffness_kind(kind: str, motor: str) -> str:
 
 ONE_FREEDOM = tuple(name for name, kind in JOINT_TYPES.items() if kind.stiffness)
 """Types that may have an actuator or a spring of their own."""
+
+
+AXIS_FIELDS = ("axis", "first_axis", "second_axis")
+
+
+def directed(joints: Mapping[str, dict[str, Any]], where: str) -> None:
+    """Put numbers in the place of names of joints, and both axes in the place of a universal joint's shaft.
+
+    Args:
+        joints: of a leg by name, as written; they are changed.
+        where: names the leg in messages.
+
+    Raises:
+        InputError: no such joint in the leg.
+    """
+    for name, joint in joints.items():
+        for key in AXIS_FIELDS:
+            if isinstance(joint.get(key), str):
+                other = choice(joint[key], joints, f'{where}, joint "{name}": {key}, which may name a joint,')
+                joint[key] = _between(joint, joints[other], joint[key])
+        if joint.get("type") == "universal" and "axis" in joint and not {"first_axis", "second_axis"} & joint.keys():
+            joint |= _cross_of(joint.pop("axis"))
+
+
+def _between(joint: Mapping[str, Any], other: Mapping[str, Any], given: str) -> list[float] | str:
+    """From the point of one joint to that of another; as it was given if they are not points, which `spec` refuses."""
+    try:
+        ends = [[parse(entry, "length") for entry in each.get("point", ())] for each in (joint, other)]
+        return [far - near for near, far in zip(*ends, strict=True)]
+    except (UnitError, TypeError, ValueError):
+        return given
+
+
+def _cross_of(axis: object) -> dict[str, Any]:
+    """Axes of a universal joint square to its shaft: the first one level, unless the shaft is upright."""
+    try:
+        shaft = Vector(*(parse(entry, "direction") for entry in axis))  # type: ignore[attr-defined]
+    except (UnitError, TypeError, ValueError):
+        return {"first_axis": axis, "second_axis": axis}
+    first = Z_AXIS.cross(shaft)
+    if not any(first.components()):
+        first = any_up(shaft)
+    return {"first_axis": list(first.components()), "second_axis": list(shaft.cross(first).components())}

@@ -12,9 +12,8 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import LIMITS, About
-from kinetostat.machine.loads import loads_platform
+from kinetostat.machine.loads import loads_platform, moving_masses
 from kinetostat.machine.machine import Configuration, Machine
-from kinetostat.machine.mass import moving_masses
 from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.renamed import current_name
