@@ -17,7 +17,7 @@ import numpy as np
 from cases import CASES, TWELVE
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.engine.batch import available_cores, evaluate
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.machine.loading import load
 from kinetostat.studies.diagnosis.hardware import processor
 
@@ -40,7 +40,7 @@ def row(name: str, mass: str) -> str:
     """Time a machine under the weight of its platform."""
     case = CASES[name]
     settings = [f"tool.mass={mass}", "load.gravity=[0, 0, -9.81]"]
-    machine, points = load(case.machine, settings), Table(case.poses(POSES))
+    machine, points = load(case.machine, settings), PointTable(case.poses(POSES))
     best: dict[tuple[str, ...], float] = {}
     started = time.perf_counter()
     values = evaluate(machine, points, LOADED).values

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from cases import SUM, TWELVE, Case
 from kinetostat.engine.batch import available_cores, evaluate
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import with_values
@@ -78,7 +78,7 @@ def routes_of(case: Case, poses: dict[str, Array], folder: Path) -> list[Route]:
 
 def our_routes(case: Case, poses: dict[str, Array]) -> list[Route]:
     """evaluate() and evaluate_gradient()."""
-    machine, points = load(case.machine), Table(poses)
+    machine, points = load(case.machine), PointTable(poses)
     tasks: dict[str, Callable[[], Sequence[Array]]] = {
         TWELVE_OUTPUTS: lambda: [*evaluate(machine, points, TWELVE).values.values()],
         SUM_OF_C: lambda: [*evaluate_gradient(machine, points, SUM, ()).values],

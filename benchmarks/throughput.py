@@ -23,7 +23,7 @@ import numpy as np
 
 from cases import CASES, TWELVE, Case
 from kinetostat.engine.batch import available_cores, evaluate
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.machine.loading import load
 from kinetostat.studies.diagnosis.hardware import processor
 from routes import DIAGONAL_OF_C, TWELVE_OUTPUTS, Array, Route, routes_of
@@ -92,7 +92,7 @@ def _time(seconds: float) -> str:
 def one(name: str, size: int) -> None:
     """Evaluate one batch a few times and print what it took: the child of `print_sizes`."""
     case = CASES[name]
-    machine, points = load(case.machine), Table(case.poses(size))
+    machine, points = load(case.machine), PointTable(case.poses(size))
     taken = []
     for _ in range(4 if size <= 1_000_000 else 2):
         started = time.perf_counter()

@@ -15,7 +15,7 @@ import numpy as np
 
 from cases import CASES, TWELVE
 from kinetostat.engine.batch import available_cores, evaluate
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.diagnosis.hardware import processor
@@ -46,7 +46,7 @@ def main() -> None:
 def row(name: str, settings: Sequence[str], count: int) -> str:
     """Time a machine at random poses."""
     case = CASES[name]
-    machine, points = load(case.machine, [*BODY, *settings]), Table(case.poses(count))
+    machine, points = load(case.machine, [*BODY, *settings]), PointTable(case.poses(count))
     plain, ringing = (timed(machine, points, quantities) for quantities in (TWELVE, SIX))
     for _ in range(TURNS):
         plain = np.minimum(plain, timed(machine, points, TWELVE))
@@ -58,7 +58,7 @@ def row(name: str, settings: Sequence[str], count: int) -> str:
     )
 
 
-def timed(machine: Machine, points: Table, quantities: Sequence[str]) -> np.ndarray:
+def timed(machine: Machine, points: PointTable, quantities: Sequence[str]) -> np.ndarray:
     """Seconds on the clock and of all cores."""
     started = time.perf_counter(), time.process_time()
     evaluate(machine, points, quantities)

@@ -17,7 +17,7 @@ from same_machines import in_other_units, quarter, reordered, turned, with_matri
 
 from kinetostat.arrays import Array
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.solving import Rest
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics.closure import solve_joints
@@ -307,7 +307,7 @@ def grid(case: Case) -> str | None:
         "singularity_margin",
         *(f"{m}_{name}" for m in ("compliance", "stiffness") for name in case.machine.family.component_names),
     ]
-    answers = evaluate(case.machine, Table({path: poses}), names, repeated=compiled)
+    answers = evaluate(case.machine, PointTable({path: poses}), names, repeated=compiled)
     for i, pose in enumerate(poses.tolist()):
         machine = with_values(case.machine, {path: pose})
         response, where = response_of(machine), f"{path} = {pose!r}, {'compiled' if compiled else 'in arrays'}"
@@ -426,7 +426,7 @@ def weight_as_force(case: Case) -> str | None:
     del written["gravity"]
     other = build({**case.document, "load": written}, "weight as a force")
     path, _ = _poses(case)
-    names, here = ["actuator_force", "actuator_moment"], Table({path: np.array([values(case.machine)[path]])})
+    names, here = ["actuator_force", "actuator_moment"], PointTable({path: np.array([values(case.machine)[path]])})
     ours, theirs = evaluate(case.machine, here, names).values, evaluate(other, here, names).values
     apart = [name for name in names if not np.allclose(ours[name], theirs[name], rtol=SAME, atol=0.0, equal_nan=True)]
     return (

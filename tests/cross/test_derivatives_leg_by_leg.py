@@ -5,7 +5,7 @@ import pytest
 from test_leg_by_leg import TASKS, known, moved, pose_of, written
 
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.closure import CLOSED_FORMS, solver_of, task_of
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values, with_values
@@ -19,7 +19,7 @@ ROUNDED = 1e-30
 def shares(machine, names, paths):
     """Change of each index per m of the pose, or per whole of a stiffness, and the indices."""
     held = values(machine)
-    found = evaluate_gradient(machine, Table({path: np.array([held[path]]) for path in paths}), names, paths)
+    found = evaluate_gradient(machine, PointTable({path: np.array([held[path]]) for path in paths}), names, paths)
     assert found.status[0] == 0
     units = np.array([1.0 if path.startswith("pose.") else held[path] for path in paths])
     return found.gradients[:, :, 0] * units, found.values
@@ -69,7 +69,7 @@ def test_machines_of_one_plan_are_judged_by_their_own_numbers():
     tilted = with_values(parallel, {f"{axis}.1": 1.1 * longer[f"{axis}.1"]})
     assert parallel.family is tilted.family
     assert solver_of(task_of(tilted)) is CLOSED_FORMS
-    points = Table({f"pose.{c}": np.array([values(parallel)[f"pose.{c}"]]) for c in "xyz"})
+    points = PointTable({f"pose.{c}": np.array([values(parallel)[f"pose.{c}"]]) for c in "xyz"})
     for machine in (parallel, tilted):
         found, expected = (
             evaluate_gradient(machine, points, "compliance_x", points.paths, repeated=native)

@@ -12,9 +12,9 @@ from kinetostat.algebra.scalar import cos, reciprocal, smaller, sqrt, where
 from kinetostat.algebra.symmetric import POSITIONS
 from kinetostat.arrays import Array, Codes
 from kinetostat.engine.batch import by_free_springs, evaluate
-from kinetostat.engine.kernel import slab_kernel
+from kinetostat.engine.kernel import quantity_program, slab_fill
 from kinetostat.engine.native import Body, Program, host_lanes
-from kinetostat.engine.points import Axis, Grid, Table
+from kinetostat.engine.points import Axis, Grid, PointTable
 from kinetostat.engine.trace import Graph, Traced, needed
 from kinetostat.engine.trigonometry import cos_and_sin
 from kinetostat.kinematics.status import Status
@@ -58,7 +58,7 @@ class Found:
 def native(machine: Machine, columns: Columns, names: tuple[str, ...] = NAMES) -> Found:
     count = len(next(iter(columns.values())))
     found = Found(np.full((len(names), count), 7.0), np.full(count, 7, dtype=np.int8))
-    fill = by_free_springs(machine, tuple(columns), names, lambda *form: slab_kernel(*form).run)
+    fill = by_free_springs(machine, tuple(columns), names, slab_fill)
     fill(columns, found.values, found.status)
     return found
 
@@ -225,7 +225,7 @@ def test_any_number_of_points(count: int) -> None:
     values_around, status_around = np.full((12, count + 6), 7.0), np.full(count + 6, 7, dtype=np.int8)
     inner = slice(3, count + 3)
     part = {path: column[:count] for path, column in columns.items()}
-    slab_kernel(machine, tuple(part), DIAGONALS).run(part, values_around[:, inner], status_around[inner])
+    slab_fill(machine, tuple(part), DIAGONALS)(part, values_around[:, inner], status_around[inner])
     np.testing.assert_array_equal(values_around[:, inner], whole.values[:, :count])
     np.testing.assert_array_equal(status_around[inner], whole.status[:count])
     assert np.all(np.delete(values_around, np.r_[inner], axis=1) == 7.0)
@@ -243,11 +243,11 @@ def test_columns_of_any_kind() -> None:
 
 def test_arrays_that_do_not_fit_are_refused() -> None:
     columns = drawn(CASES[0], "pose.", 20)
-    kernel = slab_kernel(load(FOUR), tuple(columns), DIAGONALS)
+    fill = slab_fill(load(FOUR), tuple(columns), DIAGONALS)
     with pytest.raises(ValueError, match="contiguous"):
-        kernel.run(columns, np.empty((12, 40))[:, ::2], np.empty(20, dtype=np.int8))
+        fill(columns, np.empty((12, 40))[:, ::2], np.empty(20, dtype=np.int8))
     with pytest.raises(ValueError, match="one length"):
-        kernel.run(columns, np.empty((12, 19)), np.empty(20, dtype=np.int8))
+        fill(columns, np.empty((12, 19)), np.empty(20, dtype=np.int8))
 
 
 def test_a_program_serves_all_machines_of_one_form() -> None:
@@ -255,8 +255,10 @@ def test_a_program_serves_all_machines_of_one_form() -> None:
     machine, columns = load(FOUR), drawn(CASES[0], "pose.", 20)
     changed = {"geometry.base_radius": 0.3, "geometry.base_angle": 0.2, "stiffness.actuator.1": 4e4}
     machine, other = with_values(machine, {"stiffness.actuator.1": 3e4}), with_values(machine, changed)
-    first, second = (slab_kernel(m, tuple(columns), NAMES) for m in (machine, other))
-    assert first.program is second.program
+    slab_fill(machine, tuple(columns), NAMES)
+    made = quantity_program.cache_info().misses
+    slab_fill(other, tuple(columns), NAMES)
+    assert quantity_program.cache_info().misses == made
     assert_same(native(other, columns), by_floats(other, columns))
 
 
@@ -276,7 +278,7 @@ def test_large_and_small_batches_agree() -> None:
     seen: list[int] = []
     large = evaluate(machine, grid, NAMES, lambda done, _: seen.append(done))
     some = range(7, grid.size, 1009)
-    points = Table({path: np.array([grid.columns(k, k + 1)[path][0] for k in some]) for path in counts})
+    points = PointTable({path: np.array([grid.columns(k, k + 1)[path][0] for k in some]) for path in counts})
     small = evaluate(machine, points, NAMES)
     taken = np.array([large.values[name][list(some)] for name in NAMES])
     assert_same(Found(taken, large.status[list(some)]), Found(np.array([*small.values.values()]), small.status))

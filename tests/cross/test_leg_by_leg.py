@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from kinetostat.engine.batch import NATIVE_FROM, evaluate
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.closure import CLOSED_FORMS, NEWTON, solve_joints, task_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
@@ -135,7 +135,7 @@ def test_batches_are_the_single_poses(name):
     size = 0.3 if base == name else 0.01
     columns = {path: values(machine)[path] + rng.uniform(-size, size, count) for path in paths}
     names = [*GROUPS["compliance"], *GROUPS["stiffness"]]
-    found = evaluate(machine, Table(columns), names)
+    found = evaluate(machine, PointTable(columns), names)
     assert (found.status == Status.OK).all()
     for n in (0, count // 2, count - 1):
         one = respond(with_values(machine, {path: float(column[n]) for path, column in columns.items()}))

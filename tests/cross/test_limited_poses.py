@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kinetostat.engine.batch import first_limit_passed, limits_used
-from kinetostat.engine.form import Kind, form_of, traced
-from kinetostat.engine.kernel import slab_kernel
+from kinetostat.engine.form import Specimen, form_of, traced_machine
+from kinetostat.engine.kernel import slab_fill
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import is_set
@@ -87,7 +87,7 @@ def test_floats_arrays_and_machine_code_give_one_status(name, load_settings, fie
     with np.errstate(all="ignore"):
         arrays = np.broadcast_to(respond(with_values(machine, columns)).status, POSES)
     results, codes = np.empty((1, POSES)), np.empty(POSES, dtype=np.int8)
-    slab_kernel(machine, [*columns], ["singularity_margin"]).run(columns, results, codes)
+    slab_fill(machine, [*columns], ["singularity_margin"])(columns, results, codes)
     assert {Status.OK, Status.JOINT_LIMIT} <= set(expected)
     assert np.array_equal(arrays, expected)
     assert np.array_equal(codes, expected)
@@ -116,7 +116,7 @@ def test_what_is_used_is_what_single_poses_measure(name, load_settings, fields):
 def test_no_arithmetic_is_spent_on_limits_that_are_not_set(monkeypatch):
     def nodes(machine):
         form, _ = form_of(machine, ["pose.x", "pose.z"])
-        given = traced(Kind(machine), form)
+        given = traced_machine(Specimen(machine), form)
         respond(given.machine)
         return len(given.graph.nodes)
 
@@ -132,9 +132,7 @@ def test_a_limit_that_varies_is_a_column_like_any_other():
     machine = load("hexapod")
     length = np.linspace(0.08, 0.12, 200)
     results, codes = np.empty((1, 200)), np.empty(200, dtype=np.int8)
-    slab_kernel(machine, ["limits.longest_leg"], ["singularity_margin"]).run(
-        {"limits.longest_leg": length}, results, codes
-    )
+    slab_fill(machine, ["limits.longest_leg"], ["singularity_margin"])({"limits.longest_leg": length}, results, codes)
     reach = limits_used(with_values(machine, {"limits.longest_leg": 1.0}), {"pose.x": np.zeros(1)})["longest_leg"][1]
     assert np.array_equal(codes == Status.OK, length >= reach)
     assert is_set(length)

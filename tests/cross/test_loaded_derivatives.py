@@ -7,7 +7,7 @@ from test_loaded_routes import moved_by_about
 from kinetostat import sensitivity
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.loaded import Way, loaded_fill
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.studies.optimisation.assessment import Assessor
@@ -46,7 +46,7 @@ def test_derivatives_are_differences_of_states(name):
     quantities = ["displacement_x", "tangent_free_stiffness_x", "tangent_stiffness_x", "load_factor"]
     here = values(machine)
     column = next(path for path in here if path.startswith("pose."))
-    answer = evaluate_gradient(machine, Table({column: np.array([here[column]])}), quantities, paths)
+    answer = evaluate_gradient(machine, PointTable({column: np.array([here[column]])}), quantities, paths)
     assert answer.status.tolist() == [Status.OK]
     exact = answer.gradients[:, :, 0]
     expected = np.array([differences(machine, path, quantities) for path in paths]).T

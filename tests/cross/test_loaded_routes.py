@@ -6,7 +6,7 @@ import pytest
 from kinetostat import analyze
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.loaded import NUMPY_FROM, Way, loaded_fill
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.loading import bundled
@@ -114,11 +114,11 @@ def test_many_points_go_through_programs(monkeypatch):
     machine = moved_by_about("hexapod", 1e-3)
     monkeypatch.setattr(loaded, "_solve_in_parts", lambda *_: pytest.fail("the slow solver was asked"))
     count = NUMPY_FROM
-    values = evaluate(machine, Table(poses_near(machine, count)), ["displacement_z"])
+    values = evaluate(machine, PointTable(poses_near(machine, count)), ["displacement_z"])
     assert (values.status == Status.OK).all()
 
 
 def test_gravity_without_any_mass_is_refused_by_programs_too():
     machine = load_without_limits("hexapod", ["load.gravity=[0, 0, -9.81]"])
     with refused(r"load.gravity pulls at masses, but none is known"):
-        evaluate(machine, Table({"pose.x": np.zeros(NUMPY_FROM)}), ["displacement_z"])
+        evaluate(machine, PointTable({"pose.x": np.zeros(NUMPY_FROM)}), ["displacement_z"])

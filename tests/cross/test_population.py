@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from kinetostat.engine.batch import evaluate
-from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.points import Table
-from kinetostat.engine.population import Evaluator, Population, differentiate
+from kinetostat.engine.batch import Evaluator, evaluate
+from kinetostat.engine.derivatives import differentiate, evaluate_gradient
+from kinetostat.engine.points import PointTable, Population
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values
 
@@ -32,7 +31,7 @@ def test_every_design_at_every_pose():
     assert population.shape == found.status.shape == (30, 7)
     columns = {path: np.repeat(values, 7) for path, values in population.designs.items()}
     columns |= {path: np.tile(values, 30) for path, values in population.poses.items()}
-    expected = evaluate(machine, Table(columns), NAMES)
+    expected = evaluate(machine, PointTable(columns), NAMES)
     np.testing.assert_array_equal(found.status.ravel(), expected.status)
     assert (found.status != 0).any(), "some designs must be out of reach"
     for name in NAMES:
@@ -44,7 +43,7 @@ def test_without_poses_it_is_the_machines_own(name):
     machine, path = load(name), stiff_path(name)
     population = Population({path: float(values(machine)[path]) * np.array([0.9, 1.0, 1.1])}, {})
     found = Evaluator(machine, population.paths, ["compliance_x"])(population)
-    expected = evaluate(machine, Table(population.designs), ["compliance_x"])
+    expected = evaluate(machine, PointTable(population.designs), ["compliance_x"])
     assert found.status.shape == (3, 1)
     np.testing.assert_allclose(found.values["compliance_x"][:, 0], expected.values["compliance_x"], rtol=1e-9)
 
@@ -56,7 +55,7 @@ def test_derivatives_are_those_of_the_engine(machine):
     designs = {p: float(values(loaded)[p]) * shares for p in ("geometry.platform_radius", "geometry.base_radius")}
     population, by = Population(designs, {}), tuple(designs)
     found = differentiate(loaded, population, ["compliance_x", "singularity_margin"], by)
-    expected = evaluate_gradient(loaded, Table(designs), ["compliance_x", "singularity_margin"], by)
+    expected = evaluate_gradient(loaded, PointTable(designs), ["compliance_x", "singularity_margin"], by)
     np.testing.assert_allclose(found.slopes[:, :, :, 0], expected.gradients, rtol=1e-9)
     np.testing.assert_allclose(found.values["singularity_margin"][:, 0], expected.values[1], rtol=1e-12)
 
@@ -65,7 +64,7 @@ def test_derivatives_where_joints_are_found_by_iteration():
     machine, path = load("tripteron"), stiff_path("tripteron")
     population = Population({path: float(values(machine)[path]) * np.array([1.0, 1.1])}, {})
     found = differentiate(machine, population, ["compliance_x"], [path])
-    expected = evaluate_gradient(machine, Table(population.designs), "compliance_x", [path])
+    expected = evaluate_gradient(machine, PointTable(population.designs), "compliance_x", [path])
     np.testing.assert_allclose(found.slopes[0, 0, :, 0], expected.gradients[0, 0], rtol=1e-12)
 
 

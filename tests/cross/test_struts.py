@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import as_toml, build
@@ -105,7 +105,7 @@ def test_both_bodies_of_a_strut_have_the_mass_of_its_cross_section():
 def test_batches_and_derivatives_know_that_the_length_depends_on_the_pose():
     machine = build(STRUTS, "struts")
     heights = np.array([0.45, 0.5, 0.55])
-    batch = evaluate(machine, Table({"pose.z": heights}), ["compliance_z"]).values["compliance_z"]
+    batch = evaluate(machine, PointTable({"pose.z": heights}), ["compliance_z"]).values["compliance_z"]
     alone = [analyze(with_values(machine, {"pose.z": float(z)})).C[5, 5] for z in heights]
     assert batch == pytest.approx(alone, rel=1e-10)
     exact = {row.path: row.derivatives[0] for row in sensitivity(machine, ["compliance_z"]).parameters}

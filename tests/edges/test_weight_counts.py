@@ -15,7 +15,7 @@ from kinetostat.cli import main
 from kinetostat.commands.common import DONE, NO_ANSWER
 from kinetostat.engine.batch import evaluate, in_slabs
 from kinetostat.engine.loaded import Way, loaded_fill
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.under_load import under_load
@@ -105,7 +105,7 @@ def test_loads_at_rest_are_the_same_in_all_arithmetics(name):
     rows = {}
     for way in (Way.ANY_MACHINE, Way.NUMPY, Way.NATIVE):
         fill = loaded_fill(machine, list(poses), ["actuator_force"], way)
-        (rows[way],), status = in_slabs(Table(poses), fill, 1, way.slab, 1)
+        (rows[way],), status = in_slabs(PointTable(poses), fill, 1, way.slab, 1)
         assert not status.any()
     for row in rows.values():
         np.testing.assert_allclose(row, rows[Way.ANY_MACHINE], rtol=1e-12)
@@ -115,7 +115,7 @@ def test_loads_at_rest_are_the_same_in_all_arithmetics(name):
     bound = float(np.median(rows[Way.NATIVE]))
     limited = load(name, [*settings, f"limits.actuator_force={bound} N"])
     for way in rows:
-        _, status = in_slabs(Table(poses), loaded_fill(limited, list(poses), ["aspect"], way), 1, way.slab, 1)
+        _, status = in_slabs(PointTable(poses), loaded_fill(limited, list(poses), ["aspect"], way), 1, way.slab, 1)
         assert ((status == Status.JOINT_LIMIT) == (rows[Way.ANY_MACHINE] > bound)).all()
 
 
@@ -125,7 +125,7 @@ def test_the_slope_of_the_greatest_load_is_that_of_differences(state):
     slopes = {row.path: row.derivatives[0] for row in sensitivity(machine, ["actuator_force"]).parameters}
 
     def greatest(path, value):
-        (force,) = evaluate(machine, Table({path: np.array([value])}), ["actuator_force"]).values["actuator_force"]
+        (force,) = evaluate(machine, PointTable({path: np.array([value])}), ["actuator_force"]).values["actuator_force"]
         return force
 
     for path, step in {"tool.mass": 1e-2, "load.gravity.2": 1e-3, "pose.x": 1e-6}.items():

@@ -13,7 +13,7 @@ from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE
 from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
-from kinetostat.engine.chunks import Crew, hired, in_chunks
+from kinetostat.engine.chunks import Crew, compute_with, in_chunks
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values
@@ -59,7 +59,7 @@ def assert_same(found, expected):
 @pytest.mark.parametrize("name", [MACHINE, "tripteron", "planar-3rrr"])
 def test_a_cluster_gives_the_same_bits(name, dask):
     work = work_of(name)
-    with hired(Crew(address=dask)) as compute:
+    with compute_with(Crew(address=dask)) as compute:
         found = list(compute(work, range(work.count)))
     assert len(found) == work.count > 2
     assert_same(dict(found), dict(chunks.here(work, range(work.count))))
@@ -87,7 +87,7 @@ def test_a_worker_that_dies_is_survived():
     distributed = pytest.importorskip("distributed")
     work = work_of(MACHINE)
     found = {}
-    with hired(Crew(workers=2)) as compute:
+    with compute_with(Crew(workers=2)) as compute:
         for number, part in compute(work, range(work.count)):
             if not found:
                 os.kill(min(distributed.default_client().run(os.getpid).values()), signal.SIGKILL)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from kinetostat.engine import derivatives
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.closing import closing_equations
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -45,7 +45,7 @@ def smooth_paths(machine):
 def here(machine):
     """The machine's own pose as the one point of a table."""
     path, value = next((path, value) for path, value in values(machine).items() if path.startswith("pose."))
-    return Table({path: np.array([value])})
+    return PointTable({path: np.array([value])})
 
 
 def slopes_at(machine, names, paths):
@@ -114,7 +114,7 @@ def test_machine_code_and_arrays_give_the_same_derivatives(case, monkeypatch):
     names, paths = [softness(machine)[-1], dict.fromkeys(softness(machine), 1.0)], smooth_paths(machine)[::5]
     rng = np.random.default_rng(5)
     ranges = {path: bounds for path, bounds in case.ranges.items() if path.startswith("pose.")}
-    table = Table({path: rng.uniform(low, high, 37) for path, (low, high) in ranges.items()})
+    table = PointTable({path: rng.uniform(low, high, 37) for path, (low, high) in ranges.items()})
     few_points = evaluate_gradient(machine, table, names, paths)
     monkeypatch.setattr(derivatives, "MACHINE_CODE_FROM", 1)
     many = evaluate_gradient(machine, table, names, paths)
@@ -133,7 +133,9 @@ BAR = ["sections.bar.diameter", "legs.x.slide.stiffness", "legs.z.shoulder.point
 def test_closed_forms_and_closing_equations_give_the_same_derivatives(paths, monkeypatch):
     """Machine code goes through closed forms where they hold whatever changes, arrays always through the equations."""
     machine = load("tripteron")
-    table = Table({path: np.random.default_rng(8).uniform(0.2, 0.8, 40) for path in ("pose.x", "pose.y", "pose.z")})
+    table = PointTable(
+        {path: np.random.default_rng(8).uniform(0.2, 0.8, 40) for path in ("pose.x", "pose.y", "pose.z")}
+    )
     followed = evaluate_gradient(machine, table, ["compliance_x", "compliance_ry"], paths)
     monkeypatch.setattr(derivatives, "MACHINE_CODE_FROM", 1)
     found = evaluate_gradient(machine, table, ["compliance_x", "compliance_ry"], paths)
@@ -186,7 +188,7 @@ def test_by_rigid_and_by_free_springs(monkeypatch):
     assert np.isnan(slopes[0, 2])
     for native in (1, 10**9):
         monkeypatch.setattr(derivatives, "MACHINE_CODE_FROM", native)
-        table = Table({paths[1]: np.array([1e4, 0.0, 2e4])})
+        table = PointTable({paths[1]: np.array([1e4, 0.0, 2e4])})
         found = evaluate_gradient(machine, table, ["compliance_rz"], paths[1:2])
         assert found.gradients[0, 0, 0] == pytest.approx(slopes[0, 1], rel=SAME)
         assert np.isnan(found.gradients[0, 0, 1])
@@ -194,7 +196,7 @@ def test_by_rigid_and_by_free_springs(monkeypatch):
 
 
 def test_out_of_reach_there_is_no_derivative():
-    table = Table({"pose.z": np.array([0.68, 5.0])})
+    table = PointTable({"pose.z": np.array([0.68, 5.0])})
     found = evaluate_gradient(CASES[0].machine, table, "compliance_z", ["pose.z", "geometry.base_radius"])
     assert found.status.tolist() == [0, 1]
     assert np.isfinite(found.gradients[0, :, 0]).all()

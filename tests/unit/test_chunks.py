@@ -7,7 +7,7 @@ import pytest
 
 from kinetostat.engine import batch, chunks
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.chunks import Work, here, in_chunks
+from kinetostat.engine.chunks import Work, in_chunks, in_this_process
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import parameters, values
@@ -45,7 +45,7 @@ def test_chunks_of_any_size_give_the_same_bits(case, small_slabs):
     whole = evaluate(machine, grid, names)
     for slabs in (1, 3):
         work = Work(machine, grid, tuple(names), slabs * SLAB)
-        found = dict(here(work, range(work.count)))
+        found = dict(in_this_process(work, range(work.count)))
         assert sorted(found) == list(range(work.count))
         parts = [found[number] for number in range(work.count)]
         np.testing.assert_array_equal(np.concatenate([part.status for part in parts]), whole.status)

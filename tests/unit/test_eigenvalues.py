@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.symmetric import greatest_eigenvalue
-from kinetostat.engine.gradient import gradient
-from kinetostat.engine.interpreter import Interpreted
+from kinetostat.engine.gradient import Interpreted, gradient
 from kinetostat.engine.trace import Body, Graph
 
 COUNT = 5000

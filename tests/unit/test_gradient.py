@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.scalar import cos, sin, smaller, sqrt, where
-from kinetostat.engine.gradient import gradient, share_of, with_gradients
-from kinetostat.engine.interpreter import Interpreted
+from kinetostat.engine.gradient import Interpreted, gradient, share_of, with_gradients
 from kinetostat.engine.native import Program
 from kinetostat.engine.trace import Body, Graph, needed
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.catalogue import families
 from kinetostat.machine.loading import as_toml, build, bundled, load
@@ -83,7 +83,7 @@ def test_each_link_weighs_its_length(case):
 def test_it_can_be_differentiated_and_mapped():
     machine = load("hexapod", [f"stiffness.leg_axial={TUBE}"])
     paths = ["pose.z", "geometry.base_radius", "linear_density.legs"]
-    answer = evaluate_gradient(machine, Table({"pose.z": np.array([0.135])}), "mass", paths)
+    answer = evaluate_gradient(machine, PointTable({"pose.z": np.array([0.135])}), "mass", paths)
     step = 1e-6
     for path, slope in zip(paths, answer.gradients[0, :, 0], strict=True):
         size = {"pose.z": 0.135, "geometry.base_radius": 0.115, "linear_density.legs": PER_METRE}[path]

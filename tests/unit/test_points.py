@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinetostat.engine.points import Axis, Grid, Part, Table
+from kinetostat.engine.points import Axis, ConsecutivePoints, Grid, PointTable
 
 SHAPES = st.lists(st.integers(2, 7), min_size=1, max_size=6)
 
@@ -35,9 +35,9 @@ def test_all_paths_of_an_axis_take_its_values_together():
     assert {name: column.tolist() for name, column in grid.columns(0, 2).items()} == {"p": [1.0, 2.0], "q": [1.0, 2.0]}
 
 
-@pytest.mark.parametrize("whole", [grid_of([3, 4]), Table({"a": np.arange(12.0)})])
+@pytest.mark.parametrize("whole", [grid_of([3, 4]), PointTable({"a": np.arange(12.0)})])
 def test_a_part_is_numbered_from_its_start(whole):
-    part = Part(whole, 5, 9)
+    part = ConsecutivePoints(whole, 5, 9)
     assert part.size == 4
     assert part.paths == whole.paths
     for path, column in part.columns(1, 3).items():

@@ -8,7 +8,7 @@ import pytest
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.loaded import Way, loaded_fill
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
@@ -76,7 +76,7 @@ def test_the_quick_route_and_the_modes_give_the_same_frequencies(name, links):
 def test_every_way_to_evaluate_many_poses_agrees(name):
     machine = heavy(name)
     path = next(path for path in values(machine) if path.startswith("pose."))
-    points = Table({path: values(machine)[path] + np.linspace(0.0, 0.01, 300)})
+    points = PointTable({path: values(machine)[path] + np.linspace(0.0, 0.01, 300)})
     expected = evaluate(machine, points, NAMES)
     for way in (Way.ANY_MACHINE, Way.NUMPY, Way.NATIVE):
         results, status = np.empty((6, points.size)), np.empty(points.size, dtype=np.int8)
@@ -122,10 +122,10 @@ def _compare_slopes(machine, paths):
     """Exact derivatives of three frequencies beside differences of fourth order."""
     here = values(machine)
     column = next(path for path in here if path.startswith("pose."))
-    exact = evaluate_gradient(machine, Table({column: np.array([here[column]])}), NAMES[:3], paths)
+    exact = evaluate_gradient(machine, PointTable({column: np.array([here[column]])}), NAMES[:3], paths)
     for row, path in enumerate(paths):
         step = 1e-4 * (abs(here[path]) or 0.1)
-        points = Table({path: here[path] + step * np.array([-2.0, -1.0, 1.0, 2.0])})
+        points = PointTable({path: here[path] + step * np.array([-2.0, -1.0, 1.0, 2.0])})
         near = np.array(list(evaluate(machine, points, NAMES[:3]).values.values()))
         slope = (near[:, 0] - 8.0 * near[:, 1] + 8.0 * near[:, 2] - near[:, 3]) / (12.0 * step)
         scale = exact.values[:, 0] / (abs(here[path]) or 0.1)
@@ -139,7 +139,7 @@ def _pose(machine):
 def test_equal_frequencies_have_the_derivative_of_their_mean():
     machine = heavy("hexapod")
     struts = [f"stiffness.actuator.{leg}" for leg in range(6)]
-    slopes = evaluate_gradient(machine, Table({"pose.x": np.zeros(1)}), NAMES, [*struts, "pose.x"])
+    slopes = evaluate_gradient(machine, PointTable({"pose.x": np.zeros(1)}), NAMES, [*struts, "pose.x"])
     for first, second in ((0, 1), (3, 4)):
         assert slopes.values[first] == pytest.approx(slopes.values[second], rel=1e-9)
         np.testing.assert_allclose(slopes.gradients[first], slopes.gradients[second], rtol=1e-9, atol=1e-8)
@@ -174,7 +174,7 @@ def test_both_bars_of_a_parallelogram_weigh_where_they_are(name):
 def test_a_point_mass_rings_in_three_ways():
     machine = changed(load("hexapod"), {"tool.mass": 12.0})
     assert len(modes(machine).modes) == 3
-    found = evaluate(machine, Table({"pose.x": np.zeros(1)}), NAMES).values
+    found = evaluate(machine, PointTable({"pose.x": np.zeros(1)}), NAMES).values
     assert [bool(np.isinf(found[name][0])) for name in NAMES] == [False] * 3 + [True] * 3
 
 
@@ -231,7 +231,7 @@ def test_the_cut_of_one_mode_is_that_of_the_textbook():
     assert softest.depth(2e9) == pytest.approx(-0.5 / (2e9 * softest.real))
     across = {f"cutting.direction.{k}": float(k == 2) for k in range(3)}
     cut = changed(machine, {**across, "cutting.pressure": 2e9})
-    points = Table({"pose.z": values(cut)["pose.z"] + np.array([0.0, 0.01])})
+    points = PointTable({"pose.z": values(cut)["pose.z"] + np.array([0.0, 0.01])})
     found = evaluate(cut, points, ["stable_width", "least_real_receptance", "frequency_1"]).values
     assert found["stable_width"][0] == pytest.approx(softest.depth(2e9), rel=1e-9)
     assert found["least_real_receptance"][0] == pytest.approx(softest.real, rel=1e-9)

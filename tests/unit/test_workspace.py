@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinetostat.engine.batch import NATIVE_FROM, evaluate
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
@@ -253,7 +253,7 @@ class TestBorders:
             for side, wanted in ((-0.01, True), (0.01, False)):
                 share = border[i, k] + side
                 poses = {"pose.x": np.array([x[i] + share * (x[1] - x[0])]), "pose.z": np.array([z[k]])}
-                answer = evaluate(machine, Table(poses), judge.quantities)
+                answer = evaluate(machine, PointTable(poses), judge.quantities)
                 code = judge.verdicts(answer.status, answer.values, lambda _, poses=poses: poses)[0]
                 assert bool(code == verdict[i, k]) is wanted
 

@@ -157,12 +157,12 @@ def _crew(options: argparse.Namespace) -> "Crew":
 
 
 def _in_memory(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
-    from kinetostat.engine.chunks import hired
+    from kinetostat.engine.chunks import compute_with
     from kinetostat.studies.grid.grid import answer
 
     if options.output:
         _check_folder(options.output, options.resume)
-    with hired(_crew(options)) as compute, progress_bar("computing") as progress:
+    with compute_with(_crew(options)) as compute, progress_bar("computing") as progress:
         dataset = answer(question, progress, compute)
     written = _write(options, dataset, stem) if options.output else []
 
@@ -211,13 +211,13 @@ def _draw(options: argparse.Namespace, dataset: "xr.Dataset", stem: str, title: 
 
 
 def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
-    from kinetostat.engine.chunks import hired
+    from kinetostat.engine.chunks import compute_with
     from kinetostat.studies.file_list import differing
     from kinetostat.studies.grid.stored_grid import answer_into
 
     changed = differing(options.output)
     try:
-        with hired(_crew(options)) as compute, progress_bar("computing") as progress:
+        with compute_with(_crew(options)) as compute, progress_bar("computing") as progress:
             stored = answer_into(question, options.output, stem, progress, compute, options.resume)
     except KeyboardInterrupt:
         return stopped(f"the results so far are in {options.output}; the same command continues from there.")

@@ -14,9 +14,9 @@ from itertools import islice
 import numpy as np
 
 from kinetostat.arrays import Array, Codes, Integers
-from kinetostat.engine.kernel import Fill, fill_some, slab_kernel
+from kinetostat.engine.kernel import Fill, fill_some, slab_fill
 from kinetostat.engine.loaded import Way, loaded_fill, way_of
-from kinetostat.engine.points import Part, Points
+from kinetostat.engine.points import ConsecutivePoints, Points, Population
 from kinetostat.equilibrium.numbers import states_of_rest
 from kinetostat.kinematics.limits import Check, load_checks
 from kinetostat.kinematics.status import Status
@@ -76,22 +76,27 @@ def evaluate(
         repeated: whether the same quantities will be needed many times at other numbers, as behind a slider. Then it
             pays to compile for few points as well: a thousand poses take a millisecond from then on.
     """
-    method: Method
-    if needs_state(machine, quantities):
-        way = way_of(machine, points.paths, quantities, points.size, repeated)
-        slab, most, method = way.slab, threads or available_cores(), partial(loaded_fill, way=way)
-    elif repeated or points.size >= NATIVE_FROM:
-        slab, most, method = NATIVE_SLAB, threads or available_cores(), program_fill
-    else:
-        slab, most, method = NUMPY_SLAB, 1, _numpy_fill
+    method, slab, most = _method_for(machine, points.paths, quantities, points.size, repeated)
     fill = by_free_springs(machine, points.paths, quantities, method)
-    served = points if part is None else Part(points, part.start, part.stop)
-    results, status = in_slabs(served, fill, len(quantities), slab, most, progress)
+    served = points if part is None else ConsecutivePoints(points, part.start, part.stop)
+    results, status = in_slabs(served, fill, len(quantities), slab, min(threads or most, most), progress)
     return Evaluation(dict(zip(quantities, results, strict=True)), status)
 
 
 Method = Callable[[Machine, Sequence[str], Sequence[str]], Fill]
 """A way to evaluate slabs: from a machine, its varying paths and names of quantities."""
+
+
+def _method_for(
+    machine: Machine, paths: Sequence[str], quantities: Sequence[str], count: int, repeated: bool
+) -> tuple[Method, int, int]:
+    """Choose how to evaluate so many points: the method, the points of a slab, and the slabs computed at a time."""
+    if needs_state(machine, quantities):
+        way = way_of(machine, paths, quantities, count, repeated)
+        return partial(loaded_fill, way=way), way.slab, available_cores()
+    if repeated or count >= NATIVE_FROM:
+        return slab_fill, NATIVE_SLAB, available_cores()
+    return _numpy_fill, NUMPY_SLAB, 1
 
 
 def in_slabs(
@@ -160,20 +165,9 @@ def _numpy_fill(machine: Machine, _paths: Sequence[str], quantities: Sequence[st
     return fill
 
 
-def program_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str]) -> Fill:
-    """Return the fill in machine code of quantities of unloaded machines.
-
-    Args:
-        machine: gives all parameters that do not vary.
-        paths: leaf paths of those that do.
-        quantities: names from `QUANTITIES`.
-    """
-    return slab_kernel(machine, paths, quantities).run
-
-
 def _in_threads(task: Callable[[int], int], starts: Sequence[int], threads: int) -> Iterator[int]:
     """Run the task over all starts, in order. Few tasks wait at a time, so that an interrupt takes effect soon."""
-    if threads == 1:
+    if threads == 1 or len(starts) == 1:
         yield from map(task, starts)
         return
     waiting = iter(starts)
@@ -189,6 +183,51 @@ def available_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+@dataclass(frozen=True)
+class PopulationResults:
+    """Quantities of every design at every pose.
+
+    Attributes:
+        values: by name [designs x poses]; NaN where the status is not OK.
+        status: `Status` codes [designs x poses].
+        slopes: derivatives of each quantity in turn by each path [quantities x paths x designs x poses], where they
+            have been computed.
+    """
+
+    values: dict[str, Array]
+    status: Codes
+    slopes: Array | None = None
+
+    @classmethod
+    def of(
+        cls, population: Population, names: Sequence[str], results: Array, status: Codes, slopes: Array | None = None
+    ) -> "PopulationResults":
+        """Arrange results [quantities x points] by design and pose."""
+        values = {name: row.reshape(population.shape) for name, row in zip(names, results, strict=True)}
+        return cls(values, status.reshape(population.shape), slopes)
+
+
+class Evaluator:
+    """Evaluates quantities of whole populations of a machine's designs, always in machine code."""
+
+    def __init__(self, machine: Machine, paths: Sequence[str], quantities: Sequence[str]) -> None:
+        """Compile.
+
+        Args:
+            machine: gives all parameters that do not vary.
+            paths: leaf paths of those that do: of designs, then of poses.
+            quantities: names from `kinetostatics.quantities.QUANTITIES`.
+        """
+        self._names = tuple(quantities)
+        method, self._slab, self._threads = _method_for(machine, paths, self._names, NATIVE_SLAB, repeated=True)
+        self._fill = by_free_springs(machine, paths, self._names, method)
+
+    def __call__(self, population: Population) -> PopulationResults:
+        """Evaluate a population; its size alone decides how it is cut, so that equal ones give equal bits."""
+        results, status = in_slabs(population, self._fill, len(self._names), self._slab, self._threads)
+        return PopulationResults.of(population, self._names, results, status)
 
 
 def responses(machine: Machine, points: Points) -> Response:
@@ -215,7 +254,7 @@ def first_limit_passed(machine: Machine, columns: Mapping[str, Array], fields: S
     """
     size = len(next(iter(columns.values())))
     first = np.full(size, -1)
-    for part, checks in _checked(machine, columns):
+    for part, checks in _limit_checks(machine, columns):
         for check in checks:
             beyond = ~np.broadcast_to(check.kept, first[part].shape) & (first[part] < 0)
             first[part][beyond] = fields.index(check.limit.name)
@@ -230,15 +269,15 @@ def limits_used(machine: Machine, columns: Mapping[str, Array]) -> dict[str, tup
         columns: values of the varying parameters by leaf path, SI [points]; all points must be within reach.
     """
     ranges: dict[str, tuple[float, float]] = {}
-    for _, checks in _checked(machine, columns):
+    for _, checks in _limit_checks(machine, columns):
         for check in checks:
             least, most = ranges.get(check.limit.name, (np.inf, -np.inf))
             ranges[check.limit.name] = min(least, float(np.min(check.measure))), max(most, float(np.max(check.measure)))
     return ranges
 
 
-def _checked(machine: Machine, columns: Mapping[str, Array]) -> Iterator[tuple[slice, tuple[Check, ...]]]:
-    """The limits that some points are compared with, a slab at a time, and these points."""
+def _limit_checks(machine: Machine, columns: Mapping[str, Array]) -> Iterator[tuple[slice, tuple[Check, ...]]]:
+    """The limits with which points are compared, a slab of points at a time."""
     size, judged_at_rest = len(next(iter(columns.values()))), "actuators" in rest_numbers(machine, ())
     slab = Way.ANY_MACHINE.slab if judged_at_rest else NUMPY_SLAB
     for start in range(0, size, slab):

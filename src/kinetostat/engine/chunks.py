@@ -45,7 +45,7 @@ class Work:
 
     @property
     def count(self) -> int:
-        """How many chunks."""
+        """Number of chunks."""
         return -(-self.points.size // self.chunk)
 
     def part(self, number: int) -> range:
@@ -68,18 +68,18 @@ def in_chunks(machine: Machine, points: Points, quantities: Sequence[str]) -> Wo
     return Work(machine, points, tuple(quantities), slabs * NATIVE_SLAB)
 
 
-def here(work: Work, numbers: Sequence[int]) -> Iterator[tuple[int, Evaluation]]:
+def in_this_process(work: Work, numbers: Sequence[int]) -> Iterator[tuple[int, Evaluation]]:
     """Compute chunks one after the other in this process, each on all processors."""
     for number in numbers:
         yield number, work.compute(number)
 
 
-MISSING = "--workers and --cluster need Dask, which is not installed; install it with `{}`."
-AHEAD = 2
+DASK_MISSING = "--workers and --cluster need Dask, which is not installed; install it with `{}`."
+CHUNKS_AHEAD = 2
 """Chunks handed out per thread of the cluster: one that is computed and one that waits."""
 GO_ON = "Results that are already in a folder are kept: the same command continues from there."
-PATIENCE = "10 s"
-"""How long a cluster may take to answer."""
+CLUSTER_PATIENCE = "10 s"
+"""Time in which a cluster must answer."""
 
 
 @dataclass(frozen=True)
@@ -96,24 +96,24 @@ class Crew:
 
 
 @contextmanager
-def hired(crew: Crew) -> Iterator[Compute]:
+def compute_with(crew: Crew) -> Iterator[Compute]:
     """Give a way to compute chunks with a crew, or in this process where the crew is empty.
 
     Raises:
         InputError: Dask is not installed, the cluster does not answer, or its workers run another kinetostat.
     """
     if crew.workers is None and crew.address is None:
-        yield here
+        yield in_this_process
         return
     try:
         import distributed
     except ModuleNotFoundError:
-        raise InputError(MISSING.format(adding("cluster"))) from None
+        raise InputError(DASK_MISSING.format(adding("cluster"))) from None
     with _client(distributed, crew) as client:
         _check_versions(client)
 
         def compute(work: Work, numbers: Sequence[int]) -> Iterator[tuple[int, Evaluation]]:
-            return _computed(distributed, client, work, numbers)
+            return _on_cluster(distributed, client, work, numbers)
 
         yield compute
 
@@ -123,7 +123,7 @@ def _client(distributed: Any, crew: Crew) -> Iterator[Any]:
     """A connection to the cluster of a crew; workers that were started for it end with it."""
     if crew.address is not None:
         try:
-            client = distributed.Client(crew.address, timeout=PATIENCE)
+            client = distributed.Client(crew.address, timeout=CLUSTER_PATIENCE)
         except (OSError, TypeError, ValueError) as error:
             raise InputError(f'no Dask scheduler answers at "{crew.address}" ({error}); check --cluster.') from None
         with client:
@@ -185,14 +185,16 @@ def _version_here() -> str:
     return version("kinetostat")
 
 
-def _computed(distributed: Any, client: Any, work: Work, numbers: Sequence[int]) -> Iterator[tuple[int, Evaluation]]:
+def _on_cluster(distributed: Any, client: Any, work: Work, numbers: Sequence[int]) -> Iterator[tuple[int, Evaluation]]:
     """Compute chunks on a cluster, a few for each of its threads at a time; results as they come."""
     text = as_toml(work.machine)
     waiting = iter(numbers)
 
     def hand_out(count: int) -> list[Any]:
         chosen = islice(waiting, count)
-        return [client.submit(_compute, text, work.points, work.quantities, work.chunk, n, pure=False) for n in chosen]
+        return [
+            client.submit(_on_worker, text, work.points, work.quantities, work.chunk, n, pure=False) for n in chosen
+        ]
 
     try:
         finished = distributed.as_completed(hand_out(_places(client)))
@@ -208,11 +210,13 @@ def _computed(distributed: Any, client: Any, work: Work, numbers: Sequence[int])
 
 
 def _places(client: Any) -> int:
-    """How many chunks the cluster should hold; workers come and go."""
-    return AHEAD * max(1, sum(client.nthreads().values()))
+    """Number of chunks that the cluster should hold; workers come and go."""
+    return CHUNKS_AHEAD * max(1, sum(client.nthreads().values()))
 
 
-def _compute(text: str, points: Points, quantities: tuple[str, ...], chunk: int, number: int) -> tuple[int, Evaluation]:
+def _on_worker(
+    text: str, points: Points, quantities: tuple[str, ...], chunk: int, number: int
+) -> tuple[int, Evaluation]:
     """On a worker: one chunk, on one thread, because a worker takes as many chunks as it has threads."""
     return number, Work(_machine(text), points, quantities, chunk).compute(number, threads=1)
 

@@ -16,13 +16,19 @@ from typing import TypeAlias
 import numpy as np
 
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.batch import NATIVE_SLAB, Progress, available_cores, by_free_springs, in_slabs, silent
-from kinetostat.engine.form import Form, Kind, Weights, angles, equations_of, form_of, joint_columns, objectives_of
-from kinetostat.engine.gradient import with_gradients
-from kinetostat.engine.interpreter import Interpreted
-from kinetostat.engine.kernel import Fill, closes_inside, falling_back, program_columns
-from kinetostat.engine.loaded import States
-from kinetostat.engine.points import Points
+from kinetostat.engine.batch import (
+    NATIVE_SLAB,
+    PopulationResults,
+    Progress,
+    available_cores,
+    by_free_springs,
+    in_slabs,
+    silent,
+)
+from kinetostat.engine.form import Form, Specimen, Weights, equations_of, form_of, objectives_of
+from kinetostat.engine.kernel import PROGRAMS_KEPT, Fill, closes_inside, falling_back, program_columns, runnable
+from kinetostat.engine.loaded import StatePrograms
+from kinetostat.engine.points import Points, Population
 from kinetostat.engine.trace import Runnable
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
@@ -36,9 +42,7 @@ MACHINE_CODE_FROM = 20_000
 """Number of points from which on compiling pays: NumPy differentiates some ten thousand poses per second."""
 SMALL_SLAB = 512
 """Points in a slab for NumPy and for linear systems: some thousand arrays of this length are in memory at once."""
-KEPT = 32
-"""Number of programs that are kept in memory."""
-NEAR, TRIED = 0.03, 5
+TRIAL_DISTANCE, TRIAL_POINTS = 0.03, 5
 """Closed forms are tried at this share of the machine's numbers away from them, and at so many points."""
 
 Objective: TypeAlias = str | Mapping[str, float]
@@ -86,8 +90,7 @@ def evaluate_gradient(
     weights = tuple(((entry, 1.0),) if isinstance(entry, str) else tuple(entry.items()) for entry in several)
     modes = _modes_to_know(machine, weights, (*points.paths, *paths))
     native = (repeated or points.size >= MACHINE_CODE_FROM) and not modes
-    slab = NATIVE_SLAB if native else SMALL_SLAB
-    threads = available_cores() if native and points.size > slab else 1
+    slab, threads = (NATIVE_SLAB, available_cores()) if native else (SMALL_SLAB, 1)
 
     def method(part: Machine, varying: Sequence[str], _names: Sequence[str]) -> Fill:
         return _fill(part, tuple(varying), weights, tuple(paths), native, modes)
@@ -101,8 +104,26 @@ def evaluate_gradient(
     return Gradients(values, slopes, status)
 
 
+def differentiate(
+    machine: Machine, population: Population, quantities: Sequence[str], by: Sequence[str]
+) -> PopulationResults:
+    """Compute quantities of a few designs and their exact derivatives by parameters of the design.
+
+    Programs are compiled at the first call.
+
+    Args:
+        machine: gives all parameters that do not vary.
+        population: designs and poses.
+        quantities: names from `kinetostatics.quantities.QUANTITIES`.
+        by: leaf paths of what to differentiate by.
+    """
+    sloped = evaluate_gradient(machine, population, quantities, by, repeated=True)
+    slopes = sloped.gradients.reshape(len(quantities), len(by), *population.shape)
+    return PopulationResults.of(population, quantities, sloped.values, sloped.status, slopes)
+
+
 def _modes_to_know(machine: Machine, weights: Sequence[Weights], paths: Sequence[str]) -> int:
-    """How many modes must be solved for before a program takes derivatives; 0 where it finds the frequencies itself."""
+    """Count the modes to be solved for before a program takes derivatives; 0 where it finds the frequencies itself."""
     named = {name: QUANTITIES[name] for objective in weights for name, _ in objective}
     wanted = [int(name.rpartition("_")[2]) for name, row in named.items() if row.modal and not row.loaded]
     return max(wanted) + EQUALS if wanted and not reducible(machine, paths) else 0
@@ -123,14 +144,14 @@ def _fill(
     routes = _Routes(machine, varying, weights, paths, native, modes)
     if machine.family.chains is None:
         return routes.direct()
-    if native and _closed_forms_hold(Kind(machine), tuple(values(machine).items()), varying, weights, paths):
+    if native and _closed_forms_hold(Specimen(machine), tuple(values(machine).items()), varying, weights, paths):
         return falling_back(routes.direct(closed=True), lambda: routes.by_equations)
     return routes.by_equations
 
 
-@lru_cache(KEPT)
+@lru_cache(PROGRAMS_KEPT)
 def _closed_forms_hold(
-    kind: Kind,
+    kind: Specimen,
     numbers: tuple[tuple[str, float], ...],
     varying: tuple[str, ...],
     weights: tuple[Weights, ...],
@@ -157,10 +178,10 @@ def _closed_forms_hold(
     if not closes_inside(machine):
         return False
     routes = _Routes(machine, varying, weights, paths, native=False)
-    drawn = np.random.default_rng(0).uniform(-NEAR, NEAR, (len(varying), TRIED))
+    drawn = np.random.default_rng(0).uniform(-TRIAL_DISTANCE, TRIAL_DISTANCE, (len(varying), TRIAL_POINTS))
     columns = {path: centre[path] + (abs(centre[path]) or 1.0) * row for path, row in zip(varying, drawn, strict=True)}
-    direct, expected = np.empty((2, len(weights) * (1 + len(paths)), TRIED))
-    status = np.empty(TRIED, dtype=np.int8)
+    direct, expected = np.empty((2, len(weights) * (1 + len(paths)), TRIAL_POINTS))
+    status = np.empty(TRIAL_POINTS, dtype=np.int8)
     for fill, results in ((routes.direct(closed=True), direct), (routes.by_equations, expected)):
         fill(columns, results, status)
     direct, expected = direct[:, status == Status.OK], expected[:, status == Status.OK]
@@ -188,7 +209,6 @@ class _Routes:
         self._machine, self._weights, self._paths, self._native = machine, weights, paths, native
         self._known_slopes, self._differentiated = known, tuple(path for path in paths if path not in known)
         self._form, self._fixed = form_of(machine, varying, self._differentiated)
-        self._angles = angles(machine)
         self._modes = modes
         self._loaded = bool(
             rest_numbers(machine, [name for objective in weights for name, _ in objective], limited=False)
@@ -199,7 +219,7 @@ class _Routes:
         program = self._program(self._weights, closed)
 
         def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-            given = program_columns(columns, self._form.varying, self._angles)
+            given = program_columns(self._machine, self._form, columns, len(status), closed)
             given += self._state(given, len(status), closed) + self._known_modes(columns, len(status))
             if self._known_slopes:
                 self._spread(*program.slopes(self._fixed, given, status), results)
@@ -210,8 +230,7 @@ class _Routes:
 
     def by_equations(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Fill by solving for the joints first; their derivatives follow from the closing equations."""
-        given = program_columns(columns, self._form.varying, self._angles)
-        given += joint_columns(self._machine, columns, len(status))
+        given = program_columns(self._machine, self._form, columns, len(status))
         rates = self._program(()).slopes(self._fixed, given, np.empty_like(status))[1]
         given += self._state(given, len(status), closed=False) + self._known_modes(columns, len(status))
         objectives, partial = self._program(self._weights).slopes(self._fixed, given, status)
@@ -221,7 +240,8 @@ class _Routes:
         """Coordinates of the states of rest, if any objective is about the machine under load."""
         if not self._loaded:
             return []
-        return [*States(self._machine, self._form, closed, self._native).settled(self._fixed, given, count)]
+        states = StatePrograms(self._machine, self._form, closed, self._native)
+        return states.rest_coordinates(self._fixed, given, count)
 
     def _known_modes(self, columns: Mapping[str, Array], count: int) -> list[Array]:
         """The modes that programs cannot find themselves, if any objective is about them."""
@@ -238,7 +258,7 @@ class _Routes:
             )
 
     def _program(self, weights: tuple[Weights, ...], closed: bool = False) -> "_Program":
-        form = (Kind(self._machine), self._form, weights, self._differentiated, self._native, closed)
+        form = (Specimen(self._machine), self._form, weights, self._differentiated, self._native, closed)
         return _program(*form, self._modes if weights else 0)
 
 
@@ -319,9 +339,9 @@ class _Program:
         return rows[: self.results], rows[self.results :].reshape(self.results, self.inputs, len(codes))
 
 
-@lru_cache(KEPT)
+@lru_cache(PROGRAMS_KEPT)
 def _program(
-    kind: Kind,
+    kind: Specimen,
     form: Form,
     weights: tuple[Weights, ...],
     paths: tuple[str, ...],
@@ -336,8 +356,4 @@ def _program(
         else equations_of(kind, form, paths)
     )
     count, inputs = len(formula.body.results), len(formula.inputs)
-    if not native:
-        return _Program(Interpreted(formula.body, formula.inputs), count, inputs)
-    from kinetostat.engine.native import Program  # here because LLVM takes 0.1 s to load
-
-    return _Program(Program(with_gradients(formula.body, formula.inputs)), count, inputs)
+    return _Program(runnable(formula.body, native, formula.inputs), count, inputs)

@@ -4,7 +4,7 @@ Nothing is compiled or evaluated here, and nothing depends on a machine's number
 """
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -16,7 +16,7 @@ from kinetostat.engine.trace import Body, Graph, Operand, Traced
 from kinetostat.engine.trigonometry import LARGEST_ANGLE
 from kinetostat.equilibrium.reduced import reduced_machine
 from kinetostat.kinematics.closing import closing_equations
-from kinetostat.kinematics.closure import CLOSED_FORMS, Joints, solve_joints
+from kinetostat.kinematics.closure import CLOSED_FORMS, Joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
@@ -25,13 +25,13 @@ from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.vibration.reduced import free_frequencies, frequencies_at, in_order
 from kinetostat.vibration.slopes import vibrating
 
-ORDINARY = (1e-25, 1e25)
+ORDINARY_PARAMETER = (1e-25, 1e25)
 """Bounds of ordinary parameters: what a handful of them make is neither zero nor infinite by a wide margin."""
 
 
 @dataclass(frozen=True)
 class Form:
-    """What a program makes of the parameters of a machine, by leaf path.
+    """The way in which a program takes the parameters of a machine, by leaf path.
 
     Attributes:
         constant: values that are part of the code: exactly 0 or infinite, and 1 or -1 in directions.
@@ -39,12 +39,14 @@ class Form:
             infinity.
         uses: which parameters take which of these numbers, and whether with the other sign.
         varying: the columns, in order.
+        turning: those of them that are angles.
     """
 
     constant: tuple[tuple[str, float], ...]
     inputs: tuple[bool, ...]
     uses: tuple[tuple[str, int, bool], ...]
     varying: tuple[str, ...]
+    turning: frozenset[str]
 
 
 def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()) -> tuple[Form, Array]:
@@ -59,8 +61,9 @@ def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()
         kept: leaf paths of those that get an input each, even if they are 0.
     """
     fixed = {path: float(value) for path, value in values(machine).items() if path not in varying}
-    turns = [path for path in angles(machine) & fixed.keys() if math.isfinite(fixed[path])]
-    fixed |= {path: float(reduced(np.array(fixed[path]))) for path in turns}
+    angles = frozenset(p.path for p in parameters(machine.family) if p.quantity.kind == "angle")
+    turns = [path for path in angles & fixed.keys() if math.isfinite(fixed[path])]
+    fixed |= {path: float(reduced_angles(np.array(fixed[path]))) for path in turns}
     axes = directions(machine)
     simple = {path: (0.0, 1.0) if path in axes else (0.0,) for path in fixed if path not in kept}
     constant = {path: v for path, v in fixed.items() if math.isinf(v) or abs(v) in simple.get(path, ())}
@@ -75,13 +78,9 @@ def form_of(machine: Machine, varying: Sequence[str], kept: Collection[str] = ()
         if place == len(numbers):
             numbers.append(value if alone else abs(value))
         uses.append((path, place, value < 0.0 and not alone))
-    ordinary = tuple(ORDINARY[0] < number < ORDINARY[1] for number in numbers)
-    return Form(tuple(constant.items()), ordinary, tuple(uses), tuple(varying)), np.array(numbers)
-
-
-def angles(machine: Machine) -> frozenset[str]:
-    """Return the leaf paths of all angles."""
-    return frozenset(p.path for p in parameters(machine.family) if p.quantity.kind == "angle")
+    ordinary = tuple(ORDINARY_PARAMETER[0] < number < ORDINARY_PARAMETER[1] for number in numbers)
+    turning = angles.intersection(varying)
+    return Form(tuple(constant.items()), ordinary, tuple(uses), tuple(varying), turning), np.array(numbers)
 
 
 def directions(machine: Machine) -> frozenset[str]:
@@ -89,7 +88,7 @@ def directions(machine: Machine) -> frozenset[str]:
     return frozenset(leaf for p in parameters(machine.family) if p.quantity.kind == "direction" for leaf in p.leaves)
 
 
-def reduced(angle: Array) -> Array:
+def reduced_angles(angle: Array) -> Array:
     """Turn angles (rad) back to between -pi and pi if any is beyond what traced cosines take."""
     if angle.size == 0 or max(angle.max(), -angle.min()) <= LARGEST_ANGLE:
         return angle
@@ -98,13 +97,13 @@ def reduced(angle: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Kind:
+class Specimen:
     """A machine as a specimen of its family: equal to every other one of it that is meant in the same state."""
 
     machine: Machine
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Kind):
+        if not isinstance(other, Specimen):
             return False
         return (self.machine.family, self.machine.loaded) == (other.machine.family, other.machine.loaded)
 
@@ -113,7 +112,7 @@ class Kind:
 
 
 @dataclass(frozen=True)
-class Inputs:
+class TracedMachine:
     """A machine whose parameters are traced.
 
     Attributes:
@@ -131,14 +130,14 @@ class Inputs:
     machine: Machine
 
 
-def traced(kind: Kind, form: Form) -> Inputs:
-    """Return a machine of this kind with the inputs of a form, in a new graph."""
+def traced_machine(kind: Specimen, form: Form) -> TracedMachine:
+    """Make a machine of this kind with the inputs of a form, in a new graph."""
     graph = Graph()
-    fixed = tuple(graph.input(True, ORDINARY if ordinary else None) for ordinary in form.inputs)
+    fixed = tuple(graph.input(True, ORDINARY_PARAMETER if ordinary else None) for ordinary in form.inputs)
     columns = {path: graph.input() for path in form.varying}
     used = {path: -fixed[place] if negative else fixed[place] for path, place, negative in form.uses}
     machine = with_values(kind.machine, {**dict(form.constant), **used, **columns})
-    return Inputs(graph, fixed, columns, {**used, **columns}, machine)
+    return TracedMachine(graph, fixed, columns, {**used, **columns}, machine)
 
 
 Weights: TypeAlias = tuple[tuple[str, float], ...]
@@ -146,7 +145,7 @@ Weights: TypeAlias = tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True)
-class Formula:
+class TracedFormula:
     """A body, and the inputs that its results are differentiated by: parameters by path, then joint coordinates."""
 
     body: Body
@@ -154,14 +153,14 @@ class Formula:
 
 
 def objectives_of(
-    kind: Kind,
+    kind: Specimen,
     form: Form,
     objectives: Sequence[Weights],
     paths: Sequence[str] = (),
     closed: bool = False,
     modes: int = 0,
     limited: bool = True,
-) -> Formula:
+) -> TracedFormula:
     """Trace weighted sums of quantities as functions of the parameters; NaN where the status is not OK.
 
     Args:
@@ -175,7 +174,7 @@ def objectives_of(
         limited: whether the limits of a machine meant under its loads judge its points at rest.
         modes: how many modes are known, as further columns (`vibration.slopes`); 0 to solve for frequencies inside.
     """
-    given = traced(kind, form)
+    given = traced_machine(kind, form)
     joints, columns = _joints(given, closed)
     response = respond(given.machine, joints)
     coordinates: tuple[Traced, ...] = ()
@@ -197,11 +196,11 @@ def objectives_of(
     elif any(QUANTITIES[name].modal and not QUANTITIES[name].loaded for weights in objectives for name, _ in weights):
         response = replace(response, frequencies=free_frequencies(given.machine, response, joints, bool(paths)))
     accepted = response.status < Status.OK + 0.5
-    results = [_number(where(accepted, _weighted(response, weights), math.nan)) for weights in objectives]
+    results = [_number(where(accepted, _weighted_sum(response, weights), math.nan)) for weights in objectives]
     return _formula(given, columns, results, _number(response.status), paths, coordinates)
 
 
-def step_of(kind: Kind, form: Form, closed: bool, first: bool = False) -> Body:
+def step_of(kind: Specimen, form: Form, closed: bool, first: bool = False) -> Body:
     """Trace a step of Newton's method towards rest: from coordinates of the state, which are the last columns, to them.
 
     The last result is the square of the step's size.
@@ -212,7 +211,7 @@ def step_of(kind: Kind, form: Form, closed: bool, first: bool = False) -> Body:
         closed: as for `objectives_of`.
         first: whether to begin at the free state, with two steps and without columns of coordinates.
     """
-    given = traced(kind, form)
+    given = traced_machine(kind, form)
     joints, columns = _joints(given, closed)
     equations = reduced_machine(given.machine, respond(given.machine, joints), joints)
     coordinates = () if first else _inputs(given.graph, equations.size)
@@ -225,7 +224,7 @@ def _inputs(graph: Graph, count: int) -> tuple[Traced, ...]:
     return tuple(graph.input() for _ in range(count))
 
 
-def equations_of(kind: Kind, form: Form, paths: Sequence[str]) -> Formula:
+def equations_of(kind: Specimen, form: Form, paths: Sequence[str]) -> TracedFormula:
     """Trace the closing equations of a machine written leg by leg; columns are those of objectives that are not closed.
 
     Args:
@@ -233,25 +232,25 @@ def equations_of(kind: Kind, form: Form, paths: Sequence[str]) -> Formula:
         form: how its parameters enter.
         paths: leaf paths of the parameters to differentiate by.
     """
-    given = traced(kind, form)
+    given = traced_machine(kind, form)
     _, columns = _joints(given, closed=False)
     results = [_number(gap) for gap in closing_equations(given.machine.chains(), columns[:-1])]
     return _formula(given, columns, results, 0.0, paths)
 
 
 def _formula(
-    given: Inputs,
+    given: TracedMachine,
     joints: Sequence[Traced],
     results: Sequence[Operand],
     code: Operand,
     paths: Sequence[str],
     coordinates: Sequence[Traced] = (),
-) -> Formula:
+) -> TracedFormula:
     body = Body(given.fixed, [*given.columns.values(), *joints, *coordinates], results, code)
-    return Formula(body, (*(given.parameters[path] for path in paths), *joints[:-1]))
+    return TracedFormula(body, (*(given.parameters[path] for path in paths), *joints[:-1]))
 
 
-def _joints(given: Inputs, closed: bool) -> tuple[Joints | None, tuple[Traced, ...]]:
+def _joints(given: TracedMachine, closed: bool) -> tuple[Joints | None, tuple[Traced, ...]]:
     """The joints of a traced machine, and the columns that bring them: coordinates and a status."""
     if given.machine.family.chains is None:
         return None, ()
@@ -261,19 +260,7 @@ def _joints(given: Inputs, closed: bool) -> tuple[Joints | None, tuple[Traced, .
     return Joints(columns[:-1], columns[-1]), columns
 
 
-def joint_columns(machine: Machine, columns: Mapping[str, Array], count: int) -> list[Array]:
-    """Solve for the joints of a machine at many points: the columns of a program that does not close the legs itself.
-
-    Args:
-        machine: gives all parameters that do not vary.
-        columns: values of the others by leaf path, SI [points].
-        count: number of points.
-    """
-    joints = solve_joints(with_values(machine, columns))
-    return [np.array(np.broadcast_to(c, (count,)), dtype=float) for c in (*joints.coordinates, joints.status)]
-
-
-def _weighted(response: Response, weights: Weights) -> Scalar:
+def _weighted_sum(response: Response, weights: Weights) -> Scalar:
     value: Scalar = 0.0
     for name, weight in weights:
         value = value + float(weight) * QUANTITIES[name].value(response)

@@ -6,21 +6,22 @@ left out. A new machine of the same form, with other numbers, uses the same prog
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.form import Form, Kind, angles, form_of, joint_columns, objectives_of, reduced
-from kinetostat.engine.trace import Runnable
-from kinetostat.kinematics.closure import solver_of, task_of
+from kinetostat.engine.form import Form, Specimen, form_of, objectives_of, reduced_angles
+from kinetostat.engine.gradient import Interpreted, with_gradients
+from kinetostat.engine.trace import Body, Runnable, Traced
+from kinetostat.kinematics.closure import solve_joints, solver_of, task_of
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import with_values
 
-KEPT = 64
-"""Programs kept in memory, of some 20 kB each."""
+PROGRAMS_KEPT = 64
+"""Programs of one kind kept in memory, of some 20 kB each."""
 
 Fill = Callable[[Mapping[str, Array], Array, Codes], None]
 """From the varying parameters of a slab [points] to its results [quantities x points] and status codes, in place."""
@@ -56,73 +57,80 @@ def falling_back(first: Fill, other: Callable[[], Fill]) -> Fill:
     return fill
 
 
-@dataclass(frozen=True)
-class Kernel:
-    """A program with its fixed parameters filled in.
-
-    Attributes:
-        program: the compiled code.
-        fixed: values of its fixed inputs, SI.
-        varying: leaf paths of its columns, in order.
-        angles: leaf paths of all angles.
-        machine: of which this is the program.
-        quantities: names of its results.
-        closed: whether it computes joint coordinates itself, in closed form. Otherwise they are found slab by slab and
-            are further columns, unless the family places the joints.
-    """
-
-    program: Runnable
-    fixed: Array
-    varying: tuple[str, ...]
-    angles: frozenset[str]
-    machine: Machine
-    quantities: tuple[str, ...]
-    closed: bool
-
-    def run(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-        """Evaluate a slab of points; other threads run meanwhile.
-
-        Args:
-            columns: values of the varying parameters by leaf path, SI [points].
-            results: where the quantities go, a row each [quantities x points]: NaN where the status is not OK. Rows
-                may lie apart, the points of a row may not.
-            status: where the `Status` codes go [points].
-        """
-        fill = falling_back(self._fill, self._outside) if self.closed else self._fill
-        fill(columns, results, status)
-
-    def _fill(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-        given = program_columns(columns, self.varying, self.angles)
-        if self.machine.family.chains is not None and not self.closed:
-            given += joint_columns(self.machine, columns, len(status))
-        self.program.run(self.fixed, given, results, status)
-
-    def _outside(self) -> Fill:
-        """The program of the same quantities with joints as columns."""
-        return _kernel(self.machine, self.varying, self.quantities, closed=False).run
+Further = Callable[[Array, Sequence[Array], int], Sequence[Array]]
+"""From fixed inputs and columns of a program, at a number of points, to the columns that it takes after these."""
 
 
-def program_columns(columns: Mapping[str, Array], varying: Sequence[str], turning: frozenset[str]) -> list[Array]:
-    """Return the varying parameters as a program takes them: contiguous, angles within what traced cosines take.
-
-    Args:
-        columns: values by leaf path, SI [points].
-        varying: leaf paths, in the order of the program's columns.
-        turning: leaf paths of all angles.
-    """
-    served = [np.ascontiguousarray(columns[path], dtype=float) for path in varying]
-    return [reduced(column) if path in turning else column for path, column in zip(varying, served, strict=True)]
+def nothing_further(_fixed: Array, _columns: Sequence[Array], _count: int) -> Sequence[Array]:
+    """Give no further columns."""
+    return ()
 
 
-def slab_kernel(machine: Machine, varying: Sequence[str], quantities: Sequence[str]) -> Kernel:
-    """Return the program for slabs of points of a machine; 0.1 s unless one of its form has been compiled.
+def slab_fill(machine: Machine, varying: Sequence[str], quantities: Sequence[str]) -> Fill:
+    """Return the fill in machine code of quantities of unloaded machines; 0.1 s unless such a program is there already.
 
     Args:
         machine: its family, and all parameters that do not vary.
         varying: leaf paths of the parameters that vary.
         quantities: names from `QUANTITIES`.
     """
-    return _kernel(machine, varying, quantities, closes_inside(machine))
+    if not closes_inside(machine):
+        return program_fill(machine, varying, quantities, closed=False)
+    inside = program_fill(machine, varying, quantities, closed=True)
+    return falling_back(inside, lambda: program_fill(machine, varying, quantities, closed=False))
+
+
+def program_fill(
+    machine: Machine,
+    varying: Sequence[str],
+    quantities: Sequence[str],
+    closed: bool,
+    native: bool = True,
+    further: Further = nothing_further,
+) -> Fill:
+    """Return the fill by a single program.
+
+    Args:
+        machine, varying, quantities: as for `slab_fill`.
+        closed: whether the program computes joint coordinates itself, in closed form. Otherwise they are found slab by
+            slab and are further columns, unless the family places the joints.
+        native: whether it is compiled; otherwise it runs node by node in NumPy.
+        further: gives the columns after those, as coordinates of states of rest.
+    """
+    form, fixed = form_of(machine, varying)
+    program = quantity_program(Specimen(machine), form, tuple(quantities), closed, native)
+
+    def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        given = program_columns(machine, form, columns, len(status), closed)
+        program.run(fixed, [*given, *further(fixed, given, len(status))], results, status)
+
+    return fill
+
+
+def program_columns(
+    machine: Machine, form: Form, columns: Mapping[str, Array], count: int, closed: bool = False
+) -> list[Array]:
+    """Return the columns of a program: varying parameters, and joints that it does not compute itself.
+
+    They are contiguous, and angles are within what traced cosines take.
+
+    Args:
+        machine: gives all parameters that do not vary.
+        form: of it.
+        columns: values of the varying parameters by leaf path, SI [points].
+        count: number of points.
+        closed: whether the program closes the legs itself.
+    """
+    served = [np.ascontiguousarray(columns[path], dtype=float) for path in form.varying]
+    given = [
+        reduced_angles(column) if path in form.turning else column
+        for path, column in zip(form.varying, served, strict=True)
+    ]
+    if machine.family.chains is None or closed:
+        return given
+    joints = solve_joints(with_values(machine, columns))
+    by_joint = (np.array(np.broadcast_to(c, (count,)), dtype=float) for c in (*joints.coordinates, joints.status))
+    return [*given, *by_joint]
 
 
 def closes_inside(machine: Machine) -> bool:
@@ -130,16 +138,16 @@ def closes_inside(machine: Machine) -> bool:
     return machine.family.chains is not None and solver_of(task_of(machine), traced=True).traceable
 
 
-def _kernel(machine: Machine, varying: Sequence[str], quantities: Sequence[str], closed: bool) -> Kernel:
-    form, numbers = form_of(machine, varying)
-    names = tuple(quantities)
-    return Kernel(
-        _program(Kind(machine), form, names, closed), numbers, form.varying, angles(machine), machine, names, closed
-    )
+@lru_cache(PROGRAMS_KEPT)
+def quantity_program(kind: Specimen, form: Form, quantities: tuple[str, ...], closed: bool, native: bool) -> Runnable:
+    """Return the program of some quantities, one for all machines of a kind and form."""
+    return runnable(objectives_of(kind, form, [((name, 1.0),) for name in quantities], closed=closed).body, native)
 
 
-@lru_cache(KEPT)
-def _program(kind: Kind, form: Form, quantities: tuple[str, ...], closed: bool) -> Runnable:
+def runnable(body: Body, native: bool, inputs: Sequence[Traced] = ()) -> Runnable:
+    """Return a body that machine code or NumPy evaluates, with the derivatives of its results by some inputs."""
+    if not native:
+        return Interpreted(body, inputs)
     from kinetostat.engine.native import Program  # LLVM takes 0.1 s to load: only where it pays
 
-    return Program(objectives_of(kind, form, [((name, 1.0),) for name in quantities], closed=closed).body)
+    return Program(with_gradients(body, inputs) if inputs else body)

@@ -14,10 +14,17 @@ from threading import Lock
 import numpy as np
 
 from kinetostat.arrays import Array, Codes
-from kinetostat.engine.form import Form, Kind, angles, form_of, joint_columns, objectives_of, step_of
-from kinetostat.engine.interpreter import Interpreted
-from kinetostat.engine.kernel import Fill, closes_inside, falling_back, program_columns
-from kinetostat.engine.trace import Body, Runnable
+from kinetostat.engine.form import Form, Specimen, form_of, step_of
+from kinetostat.engine.kernel import (
+    PROGRAMS_KEPT,
+    Fill,
+    closes_inside,
+    falling_back,
+    nothing_further,
+    program_fill,
+    runnable,
+)
+from kinetostat.engine.trace import Runnable
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.numbers import check_loads, loaded_numbers
 from kinetostat.kinematics.status import Status
@@ -29,16 +36,14 @@ from kinetostat.vibration.modes import frequencies
 from kinetostat.vibration.receptance import cut_receptances
 from kinetostat.vibration.reduced import leaves_plane, platform_alone, pose_frequencies, reducible
 
-KEPT = 32
-"""Programs kept in memory."""
-MOST_STEPS = 8
+MOST_NEWTON_STEPS = 8
 """Of Newton's method after the first two; each point takes as many as it needs, whatever its neighbours need."""
-NEARLY = 1e-7
+ONE_STEP_AWAY = 1e-7
 """Size of a step, rad or in units of the machine's length, after which another one is exact to round-off."""
 
 
 class Way(Enum):
-    """How loaded states and vibrations are found, and how many points a slab has.
+    """A route to loaded states and vibrations, and the number of points in a slab of it.
 
     Equations of any machine fill the third cache level with some hundred poses; its modes take as long by LAPACK as the
     formulas by Python, which more poses share. Programs by NumPy do five to ten
@@ -91,7 +96,7 @@ def loaded_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str
         quantities: names from `QUANTITIES`.
         way: how to find the states.
     """
-    fill = _filled(machine, paths, quantities, way)
+    fill = _fill_with_unknowns(machine, paths, quantities, way)
     modal = [place for place, name in enumerate(quantities) if QUANTITIES[name].modal]
 
     def with_status(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
@@ -104,25 +109,18 @@ def loaded_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str
     return with_status
 
 
-def _filled(machine: Machine, paths: Sequence[str], quantities: Sequence[str], way: Way) -> Fill:
-    """The same, which may leave vibrations unknown at poses that are said to be OK."""
+def _fill_with_unknowns(machine: Machine, paths: Sequence[str], quantities: Sequence[str], way: Way) -> Fill:
+    """Return the fill of such quantities, which may leave vibrations unknown at poses that are said to be OK."""
     plain = way in (Way.ANY_MACHINE, Way.MODES, Way.COLUMNS)
     solved = partial(_solve_in_parts, machine, tuple(quantities), (way if plain else Way.ANY_MACHINE).slab)
     if plain or not _over_scalars(machine, tuple(paths), quantities):
         return solved
-    form, fixed = form_of(machine, paths)
-    closed, native, turning = closes_inside(machine), way is Way.NATIVE, angles(machine)
+    closed, native = closes_inside(machine), way is Way.NATIVE
     cut = _cut(machine, tuple(paths)) if rest_numbers(machine, quantities) else None
-    states = States(machine, form, closed, native) if cut else None
-    program = _program(Kind(machine), form, tuple(quantities), closed, native)
-
-    def directly(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
-        given = program_columns(columns, form.varying, turning)
-        if machine.family.chains is not None and not closed:
-            given += joint_columns(machine, columns, len(status))
-        at_rest = states.settled(fixed, given, len(status)) if states else ()
-        program.run(fixed, [*given, *at_rest], results, status)
-
+    further = (
+        StatePrograms(machine, form_of(machine, paths)[0], closed, native).rest_coordinates if cut else nothing_further
+    )
+    directly = program_fill(machine, paths, quantities, closed, native, further)
     every = falling_back(directly, lambda: solved)
 
     def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
@@ -141,14 +139,16 @@ def _solve_in_parts(
         part = slice(start, start + slab)
         here = {path: values[part] for path, values in columns.items()}
         with np.errstate(all="ignore"):
-            response = _solved(machine, quantities, here, len(status[part]))
+            response = _response_with_states(machine, quantities, here, len(status[part]))
             status[part] = response.status
             for row, name in zip(results[:, part], quantities, strict=True):
                 row[:] = QUANTITIES[name].value(response)
     results[:, status != Status.OK] = np.nan
 
 
-def _solved(machine: Machine, quantities: Sequence[str], columns: Mapping[str, Array], count: int) -> Response:
+def _response_with_states(
+    machine: Machine, quantities: Sequence[str], columns: Mapping[str, Array], count: int
+) -> Response:
     """The response at some points, with what quantities need of states of rest and of vibrations."""
     wanted = [QUANTITIES[name] for name in quantities]
     posed = with_values(machine, columns)
@@ -165,7 +165,7 @@ def _solved(machine: Machine, quantities: Sequence[str], columns: Mapping[str, A
     return response
 
 
-class States:
+class StatePrograms:
     """Programs that find states of rest of machines of one kind and form."""
 
     def __init__(self, machine: Machine, form: Form, closed: bool, native: bool) -> None:
@@ -177,15 +177,15 @@ class States:
             closed: whether joints are closed inside the programs.
             native: whether to compile.
         """
-        self._key, self._making = (Kind(machine), form, closed, native), Lock()
+        self._key, self._making = (Specimen(machine), form, closed, native), Lock()
         self._first, self._size = self._step(first=True)
 
     def _step(self, first: bool) -> tuple[Runnable, int]:
         with self._making:  # threads that need a program at the same time wait until it is there
             return _step(*self._key, first)
 
-    def settled(self, fixed: Array, given: Sequence[Array], count: int) -> Array:
-        """Coordinates of the states of rest [coordinates x points], NaN where there is none nearby.
+    def rest_coordinates(self, fixed: Array, given: Sequence[Array], count: int) -> list[Array]:
+        """Find the states of rest: a row of points for each coordinate; NaN where there is none nearby.
 
         Args:
             fixed: values of the parameters that are the same at all points.
@@ -194,8 +194,8 @@ class States:
         """
         result, codes = np.empty((self._size + 1, count)), np.empty(count, dtype=np.int8)
         self._first.run(fixed, given, result, codes)
-        for _ in range(MOST_STEPS):
-            moving = result[-1] > NEARLY**2
+        for _ in range(MOST_NEWTON_STEPS):
+            moving = result[-1] > ONE_STEP_AWAY**2
             rows = np.flatnonzero(moving)
             if not len(rows):
                 break
@@ -208,11 +208,11 @@ class States:
                 np.copyto(result, stepped, where=moving)
             else:
                 result[:, rows] = stepped
-        return result[:-1]
+        return [*result[:-1]]
 
 
-_cut = lru_cache(KEPT)(cut_machine)
-_reducible = lru_cache(KEPT)(reducible)
+_cut = lru_cache(PROGRAMS_KEPT)(cut_machine)
+_reducible = lru_cache(PROGRAMS_KEPT)(reducible)
 
 
 def _over_scalars(machine: Machine, paths: tuple[str, ...], quantities: Sequence[str]) -> bool:
@@ -228,21 +228,8 @@ def _over_scalars(machine: Machine, paths: tuple[str, ...], quantities: Sequence
     return at_rest and rings
 
 
-@lru_cache(KEPT)
-def _program(kind: Kind, form: Form, quantities: tuple[str, ...], closed: bool, native: bool) -> Runnable:
-    return _runnable(objectives_of(kind, form, [((name, 1.0),) for name in quantities], closed=closed).body, native)
-
-
-@lru_cache(KEPT)
-def _step(kind: Kind, form: Form, closed: bool, native: bool, first: bool) -> tuple[Runnable, int]:
+@lru_cache(PROGRAMS_KEPT)
+def _step(kind: Specimen, form: Form, closed: bool, native: bool, first: bool) -> tuple[Runnable, int]:
     """The program of a step, or of the first ones, and how many coordinates it has."""
     body = step_of(kind, form, closed, first)
-    return _runnable(body, native), len(body.results) - 1
-
-
-def _runnable(body: Body, native: bool) -> Runnable:
-    if not native:
-        return Interpreted(body, ())
-    from kinetostat.engine.native import Program  # LLVM takes 0.1 s to load: only where it pays
-
-    return Program(body)
+    return runnable(body, native), len(body.results) - 1

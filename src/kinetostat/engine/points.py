@@ -1,10 +1,11 @@
-"""Points of parameter space that a batch visits: a grid, a table or random samples, given slab by slab.
+"""Points of parameter space that a batch visits: a grid, a table, designs at poses or random samples, slab by slab.
 
 Nothing is evaluated here. Points are computed from their numbers, so that a large grid is never in memory at once.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import prod
 from typing import Protocol
 
@@ -75,7 +76,7 @@ def _in_runs(values: Array, run: int, start: int, stop: int) -> Array:
     evaluates the points.
     """
     first, last = start // run, -(-stop // run)
-    entries = _repeated(values, first % len(values), last - first)
+    entries = _in_turn(values, first % len(values), last - first)
     if run <= stop - start:
         return np.repeat(entries, run)[start - first * run : stop - first * run]
     # Runs longer than the slab: whole runs would be far larger than what is needed, so that both ends are cut first.
@@ -85,7 +86,7 @@ def _in_runs(values: Array, run: int, start: int, stop: int) -> Array:
     return np.repeat(entries, lengths)
 
 
-def _repeated(values: Array, first: int, count: int) -> Array:
+def _in_turn(values: Array, first: int, count: int) -> Array:
     """Return `count` entries of the values in turn, over and over again, beginning with entry `first`."""
     if count < len(values):
         return values.take(np.arange(first, first + count), mode="wrap")
@@ -93,7 +94,7 @@ def _repeated(values: Array, first: int, count: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Table:
+class PointTable:
     """Points in any order, given by one column of values for each varying parameter."""
 
     values: Mapping[str, Array]
@@ -114,7 +115,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Part:
+class ConsecutivePoints:
     """Consecutive points, `start` to `stop` - 1, of a larger set."""
 
     whole: Points
@@ -136,9 +137,44 @@ class Part:
         return self.whole.columns(self.start + start, self.start + stop)
 
 
+@dataclass(frozen=True)
+class Population:
+    """Every design at every pose; poses run fastest.
+
+    Attributes:
+        designs: values by leaf path, SI [designs]; at least one.
+        poses: values by other leaf paths, SI [poses]; none for the machine's own pose.
+    """
+
+    designs: Mapping[str, Array]
+    poses: Mapping[str, Array]
+
+    @cached_property
+    def shape(self) -> tuple[int, int]:
+        """Designs and poses."""
+        return len(next(iter(self.designs.values()))), len(next(iter(self.poses.values()), (0.0,)))
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return self.shape[0] * self.shape[1]
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Leaf paths of the parameters that vary."""
+        return *self.designs, *self.poses
+
+    def columns(self, start: int, stop: int) -> dict[str, Array]:
+        """Values of each varying parameter at points `start` to `stop` - 1, SI."""
+        design, pose = np.divmod(np.arange(start, stop), self.shape[1])
+        return {path: column[design] for path, column in self.designs.items()} | {
+            path: column[pose] for path, column in self.poses.items()
+        }
+
+
 PER_CELL = 2
 """Points in each cell: two are the fewest whose difference tells how uncertain their mean is."""
-WORDS = 4
+PHILOX_WORDS = 4
 """Random numbers that Philox makes for each step of its counter."""
 
 
@@ -184,6 +220,6 @@ class Cells:
     def _shares(self, axis: int, start: int, stop: int) -> Array:
         """Random numbers, uniform from 0 to 1: where in its cell each point lies along an axis."""
         # Philox can start anywhere in its sequence; each axis has a key, and so a sequence, of its own.
-        block = start // WORDS
+        block = start // PHILOX_WORDS
         source = np.random.Philox(key=self.seed * 64 + axis, counter=block)
-        return np.random.Generator(source).random(stop - block * WORDS)[start - block * WORDS :]
+        return np.random.Generator(source).random(stop - block * PHILOX_WORDS)[start - block * PHILOX_WORDS :]

@@ -115,7 +115,7 @@ class Traced(Node):
 
 
 class Namespace:
-    """What `__array_namespace__` of a traced value offers."""
+    """The functions that `__array_namespace__` of a traced value offers."""
 
     @staticmethod
     def sqrt(a: Traced) -> Traced:
@@ -198,7 +198,7 @@ class Graph:
 
 @dataclass(frozen=True)
 class Body:
-    """What is computed at each point.
+    """The arithmetic of each point.
 
     Attributes:
         fixed: inputs that are the same at all points.
@@ -240,7 +240,7 @@ def needed(results: Iterable[Operand]) -> list[Node]:
 
 
 def _key(operation: str, operands: tuple[Operand, ...]) -> tuple[Any, ...]:
-    """What tells an expression from others: nodes by number, floats by all their digits and their sign."""
+    """The key that tells an expression from others: nodes by number, floats by all their digits and their sign."""
     names = [o.number if isinstance(o, Node) else repr(o) for o in operands]
     return (operation, frozenset(names)) if operation in COMMUTATIVE else (operation, *names)
 

@@ -8,7 +8,7 @@ LARGEST_ANGLE = 1e6
 """rad; up to here the number of quarter turns fits 20 bits, so that its products with `QUARTER` are exact."""
 QUARTER = (float.fromhex("0x1.921fb544p+0"), float.fromhex("0x1.0b4611a6p-34"), float.fromhex("0x1.3198a2e037073p-69"))
 """pi / 2 in three parts, the first two of 33 bits (fdlibm, e_rem_pio2.c)."""
-ROUNDING = 1.5 * 2.0**52
+NEAREST_SHIFT = 1.5 * 2.0**52
 """Added to a smaller number and taken off again, it leaves the nearest integer."""
 SINE = (
     -1.66666666666666324348e-01,
@@ -51,7 +51,7 @@ def cos_and_sin(angle: Scalar) -> tuple[Scalar, Scalar]:
 
 
 def _nearest(a: Scalar) -> Scalar:
-    return (a + ROUNDING) - ROUNDING
+    return (a + NEAREST_SHIFT) - NEAREST_SHIFT
 
 
 def _polynomial(coefficients: tuple[float, ...], x: Scalar) -> Scalar:

@@ -12,7 +12,7 @@ import numpy as np
 from kinetostat.arrays import Array
 from kinetostat.display import Display
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.points import Points, Table
+from kinetostat.engine.points import Points, PointTable
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
@@ -157,10 +157,14 @@ def _poses(machine: Machine, requirement: Requirement) -> tuple[Points, list[Par
             for path in dict.fromkeys(paths.values())
         ]
         read = read_columns(machine, columns, lambda path, i: f"poses.{i}.{shown(path)}")
-        return Table(read.leaves), list(read.fields), "of the list"
+        return PointTable(read.leaves), list(read.fields), "of the list"
     # One point with the pose as it is: any coordinate of it can be the column that a batch must have.
     coordinate = next(p for p in parameters(machine.family) if p.path.startswith(POSE))
-    return Table({coordinate.path: np.array([float(values(machine)[coordinate.path])])}), [], "at the pose of the file"
+    return (
+        PointTable({coordinate.path: np.array([float(values(machine)[coordinate.path])])}),
+        [],
+        "at the pose of the file",
+    )
 
 
 def _worst(condition: Condition, amounts: Array) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.numbers import judged_at_rest
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS, QUANTITIES, needs_state, rest_numbers
@@ -197,7 +197,7 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     by = [p.path for p in candidates if not math.isinf(here[p.path])]
     # One point with the pose as it is: any coordinate of it can be the column that a batch must have.
     column = next(path for path in here if path.startswith("pose."))
-    answer = evaluate_gradient(machine, Table({column: np.array([here[column]])}), names, by)
+    answer = evaluate_gradient(machine, PointTable({column: np.array([here[column]])}), names, by)
     status = Status(int(answer.status[0]))
     if status is not Status.OK:
         return Sensitivity(machine, status, FAR_AWAY if status is Status.NOT_CONVERGED else analyze(machine).message)

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from kinetostat.engine.batch import Evaluation, available_cores, evaluate
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.machine.loading import load
@@ -105,10 +105,10 @@ def results_file() -> str:
     return "a sweep written as NetCDF and read again, the same"
 
 
-def _poses(count: int) -> Table:
+def _poses(count: int) -> PointTable:
     """Poses spread over the middle of the machine's workspace."""
     source = np.random.default_rng(1)
-    return Table({"pose.x": source.uniform(-0.02, 0.02, count), "pose.z": source.uniform(0.66, 0.70, count)})
+    return PointTable({"pose.x": source.uniform(-0.02, 0.02, count), "pose.z": source.uniform(0.66, 0.70, count)})
 
 
 def _apart(first: Evaluation, others: Evaluation) -> float:

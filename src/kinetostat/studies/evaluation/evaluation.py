@@ -12,7 +12,7 @@ import numpy as np
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array, Codes
 from kinetostat.engine.batch import Progress, evaluate, silent
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
@@ -82,7 +82,7 @@ def answers_at(
     names = tuple(resolve_quantities([name for name in wanted if name not in MATRICES], parts))
     refuse_absent(machine, names, poses.fields)
     entries = [entry_name(matrix, row, column) for matrix in matrices for row in parts for column in parts]
-    computed = evaluate(machine, Table(poses.leaves), tuple(dict.fromkeys([*names, *entries])), progress)
+    computed = evaluate(machine, PointTable(poses.leaves), tuple(dict.fromkeys([*names, *entries])), progress)
     return PoseAnswers(machine, poses, names, matrices, computed.values, computed.status)
 
 

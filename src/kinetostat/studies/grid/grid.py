@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from kinetostat.engine.batch import Evaluation, Progress, evaluate, silent
-from kinetostat.engine.chunks import Compute, here, in_chunks
+from kinetostat.engine.chunks import Compute, in_chunks, in_this_process
 from kinetostat.engine.points import Grid
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
@@ -118,7 +118,7 @@ def evaluate_grid(
     return answer(grid_question(machine, ranges, quantities), progress)
 
 
-def answer(question: GridQuestion, progress: Progress = silent, compute: Compute = here) -> xr.Dataset:
+def answer(question: GridQuestion, progress: Progress = silent, compute: Compute = in_this_process) -> xr.Dataset:
     """Answer a question about a grid in memory; see `evaluate_grid`.
 
     Args:
@@ -144,7 +144,7 @@ def answer(question: GridQuestion, progress: Progress = silent, compute: Compute
 
 def _evaluated(question: GridQuestion, progress: Progress, compute: Compute) -> Evaluation:
     """All points in order."""
-    if compute is here:
+    if compute is in_this_process:
         return evaluate(question.machine, question.grid, question.names, progress)
     work = in_chunks(question.machine, question.grid, question.names)
     parts, done = {}, 0

@@ -12,7 +12,7 @@ import numpy as np
 
 from kinetostat.display import ENGINEERING
 from kinetostat.engine.batch import Evaluation, Progress, silent
-from kinetostat.engine.chunks import Compute, Work, here, in_chunks
+from kinetostat.engine.chunks import Compute, Work, in_chunks, in_this_process
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.loading import as_toml, build
@@ -98,7 +98,7 @@ def answer_into(
     folder: Path,
     stem: str,
     progress: Progress = silent,
-    compute: Compute = here,
+    compute: Compute = in_this_process,
     resume: bool = False,
 ) -> StoredGrid:
     """Answer a question about a grid into FOLDER/STEM.nc; go on with what the folder holds of the same answer.

@@ -10,7 +10,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Mask
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine
@@ -70,6 +70,6 @@ def _reach(machine: Machine, paths: list[str], start: Array, ways: Array, least:
 def _margins(machine: Machine, paths: list[str], places: Array) -> Array:
     """The singularity margin at poses [poses x coordinates]; 0 where one is out of reach or passes a limit."""
     columns = {path: np.ascontiguousarray(column) for path, column in zip(paths, places.T, strict=True)}
-    answer = evaluate(machine, Table(columns), ["singularity_margin"])
+    answer = evaluate(machine, PointTable(columns), ["singularity_margin"])
     inside: Mask = np.asarray(answer.status == Status.OK)
     return np.where(inside, answer.values["singularity_margin"], 0.0)

@@ -11,7 +11,8 @@ from itertools import product
 import numpy as np
 
 from kinetostat.arrays import Array, Codes, Integers
-from kinetostat.engine.population import Evaluator, Population
+from kinetostat.engine.batch import Evaluator
+from kinetostat.engine.points import Population
 from kinetostat.kinematics.status import Status
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.optimisation.problem import Problem

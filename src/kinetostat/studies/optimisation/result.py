@@ -11,7 +11,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Integers
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values
@@ -181,7 +181,7 @@ def _worst(problem: Problem, machine: Machine, names: list[str]) -> dict[str, fl
     numbers = values(machine)
     anywhere = next(path for path in numbers if path.startswith("pose."))
     columns = dict(problem.poses.columns) or {anywhere: np.array([float(numbers[anywhere])])}
-    answers = evaluate(machine, Table(columns), names)
+    answers = evaluate(machine, PointTable(columns), names)
     reached = answers.status == 0
     return {name: float(answers.values[name][reached].max()) if reached.any() else float("nan") for name in names}
 

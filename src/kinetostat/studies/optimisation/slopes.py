@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.engine.population import Population, differentiate
+from kinetostat.engine.derivatives import differentiate
+from kinetostat.engine.points import Population
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.optimisation.assessment import deviations
 from kinetostat.studies.optimisation.problem import Problem

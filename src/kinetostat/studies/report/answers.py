@@ -10,7 +10,7 @@ import xarray as xr
 
 from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, evaluate, silent
-from kinetostat.engine.points import Table
+from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.kinetostatics.response import respond
@@ -193,7 +193,7 @@ def _extent(machine: Machine, parameter: Parameter, reach: float) -> tuple[float
     """How far a coordinate goes to each side, SI, before there is no good answer."""
     (path,), here = parameter.leaves, float(values(machine)[parameter.path])
     steps = np.linspace(-reach, reach, 2 * PROBES + 1)
-    answer = evaluate(machine, Table({path: here + steps}), ["singularity_margin"])
+    answer = evaluate(machine, PointTable({path: here + steps}), ["singularity_margin"])
     singularity_margin = np.nan_to_num(answer.values["singularity_margin"])
     good = (answer.status == Status.OK) & (singularity_margin >= REGULAR * singularity_margin[PROBES])
     bad = np.flatnonzero(~good)

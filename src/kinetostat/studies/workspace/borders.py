@@ -11,7 +11,7 @@ import numpy as np
 
 from kinetostat.arrays import AnyArray, Array, Codes, Float32s, Integers, Mask
 from kinetostat.engine.batch import NATIVE_FROM, evaluate
-from kinetostat.engine.points import Axis, Table
+from kinetostat.engine.points import Axis, PointTable
 from kinetostat.studies.grid.grid import GridQuestion
 from kinetostat.studies.workspace.verdicts import Judge, Poses
 
@@ -70,7 +70,9 @@ def _halved(judge: Judge, axes: Sequence[Axis], nodes: Integers, axis: Integers,
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         poses = {path: start[path] + middle * step[path] for path in start}
-        answer = evaluate(judge.machine, Table(poses), judge.quantities, repeated=HALVINGS * len(nodes) >= NATIVE_FROM)
+        answer = evaluate(
+            judge.machine, PointTable(poses), judge.quantities, repeated=HALVINGS * len(nodes) >= NATIVE_FROM
+        )
         same = judge.verdicts(answer.status, answer.values, partial(_chosen, poses)) == before
         low, high = np.where(same, middle, low), np.where(same, high, middle)
     return 0.5 * (low + high)
