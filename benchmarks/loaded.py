@@ -19,7 +19,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.engine.batch import available_cores, evaluate
 from kinetostat.engine.points import PointTable
 from kinetostat.machine.loading import load
-from kinetostat.studies.diagnosis.hardware import processor
+from kinetostat.studies.diagnosis import processor
 
 LOADED = (*(f"displacement_{c}" for c in COMPONENTS), *(f"tangent_free_stiffness_{c}" for c in COMPONENTS))
 POSES, TURNS = 100_000, 16

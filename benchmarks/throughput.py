@@ -25,7 +25,7 @@ from cases import CASES, TWELVE, Case
 from kinetostat.engine.batch import available_cores, evaluate
 from kinetostat.engine.points import PointTable
 from kinetostat.machine.loading import load
-from kinetostat.studies.diagnosis.hardware import processor
+from kinetostat.studies.diagnosis import processor
 from routes import DIAGONAL_OF_C, TWELVE_OUTPUTS, Array, Route, routes_of
 
 SIZES = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000)

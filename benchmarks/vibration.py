@@ -18,7 +18,7 @@ from kinetostat.engine.batch import available_cores, evaluate
 from kinetostat.engine.points import PointTable
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
-from kinetostat.studies.diagnosis.hardware import processor
+from kinetostat.studies.diagnosis import processor
 
 SIX = tuple(f"frequency_{number}" for number in range(1, 7))
 BODY = ("tool.mass=0.5 kg", "tool.inertia=[0.003, 0.003, 0.005, 0, 0, 0]")

@@ -12,12 +12,12 @@ from rich.console import Console
 
 from kinetostat.cli import main
 from kinetostat.commands.common import DONE, NO_ANSWER
+from kinetostat.commands.doctor import print_checks
 from kinetostat.spec.installation import adding, installing
-from kinetostat.studies.diagnosis import diagnosis, self_test, software
-from kinetostat.studies.diagnosis.diagnosis import Check, State
+from kinetostat.studies import diagnosis, self_test
+from kinetostat.studies.diagnosis import InstallationCheck, Soundness
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.comparison import table_3
-from kinetostat.views.diagnosis_tables import print_checks, print_verdict
 
 
 def test_a_sound_installation(capsys):
@@ -34,15 +34,17 @@ def test_a_sound_installation(capsys):
     assert "none" in found["places"]["cache"]["detail"]
 
 
-def shown(*checks: Check) -> str:
+def shown(*checks: InstallationCheck) -> str:
     console = Console(width=80, file=StringIO())
-    print_verdict(console, print_checks(console, checks))
+    print_checks(console, checks)
     return console.file.getvalue()
 
 
 def test_on_a_terminal():
-    absent = Check("extras", "studio", State.ABSENT, "not installed (nicegui)", "pip install 'kinetostat[studio]'")
-    text = shown(Check("software", "numpy", State.SOUND, "2.4.6"), absent)
+    absent = InstallationCheck(
+        "extras", "studio", Soundness.ABSENT, "not installed (nicegui)", "pip install 'kinetostat[studio]'"
+    )
+    text = shown(InstallationCheck("software", "numpy", Soundness.SOUND, "2.4.6"), absent)
     assert "Software\n✓  numpy           2.4.6" in text
     assert "\nExtras\n–  studio          not installed (nicegui)" in text
     assert "→ pip install 'kinetostat[studio]'" in text
@@ -50,7 +52,9 @@ def test_on_a_terminal():
 
 
 def test_a_failure_on_a_terminal():
-    text = shown(Check("software", "numpy", State.FAILED, "is not installed", "pip install 'numpy>=2.1'"))
+    text = shown(
+        InstallationCheck("software", "numpy", Soundness.FAILED, "is not installed", "pip install 'numpy>=2.1'")
+    )
     assert "✗  numpy           is not installed" in text
     assert "→ pip install 'numpy>=2.1'" in text
     assert text.rstrip().endswith("To repair: numpy.")
@@ -67,8 +71,8 @@ def installed_but(**changed):
 
 
 def test_a_package_that_is_missing(monkeypatch, capsys):
-    monkeypatch.setattr(diagnosis, "PARTS", {"software": "software"})
-    monkeypatch.setattr(software, "version", installed_but(scipy=None))
+    monkeypatch.setattr(diagnosis, "PARTS", {"software": diagnosis.software_checks})
+    monkeypatch.setattr(diagnosis, "version", installed_but(scipy=None))
     assert main(["doctor"]) == NO_ANSWER
     text = capsys.readouterr().out
     assert "✗  scipy           is not installed" in text
@@ -77,28 +81,28 @@ def test_a_package_that_is_missing(monkeypatch, capsys):
 
 
 def test_a_package_that_is_too_old(monkeypatch):
-    monkeypatch.setattr(software, "version", installed_but(numpy="1.26.4"))
-    numpy = next(check for check in software.checks() if check.name == "numpy")
-    assert (numpy.state, numpy.fix) == (State.FAILED, installing(["numpy>=2.1"]))
+    monkeypatch.setattr(diagnosis, "version", installed_but(numpy="1.26.4"))
+    numpy = next(check for check in diagnosis.software_checks() if check.name == "numpy")
+    assert (numpy.state, numpy.fix) == (Soundness.FAILED, installing(["numpy>=2.1"]))
     assert numpy.detail == "1.26.4 is installed, but >=2.1 is needed"
 
 
 def test_every_package_of_the_core_is_loaded():
-    assert set(software.USED) == {requirement.name for requirement in software.requirements()}
+    assert set(diagnosis.LOADED_MODULES) == {requirement.name for requirement in diagnosis.requirements()}
 
 
 def test_an_extra_that_is_missing_is_no_failure(monkeypatch):
-    monkeypatch.setattr(software, "version", installed_but(nicegui=None))
-    found = list(software.checks())
+    monkeypatch.setattr(diagnosis, "version", installed_but(nicegui=None))
+    found = list(diagnosis.software_checks())
     studio = next(check for check in found if check.name == "studio")
-    assert (studio.state, studio.fix) == (State.ABSENT, adding("studio"))
+    assert (studio.state, studio.fix) == (Soundness.ABSENT, adding("studio"))
     assert diagnosis.healthy(found)
 
 
 def test_not_installed_at_all(monkeypatch):
-    monkeypatch.setattr(software, "version", installed_but(kinetostat=None))
-    (only,) = software.checks()
-    assert only.state is State.FAILED
+    monkeypatch.setattr(diagnosis, "version", installed_but(kinetostat=None))
+    (only,) = diagnosis.software_checks()
+    assert only.state is Soundness.FAILED
     assert only.fix == installing(["kinetostat"])
 
 
@@ -127,7 +131,7 @@ def test_wrong_numbers_are_found(monkeypatch):
     assert "1.0e-06" in found["machine code"].detail
     assert "1.0178894" in found["search"].detail
     assert "differs when it is read again" in found["files"].detail
-    failed = {name for name, check in found.items() if check.state is State.FAILED and check.fix}
+    failed = {name for name, check in found.items() if check.state is Soundness.FAILED and check.fix}
     assert failed == {"paper", "machine code", "search", "files"}
 
 

@@ -1,14 +1,23 @@
-"""`doctor`: whether this installation is sound, and what to do where it is not. No formula lives here."""
+"""`doctor`: whether this installation is sound, and what to do where it is not. No formula lives here.
+
+Checks are printed as they are made, by Rich alone: the tables of `views` need libraries that may be broken here.
+"""
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import DONE, NO_ANSWER, add_command, print_json, takes_json
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from kinetostat.commands.common import Commands
-    from kinetostat.studies.diagnosis.diagnosis import Check
+    from kinetostat.studies.diagnosis import InstallationCheck
+
+MARKS = {"sound": ("✓", "green"), "absent": ("–", "bright_black"), "failed": ("✗", "bold red")}
+NAME_WIDTH = 14
+"""Characters for the name of what is checked."""
 
 
 def add_doctor_command(commands: "Commands") -> None:
@@ -21,7 +30,7 @@ def add_doctor_command(commands: "Commands") -> None:
 
 
 def _doctor(options: argparse.Namespace) -> int:
-    from kinetostat.studies.diagnosis.diagnosis import as_json, healthy
+    from kinetostat.studies.diagnosis import as_json, healthy
 
     if options.json:
         checks = [*_checks()]
@@ -29,23 +38,19 @@ def _doctor(options: argparse.Namespace) -> int:
     else:
         from rich.console import Console
 
-        from kinetostat.views.diagnosis_tables import print_checks, print_verdict
-
-        console = Console(markup=False, emoji=False)
-        checks = print_checks(console, _checks())
-        print_verdict(console, checks)
+        checks = print_checks(Console(markup=False, emoji=False), _checks())
     return DONE if healthy(checks) else NO_ANSWER
 
 
-def _checks() -> "Iterator[Check]":
+def _checks() -> "Iterator[InstallationCheck]":
     """Make all checks, also those of pictures and the studio, which `studies.diagnosis` must not import."""
-    from kinetostat.studies.diagnosis.diagnosis import Check, State, diagnose, reinstall, tried
+    from kinetostat.studies.diagnosis import InstallationCheck, Soundness, check_of, diagnose, reinstall
 
     yield from diagnose()
-    yield tried("self-test", "pictures", _drawn, reinstall("matplotlib"))
-    yield Check("places", "cache", State.ABSENT, "none: compiled programs live in memory only")
-    yield Check("places", "configuration", State.ABSENT, "none: files and options say everything")
-    yield tried("places", "studio", _state_folder, reinstall("kinetostat"))
+    yield check_of("self-test", "pictures", _picture_size, reinstall("matplotlib"))
+    yield InstallationCheck("places", "cache", Soundness.ABSENT, "none: compiled programs live in memory only")
+    yield InstallationCheck("places", "configuration", Soundness.ABSENT, "none: files and options say everything")
+    yield check_of("places", "studio", _state_folder, reinstall("kinetostat"))
 
 
 def _state_folder() -> str:
@@ -55,8 +60,8 @@ def _state_folder() -> str:
     return f"{folder}: searches and favourites of the design tab{'' if folder.is_dir() else ' (none yet)'}"
 
 
-def _drawn() -> str:
-    """The paper's machine as a picture."""
+def _picture_size() -> str:
+    """Draw the paper's machine, and return the size of the picture."""
     from io import BytesIO
 
     from kinetostat.machine.loading import load
@@ -66,3 +71,30 @@ def _drawn() -> str:
     machine = load("zhang-gosselin-4dof")
     three_views(machine, machine.name).savefig(stream)
     return f"the paper's machine drawn, {stream.tell() / 1000:.0f} kB"
+
+
+def print_checks(console: "Console", checks: "Iterable[InstallationCheck]") -> "list[InstallationCheck]":
+    """Print checks under their headings, with what to do about failures, then the verdict; returns the checks."""
+    from rich.table import Table
+    from rich.text import Text
+
+    shown: list[InstallationCheck] = []
+    for check in checks:
+        if not shown or shown[-1].group != check.group:
+            console.print(Text(("\n" if shown else "") + check.group.capitalize(), "bold"))
+        shown.append(check)
+        mark, style = MARKS[check.state]
+        line = Table.grid(padding=(0, 2, 0, 0))
+        for width in (1, NAME_WIDTH, None):
+            line.add_column(width=width, overflow="fold" if width is None else "ellipsis")
+        line.add_row(Text(mark, style), check.name, Text(check.detail, "" if check.state == "sound" else style))
+        if check.fix:
+            line.add_row("", "", Text(f"→ {check.fix}", "cyan"))
+        console.print(line)
+    failed = [check.name for check in shown if check.state == "failed"]
+    if failed:
+        console.print(Text.assemble(("\nTo repair:", "bold red"), f" {', '.join(failed)}."))
+    else:
+        sound = " Everything needed is installed; the self-test gives the known numbers."
+        console.print(Text.assemble(("\nSound.", "bold green"), sound))
+    return shown

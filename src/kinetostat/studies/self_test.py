@@ -17,7 +17,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.diagnosis.diagnosis import Check, UnsoundError, reinstall, tried
+from kinetostat.studies.diagnosis import InstallationCheck, UnsoundError, check_of, reinstall
 from kinetostat.studies.grid.grid import evaluate_grid
 from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.log import best_feasible
@@ -28,19 +28,19 @@ from kinetostat.studies.paper.comparison import Verdict, table_3, table_4
 from kinetostat.studies.storage import write_dataset
 from kinetostat.tolerances import EQUAL_ROUTES
 
-GROUP = "self-test"
-QUANTITIES = (*GROUPS["stiffness"], *GROUPS["compliance"])
-FEW, MANY = 500, 200_000
-"""Poses for a comparison; poses for a measurement, enough to keep some cores busy for a tenth of a second."""
+DIAGONALS = (*GROUPS["stiffness"], *GROUPS["compliance"])
+COMPARED_POSES = 500
+TIMED_POSES = 200_000
+"""Enough to keep some cores busy for a tenth of a second."""
 
 
-def checks() -> Iterator[Check]:
+def checks() -> Iterator[InstallationCheck]:
     """The paper's numbers, the routes of the engine beside each other, a search, a file."""
-    yield tried(GROUP, "paper", paper_numbers, reinstall("kinetostat"))
-    yield tried(GROUP, "machine code", routes_agree, reinstall("llvmlite numpy"))
-    yield tried(GROUP, "throughput", throughput, reinstall("llvmlite numpy"))
-    yield tried(GROUP, "search", short_search, reinstall("pymoo scipy"))
-    yield tried(GROUP, "files", results_file, reinstall("h5netcdf h5py xarray"))
+    yield check_of("self-test", "paper", paper_numbers, reinstall("kinetostat"))
+    yield check_of("self-test", "machine code", routes_agree, reinstall("llvmlite numpy"))
+    yield check_of("self-test", "throughput", throughput, reinstall("llvmlite numpy"))
+    yield check_of("self-test", "search", short_search, reinstall("pymoo scipy"))
+    yield check_of("self-test", "files", results_file, reinstall("h5netcdf h5py xarray"))
 
 
 def paper_numbers() -> str:
@@ -60,27 +60,29 @@ def paper_numbers() -> str:
 
 def routes_agree() -> str:
     """K and C of the paper's machine by machine code, by NumPy and pose by pose."""
-    machine, poses = load(printed.MACHINE), _poses(FEW)
-    plain = evaluate(machine, poses, QUANTITIES)
-    compiled = evaluate(machine, poses, QUANTITIES, repeated=True)
+    machine, poses = load(printed.MACHINE), _poses(COMPARED_POSES)
+    plain = evaluate(machine, poses, DIAGONALS)
+    compiled = evaluate(machine, poses, DIAGONALS, repeated=True)
     x, z = (float(poses.values[path][0]) for path in poses.paths)
     single = analyze(load(printed.MACHINE, [f"pose.x={x!r}", f"pose.z={z!r}"]))
-    first = np.array([compiled.values[name][0] for name in QUANTITIES])
+    first = np.array([compiled.values[name][0] for name in DIAGONALS])
     alone = np.array([*single.stiffness_diagonal, *single.compliance_diagonal])
-    apart = max(_apart(compiled, plain), float(np.abs(first / alone - 1.0).max()))
-    if not apart <= EQUAL_ROUTES or (compiled.status != Status.OK).any():
-        raise UnsoundError(f"it differs from NumPy or from a single pose by {apart:.1e}; {EQUAL_ROUTES:g} is allowed")
-    return f"K and C at {FEW} poses as by NumPy and pose by pose, to {apart:.0e}"
+    difference = max(_greatest_difference(compiled, plain), float(np.abs(first / alone - 1.0).max()))
+    if not difference <= EQUAL_ROUTES or (compiled.status != Status.OK).any():
+        raise UnsoundError(
+            f"it differs from NumPy or from a single pose by {difference:.1e}; {EQUAL_ROUTES:g} is allowed"
+        )
+    return f"K and C at {COMPARED_POSES} poses as by NumPy and pose by pose, to {difference:.0e}"
 
 
 def throughput() -> str:
-    """How many poses a second, with twelve numbers each."""
-    machine, poses = load(printed.MACHINE), _poses(MANY)
-    evaluate(machine, _poses(FEW), QUANTITIES, repeated=True)
+    """Poses a second, with twelve numbers each."""
+    machine, poses = load(printed.MACHINE), _poses(TIMED_POSES)
+    evaluate(machine, _poses(COMPARED_POSES), DIAGONALS, repeated=True)
     start = time.perf_counter()
-    evaluate(machine, poses, QUANTITIES)
-    rate = MANY / (time.perf_counter() - start)
-    return f"{rate / 1e6:.2g} million poses/s, {len(QUANTITIES)} numbers each, on {available_cores()} cores"
+    evaluate(machine, poses, DIAGONALS)
+    rate = TIMED_POSES / (time.perf_counter() - start)
+    return f"{rate / 1e6:.2g} million poses/s, {len(DIAGONALS)} numbers each, on {available_cores()} cores"
 
 
 def short_search() -> str:
@@ -111,6 +113,6 @@ def _poses(count: int) -> PointTable:
     return PointTable({"pose.x": source.uniform(-0.02, 0.02, count), "pose.z": source.uniform(0.66, 0.70, count)})
 
 
-def _apart(first: Evaluation, others: Evaluation) -> float:
+def _greatest_difference(first: Evaluation, others: Evaluation) -> float:
     """Greatest relative difference of two evaluations."""
-    return max(float(np.abs(first.values[name] / others.values[name] - 1.0).max()) for name in QUANTITIES)
+    return max(float(np.abs(first.values[name] / others.values[name] - 1.0).max()) for name in DIAGONALS)

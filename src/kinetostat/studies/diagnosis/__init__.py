@@ -1,1 +1,0 @@
-"""Is this installation sound? Its packages, its processor, known numbers. Libraries are imported when needed."""
