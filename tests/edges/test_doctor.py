@@ -17,7 +17,7 @@ from kinetostat.spec.installation import adding, installing
 from kinetostat.studies import diagnosis, self_test
 from kinetostat.studies.diagnosis import InstallationCheck, Soundness
 from kinetostat.studies.paper import printed
-from kinetostat.studies.paper.comparison import table_3
+from kinetostat.studies.paper.printed import table_3
 
 
 def test_a_sound_installation(capsys):
@@ -108,7 +108,7 @@ def test_not_installed_at_all(monkeypatch):
 
 def one_digit_off():
     first, *others = table_3()
-    return [replace(first, verdict=self_test.Verdict.DIFFERS, computed=0.5), *others]
+    return [replace(first, verdict=self_test.PrintVerdict.DIFFERS, computed=0.5), *others]
 
 
 def slightly_wrong(evaluate):

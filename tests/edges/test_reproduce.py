@@ -10,9 +10,8 @@ import pytest
 from kinetostat.cli import main
 from kinetostat.commands.common import DONE, NO_ANSWER
 from kinetostat.studies.paper import printed
-from kinetostat.studies.paper.claims import Finding
-from kinetostat.studies.paper.comparison import Verdict, compare, rounds_to
-from kinetostat.studies.paper.reproduction import reproduce
+from kinetostat.studies.paper.printed import PrintVerdict, compare, rounds_to
+from kinetostat.studies.paper.reproduction import Finding, reproduce
 
 
 @pytest.fixture(scope="module")
@@ -22,13 +21,13 @@ def found():
 
 def test_nothing_differs_unexplained(found):
     assert found.explained
-    assert Counter(one.verdict for one in found.comparisons) == {Verdict.EQUAL: 82, Verdict.MISPRINT: 6}
+    assert Counter(one.verdict for one in found.comparisons) == {PrintVerdict.EQUAL: 82, PrintVerdict.MISPRINT: 6}
     assert all(check.holds for check in found.checks)
     assert Counter(claim.finding for claim in found.claims) == {Finding.HOLDS: 4, Finding.PARTLY: 6}
 
 
 def test_every_erratum_is_met_once(found):
-    met = [(one.place, one.component) for one in found.comparisons if one.verdict is Verdict.MISPRINT]
+    met = [(one.place, one.component) for one in found.comparisons if one.verdict is PrintVerdict.MISPRINT]
     assert sorted(met) == sorted(printed.ERRATA)
 
 
@@ -70,9 +69,9 @@ def test_a_number_equals_print_by_its_printed_digits(computed, text, equal):
 
 
 def test_a_misprint_is_excused_only_if_the_correction_is_reached():
-    assert compare("Table IV, row 1", "y", "2223.51", 2223.5602, "N/m").verdict is Verdict.MISPRINT
-    assert compare("Table IV, row 1", "y", "2223.51", 2223.4, "N/m").verdict is Verdict.DIFFERS
-    assert compare("Table IV, row 2", "y", "2223.51", 2223.5602, "N/m").verdict is Verdict.DIFFERS
+    assert compare("Table IV, row 1", "y", "2223.51", 2223.5602, "N/m").verdict is PrintVerdict.MISPRINT
+    assert compare("Table IV, row 1", "y", "2223.51", 2223.4, "N/m").verdict is PrintVerdict.DIFFERS
+    assert compare("Table IV, row 2", "y", "2223.51", 2223.5602, "N/m").verdict is PrintVerdict.DIFFERS
 
 
 def test_the_command_writes_tables_figures_and_one_page_that_stands_alone(tmp_path, capsys):

@@ -226,10 +226,8 @@ def _memory_size() -> int | None:
 
 
 def self_test_checks() -> Iterator[InstallationCheck]:
-    """Known numbers, computed again; imported here, because it needs every library."""
-    from kinetostat.studies.self_test import checks
-
-    yield from checks()
+    """Known numbers, computed again, in a module that needs every library and builds on this one."""
+    yield from import_module("kinetostat.studies.self_test").checks()
 
 
 PARTS = {"software": software_checks, "machine": machine_checks, "self-test": self_test_checks}

@@ -24,7 +24,7 @@ from kinetostat.studies.optimisation.log import best_feasible
 from kinetostat.studies.optimisation.problem import load_problem
 from kinetostat.studies.optimisation.search import search
 from kinetostat.studies.paper import printed
-from kinetostat.studies.paper.comparison import Verdict, table_3, table_4
+from kinetostat.studies.paper.printed import PrintVerdict, table_3, table_4
 from kinetostat.studies.storage import write_dataset
 from kinetostat.tolerances import EQUAL_ROUTES
 
@@ -46,14 +46,14 @@ def checks() -> Iterator[InstallationCheck]:
 def paper_numbers() -> str:
     """Tables III and IV of the paper, as far as they are printed."""
     numbers = [*table_3(), *table_4()]
-    wrong = [number for number in numbers if number.verdict is Verdict.DIFFERS]
+    wrong = [number for number in numbers if number.verdict is PrintVerdict.DIFFERS]
     if wrong:
         first = wrong[0]
         raise UnsoundError(
             f"{len(wrong)} of {len(numbers)} numbers differ from print; {first.place}, {first.component}: "
             f"{first.computed:.9g} for {first.printed}"
         )
-    misprints = sum(number.verdict is Verdict.MISPRINT for number in numbers)
+    misprints = sum(number.verdict is PrintVerdict.MISPRINT for number in numbers)
     equal = len(numbers) - misprints
     return f"{equal} of {len(numbers)} numbers of Tables III and IV as printed, {misprints} known misprints"
 

@@ -1,14 +1,17 @@
 """The reproduction of the paper on the terminal and in files: tables (CSV, JSON), figures and an HTML page.
 
-Numbers and verdicts come from `studies.paper`; the page itself is written in `paper_page`.
+The page stands alone: no script, no request, pictures inside. Numbers and verdicts come from `studies.paper`.
 """
 
 import csv
 import io
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, fields
 from functools import partial
+from html import escape
+from importlib.metadata import version
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +22,14 @@ from rich.text import Text
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.spec.installation import command, starting
 from kinetostat.studies.optimisation.result_data import as_dataset
-from kinetostat.studies.paper.claims import Claim
-from kinetostat.studies.paper.comparison import Comparison, Verdict
-from kinetostat.studies.paper.derivation import Check
-from kinetostat.studies.paper.reproduction import Reproduction
+from kinetostat.studies.paper import printed
+from kinetostat.studies.paper.printed import EquationCheck, PaperNumber, PrintVerdict
+from kinetostat.studies.paper.reproduction import Claim, Finding, Reproduction
 from kinetostat.studies.storage import write_dataset, write_json, write_text
 from kinetostat.views.drawing import three_views
-from kinetostat.views.figures import Tell, contour_maps, curves, save
+from kinetostat.views.figures import Tell, as_svg, contour_maps, curves, save
 from kinetostat.views.optimisation_figures import convergence
-from kinetostat.views.paper_page import misprints, page
+from kinetostat.views.page import Markup, figure, table, whole_page
 from kinetostat.views.tables import text_table
 
 FIGURE_4 = "Fig. 4: stiffness against the stiffness of the passive links"
@@ -92,7 +94,9 @@ def print_summary(console: Console, reproduction: Reproduction, written: Sequenc
     if full:
         _print_everything(console, reproduction)
     else:
-        differing = [comparison for comparison in reproduction.comparisons if comparison.verdict is Verdict.DIFFERS]
+        differing = [
+            comparison for comparison in reproduction.comparisons if comparison.verdict is PrintVerdict.DIFFERS
+        ]
         if differing:
             console.print(_numbers_table(differing))
     more = "" if full else "; --full prints every number, equation and statement"
@@ -127,8 +131,8 @@ def verdict(reproduction: Reproduction) -> str:
     holding = sum(check.holds for check in reproduction.checks)
     findings = ", ".join(f"{count} {in_number(word, count)}" for word, count in statements.items())
     return (
-        f"{len(reproduction.comparisons)} numbers: {numbers[Verdict.EQUAL]} equal to print, "
-        f"{numbers[Verdict.MISPRINT]} known misprints, {numbers[Verdict.DIFFERS]} differ. "
+        f"{len(reproduction.comparisons)} numbers: {numbers[PrintVerdict.EQUAL]} equal to print, "
+        f"{numbers[PrintVerdict.MISPRINT]} known misprints, {numbers[PrintVerdict.DIFFERS]} differ. "
         f"{len(reproduction.checks)} groups of equations: {holding} hold. "
         f"{len(claims)} statements: {findings}."
     )
@@ -140,13 +144,13 @@ def in_number(finding: str, count: int) -> str:
     return (verb if count == 1 else verb.removesuffix("s")) + space + rest
 
 
-def _numbers_table(comparisons: Sequence[Comparison]) -> Any:
+def _numbers_table(comparisons: Sequence[PaperNumber]) -> Any:
     table = text_table("Numbers", "place", "", "printed", "computed", "unit", "verdict")
     place = ""
     shown = {
-        Verdict.EQUAL: Text("equal"),
-        Verdict.MISPRINT: Text("misprint", "yellow"),
-        Verdict.DIFFERS: Text("DIFFERS", "red"),
+        PrintVerdict.EQUAL: Text("equal"),
+        PrintVerdict.MISPRINT: Text("misprint", "yellow"),
+        PrintVerdict.DIFFERS: Text("DIFFERS", "red"),
     }
     for comparison in comparisons:
         head = "" if comparison.place == place else comparison.place
@@ -162,9 +166,170 @@ def _numbers_table(comparisons: Sequence[Comparison]) -> Any:
     return table
 
 
-def _csv(rows: Sequence[Comparison | Check | Claim]) -> str:
+def _csv(rows: Sequence[PaperNumber | EquationCheck | Claim]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([field.name for field in fields(rows[0])])
     writer.writerows(astuple(row) for row in rows)
     return text.getvalue()
+
+
+MARKS = {
+    PrintVerdict.EQUAL: "good",
+    PrintVerdict.MISPRINT: "note",
+    PrintVerdict.DIFFERS: "bad",
+    Finding.HOLDS: "good",
+    Finding.PARTLY: "note",
+    Finding.FAILS: "bad",
+}
+
+COUNTS = ("no", "one", "two", "three", "four", "five", "six")
+NUMERIC = (False, False, True, True, False, False)
+"""Columns of the table of numbers."""
+
+STYLE = """
+.tiles { display: flex; flex-wrap: wrap; gap: .8rem; margin: 1.4rem 0; }
+.tile { border: 1px solid var(--line); border-radius: .5rem; padding: .6rem .9rem; }
+.tile b { display: block; font-size: 1.6rem; line-height: 1.2; }
+.mark { border-radius: .3rem; padding: .05rem .45rem; font-size: .85rem; white-space: nowrap; }
+.good { background: #dff3e4; color: #14532d; } .note { background: #fdf0cf; color: #6b4400; }
+.bad { background: #fde0df; color: #7f1d1d; }
+dl dt { font-weight: 600; margin-top: 1rem; } dl dd { margin: .15rem 0 0 0; max-width: 46rem; }
+"""
+
+CAPTIONS = {
+    "machine": "Four U-P-S legs (blue, thick: cylinder) and the passive leg (orange) that leaves four freedoms. The "
+    "text from which this program was made has no figures; the geometry is a reconstruction that the printed numbers "
+    "determine completely.",
+    "figure-4": "K_rz and K_y grow with the passive links; the other four do not depend on them at this pose.",
+    "figure-5": "The paper's cut through the workspace. The machine itself cannot move along y: there, y shifts the "
+    "plane of its passive leg, and the platform with it.",
+    "figure-6": "The paper's search again, with other random numbers. The right panel shows how far "
+    "best and mean still are from the last best.",
+}
+
+
+def page(reproduction: Reproduction, figures: Mapping[str, Figure]) -> str:
+    """The page.
+
+    Args:
+        reproduction: what to show.
+        figures: by name, drawn; each name has a caption here.
+    """
+    pictures = {name: figure(as_svg(drawn), CAPTIONS[name]) for name, drawn in figures.items()}
+    body = [
+        "<h1>Zhang and Gosselin's machine, reproduced</h1>",
+        '<p class="soft">' + escape(printed.CITATION) + ", "
+        f"compared with the results of kinetostat {escape(version('kinetostat'))}. "
+        "Order of components: rx ry rz x y z; SI units, base axes, at the platform point P.</p>",
+        _tiles(reproduction),
+        "<h2>The machine</h2>",
+        pictures["machine"],
+        "<h2>Numbers</h2>",
+        "<p>A number is equal to print if it rounds to the digits that are printed. A misprint is listed only where "
+        "the corrected digits are reached, with the reason.</p>",
+        *(f"<p>{escape(line)}</p>" for line in misprints(reproduction)),
+        *_numbers(reproduction.comparisons),
+        "<h2>Equations 1 to 32</h2>",
+        _equations(reproduction),
+        "<h2>Stiffness against link stiffness</h2>",
+        pictures["figure-4"],
+        "<h2>Compliance over the workspace</h2>",
+        pictures["figure-5"],
+        "<h2>Design guidelines and further facts, tested</h2>",
+        _statements(reproduction.claims),
+        "<h2>Optimisation</h2>",
+        _statements(reproduction.search_claims),
+        pictures["figure-6"],
+        "<h2>Slips of typography</h2>",
+        f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in printed.TYPOGRAPHY)}</ul>",
+    ]
+    return whole_page("Zhang and Gosselin's machine, reproduced by kinetostat", STYLE, body)
+
+
+def misprints(reproduction: Reproduction) -> Iterator[str]:
+    """Write a sentence on the misprints of each place of the paper: what is printed, what it should say, and why."""
+    known = [comparison for comparison in reproduction.comparisons if comparison.verdict is PrintVerdict.MISPRINT]
+    for place, group in groupby(known, key=lambda comparison: comparison.place):
+        wrong = list(group)
+        pairs = [
+            f"{_symbol(place, each.component)} {each.printed} should read "
+            f"{printed.ERRATA[place, each.component].corrected}"
+            for each in wrong
+        ]
+        count = COUNTS[len(wrong)] if len(wrong) < len(COUNTS) else str(len(wrong))
+        are = "number is a misprint" if len(wrong) == 1 else "numbers are misprints"
+        reason = printed.ERRATA[place, wrong[0].component].reason
+        yield f"{place}: {count} {are} of the paper. {'; '.join(pairs)}. Reason: {reason}."
+
+
+def _symbol(place: str, component: str) -> str:
+    """Return the symbol of a number of the paper's tables: C_rx in Table III, K_rx in Table IV."""
+    letter = {"Table III": "C_", "Table IV": "K_"}.get(place.partition(",")[0], "")
+    return component if "/" in component else f"{letter}{component}"
+
+
+def _tiles(reproduction: Reproduction) -> str:
+    equal = sum(comparison.verdict is PrintVerdict.EQUAL for comparison in reproduction.comparisons)
+    misprints = sum(comparison.verdict is PrintVerdict.MISPRINT for comparison in reproduction.comparisons)
+    differing = len(reproduction.comparisons) - equal - misprints
+    equations = f"{sum(check.holds for check in reproduction.checks)} of {len(reproduction.checks)}"
+    claims = (*reproduction.claims, *reproduction.search_claims)
+    holding = sum(claim.finding is Finding.HOLDS for claim in claims)
+    limited = sum(claim.finding is Finding.PARTLY for claim in claims)
+    tiles = [
+        (equal, "numbers equal to print"),
+        (misprints, "known misprints"),
+        (differing, "numbers differ"),
+        (equations, "groups of equations hold"),
+        (f"{holding} + {limited}", "statements hold + in part"),
+    ]
+    cells = "".join(f'<div class="tile"><b>{figure}</b>{escape(text)}</div>' for figure, text in tiles)
+    return f'<div class="tiles">{cells}</div>'
+
+
+def _numbers(comparisons: Sequence[PaperNumber]) -> Iterable[str]:
+    titles = {"Table": "Tables III and IV", "Eq.": "Equations 33 to 38", "Section": "Designs of section 4.3"}
+    heads = ("place", "quantity", "printed", "computed", "unit", "verdict")
+    for head, group in groupby(comparisons, key=lambda comparison: comparison.place.split(" ")[0]):
+        rows = []
+        for place, members in groupby(group, key=lambda comparison: comparison.place):
+            rows += [_number_row(comparison, place if first else "") for comparison, first in _marking_first(members)]
+        yield table(titles[head], heads, rows, NUMERIC)
+
+
+def _marking_first(members: Iterable[PaperNumber]) -> Iterable[tuple[PaperNumber, bool]]:
+    return ((member, i == 0) for i, member in enumerate(members))
+
+
+def _number_row(comparison: PaperNumber, place: str) -> tuple[str, ...]:
+    verdict = Markup(_mark(comparison.verdict) + (f" {escape(comparison.reason)}" if comparison.reason else ""))
+    return place, comparison.component, comparison.printed, f"{comparison.computed:.9g}", comparison.unit, verdict
+
+
+def _equations(reproduction: Reproduction) -> str:
+    rows = [
+        (
+            check.equation,
+            check.statement,
+            f"{check.residual:.1e}",
+            f"{check.tolerance:.0e}",
+            _mark(Finding.HOLDS if check.holds else Finding.FAILS),
+        )
+        for check in reproduction.checks
+    ]
+    heads = ("equation", "statement", "residual", "tolerance", "verdict")
+    return table("The paper's matrices A, B, J and J' against legs as (W, G)", heads, rows, NUMERIC[-5:])
+
+
+def _statements(claims: Sequence[Claim]) -> str:
+    entries = [
+        f"<dt>{escape(claim.place)} {_mark(claim.finding)}</dt><dd>{escape(claim.statement)}</dd>"
+        f'<dd class="soft">{escape(claim.measured)} {escape(claim.limits)}</dd>'
+        for claim in claims
+    ]
+    return f"<dl>{''.join(entries)}</dl>"
+
+
+def _mark(verdict: PrintVerdict | Finding) -> Markup:
+    return Markup(f'<span class="mark {MARKS[verdict]}">{escape(verdict.value)}</span>')
