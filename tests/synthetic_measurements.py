@@ -22,9 +22,9 @@ def posed(machine, count, turn=0.12, share=0.08, seed=3):
 def measured(model, poses, truth, names=(*POSITION, *TURNED), rng=None, frame=None):
     """What an instrument would measure, with noise."""
     rng, count = rng or np.random.default_rng(5), len(model)
-    moved, _ = model.displaced(truth)
-    turned = exponential(np.concatenate([moved[:, :3], 0.0 * moved[:, :3]], axis=1)).rotation @ model.turned
-    place = Motions(turned, model.tool + moved[:, 3:])
+    moved, _ = model.displacement(truth)
+    turned = exponential(np.concatenate([moved[:, :3], 0.0 * moved[:, :3]], axis=1)).rotation @ model.drawn.axes
+    place = Motions(turned, model.drawn.tool + moved[:, 3:])
     place = place if frame is None else frame.inverse() @ place
     angles = logarithm(Motions(place.rotation, np.zeros((count, 3))))[:, :3]
     true = dict(zip((*POSITION, *TURNED), (*place.translation.T, *angles.T), strict=True))

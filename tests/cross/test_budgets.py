@@ -36,7 +36,7 @@ def test_drawn_machines_are_those_of_forward_kinematics():
     lines = read_tolerances({"zeros": "0.2 mm", **{f"geometry.{field}": "0.5 mm" for field in fields}})
     model = error_model(machine, {}, 1)
     parts = toleranced(machine, model.errors, lines)
-    made = inputs_of(parts, model.rates(), model.load, 0.1)
+    made = inputs_of(parts, model.rates(), model.drawn.load, 0.1)
     here = values(machine)
     for drawn in next(made.machines(4, 5)):
         errors = made.drawn + made.errors @ drawn
@@ -45,7 +45,7 @@ def test_drawn_machines_are_those_of_forward_kinematics():
         stands = {a.name: float(a.coordinate) + off[f"legs.{a.leg}.actuator.zero"] for a in stand(machine, None)}
         reached = forward(built, stands, starts=0).present
         drawn_point = np.array(machine.configure().platform.translation.components(), dtype=float)
-        moved, _ = model.displaced(errors)
+        moved, _ = model.displacement(errors)
         assert moved[0, 3:] == pytest.approx(np.array(reached.position) - drawn_point, abs=1e-9)
         assert np.linalg.norm(moved[0, 3:]) > 3e-5
 
@@ -68,7 +68,7 @@ def total_indices(machine, made, groups, count=256):
     model = error_model(machine, {path: np.full(count, float(values(machine)[path]))}, count)
 
     def moved(variables):
-        return model.displaced(made.drawn + variables @ made.errors.T)[0][:, 3:]
+        return model.displacement(made.drawn + variables @ made.errors.T)[0][:, 3:]
 
     whole, indices = moved(first), []
     for group in groups:
@@ -87,7 +87,7 @@ def test_what_single_contributions_leave_bounds_total_indices_and_falls_with_the
         left.append(answer.exact.unexplained[answer.measures.index("position")])
         model = error_model(machine, {}, 1)
         parts = toleranced(machine, model.errors, read_tolerances(lines))
-        made = inputs_of(parts, model.rates(), model.load, model.length)
+        made = inputs_of(parts, model.rates(), model.drawn.load, model.length)
         names = list(dict.fromkeys(part.line for part in parts))
         groups = [np.flatnonzero(np.array([parts[o].line == name for o in made.owner])) for name in names]
         total = total_indices(machine, made, groups)

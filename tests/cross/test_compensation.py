@@ -54,10 +54,10 @@ def test_zeros_gains_and_geometry_are_compensated_together(name, tmp_path):
     for pose, errors in ((drawn, truth), (wanted, 0.0 * truth)):
         columns = {f"pose.{path.removeprefix('pose.')}": np.array([value]) for path, value in pose.items()}
         model = error_model(machine, columns, 1, np.zeros(6))
-        moved, _ = model.displaced(errors)
-        turned = exponential(np.hstack([moved[:, :3], 0.0 * moved[:, :3]])).rotation @ model.turned
+        moved, _ = model.displacement(errors)
+        turned = exponential(np.hstack([moved[:, :3], 0.0 * moved[:, :3]])).rotation @ model.drawn.axes
         turns = 0.0 * turned if name in ("delta", "orthoglide") else turned  # a Delta cannot turn back what errors turn
-        off.append(np.concatenate([turns.ravel(), (model.tool + moved[:, 3:]).ravel()]))
+        off.append(np.concatenate([turns.ravel(), (model.drawn.tool + moved[:, 3:]).ravel()]))
     # A file says legs that are more than rods to first order: of errors of 2e-4 their square is left.
     assert off[0] == pytest.approx(off[1], abs=1e-9 if name in ("hexapod", "orthoglide") else 2e-7)
     uncorrected = command(built, given)

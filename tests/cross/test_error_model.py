@@ -60,7 +60,7 @@ def test_what_the_rates_leave_out_is_of_second_order(case):
     rates, errors = model.rates(), drawn(model, 1e-4)
     left = []
     for size in (4.0, 2.0, 1.0):
-        exact, status = model.displaced(size * errors)
+        exact, status = model.displacement(size * errors)
         assert (status == Status.OK).all()
         left.append(np.abs(exact - rates @ (size * errors)).max())
     orders = np.log2(np.array(left[:-1]) / left[1:])
@@ -71,7 +71,7 @@ def test_what_the_rates_leave_out_is_of_second_order(case):
 def test_rates_at_errors_are_the_derivative_there(case):
     model = error_model(case.machine, around(case.machine), POSES)
     at, way = drawn(model, 3e-3), drawn(model, 1e-5, 5)
-    ends = [model.displaced(at + sign * way)[0] for sign in (1.0, -1.0)]
+    ends = [model.displacement(at + sign * way)[0] for sign in (1.0, -1.0)]
     slope = 0.5 * (ends[0] - ends[1])[:, 3:]
     left = np.abs(slope - (model.rates(values=at) @ way)[:, 3:]).max()
     # Legs that share a misfit turn with it, which the rates leave out.
@@ -118,7 +118,7 @@ def test_a_hexapod_moves_as_the_same_machine_drawn_with_its_errors():
     pose = {path: np.array([value]) for path, value in values(machine).items() if path.startswith("pose.")}
     model = error_model(machine, pose, 1)
     sizes = dict(zip(POINTS, (2e-3, -1e-3, 1.5e-3, 1e-3), strict=True))
-    errors, goal = np.zeros(len(model.errors)), model.actuators[0].copy()
+    errors, goal = np.zeros(len(model.errors)), model.drawn.actuators[0].copy()
     for path, size in sizes.items():
         leg, joint, entry = POINTS[path]
         joints = document["legs"][leg]["joints"]
@@ -128,7 +128,7 @@ def test_a_hexapod_moves_as_the_same_machine_drawn_with_its_errors():
     errors[place_of(model, "legs.leg 2.actuator.zero")] = 0.5e-3
     errors[place_of(model, "legs.leg 4.actuator.gain")] = 1e-3
     goal += [0.0, 0.5e-3, 0.0, 1e-3 * goal[3], 0.0, 0.0]
-    moved, _ = model.displaced(errors)
+    moved, _ = model.displacement(errors)
     expected = moved_by_forward(build(document, "built", settings), machine, goal)
     assert np.abs(expected).max() > 1e-4
     assert moved[0, 3:] == pytest.approx(expected[3:], abs=1e-10)
@@ -181,7 +181,7 @@ def test_a_delta_with_bars_of_different_length_tilts():
     """Against the six lengths of its bars, from elbows that stand still to a platform that is free."""
     machine = load_without_limits("delta", ["pose.x=0.04", "pose.y=-0.02"])
     model, bars = error_model(machine, {}, 1), bars_of(machine)
-    point = model.tool[0]
+    point = model.drawn.tool[0]
     lengths = np.linalg.norm(bars[:, 1] - bars[:, 0], axis=1)
 
     def misfit(moved, wanted):
@@ -215,4 +215,4 @@ def test_compliances_deflect_the_tool_by_their_share_of_the_load():
     response = respond(machine)
     compliance = np.array(response.compliance.rows(), dtype=float)
     expected = compliance @ np.array(response.load.components(), dtype=float)
-    assert model.compliance(model.load)[0].sum(axis=1) == pytest.approx(expected)
+    assert model.deflections(model.drawn.load)[0].sum(axis=1) == pytest.approx(expected)

@@ -130,7 +130,7 @@ def test_readings_of_actuators_give_what_poses_give(tmp_path, capsys):
     written(by_pose, data)
     lines = [line.split(", ") for line in by_pose.read_text().splitlines()]
     heads = [f"actuator.{actuator.name} [mm]" for actuator in stand(machine)]
-    readings = [[f"{1e3 * value:.12f}" for value in row] for row in model.actuators]
+    readings = [[f"{1e3 * value:.12f}" for value in row] for row in model.drawn.actuators]
     rows = zip([heads, *readings], (line[len(poses) :] for line in lines), strict=True)
     by_reading.write_text("\n".join(", ".join([*start, *end]) for start, end in rows) + "\n")
     records = [

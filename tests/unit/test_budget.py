@@ -85,7 +85,7 @@ def test_drawn_machines_have_the_predicted_mean_square_and_no_worse_case(name):
     machine = load(name)
     model = error_model(machine, {}, 1)
     parts = toleranced(machine, model.errors, read_tolerances(LINES[name]))
-    variables = inputs_of(parts, model.rates(), model.load, 1.0)
+    variables = inputs_of(parts, model.rates(), model.drawn.load, 1.0)
     rows = measures_of(np.eye(6)[None], machine.family.component_names, None, 1.0)[0]
     drawn = np.concatenate(list(variables.machines(FEW, 3)))
     sizes = rows.sizes(rows.applied((drawn @ variables.columns[0].T)[:, :, None])[:, :, 0])
@@ -232,7 +232,7 @@ def test_the_joints_of_a_strut_are_pressed_along_it():
     machine = load("hexapod", ["load.force=[50, 20, -400]", "pose.x=5 mm", "pose.roll=3 deg"])
     model = error_model(machine, {}, 1)
     parts = toleranced(machine, model.errors, read_tolerances({"clearances": "5 um"}))
-    made = inputs_of(parts, model.rates(), model.load, 0.3)
+    made = inputs_of(parts, model.rates(), model.drawn.load, 0.3)
     assert made.pressed.all()
     legs = {leg.name: leg for leg in machine.configure().legs}
     for number, part in enumerate(parts):

@@ -51,7 +51,7 @@ def test_compliances_follow_from_deflections_under_known_loads():
     truth = np.array([0.1 * rng.normal() if error.group == "compliances" else 0.0 for error in model.errors])
     soft = np.flatnonzero(truth)
     wrenches = rng.normal(size=(count, 6)) * [20.0, 20.0, 20.0, 300.0, 300.0, 300.0]
-    deflected = model.compliance(wrenches) @ (1.0 + truth[soft])
+    deflected = model.deflections(wrenches) @ (1.0 + truth[soft])
     names = {f"deflection.{name}": deflected[:, i] for i, name in enumerate((*TURNED, *POSITION))}
     sigma = {name: np.full(count, 1e-3 * np.abs(entries).max()) for name, entries in names.items()}
     noisy = {name: entries + sigma[name] * rng.normal(size=count) for name, entries in names.items()}

@@ -123,7 +123,7 @@ def test_differences_over_their_uncertainty_are_as_large_as_they_should_be(tmp_p
     """Machines with springs drawn by their tolerance, measured with noise: chi-square of 5 entries is 5 on average."""
     machine, rng = load_without_limits("hexapod", [SOFT]), np.random.default_rng(3)
     model = error_model(machine, {}, 1)
-    dyads = np.stack([model.compliance(unit[None])[0] for unit in np.eye(6)], axis=1)
+    dyads = np.stack([model.deflections(unit[None])[0] for unit in np.eye(6)], axis=1)
     names = ("compliance_rx", "compliance_rz", "compliance_x", "compliance_z", "compliance_rx_y")
     places = [(0, 0), (2, 2), (3, 3), (5, 5), (0, 4)]
     squares = []

@@ -14,7 +14,7 @@ import numpy as np
 from kinetostat.accuracy.closing import Errors, Place, followed, placed
 from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.accuracy.rows import Row
-from kinetostat.accuracy.screws import scaled
+from kinetostat.accuracy.screws import independent, scaled
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
 from kinetostat.arrays import Array
@@ -26,7 +26,6 @@ from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import POSE
 from kinetostat.spec.errors import InputError
-from kinetostat.tolerances import SEEN_BY_LEG
 
 REACHED = 1e-9
 """Gap of a leg at the drawn home place, rad or in units of the machine's length, with which it counts as reached."""
@@ -68,7 +67,7 @@ def as_built(machine: Machine, errors: Array, model: ErrorModel | None = None) -
             "rigid links can say; use the record of the fit instead."
         )
     values = np.asarray(errors, dtype=float)
-    configuration, coordinates = _placed(model, values, still(1), None)
+    configuration, coordinates = _configuration_near(model, values, still(1), None)
     return AsBuilt(configuration, *_commands(model, values, coordinates))
 
 
@@ -82,12 +81,13 @@ def compliances_as_built(errors: Array, model: ErrorModel) -> Array:
         errors: SI, in the order of the model [errors].
         model: of a machine that is not overconstrained.
     """
-    configuration, _ = _placed(model, np.asarray(errors, dtype=float), model.drawn.platform, model.drawn.coordinates)
+    drawn = model.drawn.state
+    configuration, _ = _configuration_near(model, np.asarray(errors, dtype=float), drawn.platform, drawn.coordinates)
     rows = compliance_at(model.machine, configuration).rows()
     return stacked([entry for row in rows for entry in row], len(model)).reshape(-1, 6, 6)
 
 
-def _placed(
+def _configuration_near(
     model: ErrorModel, values: Array, target: Motions, drawn: Sequence[Array] | None
 ) -> tuple[Configuration, list[Array]]:
     """Place all legs with errors [errors] where their platform is displaced to a target, or near it.
@@ -99,7 +99,7 @@ def _placed(
         drawn: coordinates of the legs there without errors; None to have them found.
     """
     actuators = np.array([error.group in ("zeros", "gains") for error in model.errors])
-    links = model.inserted(np.where(actuators, 0.0, values))
+    links = model.leg_errors(np.where(actuators, 0.0, values))
     rows = model.rows
     coordinates = [
         drawn[number] if drawn and not links[number] else followed(row, target, rows.length, links[number])
@@ -109,7 +109,7 @@ def _placed(
     gaps = [_gap(target, placed(row, q, e).end, rows.length) for row, q, e in every]
     platform = target
     if max(gaps) > REACHED:
-        platform, coordinates = _driven(model, values, links)
+        platform, coordinates = _driven_legs(model, values, links)
     places = [placed(row, q, e) for row, q, e in zip(rows.legs, coordinates, links, strict=True)]
     parts = zip(rows.configuration.legs, rows.legs, places, links, strict=True)
     legs = [_leg(leg, row, place, link) for leg, row, place, link in parts]
@@ -123,10 +123,10 @@ def _placed(
 
 def model_at_home(machine: Machine) -> ErrorModel:
     """The errors of a machine at its home place: that of a family's file, or the home pose of one leg by leg."""
-    return error_model(machine, _home(machine), 1, np.zeros(6))
+    return error_model(machine, _home_pose(machine), 1, np.zeros(6))
 
 
-def _home(machine: Machine) -> dict[str, Array]:
+def _home_pose(machine: Machine) -> dict[str, Array]:
     """The pose at the home place: that of a family's file, or the home pose of a machine leg by leg."""
     if machine.family.chains is None:
         return {}
@@ -140,9 +140,9 @@ def _gap(target: Motions, end: Motions, length: float) -> float:
     return float(np.abs(scaled(logarithm(target @ end.inverse()), length)).max())
 
 
-def _driven(model: ErrorModel, values: Array, links: Errors) -> tuple[Motions, list[Array]]:
+def _driven_legs(model: ErrorModel, values: Array, links: Errors) -> tuple[Motions, list[Array]]:
     """Place the platform with actuators as drawn, and all joints with it, actuators with their errors."""
-    state = model.closed_with(values)
+    state = model.closed_state(values)
     coordinates = [
         followed(row, state.platform, model.rows.length, errors)
         for row, errors in zip(model.rows.legs, links, strict=True)
@@ -178,22 +178,12 @@ def _leg(leg: Leg, row: Row, place: Place, errors: dict[int, Array]) -> Leg:
 def _idle(chain: list[Element]) -> tuple[int, ...]:
     """The passive freedoms that follow from those before them, such as the spin of a strut, at the first pose."""
     joints = [joint for element in chain for joint in element.freedoms]
-    if not joints:
-        return ()
     points = [joint.point for joint in joints if joint.point is not None]
-    length = max([_first((point - points[0]).norm()) for point in points], default=0.0) or 1.0
     about = points[0] if points else ZERO
-    twists = np.array([[_first(c) for c in joint.twist(about).components()] for joint in joints])
-    twists = twists / [1, 1, 1, *[length] * 3]
-    basis: list[Array] = []
-    idle = []
-    for number, twist in enumerate(twists):
-        rest = twist - sum((way * (way @ twist) for way in basis), np.zeros(6))
-        if np.linalg.norm(rest) < SEEN_BY_LEG * np.linalg.norm(twist):
-            idle.append(number)
-        else:
-            basis.append(rest / np.linalg.norm(rest))
-    return tuple(idle)
+    length = max([_first((point - about).norm()) for point in points], default=0.0) or 1.0
+    twists = np.array([[_first(c) for c in joint.twist(about).components()] for joint in joints]).reshape(-1, 6)
+    chosen = independent(scaled(twists, length).T[None])
+    return tuple(number for number in range(len(joints)) if number not in chosen)
 
 
 def _first(scalar: Scalar) -> float:

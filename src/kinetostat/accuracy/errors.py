@@ -1,10 +1,14 @@
-"""The numbers of a leg that may be wrong, by its form: where joints lie on their links, zeros and gains of actuators.
+"""The numbers of a machine that may be wrong: places of joints on their links, zeros and gains, shared sizes.
 
 An error displaces everything behind some motion of the leg by a small screw motion: in front of a joint it moves or
 tilts the joint on its link, behind the last one the platform on the leg. What a passive joint takes up by its own
 freedom is left out, and so is what no motion of the leg can tell from the errors that are listed before it. A strut
 between two balls keeps both centres and its zero, a leg in general 4 numbers for each revolute, 2 for each slide and 6
 for its end.
+
+A number that several legs share, such as the base radius of a family, is a combination of errors of these legs. Where
+it changes, joints lie elsewhere at the home place and actuators count from elsewhere; the rates of both make one error,
+which is exact for what enters linearly.
 
 Source: theory (45) and (49).
 """
@@ -15,14 +19,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinetostat.accuracy.closing import free_screws, placed
-from kinetostat.accuracy.rows import Row, Rows, Unit, places_of
+from kinetostat.accuracy.rows import Row, Rows, Unit, places_of, rows_of
 from kinetostat.accuracy.screws import Screws, independent, moved_to, scaled
 from kinetostat.algebra.vector import AXES, ZERO, Vector
 from kinetostat.arrays import Array
+from kinetostat.equilibrium.motion import Motions, logarithm
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.link import Parallelogram
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.tolerances import NO_LINK, PARALLEL_AXES, SEEN_BY_LEG
 
+SHARED_STEP = 1e-5
+"""Of central differences, rad or in units of the machine's length: what they leave out is its square."""
+SHARED_TABLE = "geometry."
 ZEROS, BASE, PLATFORM, LENGTHS, LINKS, TILTS, OFFSETS = range(7)
 """The order in which errors are listed where only some of them can be told apart."""
 
@@ -81,7 +91,7 @@ def errors_of(rows: Rows) -> list[Source]:
     for number, row in enumerate(rows.legs):
         every = [source for _, source in sorted(_candidates(number, row, rows), key=lambda entry: entry[0])]
         sources += _distinct(row, rows, every)
-        sources += _felt(row, rows, list(_clearances(number, row)))
+        sources += _effective(row, rows, list(_clearances(number, row)))[0]
     return sources
 
 
@@ -102,27 +112,18 @@ def effects(row: Row, rows: Rows, sources: Sequence[Source], coordinates: Array)
     return np.stack(columns, axis=1) if columns else np.zeros((0, 0))
 
 
+def _effective(row: Row, rows: Rows, sources: Sequence[Source]) -> tuple[list[Source], Array]:
+    """Those that move the platform somewhere, and their `effects`."""
+    columns = effects(row, rows, sources, places_of(row, rows.length))
+    moving = np.flatnonzero(np.linalg.norm(columns, axis=0) > SEEN_BY_LEG / rows.length)
+    return [sources[int(number)] for number in moving], columns[:, moving]
+
+
 def _distinct(row: Row, rows: Rows, sources: Sequence[Source]) -> list[Source]:
     """Those whose effects do not follow from the effects of those before them, in the order of the leg."""
-    columns = effects(row, rows, sources, places_of(row, rows.length))
-    basis: list[Array] = []
-    kept = []
-    for number, column in enumerate(columns.T):
-        size = float(np.linalg.norm(column))
-        rest = column
-        for _ in range(2):
-            rest = rest - sum((direction * (direction @ rest) for direction in basis), np.zeros_like(rest))
-        left = float(np.linalg.norm(rest))
-        if size > SEEN_BY_LEG / rows.length and left > SEEN_BY_LEG * size:
-            basis.append(rest / left)
-            kept.append(sources[number])
-    return sorted(kept, key=lambda source: source[1][0].behind)
-
-
-def _felt(row: Row, rows: Rows, sources: Sequence[Source]) -> list[Source]:
-    """Those that move the platform somewhere."""
-    sizes = np.linalg.norm(effects(row, rows, sources, places_of(row, rows.length)), axis=0) if sources else []
-    return [source for source, size in zip(sources, sizes, strict=True) if size > SEEN_BY_LEG / rows.length]
+    moving, columns = _effective(row, rows, sources)
+    distinct = [moving[number] for number in independent(columns[None])]
+    return sorted(distinct, key=lambda source: source[1][0].behind)
 
 
 def _candidates(number: int, row: Row, rows: Rows) -> Iterator[tuple[int, Source]]:
@@ -293,3 +294,59 @@ class _Named:
     ) -> Source:
         error = MachineError(f"legs.{self.leg}.{self.unit.name}.{name}", kind, group, words, self.leg)
         return error, (Insertion(self.number, self.unit.first if behind is None else behind, twist, factor),)
+
+
+def shared_errors(machine: Machine, rows: Rows) -> list[Source]:
+    """List the lengths and angles of the table [geometry] of a family; none of a machine written leg by leg.
+
+    Args:
+        machine: with numbers.
+        rows: the machine at its home place.
+    """
+    if machine.family.chains:
+        return []
+    given, sources = values(machine), []
+    fields = {leaf: p for p in parameters(machine.family) if p.path.startswith(SHARED_TABLE) for leaf in p.leaves}
+    for path, field in fields.items():
+        kind = field.quantity.kind
+        if kind not in ("length", "angle"):
+            continue
+        step = SHARED_STEP * (rows.length if kind == "length" else 1.0)
+        more, less = (rows_of(with_values(machine, {path: float(given[path]) + s * step})) for s in (1.0, -1.0))
+        insertions = tuple(_shared_insertions(rows, more, less, 2.0 * step))
+        if insertions and all(np.isfinite(insertion.twist).all() for insertion in insertions):
+            sources.append((MachineError(path, kind, "shared", field.quantity.meaning, ""), insertions))
+    return sources
+
+
+def _shared_insertions(rows: Rows, more: Rows, less: Rows, step: float) -> Iterator[Insertion]:
+    """Change of the legs per unit of a number, from the machine with more and less of it."""
+    home = Motions(more.rotation[None], more.point[None]) @ Motions(less.rotation[None], less.point[None]).inverse()
+    platform = logarithm(home)[0] / step
+    for number, row in enumerate(rows.legs):
+        legs = more.legs[number], less.legs[number]
+        for place, unit in enumerate(row.units):
+            units = legs[0].units[place], legs[1].units[place]
+            for motion in range(unit.first, unit.last):
+                twist = _axis_motion(motion, unit, *units) / step
+                if twist.any():
+                    yield Insertion(number, motion, twist)
+                    yield Insertion(number, motion + 1, -twist)
+            drives = units[0].drive, units[1].drive
+            if unit.drive and drives[0] and drives[1] and drives[0].home != drives[1].home:
+                rate = unit.drive.sense * (drives[1].home - drives[0].home) / step
+                yield Insertion(number, unit.first, row.twists[unit.first] * rate)
+        if platform.any():
+            yield Insertion(number, len(row.twists), platform)
+
+
+def _axis_motion(motion: int, unit: Unit, more: Unit, less: Unit) -> Array:
+    """The screw motion that takes the axis of a motion from one place to another [6]."""
+    which = motion - unit.first
+    axis = 0 if unit.bars else which
+    turning = less.axes[axis].cross(more.axes[axis])
+    points = [end.bars.far if end.bars and which else end.point for end in (unit, more, less)]
+    if points[0] is None or points[1] is None or points[2] is None or unit.kind == "slide":
+        return np.array([*turning.components(), 0.0, 0.0, 0.0], dtype=float)
+    shift = points[0].cross(turning) + points[1] - points[2]
+    return np.array([*turning.components(), *shift.components()], dtype=float)

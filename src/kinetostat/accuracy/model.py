@@ -14,10 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from kinetostat.accuracy.closing import Errors, State, closed, followed, free_screws, freed, holding, placed
-from kinetostat.accuracy.errors import Insertion, MachineError, Source, errors_of
+from kinetostat.accuracy.errors import Insertion, MachineError, Source, errors_of, shared_errors
 from kinetostat.accuracy.rows import Row, Rows, places_of, rows_of
 from kinetostat.accuracy.screws import independent, scaled
-from kinetostat.accuracy.shared import shared_errors
 from kinetostat.arrays import Array, Codes, Integers
 from kinetostat.equilibrium.motion import Motions, cross
 from kinetostat.kinematics.closing import stacked
@@ -35,7 +34,7 @@ PLACED = (Status.OK, Status.JOINT_LIMIT)
 
 
 @dataclass(frozen=True)
-class Flexible:
+class FlexibleSpring:
     """Motion of the tool at n poses by the compliance of a spring.
 
     Attributes:
@@ -46,10 +45,55 @@ class Flexible:
     twist: Array
     compliance: Array
 
-    def moved(self, wrenches: Array) -> Array:
+    def deflection(self, wrenches: Array) -> Array:
         """The twist of the tool by its deformation under wrenches at the tool point [n x 6], SI [n x 6]."""
         load = np.einsum("ni,ni->n", self.twist, wrenches)
         return np.asarray(self.twist * (self.compliance * load)[:, None])
+
+
+@dataclass(frozen=True)
+class DrawnMachine:
+    """The machine without errors at n poses.
+
+    Attributes:
+        status: `Status` codes of the machine at the poses [n]; results are NaN where it has no place.
+        state: displacement of its platform from the home place, and the coordinates of its legs.
+        tool: the tool point, base frame, m [n x 3].
+        axes: the axes of its platform as columns, base frame [n x 3 x 3].
+        actuators: coordinates of its actuators, m or rad [n x actuators].
+        load: the wrench at the tool point under which compliances count, base axes, N·m and N [n x 6].
+        springs: those that deflect.
+        leg_compliances: of each leg without its passive joints, at the tool, in the length's units [n x 6 x 6].
+    """
+
+    status: Codes
+    state: State
+    tool: Array
+    axes: Array
+    actuators: Array
+    load: Array
+    springs: tuple[FlexibleSpring, ...]
+    leg_compliances: tuple[Array, ...]
+
+    def at_poses(self, rows: Integers) -> "DrawnMachine":
+        """The machine at some of the poses [rows]."""
+        platform = self.state.platform
+        state = State(
+            Motions(platform.rotation[rows], platform.translation[rows]),
+            tuple(q[rows] for q in self.state.coordinates),
+            self.state.settled[rows],
+        )
+        springs = tuple(FlexibleSpring(spring.twist[rows], spring.compliance[rows]) for spring in self.springs)
+        return DrawnMachine(
+            self.status[rows],
+            state,
+            self.tool[rows],
+            self.axes[rows],
+            self.actuators[rows],
+            self.load[rows],
+            springs,
+            tuple(compliance[rows] for compliance in self.leg_compliances),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,34 +102,25 @@ class ErrorModel:
 
     Attributes:
         machine: as drawn.
+        drawn: the same at the poses, without errors.
         errors: every number that may be wrong.
-        status: `Status` codes of the drawn machine at the poses [n]; results are NaN where it has no place.
-        tool: the tool point of the drawn machine, base frame, m [n x 3].
-        turned: the axes of its platform as columns, base frame [n x 3 x 3].
-        actuators: where its actuators stand, m or rad [n x actuators].
-        load: the wrench at the tool point under which compliances count, base axes, N·m and N [n x 6].
-        rows: its legs at the home place.
-        sources: what its errors put into the legs, in their order; compliances, the last errors, put nothing there.
+        sources: what errors put into the legs, in their order; compliances, the last errors, put nothing there.
+        rows: the legs at the home place.
+        tool_home: the tool point at the home place, m [3].
+        independent: by leg, the free screws that do not follow from those before them wherever the leg is.
     """
 
     machine: Machine
+    drawn: DrawnMachine
     errors: tuple[MachineError, ...]
-    status: Codes
-    tool: Array
-    turned: Array
-    actuators: Array
-    load: Array
-    rows: Rows
     sources: tuple[Source, ...]
-    _flexible: tuple[Flexible, ...]
-    _drawn: State
-    _tool_home: Array
-    _chosen: tuple[tuple[int, ...], ...]
-    _soft: tuple[Array, ...]
-    _latest: dict[bytes, State] = field(default_factory=dict)
+    rows: Rows
+    tool_home: Array
+    independent: tuple[tuple[int, ...], ...]
+    _last_state: dict[bytes, State] = field(default_factory=dict)
 
     def __len__(self) -> int:
-        return len(self.status)
+        return len(self.drawn.status)
 
     @property
     def length(self) -> float:
@@ -93,22 +128,21 @@ class ErrorModel:
         return self.rows.length
 
     @property
-    def drawn(self) -> State:
-        """Places of the drawn machine at the poses."""
-        return self._drawn
-
-    @property
     def overconstrained(self) -> bool:
         """Whether the legs carry more wrenches than the platform needs, so that they share a misfit."""
-        return sum(6 - len(chosen) for chosen in self._chosen) + len(self.rows.absent) > 6
+        return sum(6 - len(screws) for screws in self.independent) + len(self.rows.absent) > 6
 
-    def inserted(self, values: Array) -> Errors:
+    def at_poses(self, rows: Integers) -> "ErrorModel":
+        """The model at some of its poses [rows]."""
+        return replace(self, drawn=self.drawn.at_poses(rows), _last_state={})
+
+    def leg_errors(self, values: Array) -> Errors:
         """The screw motions that errors put into each leg at the poses, one for all of them where they agree.
 
         Args:
             values: SI [errors], or others at each pose [n x errors].
         """
-        errors: Errors = [{} for _ in self.rows.legs]
+        motions: Errors = [{} for _ in self.rows.legs]
         each = np.atleast_2d(np.asarray(values, dtype=float))
         for number, (_, insertions) in enumerate(self.sources):
             if not each[:, number].any():
@@ -116,44 +150,39 @@ class ErrorModel:
             for i in insertions:
                 amount = each[:, number]
                 if i.factor is not None:
-                    amount = amount * i.amount(self._drawn.coordinates[i.leg])
-                errors[i.leg][i.behind] = errors[i.leg].get(i.behind, np.zeros((1, 6))) + amount[:, None] * i.twist
-        return errors
+                    amount = amount * i.amount(self.drawn.state.coordinates[i.leg])
+                motions[i.leg][i.behind] = motions[i.leg].get(i.behind, np.zeros((1, 6))) + amount[:, None] * i.twist
+        return motions
 
-    def closed_with(self, values: Array) -> State:
-        """Place all legs with errors [errors], theory (48)."""
-        return self._closed(np.asarray(values, dtype=float))
+    def closed_state(self, values: Array) -> State:
+        """Place all legs with errors [errors] or [n x errors], theory (48).
 
-    def taken(self, rows: Integers) -> "ErrorModel":
-        """The model at some of its poses [rows]."""
-        drawn = State(
-            Motions(self._drawn.platform.rotation[rows], self._drawn.platform.translation[rows]),
-            tuple(q[rows] for q in self._drawn.coordinates),
-            self._drawn.settled[rows],
-        )
-        flexible = tuple(Flexible(f.twist[rows], f.compliance[rows]) for f in self._flexible)
-        parts = {name: getattr(self, name)[rows] for name in ("status", "tool", "turned", "actuators", "load")}
-        soft = tuple(s[rows] for s in self._soft)
-        return replace(self, _drawn=drawn, _flexible=flexible, _soft=soft, _latest={}, **parts)
+        The state at the last values is kept, because a fit asks for it again.
+        """
+        key = np.asarray(values, dtype=float).tobytes()
+        if key not in self._last_state:
+            drawn, errors = self.drawn, self.leg_errors(values)
+            with np.errstate(all="ignore"):
+                state = closed(self.rows, drawn.state, errors, self.tool_home, self.independent, drawn.leg_compliances)
+            self._last_state.clear()
+            self._last_state[key] = state
+        return self._last_state[key]
 
-    def rates(self, rows: Integers | None = None, values: Array | None = None) -> Array:
+    def rates(self, values: Array | None = None) -> Array:
         """Motion of the tool per unit of each error, with the actuators held, theory (46).
 
         Args:
-            rows: numbers of the poses; all if None.
             values: errors [errors] at which the rates are taken; none if None.
 
         Returns:
             Twists of the tool point, rotation first, base axes, rad and m per SI unit of the error [n x 6 x errors];
             NaN where the machine has no place.
         """
-        if rows is not None:
-            return self.taken(rows).rates(values=values)
         if values is None:
-            return self._rates_at(self._drawn, [{} for _ in self.rows.legs])
-        return self._rates_at(self._closed(values), self.inserted(values))
+            return self._rates_at(self.drawn.state, [{} for _ in self.rows.legs])
+        return self._rates_at(self.closed_state(values), self.leg_errors(values))
 
-    def displaced(self, values: Array) -> tuple[Array, Codes]:
+    def displacement(self, values: Array) -> tuple[Array, Codes]:
         """Displacement of the tool by errors of any size, theory (48); compliances add to first order.
 
         Args:
@@ -163,85 +192,70 @@ class ErrorModel:
             Rotation vectors of the platform and displacements of the tool point from the drawn machine, base axes, rad
             and m [n x 6], and `Status` codes [n]; NaN where the legs do not close.
         """
-        return self._moved(self._closed(values), self._each(values))
+        drawn, state = self.drawn, self.closed_state(values)
+        motion = (state.platform @ drawn.state.platform.inverse()).amounts()
+        motion[:, 3:] = self._tool_at(state.platform) - drawn.tool
+        each = np.broadcast_to(np.asarray(values, dtype=float), (len(self), len(self.errors)))
+        for number, spring in enumerate(drawn.springs, len(self.sources)):
+            motion = motion + spring.deflection(drawn.load) * each[:, number, None]
+        status = np.where(np.isin(drawn.status, PLACED) & ~state.settled, int(Status.NOT_CONVERGED), drawn.status)
+        return np.where(np.isin(status, PLACED)[:, None], motion, np.nan), status
 
-    def linearised(self, values: Array, wanted: Collection[int]) -> tuple[Array, Array]:
-        """Compute `displaced` and `rates` at errors [errors] in one go [n x 6], [n x 6 x errors].
+    def linearisation(self, values: Array, wanted: Collection[int]) -> tuple[Array, Array]:
+        """Compute `displacement` and `rates` at errors [errors] together [n x 6], [n x 6 x errors].
 
         Args:
             values: of the errors, SI.
             wanted: errors whose rates are needed; the other rates are 0.
         """
-        state = self._closed(values)
-        return self._moved(state, self._each(values))[0], self._rates_at(state, self.inserted(values), wanted)
+        rates = self._rates_at(self.closed_state(values), self.leg_errors(values), wanted)
+        return self.displacement(values)[0], rates
 
-    def _moved(self, state: State, each: Array) -> tuple[Array, Codes]:
-        motion = state.platform @ self._drawn.platform.inverse()
-        moved = motion.amounts()
-        moved[:, 3:] = self._tool_at(state.platform) - self.tool
-        for number, spring in enumerate(self._flexible, len(self.sources)):
-            moved = moved + spring.moved(self.load) * each[:, number, None]
-        status = np.where(np.isin(self.status, PLACED) & ~state.settled, int(Status.NOT_CONVERGED), self.status)
-        return np.where(np.isin(status, PLACED)[:, None], moved, np.nan), status
-
-    def compliance(self, wrenches: Array) -> Array:
+    def deflections(self, wrenches: Array) -> Array:
         """Deflection of the tool under wrenches per relative error of each spring's compliance [n x 6 x springs].
 
         Args:
             wrenches: at the tool point, base axes, N·m and N [n x 6]; the sum over all springs is the deflection.
         """
-        parts = [spring.moved(wrenches) for spring in self._flexible]
+        parts = [spring.deflection(wrenches) for spring in self.drawn.springs]
         return np.stack(parts, axis=2) if parts else np.zeros((len(self), 6, 0))
 
-    def _each(self, values: Array) -> Array:
-        return np.broadcast_to(np.asarray(values, dtype=float), (len(self), len(self.errors)))
-
     def _tool_at(self, platform: Motions) -> Array:
-        return platform.point(np.broadcast_to(self._tool_home, (len(self), 3)))
-
-    def _closed(self, values: Array) -> State:
-        """Place all legs with errors; the places for the last values are kept, because a fit asks for them again."""
-        key = np.asarray(values, dtype=float).tobytes()
-        if key not in self._latest:
-            errors = self.inserted(values)
-            with np.errstate(all="ignore"):
-                state = closed(self.rows, self._drawn, errors, self._tool_home, self._chosen, self._soft)
-            self._latest.clear()
-            self._latest[key] = state
-        return self._latest[key]
+        return platform.point(np.broadcast_to(self.tool_home, (len(self), 3)))
 
     def _rates_at(self, state: State, errors: Errors, wanted: Collection[int] | None = None) -> Array:
         tool, length, legs = self._tool_at(state.platform), self.rows.length, self.rows.legs
-        together: dict[tuple[int, int], list[tuple[int, Insertion]]] = {}
+        by_place: dict[tuple[int, int], list[tuple[int, Insertion]]] = {}
         for number, (_, insertions) in enumerate(self.sources):
             for i in insertions if wanted is None or number in wanted else ():
-                together.setdefault((i.leg, i.behind), []).append((number, i))
+                by_place.setdefault((i.leg, i.behind), []).append((number, i))
         with np.errstate(all="ignore"):
             places = [placed(row, q, e) for row, q, e in zip(legs, state.coordinates, errors, strict=True)]
-            hold = holding(self.rows, freed(self.rows, places, tool, self._chosen), tool, self._soft)
+            free = freed(self.rows, places, tool, self.independent)
+            hold = holding(self.rows, free, tool, self.drawn.leg_compliances)
             result = np.zeros((len(self), 6, len(self.errors)))
-            for (leg, behind), entries in together.items():
-                felt = _brought_back(hold.at_origin(leg, tool, length), places[leg].before[behind])
-                felt = _beside(felt, errors[leg].get(behind))
-                amounts = np.stack([i.amount(self._drawn.coordinates[leg]) for _, i in entries], axis=1)
-                work = np.swapaxes(felt, 1, 2) @ np.array([i.twist for _, i in entries]).T * amounts[:, None]
-                moved = hold.shares[leg] @ work
+            for (leg, behind), entries in by_place.items():
+                wrenches = _work_in_body(hold.at_origin(leg, tool, length), places[leg].before[behind])
+                wrenches = _work_beside(wrenches, errors[leg].get(behind))
+                amounts = np.stack([i.amount(self.drawn.state.coordinates[leg]) for _, i in entries], axis=1)
+                work = np.swapaxes(wrenches, 1, 2) @ np.array([i.twist for _, i in entries]).T * amounts[:, None]
+                twists = hold.shares[leg] @ work
                 for column, (number, _) in enumerate(entries):
-                    result[:, :, number] += moved[:, :, column]
+                    result[:, :, number] += twists[:, :, column]
         result[:, 3:] *= length
-        result[:, :, len(self.sources) :] = self.compliance(self.load)
-        sound = np.isin(self.status, PLACED) & state.settled
+        result[:, :, len(self.sources) :] = self.deflections(self.drawn.load)
+        sound = np.isin(self.drawn.status, PLACED) & state.settled
         return np.where(sound[:, None, None], result, np.nan)
 
 
-def _brought_back(wrenches: Array, place: Motions) -> Array:
+def _work_in_body(wrenches: Array, place: Motions) -> Array:
     """Work of wrenches at the base origin [n x 6 x m] on screws fixed in a body: the transposed adjoint."""
     moments, forces = np.swapaxes(wrenches[:, :3], 1, 2), np.swapaxes(wrenches[:, 3:], 1, 2)
     moments = moments + cross(forces, place.translation[:, None])
     return np.concatenate([np.swapaxes(part @ place.rotation, 1, 2) for part in (moments, forces)], axis=1)
 
 
-def _beside(wrenches: Array, error: Array | None) -> Array:
+def _work_beside(wrenches: Array, error: Array | None) -> Array:
     """Work of wrenches [n x 6 x m] on the screws by which exp(e) moves on the left per unit added to e [n x 6], small.
 
     With B the transposed bracket of e it is 1 + B / 2 + B^2 / 6.
@@ -286,48 +300,38 @@ def error_model(
     rows = rows_of(machine)
     if not all(np.isfinite(twist).all() for row in rows.legs for twist in row.twists):
         raise InputError(f"{machine.name} cannot be placed at its pose; change [pose] until `kinetostat check` is ok.")
-    platform, turned = _displacement(rows, response, count)
+    platform, axes = _displacement(rows, response, count)
     with np.errstate(all="ignore"):
         coordinates = tuple(followed(row, platform, rows.length) for row in rows.legs)
     actuators = stacked([a.coordinate for a in stands], count)
-    _check(rows, coordinates, actuators, status)
-    sources = [*errors_of(rows), *shared_errors(machine, rows)]
-    flexible, names = _flexible(response, count)
-    offset = np.array(machine.tables["tool"].offset, dtype=float)
-    tool_home = rows.point + rows.rotation @ offset
+    _mark_other_placements(rows, coordinates, actuators, status)
+    springs, compliance_errors = _flexible_springs(response, count)
+    tool_home = rows.point + rows.rotation @ np.array(machine.tables["tool"].offset, dtype=float)
     if response.configuration.plane is not None:
         tool_home = np.where([1, 1, 0], tool_home, rows.point)
-    chosen = tuple(_independent(row, rows) for row in rows.legs)
-    given = stacked(response.load.components(), count) if load is None else np.broadcast_to(load, (count, 6))
-    return ErrorModel(
-        machine,
-        (*(error for error, _ in sources), *names),
-        status,
-        platform.point(np.broadcast_to(tool_home, (count, 3))),
-        turned,
-        actuators,
-        np.asarray(given, dtype=float),
-        rows,
-        tuple(sources),
-        flexible,
-        State(platform, coordinates, np.ones(count, dtype=bool)),
-        tool_home,
-        chosen,
-        _soft(response, rows, count),
-    )
+    tool = platform.point(np.broadcast_to(tool_home, (count, 3)))
+    state = State(platform, coordinates, np.ones(count, dtype=bool))
+    wrench = stacked(response.load.components(), count) if load is None else np.broadcast_to(load, (count, 6))
+    wrench = np.asarray(wrench, dtype=float)
+    leg_compliances = _leg_compliances(response, rows, count)
+    drawn = DrawnMachine(status, state, tool, axes, actuators, wrench, springs, leg_compliances)
+    sources = (*errors_of(rows), *shared_errors(machine, rows))
+    errors = (*(error for error, _ in sources), *compliance_errors)
+    independent_screws = tuple(_independent_screws(row, rows) for row in rows.legs)
+    return ErrorModel(machine, drawn, errors, sources, rows, tool_home, independent_screws)
 
 
 def _displacement(rows: Rows, response: Response, count: int) -> tuple[Motions, Array]:
     """Displacement of the platform from its home place, and its axes as columns [n x 3 x 3]."""
     placement = response.configuration.platform
     axes = (placement.rotation.x, placement.rotation.y, placement.rotation.z)
-    turned = np.stack([stacked(axis.components(), count) for axis in axes], axis=2)
-    rotation = turned @ rows.rotation.T
+    columns = np.stack([stacked(axis.components(), count) for axis in axes], axis=2)
+    rotation = columns @ rows.rotation.T
     point = stacked(placement.translation.components(), count)
-    return Motions(rotation, point - np.einsum("nij,j->ni", rotation, rows.point)), turned
+    return Motions(rotation, point - np.einsum("nij,j->ni", rotation, rows.point)), columns
 
 
-def _check(rows: Rows, coordinates: Sequence[Array], actuators: Array, status: Codes) -> None:
+def _mark_other_placements(rows: Rows, coordinates: Sequence[Array], actuators: Array, status: Codes) -> None:
     """Mark poses at which a leg that is followed from the home place has its actuator elsewhere than the machine."""
     for row, joints in zip(rows.legs, coordinates, strict=True):
         for drive in (unit.drive for unit in row.units if unit.drive):
@@ -337,13 +341,13 @@ def _check(rows: Rows, coordinates: Sequence[Array], actuators: Array, status: C
             status[elsewhere] = int(Status.NOT_CONVERGED)
 
 
-def _independent(row: Row, rows: Rows) -> tuple[int, ...]:
+def _independent_screws(row: Row, rows: Rows) -> tuple[int, ...]:
     """Choose the free screws of a leg that are independent wherever it is; it carries six wrenches less these."""
     coordinates = places_of(row, rows.length)
     return independent(free_screws(row, rows, placed(row, coordinates, {}), np.zeros((len(coordinates), 3))))
 
 
-def _soft(response: Response, rows: Rows, count: int) -> tuple[Array, ...]:
+def _leg_compliances(response: Response, rows: Rows, count: int) -> tuple[Array, ...]:
     """The compliance of the springs of each leg at the tool, in units of the length [n x 6 x 6]."""
     result = []
     for leg in response.legs:
@@ -356,7 +360,7 @@ def _soft(response: Response, rows: Rows, count: int) -> tuple[Array, ...]:
     return tuple(result)
 
 
-def _flexible(response: Response, count: int) -> tuple[tuple[Flexible, ...], list[MachineError]]:
+def _flexible_springs(response: Response, count: int) -> tuple[tuple[FlexibleSpring, ...], list[MachineError]]:
     """The springs that deflect, and the relative error of the compliance of each."""
     flexible, names = [], []
     of_legs = [(leg.name, spring) for leg in response.configuration.legs for spring in leg.springs]
@@ -369,6 +373,6 @@ def _flexible(response: Response, count: int) -> tuple[tuple[Flexible, ...], lis
         alone = sum(other.of == spring.of for _, other in of_legs) == 1
         part = (spring.of if alone else spring.name).removeprefix(f"{leg} ").replace(".", " ")
         words = f"compliance of the {part} of {leg}, relative"
-        flexible.append(Flexible(stacked(twist.components(), count), size))
+        flexible.append(FlexibleSpring(stacked(twist.components(), count), size))
         names.append(MachineError(f"legs.{leg}.{part}.compliance", "ratio", "compliances", words, leg))
     return tuple(flexible), names

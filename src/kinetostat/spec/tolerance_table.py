@@ -1,6 +1,6 @@
 """Table [tolerances] of machine files: how far numbers of the machine may be from the drawing. Nothing is evaluated.
 
-Which numbers a line is about depends on the machine, and is looked up in `studies.budget.sources`.
+Which numbers a line is about depends on the machine, and is looked up in `studies.budget.tolerances`.
 """
 
 import json

@@ -93,7 +93,7 @@ def correlation_figure(answer: Identification) -> Figure:
 def pose_figure(answer: Identification) -> Figure:
     """The commanded tool points, from above and from the front, and the poses to be measured next."""
     scale = answer.machine.display.scale("m")
-    tool = answer.observed.model.tool * scale.factor
+    tool = answer.observed.model.drawn.tool * scale.factor
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(6.4, 3.6), layout="constrained")
         for panel, (title, across, up) in zip(figure.subplots(1, 2), (("plan", 0, 1), ("front", 0, 2)), strict=True):

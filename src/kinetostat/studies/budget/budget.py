@@ -263,15 +263,17 @@ class _Work:
         model = error_model(self.machine, columns, count)
         if not self.parts:
             self.parts = toleranced(self.machine, model.errors, self.lines)
-        settled = np.asarray(model.status == Status.OK)
-        spread = self._spread(model.taken(np.flatnonzero(settled))) if settled.any() else None
+        settled = np.asarray(model.drawn.status == Status.OK)
+        spread = self._spread(model.at_poses(np.flatnonzero(settled))) if settled.any() else None
         self.spreads.append((settled, spread))
-        return model.status
+        return model.drawn.status
 
     def _spread(self, model: ErrorModel) -> Spread:
         length = float(self.machine.configure((0.0,) * _joints(self.machine)).length)
         rates = _clean(model.rates(), length)
-        inputs = inputs_of(self.parts, rates, model.load, length, others=self.many and loads_platform(self.machine))
+        inputs = inputs_of(
+            self.parts, rates, model.drawn.load, length, others=self.many and loads_platform(self.machine)
+        )
         zeros = [place for place, error in enumerate(model.errors) if error.group == "zeros"]
         names = self.machine.family.component_names
         measures, self.freedoms, self.parasitic = measures_of(rates[:, :, zeros], names, self.along, length)

@@ -65,7 +65,7 @@ def solved_exactly(machine: Machine, inputs: Inputs, measures: Measures, count: 
             drawn = slab[start : start + AT_ONCE]
             if model is None or len(model) != len(drawn):
                 model = error_model(machine, {path: np.full(len(drawn), here)}, len(drawn))
-            moved, _ = model.displaced(inputs.drawn + drawn @ inputs.errors.T)
+            moved, _ = model.displacement(inputs.drawn + drawn @ inputs.errors.T)
             linear = inputs.shift[0] + drawn @ inputs.columns[0].T
             exact.append(measures.applied(moved.T[None])[0].T)
             first.append(measures.applied(linear.T[None])[0].T)

@@ -138,9 +138,9 @@ def _candidates(
         poses = {path: rng.uniform(low, high, CANDIDATES) for path, (low, high) in spans.items()}
         within = BEYOND_LIMITS if limits_set(machine.tables["limits"]) else WITHOUT_LIMITS
     whole = error_model(machine, poses, CANDIDATES, np.zeros(6))
-    rows = np.flatnonzero(np.isin(whole.status, PLACED if within != WITHIN_LIMITS else Status.OK))
+    rows = np.flatnonzero(np.isin(whole.drawn.status, PLACED if within != WITHIN_LIMITS else Status.OK))
     poses = {path: values[rows] for path, values in poses.items()}
-    return observed(whole.taken(rows), _like(seen.data, poses, len(rows)), seen.unknowns, seen.frame), within
+    return observed(whole.at_poses(rows), _like(seen.data, poses, len(rows)), seen.unknowns, seen.frame), within
 
 
 def _like(data: Measurements, pose: Mapping[str, Array], count: int) -> Measurements:

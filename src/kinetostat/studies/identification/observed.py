@@ -105,16 +105,16 @@ class Observed:
     def _predict(self, values: Array, with_rates: bool) -> tuple[Array, Array]:
         model, errors = self.model, self.errors(values)
         moved, whole = (
-            model.linearised(errors, set(self.chosen.tolist()))
+            model.linearisation(errors, set(self.chosen.tolist()))
             if with_rates
-            else (model.displaced(errors)[0], np.zeros(0))
+            else (model.displacement(errors)[0], np.zeros(0))
         )
-        soft = model.compliance(self.data.wrenches)
+        soft = model.deflections(self.data.wrenches)
         grown = 1.0 + errors[len(errors) - soft.shape[2] :]
         deflected = soft @ grown
         moved = moved + deflected
-        turned = exponential(np.concatenate([moved[:, :3], 0.0 * moved[:, :3]], axis=1)).rotation @ model.turned
-        tool = model.tool + moved[:, 3:]
+        turned = exponential(np.concatenate([moved[:, :3], 0.0 * moved[:, :3]], axis=1)).rotation @ model.drawn.axes
+        tool = model.drawn.tool + moved[:, 3:]
         frame, target = self._of(values, FRAME), self._of(values, TARGET)
         arm = np.einsum("nij,j->ni", turned, target[3:])
         shift = exponential(frame[None] * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
@@ -131,7 +131,7 @@ class Observed:
         self, twists: Array, turned: Array, at: Array, arm: Array, axes: Array, target: Array, frame: Array
     ) -> Array:
         """How the target turns and moves in the measuring frame per unit of each unknown [n x 6 x unknowns]."""
-        soft = self.model.compliance(self.data.wrenches)
+        soft = self.model.deflections(self.data.wrenches)
         first = len(self.model.errors) - soft.shape[2]
         for number, place in enumerate(self.chosen):
             if place >= first:
@@ -227,10 +227,10 @@ def observed(
         InputError: the drawn machine has no place at a commanded pose, or measured positions lie far from it although
             the measuring frame is the base frame.
     """
-    elsewhere = np.flatnonzero(~np.isin(model.status, PLACED))
+    elsewhere = np.flatnonzero(~np.isin(model.drawn.status, PLACED))
     if elsewhere.size:
         row = int(elsewhere[0])
-        sentence = Status(int(model.status[row])).sentence
+        sentence = Status(int(model.drawn.status[row])).sentence
         raise data.refused(row, f"the drawn machine is not at the commanded pose. {sentence} Check units and angles.")
     paths = [error.path for error in model.errors]
     chosen = np.array([paths.index(u.path) if u.path in paths else -1 for u in unknowns], dtype=np.int64)
@@ -267,7 +267,7 @@ def _frame(model: ErrorModel, data: Measurements) -> Motions:
     rows = np.isfinite(seen).all(axis=1)
     if rows.sum() < 3:
         return still_frame()
-    start, end = seen[rows], model.tool[rows]
+    start, end = seen[rows], model.drawn.tool[rows]
     spread = (start - start.mean(axis=0)).T @ (end - end.mean(axis=0))
     left, _, right = np.linalg.svd(spread)
     hand = np.diag([1.0, 1.0, np.sign(np.linalg.det(right.T @ left.T))])
@@ -278,12 +278,12 @@ def _frame(model: ErrorModel, data: Measurements) -> Motions:
 def _check_far(model: ErrorModel, data: Measurements) -> None:
     length = model.length
     for i, name in enumerate(POSITION):
-        off = np.abs(data.values.get(name, model.tool[:, i]) - model.tool[:, i])
+        off = np.abs(data.values.get(name, model.drawn.tool[:, i]) - model.drawn.tool[:, i])
         if np.isfinite(off).any() and np.nanmedian(off) > FAR * length:
             row = int(np.nanargmax(off))
             raise data.refused(
                 row,
                 f"measured.{name} is {1e3 * data.values[name][row]:.6g} mm where the drawn machine has its tool at "
-                f"{1e3 * model.tool[row, i]:.6g} mm, and most others are as far away; check the unit in the head of "
-                "the column, or say that the measuring frame is unknown (--frame).",
+                f"{1e3 * model.drawn.tool[row, i]:.6g} mm, and most others are as far away; check the unit in the head "
+                "of the column, or say that the measuring frame is unknown (--frame).",
             )

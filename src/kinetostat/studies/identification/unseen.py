@@ -217,13 +217,13 @@ def _judged(words: str, way: Array, observed: Observed, twists: Array, sizes: Ar
 
 def _replaced(moved: Array, observed: Observed) -> Array:
     """What motions of the base and of the target make of motions of the tool [n x 6]."""
-    count, tool = len(moved), observed.model.tool
+    count, tool = len(moved), observed.model.drawn.tool
     ways = []
     for turning, moving in product((0.0, 1.0), np.eye(3)):
         axis = np.broadcast_to(moving, (count, 3))
         still = np.zeros((count, 3))
         ways.append(np.concatenate([axis, cross(axis, tool)] if turning else [still, axis], axis=1).ravel())
-        arm = np.einsum("nij,j->ni", observed.model.turned, moving)
+        arm = np.einsum("nij,j->ni", observed.model.drawn.axes, moving)
         ways.append(np.concatenate([arm, still] if turning else [still, arm], axis=1).ravel())
     unit = np.tile([observed.model.length] * 3 + [1.0] * 3, count)
     columns = np.stack(ways, axis=1) * unit[:, None]

@@ -155,9 +155,9 @@ def validate_measured(
     pose = dict(measured.deflections.pose) if measured.deflections else {}
     count = len(measured.deflections) if measured.deflections else 1
     model = error_model(machine, pose, count, np.zeros(6))
-    bad = np.flatnonzero(~np.isin(model.status, PLACED))
+    bad = np.flatnonzero(~np.isin(model.drawn.status, PLACED))
     if bad.size:
-        sentence = Status(int(model.status[bad[0]])).sentence
+        sentence = Status(int(model.drawn.status[bad[0]])).sentence
         line = f"line {measured.deflections.lines[bad[0]]}: " if measured.deflections else ""
         raise InputError(f'"{data}", {line}the drawn machine is not at the measured pose. {sentence}')
     response = respond(with_values(machine, pose) if pose else machine)

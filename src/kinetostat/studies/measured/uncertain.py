@@ -92,7 +92,7 @@ def _of_fit(machine: Machine, paths: Mapping[str, int], path: Path) -> tuple[lis
 def dyads_of(model: ErrorModel) -> Array:
     """What each spring brings to the compliance at the tool point [n x 6 x 6 x springs], base axes, SI: theory (8)."""
     loads = [np.broadcast_to(unit, (len(model), 6)) for unit in np.eye(6)]
-    return np.stack([model.compliance(load) for load in loads], axis=2)
+    return np.stack([model.deflections(load) for load in loads], axis=2)
 
 
 def compliance_changes(model: ErrorModel, uncertain: Uncertain, dyads: Array) -> tuple[Array, tuple[str, ...]]:
