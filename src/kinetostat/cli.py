@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from kinetostat.commands.asking import add_question
 from kinetostat.commands.budget import add_budget_command
 from kinetostat.commands.common import (
     BAD_INPUT,
@@ -40,7 +41,6 @@ from kinetostat.commands.grid import add_grid_commands
 from kinetostat.commands.identify import add_identify_command
 from kinetostat.commands.influence import add_influence_commands
 from kinetostat.commands.loaded import add_command_command, analyze_loaded
-from kinetostat.commands.modes import add_modes_command
 from kinetostat.commands.optimize import add_optimize_commands
 from kinetostat.commands.path import add_path_command
 from kinetostat.commands.report import add_report_commands
@@ -209,7 +209,7 @@ def _parser() -> Parser:
     add_path_command(commands)
     add_grid_commands(commands)
     add_influence_commands(commands)
-    add_modes_command(commands)
+    add_question(commands, "modes")
     add_budget_command(commands)
     add_compare_commands(commands)
     add_optimize_commands(commands)

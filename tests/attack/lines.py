@@ -76,6 +76,8 @@ def place_files() -> None:
 def commands() -> dict[str, argparse.ArgumentParser]:
     """The parsers of the commands by name."""
     (action,) = [a for a in _parser()._actions if isinstance(a, argparse._SubParsersAction)]
+    for parser in action.choices.values():
+        parser.fill()
     return {name: parser for name, parser in action.choices.items() if name not in LONG}
 
 

@@ -344,10 +344,10 @@ def test_a_machine_with_a_heavy_platform_has_a_section_of_its_vibrations(tmp_pat
     page = Page(reported(tmp_path / "r.html", "hexapod", *words))
     known = told("modes", "hexapod", *words[-4:])
     assert page.results["vibration"] == known
-    assert f"Vibration: {known['message']}".replace("\N{NO-BREAK SPACE}", " ") in page.text
-    _, *rows = page.table("Natural frequencies")
+    assert f"Modes: {known['message']}".replace("\N{NO-BREAK SPACE}", " ") in page.text
+    _, *rows = page.table("Modes")
     assert [number(row[1]) for row in rows] == pytest.approx([m["frequency"] for m in known["modes"]], rel=5e-4)
-    assert "Vibration:" not in Page(reported(tmp_path / "s.html", "hexapod", *LESS)).text
+    assert "Modes:" not in Page(reported(tmp_path / "s.html", "hexapod", *LESS)).text
 
 
 def test_a_machine_with_tolerances_has_a_section_of_its_error(tmp_path):

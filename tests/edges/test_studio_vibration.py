@@ -10,7 +10,7 @@ from kinetostat.studies.attribution import ranked
 from kinetostat.studies.vibration import modes
 from kinetostat.studio.ringing import SwingRequest, ringing, swing
 from kinetostat.views.scene.proportions import proportions_of
-from kinetostat.views.vibration_tables import percent
+from kinetostat.views.vibration import percent
 
 MASSES = ("tool.mass=12", "tool.inertia=[0.3, 0.3, 0.5, 0, 0, 0]", "linear_density.legs=4")
 

@@ -7,8 +7,8 @@ from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.grid.grid import evaluate_grid
 from kinetostat.studies.vibration import modes
 from kinetostat.views.figures import curves, look_of
+from kinetostat.views.vibration import MOST_PARTS, cut_of, mode_table, share_table, strain_of
 from kinetostat.views.vibration_figures import response_figure
-from kinetostat.views.vibration_tables import MOST_PARTS, cut_by_table, mode_table, share_table, strain_of
 
 LIGHT_LEGS = {"tool.mass": 12.0, "linear_density.legs": 0.5, "drives.rotor_inertia": 2e-5, "drives.lead": 0.01}
 
@@ -55,10 +55,10 @@ def test_a_planar_machine_does_not_answer_along_z():
 
 def test_a_cutting_pressure_without_a_direction_asks_for_one():
     machine = changed(load("hexapod"), {"tool.mass": 12.0})
-    assert cut_by_table(modes(machine)) == ""
+    assert cut_of(modes(machine)) == ""
     pressed = changed(machine, {"cutting.pressure": 2e9})
-    assert "write direction = [1, 0, 0]" in cut_by_table(modes(pressed))
-    assert "Along x " in cut_by_table(modes(changed(pressed, {"cutting.direction.0": 2.0})))
+    assert "write direction = [1, 0, 0]" in cut_of(modes(pressed))
+    assert "Along x " in cut_of(modes(changed(pressed, {"cutting.direction.0": 2.0})))
 
 
 def test_a_sweep_draws_every_quantity_each_with_a_look_of_its_own():
@@ -70,8 +70,8 @@ def test_a_sweep_draws_every_quantity_each_with_a_look_of_its_own():
 
 
 def test_the_response_marks_the_point_that_limits_a_cut():
-    answer = modes(changed(load("hexapod"), LIGHT_LEGS))
-    real = next(panel for panel in response_figure(answer, (1.0, 0.0, 0.0)).axes if panel.get_ylabel()[:4] == "real")
+    answer = modes(changed(load("hexapod"), LIGHT_LEGS), along=(1.0, 0.0, 0.0))
+    real = next(panel for panel in response_figure(answer).axes if panel.get_ylabel()[:4] == "real")
     mark = next(line for line in real.lines if line.get_marker() == "o")
     softest = answer.softest([1.0, 0.0, 0.0])
     assert mark.get_xdata()[0] == softest.frequency

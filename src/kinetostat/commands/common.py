@@ -12,20 +12,20 @@ import threading
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from kinetostat.spec.installation import as_typed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from typing import TypeAlias
 
+    from matplotlib.figure import Figure
     from rich.console import Console
 
     from kinetostat.engine.batch import Progress
     from kinetostat.machine.machine import Machine
     from kinetostat.studies.requirements import Verdict
-    from kinetostat.views.figures import Drawings
 
     Commands: TypeAlias = argparse._SubParsersAction["Parser"]
 
@@ -89,7 +89,24 @@ def _broken(line: str, width: int) -> list[str]:
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that reports mistakes in one readable paragraph."""
+    """An argument parser that reports mistakes in one readable paragraph, and whose options may be added when needed.
+
+    Attributes:
+        later: adds its options and its description; it is called once, before anything is parsed or listed.
+    """
+
+    later: "Callable[[Parser], None] | None" = None
+
+    def fill(self) -> None:
+        """Add what is to be added later."""
+        later, self.later = self.later, None
+        if later is not None:
+            later(self)
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse the words of a command."""
+        self.fill()
+        return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
         """Print what is wrong and where the help is; exit with code 2."""
@@ -178,7 +195,7 @@ def _formats(text: str) -> tuple[str, ...]:
     return formats
 
 
-def write_figures(options: argparse.Namespace, drawings: "Drawings") -> list[Path]:
+def write_figures(options: argparse.Namespace, drawings: "Mapping[str, Callable[[], Figure]]") -> list[Path]:
     """Draw figures and write them in the formats asked for; a bar says which one is being drawn.
 
     Args:

@@ -1,19 +1,16 @@
-"""Natural frequencies and modes of a machine at its pose, and how its tool responds to a varying force.
+"""Natural frequencies and modes of a machine at its pose, and the response of its tool to a varying force.
 
 The equations are in `vibration`; the command is `modes`.
 """
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinetostat.algebra.screw import COMPONENTS, Twist, Wrench
+from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array, Complex
 from kinetostat.equilibrium.admissible import starts_of
@@ -32,20 +29,17 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.machine import springs as springs_of
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.attribution import largest_contributors, parts_and_kinds
 from kinetostat.studies.grid.quantities import refuse_unknown_mass
 from kinetostat.studies.indices import unit_direction
-from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.refusal import why_not
 from kinetostat.tolerances import EQUAL_FREQUENCIES
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.modes import modes as solved_modes
 from kinetostat.vibration.receptance import ASSUMED_RATIO, Damper, Softest, along, damper, least_real_part, receptance
 from kinetostat.vibration.shares import effective_masses, kinetic_shares, strain_shares
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 HELD_BY_LOADS = (Status.SINGULAR, Status.JOINT_LIMIT)
 """Statuses without loads that a machine at rest under its loads may have."""
@@ -121,6 +115,9 @@ class Vibration(Immutable):
         assumed: whether the damping ratio is `ASSUMED_RATIO` because the file says nothing about damping.
         solution: all modes as they were solved for, with those without mass; None where there are none.
         damping: the damping of the modes.
+        direction: in which the tool is pushed, base axes; empty where nothing says it.
+        cutting_pressure: cutting force per area of the chip, N/m²; None where nothing says it.
+        lowest, highest: ends of the range of the response, Hz; None for about the first six modes.
     """
 
     machine: Machine
@@ -134,6 +131,10 @@ class Vibration(Immutable):
     assumed: bool = False
     solution: Modes | None = None
     damping: Damper | None = None
+    direction: tuple[float, ...] = ()
+    cutting_pressure: float | None = None
+    lowest: float | None = None
+    highest: float | None = None
 
     def __repr__(self) -> str:
         return f"<Vibration of {self.machine.name!r}: {self.status.word}, {len(self.modes)} modes>"
@@ -187,15 +188,51 @@ class Vibration(Immutable):
 
 
 @checked
-def modes(machine: Machine) -> Vibration:
+def modes(
+    machine: Machine,
+    along: Sequence[float] = (),
+    cutting_pressure: float | str | None = None,
+    lowest: float | str | None = None,
+    highest: float | str | None = None,
+) -> Vibration:
     """Find the natural vibrations of a machine at its pose, about its state under load where `machine.loaded` is set.
 
     Args:
         machine: with its pose; its masses are those of [tool], of its links and of its drives.
+        along: direction in which the tool is pushed, base axes; that of [cutting] if empty.
+        cutting_pressure: cutting force per area of the chip, N/m² or with a unit; that of [cutting] if None.
+        lowest, highest: ends of the range of the response, Hz or with a unit; about the first six modes if None.
 
     Raises:
-        InputError: nothing says a mass, or rotors have an inertia and nothing says how far they turn.
+        InputError: nothing says a mass, rotors have an inertia and nothing says how far they turn, a direction is zero,
+            a pressure has no direction, or the range is empty.
     """
+    cutting = machine.tables["cutting"]
+    if along:
+        unit_direction(along, "along")
+    direction = tuple(along) or (tuple(cutting.direction) if any(cutting.direction) else ())
+    pressure, low, high = (
+        None if value is None else positive(value, kind, name)
+        for value, kind, name in (
+            (cutting_pressure, "cutting pressure", "cutting_pressure"),
+            (lowest, "frequency", "lowest"),
+            (highest, "frequency", "highest"),
+        )
+    )
+    if low is not None and high is not None and low >= high:
+        raise InputError(f"lowest is {low:g} Hz, not below highest, {high:g} Hz; exchange them.")
+    if pressure is not None and not direction:
+        raise InputError("cutting_pressure needs the direction across the cut; give along as well, e.g. 1,0,0.")
+    return replace(
+        _modes_at_pose(machine),
+        direction=direction,
+        cutting_pressure=pressure or cutting.pressure or None,
+        lowest=low,
+        highest=high,
+    )
+
+
+def _modes_at_pose(machine: Machine) -> Vibration:
     joints = solve_joints(machine) if machine.family.chains else None
     response = respond(machine, joints)
     refuse_unknown_mass(machine, "modes", response.configuration)
@@ -333,89 +370,16 @@ def _shape(response: Response, equations: Balance, solution: Modes, number: int)
     )
 
 
-def frequency_range(
-    answer: Vibration, lowest: float | None = None, highest: float | None = None, points: int = POINTS, near: int = NEAR
-) -> Array:
+def frequency_range(answer: Vibration, points: int = POINTS, near: int = NEAR) -> Array:
     """Frequencies for curves, close together near the modes, Hz.
 
     Args:
-        answer: with its modes.
-        lowest, highest: ends of the range, Hz; about the first six modes if None.
+        answer: with its modes and the ends of its range.
         points: over the whole range.
         near: about each of these modes, besides.
     """
     shown = answer.modes[:DRAWN]
-    ends = (lowest or BELOW * shown[0].frequency, highest or ABOVE * shown[-1].frequency)
+    ends = (answer.lowest or BELOW * shown[0].frequency, answer.highest or ABOVE * shown[-1].frequency)
     about = [m.frequency * (1.0 + max(m.ratio, 1e-4) * np.linspace(-WIDE, WIDE, near)) for m in shown]
     every = np.concatenate([np.geomspace(*ends, points), *about])
     return np.unique(every[(every >= ends[0]) & (every <= ends[1])])
-
-
-def as_csv(answer: Vibration) -> str:
-    """The modes as CSV, SI, a row each: frequency, damping ratio, motion of the tool, masses."""
-    rows = io.StringIO(newline="")
-    writer = csv.writer(rows, lineterminator="\n")
-    masses = ["modal_mass", "modal_stiffness", *(f"effective_mass_{axis}" for axis in "xyz")]
-    writer.writerow(["mode", "frequency_hz", "damping_ratio", *answer.components, "direction", *masses])
-    for number, mode in enumerate(answer.modes, 1):
-        numbers = [mode.modal_mass, mode.modal_stiffness, *mode.effective_mass]
-        writer.writerow([number, mode.frequency, mode.ratio, *mode.tool, mode.direction, *numbers])
-    return rows.getvalue()
-
-
-def response_dataset(answer: Vibration, frequencies: Array) -> "xr.Dataset":
-    """The receptance of the tool over frequency as a dataset, SI: real and imaginary parts [frequency x row x column].
-
-    Args:
-        answer: of a pose that has one.
-        frequencies: Hz.
-    """
-    import xarray as xr  # takes long to load
-
-    values, names = answer.receptance(frequencies.tolist()), [*answer.components]
-    parts = [COMPONENTS.index(name) for name in names]
-    values = values[:, parts][:, :, parts]
-    dims = ("frequency", "moved", "loaded")
-    return xr.Dataset(
-        {
-            "receptance_real": (
-                dims,
-                values.real,
-                {"long_name": "real part, rad and m per N·m and N"},
-            ),
-            "receptance_imaginary": (dims, values.imag, {"long_name": "imaginary part, the same units"}),
-        },
-        {"frequency": ("frequency", frequencies, {"units": "Hz"}), "moved": names, "loaded": names},
-        {"machine": answer.machine.name, "reference": answer.machine.reference},
-    )
-
-
-def as_json(answer: Vibration) -> dict[str, Any]:
-    """The vibrations as plain data, SI."""
-    return as_answer(
-        {
-            "name": answer.machine.name,
-            "status": answer.status.word,
-            "message": answer.message,
-            "loaded": answer.loaded,
-            "components": list(answer.components),
-            "moving_mass": answer.moving_mass,
-            "without_known_mass": list(answer.uncounted),
-            "damping_assumed": answer.assumed,
-            "modes": [
-                {
-                    "frequency": mode.frequency,
-                    "damping_ratio": mode.ratio,
-                    "tool": dict(zip(answer.components, mode.tool, strict=True)),
-                    "direction": mode.direction,
-                    "modal_mass": mode.modal_mass,
-                    "modal_stiffness": mode.modal_stiffness,
-                    "effective_mass": dict(zip("xyz", mode.effective_mass, strict=True)),
-                    "strain_energy": dict(mode.strain),
-                    "strain_energy_by_kind": dict(mode.kinds),
-                    "kinetic_energy": dict(mode.kinetic),
-                }
-                for mode in answer.modes
-            ],
-        }
-    )

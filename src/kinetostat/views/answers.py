@@ -8,13 +8,13 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.studies.storage import write_bytes, write_dataset, write_json, write_text
+from kinetostat.views.question import Description, late
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,13 +33,15 @@ class Kind:
         drawn: gives the functions that draw its figures, by name, the most telling one first; empty if there are none.
         plain: gives a result as plain data; empty where it is kept in another way.
         files: what is in a file of another format, a text, bytes or a dataset, by suffix.
+        description: where the description of these answers lives; everything else then follows from it.
     """
 
     type: str
-    printer: str
+    printer: str = ""
     drawn: str = ""
     plain: str = ""
     files: dict[str, str] = field(default_factory=dict)
+    description: str = ""
 
     @property
     def name(self) -> str:
@@ -48,18 +50,32 @@ class Kind:
 
     def tell(self, console: "Console", answer: object) -> None:
         """Print a result of this kind."""
-        _function(self.printer)(console, answer)
+        if self.description:
+            late("views.terminal.tell")(console, late(self.description), answer)
+        else:
+            late(self.printer)(console, answer)
 
     def figures(self, answer: object) -> "Drawings":
         """Return the functions that draw a result, by name; the most telling one first."""
-        drawings: Drawings = _function(self.drawn)(answer) if self.drawn else {}
+        if self.description:
+            return {**described(self.description).drawings(answer)}
+        drawings: Drawings = late(self.drawn)(answer) if self.drawn else {}
         return drawings
 
 
-def _function(path: str) -> Callable[..., Any]:
-    module, _, name = path.rpartition(".")
-    function: Callable[..., Any] = getattr(import_module(f"kinetostat.{module}"), name)
-    return function
+def description_of(answer: object) -> Description:
+    """Look up the description of an answer.
+
+    Raises:
+        InputError: it is not an answer of kinetostat.
+    """
+    return described(kind_of(answer).description)
+
+
+def described(path: str) -> Description:
+    """Import the description that a text names."""
+    description: Description = late(path)
+    return description
 
 
 KINDS = (
@@ -81,12 +97,7 @@ KINDS = (
         "views.loaded_figures.loaded_figures",
         "studies.under_load.as_json",
     ),
-    Kind(
-        "studies.vibration.Vibration",
-        "views.vibration_tables.print_vibration",
-        "views.vibration_figures.vibration_figures",
-        "studies.vibration.as_json",
-    ),
+    Kind("studies.vibration.Vibration", description="views.vibration.VIBRATION"),
     Kind("studies.command.Command", "views.loaded_tables.print_command", plain="studies.command.as_json"),
     Kind(
         "studies.correction.table.CorrectionTable",
@@ -209,6 +220,8 @@ def plot(answer: object, which: str | None = None) -> "Figure":
 
 
 Writer = Callable[[Path], None]
+FORMS = {"json": "json_of", "csv": "csv_of", "nc": "dataset_of"}
+"""Function of `data_forms` that makes each form of an answer."""
 FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
 
 
@@ -236,19 +249,33 @@ def save(what: object, path: str | Path) -> Path:
 def _writers(what: object) -> dict[str, Writer]:
     """Return the ways to write it, by suffix."""
     if _is(what, "matplotlib.figure.Figure"):
-        return dict.fromkeys(FIGURE_SUFFIXES, partial(_function("views.figures.save_figure"), what))
+        return dict.fromkeys(FIGURE_SUFFIXES, partial(late("views.figures.save_figure"), what))
     if _is(what, "views.picture.Picture"):
-        return {".png": partial(_write, what)}
+        return {".png": partial(write_content, what)}
     kind = kind_of(what)
     written: dict[str, Writer] = {}
+    if kind.description:
+        written |= {
+            f".{form}": partial(write_form, described(kind.description), what, form)
+            for form in described(kind.description).forms
+        }
     if kind.plain:
-        written[".json"] = lambda path: write_json(path, _function(kind.plain)(what))
+        written[".json"] = lambda path: write_json(path, late(kind.plain)(what))
     for suffix, content in kind.files.items():
-        written[suffix] = lambda path, content=content: _write(_function(content)(what), path)  # type: ignore[misc]
+        written[suffix] = lambda path, content=content: write_content(late(content)(what), path)  # type: ignore[misc]
     return written
 
 
-def _write(content: Any, path: Path) -> None:
+def write_form(description: Description, answer: object, form: str, path: Path) -> None:
+    """Write an answer as "json", "csv" or "nc"."""
+    content = late(f"views.data_forms.{FORMS[form]}")(description, answer)
+    if form == "json":
+        write_json(path, content)
+    else:
+        write_content(content, path)
+
+
+def write_content(content: Any, path: Path) -> None:
     """Write a text, bytes or a dataset."""
     write = write_text if isinstance(content, str) else write_bytes if isinstance(content, bytes) else write_dataset
     write(path, content)

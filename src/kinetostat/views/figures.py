@@ -2,7 +2,7 @@
 
 import io
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -126,7 +126,12 @@ def curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
     return figure
 
 
-def save(drawings: Drawings, folder: Path, formats: Sequence[str] = ("png",), tell: Tell | None = None) -> list[Path]:
+def save(
+    drawings: Mapping[str, Callable[[], Figure]],
+    folder: Path,
+    formats: Sequence[str] = ("png",),
+    tell: Tell | None = None,
+) -> list[Path]:
     """Draw figures and write them into a folder.
 
     Args:

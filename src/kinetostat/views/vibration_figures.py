@@ -1,6 +1,5 @@
 """Pictures of vibrations: the receptance of the tool over frequency with the modes marked, and shapes of the modes."""
 
-from collections.abc import Sequence
 from functools import partial
 
 import matplotlib as mpl
@@ -13,42 +12,46 @@ from kinetostat.arrays import Array
 from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.vibration import DRAWN, Vibration, frequency_range
-from kinetostat.views.figures import COLOURS, DASHES, STYLE, Drawings, fix_layout, note_setting, set_title
+from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting, set_title
 from kinetostat.views.loaded_figures import moved_figure
-from kinetostat.views.vibration_tables import axis_of
+from kinetostat.views.question import Drawing
+from kinetostat.views.vibration import axis_of
 
+IN_REPORTS = 3
+"""Modes of which reports draw the shape."""
 LEAST_GAP = 0.025
 """Least distance between the numbers of two modes, as a share of the width of a panel."""
 ANY_SIZE = "a mode has a shape, and no size: the motion is as large as can be seen"
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
-def vibration_figures(answer: Vibration, direction: Sequence[float] = (), frequencies: Array | None = None) -> Drawings:
-    """The functions that draw the vibrations of a machine, by name; none where there are no modes."""
+def vibration_figures(answer: Vibration) -> dict[str, Drawing]:
+    """Drawings of the vibrations of a machine, by name; none where there are no modes."""
     if not answer.modes:
         return {}
-    drawn: Drawings = {"response": partial(response_figure, answer, direction, frequencies)}
-    return drawn | {f"mode-{k + 1}": partial(shape_figure, answer, k) for k in range(min(DRAWN, len(answer.modes)))}
+    response = "Motion of the tool per force along it: size, phase, real part and Nyquist curve."
+    shapes = {
+        f"mode-{k + 1}": Drawing(
+            f"Shape of mode {k + 1}, {answer.machine.display.show(mode.frequency, 'Hz')}.",
+            partial(shape_figure, answer, k),
+            minor=k >= IN_REPORTS or mode.shape is None,
+        )
+        for k, mode in enumerate(answer.modes[:DRAWN])
+    }
+    return {"response": Drawing(response, partial(response_figure, answer)), **shapes}
 
 
-def response_figure(
-    answer: Vibration,
-    direction: Sequence[float] = (),
-    frequencies: Array | None = None,
-    title: str = "{}: motion of the tool per force",
-) -> Figure:
+def response_figure(answer: Vibration, title: str = "{}: motion of the tool per force") -> Figure:
     """Draw magnitude, phase and real part of the receptance over frequency, and the Nyquist curve.
 
     Args:
-        answer: with its modes.
-        direction: in which the tool is pushed, base axes; along x, y and z if empty.
-        frequencies: Hz; about the first six modes if None.
+        answer: with its modes; along x, y and z where it has no direction.
         title: over the figure, with braces for the name of the machine.
     """
     machine = answer.machine
-    given = frequency_range(answer) if frequencies is None else frequencies
+    given = frequency_range(answer)
     scale = machine.display.scale("m/N")
-    ways = {axis_of(direction): tuple(direction)} if direction else AXES
+    ways = {axis_of(answer.direction): answer.direction} if answer.direction else AXES
     ways = {name: way for name, way in ways.items() if name not in AXES or name in answer.components}
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.6, 5.6), layout="constrained")

@@ -26,7 +26,7 @@ from kinetostat.studio.ringing import Ringing, SwingRequest, ringing, swing
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import bars, heading, paragraph, shown
 from kinetostat.views.analysis_tables import entry_unit
-from kinetostat.views.vibration_tables import LEAST_SHARE, MOST_PARTS, cut_by_table, damping_of, masses_of, percent
+from kinetostat.views.vibration import LEAST_SHARE, MOST_PARTS, cut_of, damping_of, masses_of, percent
 
 MODES, RESPONSE = "Modes", "Response"
 CUT = "the cut"
@@ -214,7 +214,7 @@ def about(new: Ringing) -> str:
     answer = new.answer
     if not answer.modes:
         return paragraph(answer.message, "lead")
-    more = f"{masses_of(answer)} Damping: {damping_of(answer)} {cut_by_table(answer)}"
+    more = f"{masses_of(answer)} Damping: {damping_of(answer)} {cut_of(answer)}"
     return paragraph(answer.message, "lead") + paragraph(more.rstrip())
 
 

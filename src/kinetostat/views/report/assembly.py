@@ -3,18 +3,20 @@
 Nothing is computed here, and no format is known.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.report.answers import Answers
 from kinetostat.studies.setting import pose_of
 from kinetostat.validation.comparison import Validation
-from kinetostat.views.report.content import Report
+from kinetostat.views.figures import contour_maps, curves
+from kinetostat.views.report.content import Block, Report
+from kinetostat.views.report.described import described_section
 from kinetostat.views.report.design import guideline_section, sensitivity_section
 from kinetostat.views.report.identification import identification_section
 from kinetostat.views.report.machine import data_section, machine_section, portrait
-from kinetostat.views.report.pictures import shown
+from kinetostat.views.report.pictures import drawn, shown
 from kinetostat.views.report.provenance import Origin, method_section, record_section, validation_section
 from kinetostat.views.report.stiffness import load_section, stiffness_section, workspace_section
 from kinetostat.views.report.study import study_section
@@ -22,7 +24,7 @@ from kinetostat.views.report.summary import summary_section
 from kinetostat.views.report.tolerances import tolerances_section
 from kinetostat.views.report.typesetting import typeset
 from kinetostat.views.report.under_load import loaded_section
-from kinetostat.views.report.vibration import vibration_section
+from kinetostat.views.vibration import VIBRATION
 
 
 def report_of(
@@ -53,7 +55,7 @@ def report_of(
         stiffness_section(analysis),
         load_section(analysis, pictures),
         *([loaded_section(answers.loaded, analysis)] if answers.loaded else []),
-        *([vibration_section(answers.vibration, answers.frequencies)] if answers.vibration else []),
+        *([described_section(VIBRATION, answers.vibration, _frequencies(answers))] if answers.vibration else []),
         *([tolerances_section(answers.budget)] if answers.budget else []),
         *([identification_section(answers.fit, answers.machine)] if answers.fit else []),
         workspace_section(answers),
@@ -70,6 +72,15 @@ def report_of(
         tuple(sections),
         {"machine.toml": origin.machine_file, "results.json": origin.results},
     )
+
+
+def _frequencies(answers: Answers) -> Iterator[Block]:
+    """The first natural frequency over the poses of the maps, where there are any."""
+    over = answers.frequencies
+    if over is not None and (over["status"] == int(Status.OK)).any():
+        draw = contour_maps if over["status"].ndim == 2 else curves
+        names = [str(name) for name in over.data_vars if "frequency" in str(name)]
+        yield drawn(draw(over, names, ""), "The first natural frequency over the poses.")
 
 
 def _title_block(answers: Answers) -> list[tuple[str, str]]:

@@ -1,0 +1,167 @@
+"""Any question as a command: its options, its answer on the terminal, and the files of a folder. No formula lives here.
+
+The options of a question are added when its command is used, so that `kinetostat --help` imports no question.
+"""
+
+import argparse
+import sys
+from contextlib import nullcontext
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kinetostat.commands.common import (
+    Help,
+    Parser,
+    direction,
+    give,
+    load_machine,
+    progress_bar,
+    said_when_slow,
+    takes_figures,
+    takes_json,
+    takes_loaded,
+    takes_machine,
+    write_figures,
+)
+from kinetostat.spec.errors import InputError
+from kinetostat.views.question import Option, Question, late
+from kinetostat.views.questions import QUESTIONS
+
+if TYPE_CHECKING:
+    from kinetostat.commands.common import Commands
+    from kinetostat.views.question import Description
+
+LONGEST_COUNT = 9
+"""Digits of the whole numbers that options take."""
+
+
+def add_question(commands: "Commands", word: str) -> None:
+    """Add the command of a question; its options follow when it is used."""
+    summary, where = QUESTIONS[word]
+    command = commands.add_parser(word, help=summary, formatter_class=Help)
+    command.later = partial(_fill, summary=summary, where=where)
+
+
+def _fill(command: Parser, summary: str, where: str) -> None:
+    question: Question = late(where)
+    command.description = f"{summary[0].upper()}{summary[1:]}."
+    command.epilog = f"example:\n  {question.example}\n"
+    command.set_defaults(run=partial(ask, question))
+    takes_machine(command)
+    for option in question.options:
+        _add_option(command, option)
+    if question.loaded:
+        takes_loaded(command, question.loaded)
+    if question.full:
+        command.add_argument("--full", action="store_true", help=question.full)
+    if question.output:
+        takes_figures(command, question.output)
+    takes_json(command)
+
+
+def _add_option(command: Parser, option: Option) -> None:
+    """Add an option, or what stands after the machine without a name."""
+    words: dict[str, Any] = {"help": option.meaning}
+    if option.kind == "flag":
+        command.add_argument(option.flag, action="store_true", dest=option.name, **words)
+        return
+    words["type"] = READERS.get(option.kind, str)
+    words["default"] = list(option.default or ()) if option.many else option.default
+    if option.choices:
+        words["choices"] = option.choices
+    else:
+        words["metavar"] = option.metavar or METAVARS.get(option.kind, option.name.upper())
+    if option.many:
+        words["action"] = "append"
+    if option.first:
+        words |= {} if option.required else {"nargs": "?"}
+        command.add_argument(option.name, **words)
+        return
+    command.add_argument(option.flag, dest=option.name, required=option.required, **words)
+    for former in option.former:
+        words |= {"help": argparse.SUPPRESS, "action": partial(_Former, option.flag), "default": argparse.SUPPRESS}
+        command.add_argument(former, dest=option.name, **words)
+
+
+class _Former(argparse.Action):
+    """An earlier word of an option: it works, and says what the option is called now."""
+
+    def __init__(self, current: str, **options: Any) -> None:
+        super().__init__(**options)
+        self.current = current
+
+    def __call__(self, _parser: Any, namespace: Any, values: Any, option: str | None = None) -> None:
+        print(f"kinetostat: {option} is now called {self.current}.", file=sys.stderr)
+        setattr(namespace, self.dest, values)
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or len(text) > LONGEST_COUNT:
+        raise argparse.ArgumentTypeError(f"{text} is not a number; give a whole number of at most nine digits")
+    return int(text)
+
+
+READERS = {"direction": direction, "count": _count, "number": float, "file": Path}
+"""Functions that read the words of an option, by its kind; others stay texts."""
+METAVARS = {"direction": "X,Y,Z", "count": "N", "number": "NUMBER", "file": "FILE"}
+
+
+def ask(question: Question, options: argparse.Namespace) -> int:
+    """Ask a question with the options of its command, and show the answer.
+
+    Returns:
+        The exit code.
+
+    Raises:
+        InputError: what the question refuses, in the words of the command line.
+    """
+    from kinetostat.views.answers import description_of
+    from kinetostat.views.data_forms import json_of
+    from kinetostat.views.terminal import tell
+
+    machine = load_machine(options)
+    values = {option.name: getattr(options, option.name) for option in question.options}
+    waiting = nullcontext() if question.reports_progress else said_when_slow(question.slow)
+    try:
+        with waiting, progress_bar(question.slow) as progress:
+            reports = {"progress": progress} if question.reports_progress else {}
+            answer = question.answer(machine, **values, **reports)
+    except InputError as error:
+        raise InputError(_in_words(question, str(error))) from None
+    description = description_of(answer)
+    answered, full = description.answered(answer), getattr(options, "full", False)
+    written = write_folder(options, description, answer) if answered and getattr(options, "output", None) else []
+    return give(
+        options,
+        answered,
+        lambda: json_of(description, answer),
+        lambda console: tell(console, description, answer, full),
+        written,
+        message=getattr(answer, "message", ""),
+    )
+
+
+def _in_words(question: Question, message: str) -> str:
+    """A message that begins with an argument of Python, in the words of the command line."""
+    first, space, rest = message.partition(" ")
+    flags = {option.name: option.flag for option in question.options if not option.first}
+    return f"{flags.get(first, first)}{space}{rest}"
+
+
+def write_folder(options: argparse.Namespace, description: "Description", answer: Any) -> list[Path]:
+    """Write the files and the figures of an answer into the folder of `--output`; return their paths."""
+    from kinetostat.views.answers import FORMS, write_content, write_form
+
+    written: list[Path] = []
+    for name, form in description.files.items():
+        path = options.output / name
+        if form in FORMS:
+            write_form(description, answer, str(form), path)
+        else:
+            content = late(form)(answer)
+            if content is None:
+                continue
+            write_content(content, path)
+        written.append(path)
+    return written + write_figures(options, description.drawings(answer))

@@ -1,0 +1,118 @@
+"""Answers as plain data, CSV and NetCDF, made of the fields of their description. Nothing is computed, all is SI."""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kinetostat.studies.plain_data import as_answer, no_formula
+from kinetostat.views.question import Description, Field, Records
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def json_of(description: Description, answer: Any) -> dict[str, Any]:
+    """An answer as plain data: a key for each field, a list of objects for records."""
+    return as_answer(_object(description.fields, answer))
+
+
+def _object(fields: Sequence[Field | Records], item: Any) -> dict[str, Any]:
+    """Keys and values of the fields that JSON has."""
+    return {
+        part.key: [_object(part.fields, record) for record in part.of(item)]
+        if isinstance(part, Records)
+        else part.of(item)
+        for part in fields
+        if "json" in part.forms
+    }
+
+
+def csv_of(description: Description, answer: Any) -> str:
+    """The first records of an answer as CSV: a row for each, numbered from 1.
+
+    Names that a spreadsheet would take for a formula have an apostrophe before them.
+    """
+    records = next(part for part in description.fields if isinstance(part, Records) and "csv" in part.forms)
+    shown, items = [part for part in records.fields if "csv" in part.forms], records.of(answer)
+    entries = {part.key: _entries(part, items) for part in shown}
+    heads = [head for part in shown for head in _heads(part, entries[part.key])]
+    rows = io.StringIO(newline="")
+    writer = csv.writer(rows, lineterminator="\n")
+    writer.writerow([records.axis, *heads])
+    for number, item in enumerate(items, 1):
+        writer.writerow([number, *(cell for part in shown for cell in _cells(part, item, entries[part.key]))])
+    return rows.getvalue()
+
+
+def _entries(part: Field, items: Sequence[Any]) -> list[str] | None:
+    """Names of the entries of a mapping, of all records together; None for a field that is not one."""
+    values = [part.of(item) for item in items]
+    mappings = [value for value in values if isinstance(value, Mapping)]
+    return list(dict.fromkeys(str(name) for value in mappings for name in value)) if mappings else None
+
+
+def _heads(part: Field, entries: Sequence[str] | None) -> list[str]:
+    if entries is None:
+        return [part.name]
+    return list(entries) if part.column == "*" else [f"{part.name}_{name}" for name in entries]
+
+
+def _cells(part: Field, item: Any, entries: Sequence[str] | None) -> list[Any]:
+    value = part.of(item)
+    cells = [value] if entries is None else [value.get(name) for name in entries]
+    return [no_formula(cell) if isinstance(cell, str) else cell for cell in cells]
+
+
+def dataset_of(description: Description, answer: Any) -> "xr.Dataset":
+    """An answer as a dataset: arrays over their axes, and the records, one along an axis of their own.
+
+    Axes are those of the description, and of records their numbers from 1 and the names of mappings.
+    """
+    import xarray as xr  # takes long to load
+
+    coordinates = {
+        axis.name: (axis.name, np.asarray(Field(axis.name, axis.take).of(answer)), _about(axis))
+        for axis in description.axes
+    }
+    variables: dict[str, Any] = {}
+    for part in description.fields:
+        if "nc" not in part.forms:
+            continue
+        if isinstance(part, Records):
+            _add_records(part, part.of(answer), variables, coordinates)
+        elif part.axes:
+            variables[part.name] = (part.axes, part.of(answer), _about(part))
+    about = {"machine": answer.machine.name, "reference": answer.machine.reference}
+    return xr.Dataset(variables, coordinates, about)
+
+
+def _add_records(
+    records: Records, items: Sequence[Any], variables: dict[str, Any], coordinates: dict[str, Any]
+) -> None:
+    """Add a variable for each field of records, and the axes that they need."""
+    coordinates[records.axis] = (records.axis, np.arange(1, len(items) + 1), {})
+    for part in records.fields:
+        if "nc" not in part.forms:
+            continue
+        values = [part.of(item) for item in items]
+        names = _entries(part, items)
+        if names is None:
+            variables[part.name] = (records.axis, np.asarray([_scalar(value) for value in values]), _about(part))
+        else:
+            (axis,) = part.axes
+            coordinates[axis] = (axis, names, {})
+            rows = [[value.get(name, 0.0) for name in names] for value in values]
+            variables[part.name] = ((records.axis, axis), np.asarray(rows, dtype=float), _about(part))
+
+
+def _scalar(value: Any) -> Any:
+    """A number as it is, a missing one as NaN, anything else as text."""
+    return value if isinstance(value, bool | Real) else np.nan if value is None else str(value)
+
+
+def _about(part: Any) -> dict[str, str]:
+    return {name: text for name, text in (("units", part.unit), ("long_name", part.long_name)) if text}

@@ -1,0 +1,8 @@
+"""All questions by their word, with a phrase that says what is computed, and where they live. Nothing is imported."""
+
+from collections.abc import Mapping
+
+QUESTIONS: Mapping[str, tuple[str, str]] = {
+    "modes": ("compute natural frequencies and modes, and the receptance of the tool", "views.vibration.MODES"),
+}
+"""Word, which is the command and the Python function; phrase; and the place of the `Question` in kinetostat."""

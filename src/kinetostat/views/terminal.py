@@ -1,0 +1,29 @@
+"""Answers on a terminal, made of their description: machine and state, sentences, tables. Nothing is computed."""
+
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from kinetostat.views.question import Description
+from kinetostat.views.tables import print_doubts
+
+
+def tell(console: Console, description: Description, answer: Any, full: bool = False) -> None:
+    """Print an answer: first the machine with its state, then a line for each sentence, notes, and the tables.
+
+    Args:
+        console: on which it is printed.
+        description: of answers of this kind.
+        answer: of any kind that has a machine.
+        full: whether tables show every row.
+    """
+    console.print(Text.assemble((answer.machine.name, "bold"), f"  {description.state(answer)}"))
+    lines = Table.grid(padding=(0, 2, 0, 0))
+    for head, sentence in description.lines(answer):
+        lines.add_row(Text(head, "bold"), sentence)
+    console.print(lines)
+    print_doubts(console, answer.machine)
+    for table in description.tables(answer, full):
+        console.print(table)

@@ -1,0 +1,245 @@
+"""Natural frequencies and modes: the question, and the description of its answer. Nothing is computed here."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.arrays import Complex
+from kinetostat.display import Display, number
+from kinetostat.studies.attribution import ranked
+from kinetostat.studies.setting import pose_of
+from kinetostat.studies.vibration import Mode, Vibration, frequency_range, modes
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.question import Axis, Description, Field, Lines, Option, Question, Records
+from kinetostat.views.tables import numeric_table
+
+LEAST_SHARE = 0.005
+"""Share of the energy of every mode below which a part has no line of its own."""
+MOST_PARTS = 12
+"""Parts that have a line; where more springs deform, their kinds have one."""
+LEAST_PERCENT = 0.0005
+"""Share that is shown as nothing."""
+
+
+def masses_of(answer: Vibration) -> str:
+    """Say what moves, and of which parts no mass is known."""
+    text = f"{answer.machine.display.show(answer.moving_mass, 'kg')} move."
+    if not answer.uncounted:
+        return text
+    return f"{text} Nothing says the mass of {', '.join(answer.uncounted)}: they count as massless."
+
+
+def damping_of(answer: Vibration) -> str:
+    """Say how the modes are damped."""
+    if answer.assumed:
+        return f"{number(100.0 * answer.modes[0].ratio)} % of critical in every mode, assumed; give a table [damping]."
+    ratios = [100.0 * mode.ratio for mode in answer.modes]
+    ends = dict.fromkeys(number(ratio, digits=3) for ratio in (min(ratios), max(ratios)))
+    return f"{' to '.join(ends)} % of critical, by the table [damping]."
+
+
+def cut_of(answer: Vibration) -> str:
+    """Say where the real part of the receptance across the cut is least, and the width of cut that follows.
+
+    Nothing is said where neither a direction nor a pressure is known.
+    """
+    if not answer.direction:
+        unknown = "Nothing says the direction across the cut: write direction = [1, 0, 0] under [cutting]."
+        return unknown if answer.cutting_pressure else ""
+    softest, display = answer.softest(answer.direction), answer.machine.display
+    text = f"Along {axis_of(answer.direction)} the real part of the receptance is least at "
+    text += f"{display.show(softest.frequency, 'Hz')}: {display.show(softest.real, 'm/N')}."
+    if answer.cutting_pressure is None:
+        return text
+    width = display.show(softest.depth(answer.cutting_pressure), "m", endless="any width")
+    return f"{text} Cuts up to {width} wide are stable at every spindle speed."
+
+
+def axis_of(direction: Sequence[float]) -> str:
+    """A direction by the name of its axis, "x", or by its three numbers, "1,0,2"."""
+    axes = [name for name, part in zip("xyz", direction, strict=True) if part]
+    return axes[0] if len(axes) == 1 else ",".join(f"{part:g}" for part in direction)
+
+
+def strain_of(modes: Sequence[Mode]) -> list[Mapping[str, float]]:
+    """Shares of the strain energy of each mode by spring, or by kind of spring where there are too many for a table."""
+    springs = {name for mode in modes for name, share in mode.strain.items() if abs(share) >= LEAST_SHARE}
+    return [mode.kinds if len(springs) > MOST_PARTS else mode.strain for mode in modes]
+
+
+def mode_table(modes: Sequence[Mode], display: Display, components: Sequence[str]) -> FittedTable:
+    """A line for each mode: frequency, damping, how the tool moves, what would ring there alone.
+
+    Args:
+        modes: from the lowest.
+        display: of the machine.
+        components: that the machine has: a planar one does not answer along z.
+    """
+    axes = [axis for axis in "xyz" if axis != "z" or "rx" in components or "z" in components]
+    heads = ["Hz", "damping %", "tool", "modal mass", "modal stiffness", *(f"{axis} %" for axis in axes)]
+    named = f"{', '.join(axes)}: share of the moving mass that answers a shaking base"
+    table = numeric_table(f"Modes; {named}", "", heads)
+    for place, mode in enumerate(modes, 1):
+        turning = len(mode.direction) == 2
+        table.add_row(
+            str(place),
+            number(mode.frequency, digits=display.digits),
+            number(100.0 * mode.ratio, digits=3),
+            mode.direction,
+            display.show(mode.modal_mass, "kg·m**2" if turning else "kg"),
+            display.show(mode.modal_stiffness, "N·m/rad" if turning else "N/m"),
+            *(percent(share) for _, share in zip(axes, mode.effective_mass, strict=False)),
+        )
+    return table
+
+
+def share_table(title: str, shares: Sequence[Mapping[str, float]]) -> FittedTable:
+    """Shares of an energy by part in each mode, the greatest parts first, in percent."""
+    names = dict.fromkeys(name for mode in shares for name in mode)
+    largest = {name: max(abs(mode.get(name, 0.0)) for mode in shares) for name in names}
+    order = [name for name, _ in ranked(largest)]
+    shown = [name for name in order if largest[name] >= LEAST_SHARE][:MOST_PARTS]
+    table = numeric_table(title, "", [str(place) for place in range(1, len(shares) + 1)])
+    for name in shown:
+        table.add_row(name, *(percent(mode.get(name, 0.0)) for mode in shares))
+    rest = order[len(shown) :]
+    left = [sum(mode.get(name, 0.0) for name in rest) for mode in shares]
+    if any(abs(share) >= LEAST_PERCENT for share in left):
+        table.add_row(rest[0] if len(rest) == 1 else f"{len(rest)} others", *map(percent, left))
+    return table
+
+
+def percent(share: float) -> str:
+    """A share as a number of percent, a dash where it is nothing."""
+    return f"{100.0 * share:.1f}" if abs(share) >= LEAST_PERCENT else "–"
+
+
+def _lines(answer: Vibration) -> Lines:
+    if not answer.modes:
+        return [("Pose", f"{pose_of(answer.machine)}. {answer.message}")]
+    lines = [
+        ("Pose", f"{pose_of(answer.machine)}."),
+        ("Modes", answer.message),
+        ("Masses", masses_of(answer)),
+        ("Damping", damping_of(answer)),
+    ]
+    cut = cut_of(answer)
+    return [*lines, ("Cutting", cut)] if cut else lines
+
+
+def _tables(answer: Vibration, _full: bool) -> Iterator[FittedTable]:
+    if answer.modes:
+        yield mode_table(answer.modes, answer.machine.display, answer.components)
+        yield share_table("Strain energy (%)", strain_of(answer.modes))
+        yield share_table("Kinetic energy (%)", [mode.kinetic for mode in answer.modes])
+
+
+def _named_modes(answer: Vibration) -> list[dict[str, Any]]:
+    """The modes with the names of their components."""
+    names, axes = answer.components, "xyz"
+    return [
+        vars(mode)
+        | {
+            "tool": dict(zip(names, mode.tool, strict=True)),
+            "effective_mass": dict(zip(axes, mode.effective_mass, strict=True)),
+        }
+        for mode in answer.modes
+    ]
+
+
+def _receptance(answer: Vibration) -> Complex:
+    """The receptance over the frequencies of the response, of the components that the machine has."""
+    parts = [COMPONENTS.index(name) for name in answer.components]
+    return answer.receptance(frequency_range(answer).tolist())[:, parts][:, :, parts]
+
+
+MODE = (
+    Field("frequency", unit="Hz", long_name="natural frequency", column="frequency_hz"),
+    Field("damping_ratio", "ratio", long_name="damping ratio"),
+    Field(
+        "tool",
+        long_name="motion of the tool in a motion of mass 1 kg, rad and m per root of a kg m2",
+        axes=("component",),
+        column="*",
+    ),
+    Field("direction", long_name="component in which the tool moves most"),
+    Field("modal_mass", long_name="mass that would vibrate there alone, kg or kg m2"),
+    Field("modal_stiffness", long_name="stiffness on which it would, N/m or N m/rad"),
+    Field("effective_mass", long_name="share of all mass that answers a shaking base", axes=("shaken",)),
+    Field("strain_energy", "strain", long_name="share of strain energy", axes=("spring",), forms=("json", "nc")),
+    Field("strain_energy_by_kind", "kinds", forms=("json",)),
+    Field("kinetic_energy", "kinetic", long_name="share of kinetic energy", axes=("part",), forms=("json", "nc")),
+)
+RESPONSE = ("frequency", "moved", "loaded")
+
+VIBRATION = Description(
+    type="studies.vibration.Vibration",
+    title="Vibration",
+    fields=(
+        Field("name", "machine.name"),
+        Field("status", "status.word"),
+        Field("message"),
+        Field("loaded"),
+        Field("components", lambda answer: list(answer.components)),
+        Field("moving_mass"),
+        Field("without_known_mass", lambda answer: list(answer.uncounted)),
+        Field("damping_assumed", "assumed"),
+        Records("modes", "mode", MODE, _named_modes),
+        Field(
+            "receptance_real",
+            lambda answer: _receptance(answer).real,
+            long_name="real part, rad and m per N·m and N",
+            axes=RESPONSE,
+            forms=("nc",),
+        ),
+        Field(
+            "receptance_imaginary",
+            lambda answer: _receptance(answer).imag,
+            long_name="imaginary part, the same units",
+            axes=RESPONSE,
+            forms=("nc",),
+        ),
+    ),
+    lines=_lines,
+    tables=_tables,
+    figures="views.vibration_figures.vibration_figures",
+    axes=(Axis("frequency", frequency_range, "Hz"), Axis("moved", "components"), Axis("loaded", "components")),
+    state=lambda answer: "about its state under load" if answer.loaded else answer.status.word,
+    answered=lambda answer: bool(answer.modes),
+    files={"modes.csv": "csv", "response.nc": "nc"},
+)
+MODES = Question(
+    example='kinetostat modes hexapod --set tool.mass="12 kg" -o modes',
+    answer=modes,
+    options=(
+        Option(
+            "along",
+            "direction",
+            "direction in which the tool is pushed, for the response (default: that of [cutting], else x, y and z)",
+            default=(),
+        ),
+        Option(
+            "cutting_pressure",
+            "quantity",
+            'cutting force per area of the chip, e.g. "2000 N/mm**2": tells the width of cut that stays stable in the '
+            "direction of --along",
+            metavar="PRESSURE",
+        ),
+        Option(
+            "lowest",
+            "quantity",
+            'lowest frequency of the response, e.g. "10 Hz" (default: a fifth of the first mode)',
+            metavar="FREQUENCY",
+            former=("--from",),
+        ),
+        Option(
+            "highest",
+            "quantity",
+            'highest frequency of the response, e.g. "500 Hz" (default: above the sixth mode)',
+            metavar="FREQUENCY",
+            former=("--to",),
+        ),
+    ),
+    loaded="vibrations about the state of rest under the loads, with tensions and weights",
+    output="modes.csv, response.nc and the figures",
+)
