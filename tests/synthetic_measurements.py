@@ -3,8 +3,8 @@
 import numpy as np
 
 from kinetostat.accuracy.model import error_model
-from kinetostat.equilibrium.motion import Motions, exponential, logarithm
 from kinetostat.machine.parameters import parameters, values
+from kinetostat.numerics.motions import Motions, exponential, logarithm
 from kinetostat.studies.identification.measurements import POSITION, TURNED, Measurements
 
 SIGMA = dict.fromkeys(POSITION, 5e-6) | dict.fromkeys(TURNED, 3e-5)

@@ -15,6 +15,7 @@ LAYERS = [
     "spec",
     "algebra",
     "machine",
+    "numerics",
     "kinematics",
     "kinetostatics",
     "equilibrium",

@@ -7,11 +7,11 @@ import pytest
 
 from kinetostat.accuracy.built import as_built, model_at_home
 from kinetostat.accuracy.model import error_model
-from kinetostat.equilibrium.motion import exponential
 from kinetostat.exchange.leg_by_leg import built_text
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import build, changed, load
 from kinetostat.machine.parameters import values
+from kinetostat.numerics.motions import exponential
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.assembly import forward
 from kinetostat.studies.command import command

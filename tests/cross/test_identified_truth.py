@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from kinetostat.cli import main
-from kinetostat.equilibrium.motion import exponential
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.machine.loading import build
+from kinetostat.numerics.motions import exponential
 from kinetostat.studies.evaluation.given_poses import given_poses
 from kinetostat.studies.identification.identification import identified
 from kinetostat.studies.identification.measurements import POSITION, Measurements

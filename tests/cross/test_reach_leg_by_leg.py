@@ -5,13 +5,13 @@ import pytest
 
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics import closure
-from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.leg_gaps import Problems, free_coordinates, goal_of, problems_of
 from kinetostat.kinematics.leg_span import too_far_or_near
 from kinetostat.kinematics.nearest import nearest_pose
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.column import stacked
 from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.spec import document

@@ -5,8 +5,8 @@ import pytest
 
 from kinetostat.accuracy.built import as_built
 from kinetostat.accuracy.model import error_model
-from kinetostat.equilibrium.motion import Motions
 from kinetostat.machine.machine import springs
+from kinetostat.numerics.motions import Motions
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.identification.fit import Wishes, fitted
 from kinetostat.studies.identification.identification import identified, identify

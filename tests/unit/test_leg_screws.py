@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinetostat.accuracy.screws import SEEN, Screws, independent
-from kinetostat.equilibrium.motion import each_about, exponential
+from kinetostat.numerics.motions import each_about, exponential
 
 
 def leg_screws(count=30, seed=4):

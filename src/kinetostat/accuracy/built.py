@@ -18,13 +18,14 @@ from kinetostat.accuracy.screws import independent, scaled
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.motion import Motions, exponential, logarithm, still
-from kinetostat.kinematics.closing import pose_of, stacked
+from kinetostat.kinematics.closing import pose_of
 from kinetostat.kinetostatics.response import compliance_at
+from kinetostat.machine.column import stacked
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import POSE
+from kinetostat.numerics.motions import Motions, exponential, logarithm, still
 from kinetostat.spec.errors import InputError
 
 REACHED = 1e-9

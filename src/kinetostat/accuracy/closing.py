@@ -15,7 +15,7 @@ import numpy as np
 from kinetostat.accuracy.rows import Row, Rows, places_of
 from kinetostat.accuracy.screws import Screws, independent, moved_to, scaled
 from kinetostat.arrays import Array, Mask
-from kinetostat.equilibrium.motion import Motions, cross, each_about, exponential, logarithm, still
+from kinetostat.numerics.motions import Motions, cross, each_about, exponential, logarithm, still
 
 SETTLED = 1e-8
 """Motion of the last step of Newton's method, rad or in units of the machine's length: the next one would be about its

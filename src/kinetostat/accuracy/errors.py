@@ -23,11 +23,11 @@ from kinetostat.accuracy.rows import Row, Rows, Unit, places_of, rows_of
 from kinetostat.accuracy.screws import Screws, independent, moved_to, scaled
 from kinetostat.algebra.vector import AXES, ZERO, Vector
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.motion import Motions, logarithm
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.numerics.motions import Motions, logarithm
 from kinetostat.tolerances import NO_LINK, PARALLEL_AXES, SEEN_BY_LEG
 
 SHARED_STEP = 1e-5

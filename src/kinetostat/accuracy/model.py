@@ -18,14 +18,14 @@ from kinetostat.accuracy.errors import Insertion, MachineError, Source, errors_o
 from kinetostat.accuracy.rows import Row, Rows, places_of, rows_of
 from kinetostat.accuracy.screws import independent, scaled
 from kinetostat.arrays import Array, Codes, Integers
-from kinetostat.equilibrium.motion import Motions, cross
-from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.column import stacked
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, with_values
+from kinetostat.numerics.motions import Motions, cross
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import ONE_PLACEMENT
 

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from kinetostat.arrays import Array, Mask
-from kinetostat.equilibrium.motion import cross
+from kinetostat.numerics.motions import cross
 from kinetostat.tolerances import NEARLY_DEPENDENT, SEEN_BY_LEG
 
 SEEN = 1e-7

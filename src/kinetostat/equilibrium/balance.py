@@ -15,7 +15,7 @@ import numpy as np
 from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.chains import Chain
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.motion import (
+from kinetostat.numerics.motions import (
     Motions,
     brackets,
     cross,

@@ -13,10 +13,10 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.equilibrium.motion import of_scalars
 from kinetostat.machine.leg import Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Member
+from kinetostat.numerics.motions import of_scalars
 from kinetostat.tolerances import DEPENDENT
 
 SIGNS = {"": 0.0, "pulls": 1.0, "pushes": -1.0}

@@ -13,8 +13,8 @@ import numpy as np
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import free_state
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.motion import logarithm
 from kinetostat.equilibrium.solving import Solution, at_rest, solve
+from kinetostat.numerics.motions import logarithm
 from kinetostat.tolerances import COMMANDED, UNRESISTED
 
 MOST_CORRECTIONS = 12

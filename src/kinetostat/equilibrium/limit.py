@@ -11,9 +11,9 @@ import numpy as np
 from kinetostat.arrays import Array, Mask
 from kinetostat.equilibrium.balance import Balance, State, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.motion import logarithm
 from kinetostat.equilibrium.solving import at_rest, newton, with_share
 from kinetostat.equilibrium.stability import Stability, stabilities, stability
+from kinetostat.numerics.motions import logarithm
 from kinetostat.tolerances import AT_REST, ZERO_PIVOT
 
 RATIO, CANDIDATES, FEW = 2.0, 14, 4

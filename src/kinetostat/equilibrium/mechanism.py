@@ -18,12 +18,12 @@ from kinetostat.algebra.vector import Displacement
 from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.chains import Chain, Given, Masses, Units, Weight, chain_of
 from kinetostat.equilibrium.drives import with_drives
-from kinetostat.equilibrium.motion import of_scalars
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring, Turn
 from kinetostat.machine.loads import gravity_of, located_members, platform_masses, turned_tensor
 from kinetostat.machine.machine import Machine
+from kinetostat.numerics.motions import of_scalars
 
 
 @dataclass(frozen=True)

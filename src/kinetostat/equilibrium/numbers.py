@@ -16,12 +16,12 @@ from kinetostat.equilibrium.solving import at_rest
 from kinetostat.equilibrium.stability import Stabilities, stabilities
 from kinetostat.equilibrium.tangent import compliance, inverse
 from kinetostat.equilibrium.tensions import tensioned
-from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.limits import load_checks, within
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS, rest_numbers
 from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.column import stacked
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.links import growth_of
 from kinetostat.machine.machine import Machine

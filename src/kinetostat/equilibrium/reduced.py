@@ -21,7 +21,6 @@ from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import LegTerms, leg_terms, placed_leg, platform_load
 from kinetostat.equilibrium.cut import Cut, Rod, cut
 from kinetostat.equilibrium.mechanism import mechanism_of
-from kinetostat.equilibrium.motion import Motions, cross, of_scalars, skew_of
 from kinetostat.equilibrium.numbers import FREE, borne, greatest_loads
 from kinetostat.equilibrium.solving import LONGEST_STEP
 from kinetostat.kinematics.closure import Joints
@@ -29,6 +28,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
+from kinetostat.numerics.motions import Motions, cross, of_scalars, skew_of
 from kinetostat.tolerances import AT_REST, UNRESISTED
 
 LARGEST_TURN = 0.2

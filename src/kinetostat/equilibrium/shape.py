@@ -11,9 +11,9 @@ import numpy as np
 from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.balance import Balance, placed_leg
-from kinetostat.equilibrium.motion import Motions
 from kinetostat.kinetostatics.deflected import DeflectedLink, leg_links
 from kinetostat.machine.leg import Leg
+from kinetostat.numerics.motions import Motions
 
 
 def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> tuple[DeflectedLink, ...]:

@@ -13,8 +13,8 @@ import numpy as np
 
 from kinetostat.arrays import Array, Mask
 from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.motion import skew_of
 from kinetostat.equilibrium.solving import solve
+from kinetostat.numerics.motions import skew_of
 from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, UNRESISTED
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, cos, sin, smaller, sqrt
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector, rotation_x, rotation_y, rotation_z
 from kinetostat.arrays import Array
-from kinetostat.machine.column import column
+from kinetostat.machine.column import column, stacked
 from kinetostat.machine.leg import Joint, Turn
 from kinetostat.machine.machine import Chains, Closure, Configuration, Step
 from kinetostat.machine.written.family import place
@@ -220,13 +220,6 @@ def _platform_twists(ends: Sequence[LegEnd], count: int) -> list[Array]:
         first += len(end.movers)
         blocks.append(block)
     return blocks
-
-
-def stacked(scalars: Sequence[Scalar], count: int) -> Array:
-    """Stack scalars as columns [n x scalars]."""
-    if not scalars:
-        return np.zeros((count, 0))
-    return np.stack([np.broadcast_to(np.asarray(s, dtype=float), (count,)) for s in scalars], axis=1)
 
 
 def pose_of(end: Displacement) -> dict[str, Array]:

@@ -13,13 +13,12 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, where
 from kinetostat.arrays import Array, Codes
-from kinetostat.kinematics.closing import clearance, leg_end, platform_placement, squared_distance, stacked
+from kinetostat.kinematics.closing import clearance, leg_end, platform_placement, squared_distance
 from kinetostat.kinematics.following import follow
-from kinetostat.kinematics.leg_gaps import free_coordinates, goal_of, problems_of, undetermined
+from kinetostat.kinematics.leg_gaps import free_coordinates, goal_of, problems_of, some, undetermined
 from kinetostat.kinematics.leg_span import too_far_or_near
 from kinetostat.kinematics.status import Status
-from kinetostat.kinematics.ways import some
-from kinetostat.machine.column import column
+from kinetostat.machine.column import column, stacked
 from kinetostat.machine.leg import Turn
 from kinetostat.machine.machine import Chains, Machine
 from kinetostat.tolerances import CLOSED

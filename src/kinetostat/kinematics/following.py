@@ -12,10 +12,11 @@ that are accepted by the contraction of Newton's method.
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.kinematics.leg_gaps import Coordinates, Problems, least_norm, stays_in_plane
+from kinetostat.kinematics.leg_gaps import Coordinates, Problems, least_norm, some, stays_in_plane
 from kinetostat.kinematics.status import Status
-from kinetostat.kinematics.ways import Plan, Way, rows_of, some, ways
+from kinetostat.kinematics.ways import Plan, Way, rows_of, ways
 from kinetostat.machine.leg import rows_about_one_point
+from kinetostat.numerics.iteration import Steps, largest, newton
 from kinetostat.tolerances import CLOSED, DEPENDENT, LEAST_GAP_SETTLED, NEWTON_SETTLED
 
 MOST_TRIALS = 80
@@ -99,10 +100,16 @@ def _strides(problems: Problems, way: Way, goal: Coordinates, furthest: float) -
     here = np.flatnonzero(arrived)
     if here.size:
         part, there = problems.take(here), some(goal, here)
-        settled, gap = _settled(part, unknowns[here], there)
-        unknowns[here] = settled
-        same = same_mode(part, settled, there)
-        solved[here], crossed[here] = (gap <= CLOSED) & same, (gap <= CLOSED) & ~same
+
+        def equations(values: Array, rows: Integers) -> tuple[Array, Steps]:
+            left, rates = part.take(rows).gaps(values, some(there, rows))
+            return largest(left), lambda going: least_norm(rates[going], left[going])
+
+        # A gap that no longer becomes less has reached round-off, or cannot be closed.
+        steps, start = MOST_ITERATIONS, unknowns[here]
+        end = newton(equations, start, len(here), most_steps=steps, closed=NEWTON_SETTLED, contraction=1.0)
+        unknowns[here], closed, same = end.value, end.residual <= CLOSED, same_mode(part, end.value, there)
+        solved[here], crossed[here] = closed & same, closed & ~same
     return unknowns, solved, crossed
 
 
@@ -133,14 +140,14 @@ def _step(problems: Problems, unknowns: Array, target: Coordinates, furthest: fl
     """
     left, rates = problems.gaps(unknowns, target)
     tangent = least_norm(rates, left)
-    first = _size(tangent)
+    first = largest(tangent)
     moved, longer = unknowns.copy(), furthest / np.maximum(first, 1e-30)
     accepted = longer >= 1.0
     tried = np.flatnonzero(accepted)
     if tried.size:
         part, start = problems.take(tried), unknowns[tried] + tangent[tried]
         correction = least_norm(*part.gaps(start, some(target, tried))[::-1])
-        size = _size(correction)
+        size = largest(correction)
         close = (size <= CONTRACTION * first[tried]) | (size <= ROUND_OFF)
         accepted[tried] = close & (size <= NEARBY)
         moved[tried] = start + correction
@@ -149,30 +156,6 @@ def _step(problems: Problems, unknowns: Array, target: Coordinates, furthest: fl
         steady = np.maximum(CONTRACTION * first[tried] / np.maximum(size, ROUND_OFF), 0.25)
         longer[tried] = np.minimum(np.minimum(allowed, longer[tried]), steady)
     return moved, np.where(np.isfinite(longer), longer, 0.0), accepted
-
-
-def _size(steps: Array) -> Array:
-    """The largest change of an unknown in each problem; infinite where it is not a number."""
-    largest = np.max(np.abs(steps), axis=1, initial=0.0)
-    return np.where(np.isfinite(largest), largest, np.inf)
-
-
-def _settled(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[Array, Array]:
-    """Go on by Newton's method until nothing but round-off is left; return the best unknowns and their gaps."""
-    best, least = unknowns.copy(), np.full(len(unknowns), np.inf)
-    current, items = unknowns, np.arange(len(unknowns))
-    for _ in range(MOST_ITERATIONS):
-        part = problems.take(items)
-        left, rates = part.gaps(current, some(goal, items))
-        gap = _size(left)
-        better = gap < least[items]
-        best[items[better]], least[items[better]] = current[better], gap[better]
-        # A problem that no longer improves has reached round-off, or cannot be solved.
-        go = better & (gap > NEWTON_SETTLED)
-        if not go.any():
-            break
-        current, items = current[go] + least_norm(rates[go], left[go]), items[go]
-    return best, least
 
 
 def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[Array, Mask]:
@@ -198,7 +181,7 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
         if not items.size:
             break
         step = np.einsum("ncd,nd->nc", inverse, slope)
-        step *= (share * np.minimum(1.0, DESCENT / np.maximum(_size(step), 1e-30)))[:, None]
+        step *= (share * np.minimum(1.0, DESCENT / np.maximum(largest(step), 1e-30)))[:, None]
         moved = best[items] + step
         left, rates, distance_there = problems.take(items).measured(moved, some(goal, items))
         slope_there = np.einsum("nrc,nr->nc", rates, left)

@@ -17,19 +17,18 @@ import numpy as np
 
 from kinetostat.algebra.vector import Displacement
 from kinetostat.arrays import Array, Mask
-from kinetostat.kinematics.closing import ANGLES, gaps_at, leg_ends, pose_of, squared_distance, stacked, units_of
+from kinetostat.kinematics.closing import ANGLES, gaps_at, leg_ends, pose_of, squared_distance, units_of
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators
-from kinetostat.machine.column import column
+from kinetostat.machine.column import column, stacked
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, parameters, values, with_values
+from kinetostat.numerics.iteration import least_squares
 from kinetostat.tolerances import CLOSED, NEWTON_SETTLED, ONE_PLACEMENT, UNDRIVEN
 
 MOST_ITERATIONS = 60
 """Of damped least squares: a start that has not arrived by then is in no solution's reach."""
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-14, 1e6
-"""Shares of the mean square of the rates."""
 FINEST = 1e-6
 """Step of central differences, rad or in units of the machine's length: the half of all digits that steps need."""
 STRIDE, MOST_STRIDES = 0.05, 400
@@ -285,7 +284,7 @@ def assembly_modes(system: System, goal: Array, starts: int, spread: float) -> l
     with np.errstate(all="ignore"):
         ends, arrived = _followed(system, goal[None])
         first = [*ends[arrived], system.here]
-        unknowns, largest = _least_squares(system, np.concatenate([first, system.here + around]), goal)
+        unknowns, largest = _solutions(system, np.concatenate([first, system.here + around]), goal)
     sound = unknowns[largest < CLOSED]
     places = system.placements(sound, goal)
     (here,) = system.placements(system.here[None], _coordinates(system))
@@ -320,7 +319,7 @@ def poses_at(system: System, goals: Array) -> tuple[dict[str, Array], Mask]:
         unknowns, arrived = _followed(system, goals)
         lost = np.flatnonzero(~arrived)
         if lost.size:
-            unknowns[lost], largest = _least_squares(system, np.tile(system.here, (len(lost), 1)), goals[lost])
+            unknowns[lost], largest = _solutions(system, np.tile(system.here, (len(lost), 1)), goals[lost])
             arrived[lost] = largest < CLOSED
         return system.poses(unknowns, goals), arrived
 
@@ -342,7 +341,7 @@ def _followed(system: System, goals: Array) -> tuple[Array, Mask]:
         if not rows.size:
             break
         here = start + way[rows] * (step / steps)
-        unknowns, largest = _least_squares(system, at[rows], here, NEWTON_SETTLED if step == steps else CLOSED)
+        unknowns, largest = _solutions(system, at[rows], here, NEWTON_SETTLED if step == steps else CLOSED)
         rates = system.left(unknowns, here)[1]
         turn = np.sign(np.linalg.det(rates)) if rates.shape[1] == rates.shape[2] else np.zeros(len(rows))
         leap = np.abs(unknowns - at[rows]).max(axis=1, initial=0.0)
@@ -351,38 +350,15 @@ def _followed(system: System, goals: Array) -> tuple[Array, Mask]:
     return at, sound
 
 
-def _least_squares(system: System, starts: Array, goal: Array, settled: float = NEWTON_SETTLED) -> tuple[Array, Array]:
+def _solutions(system: System, starts: Array, goal: Array, settled: float = NEWTON_SETTLED) -> tuple[Array, Array]:
     """Solve from many starts at once until no more than `settled` is left of any equation.
 
     Returns:
         Unknowns [n x unknowns], and the largest of what is left of the equations [n].
     """
-    best, goals = starts.copy(), np.broadcast_to(goal, (len(starts), goal.shape[-1]))
-    left, rates = system.left(best, goals)
-    damping = np.full(len(best), FIRST_DAMPING)
-    going = np.asarray(np.isfinite(left).all(axis=1) & np.isfinite(rates).all(axis=(1, 2)))
-    for _ in range(MOST_ITERATIONS):
-        active = np.flatnonzero(going)
-        if not active.size or not best.shape[1]:
-            break
-        moved = best[active] + _steps(left[active], rates[active], damping[active])
-        new_left, new_rates = system.left(moved, goals[active])
-        better = (new_left**2).sum(axis=1) < (left[active] ** 2).sum(axis=1)
-        better &= np.isfinite(new_rates).all(axis=(1, 2))
-        won = active[better]
-        best[won], left[won], rates[won] = moved[better], new_left[better], new_rates[better]
-        damping[active] = np.clip(damping[active] * np.where(better, 0.1, 10.0), LEAST_DAMPING, MOST_DAMPING)
-        arrived = np.abs(left[active]).max(axis=1, initial=0.0) <= settled
-        # Near a solution a step that no longer improves has reached round-off.
-        close = np.abs(left[active]).max(axis=1, initial=0.0) < CLOSED
-        going[active] = ~arrived & (better | ~close) & (damping[active] < MOST_DAMPING)
-    return best, np.where(np.isfinite(left).all(axis=1), np.abs(left).max(axis=1, initial=0.0), np.inf)
-
-
-def _steps(left: Array, rates: Array, damping: Array) -> Array:
-    """Damped least-squares steps [n x unknowns]."""
-    square = np.swapaxes(rates, 1, 2) @ rates
-    size = np.trace(square, axis1=1, axis2=2) / square.shape[1] + 1e-300
-    square = square + (damping * size)[:, None, None] * np.eye(square.shape[1])
-    work = np.swapaxes(rates, 1, 2) @ left[:, :, None]
-    return np.asarray(np.linalg.solve(square, work)[:, :, 0])
+    goals = np.broadcast_to(goal, (len(starts), goal.shape[-1]))
+    end = least_squares(
+        lambda unknowns, rows: system.left(unknowns, goals[rows]), starts, most_steps=MOST_ITERATIONS,
+        settled=settled, closed=CLOSED,
+    )  # fmt: skip
+    return end.value, end.residual

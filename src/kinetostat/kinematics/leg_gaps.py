@@ -15,22 +15,19 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.kinematics.closing import (
-    ANGLES,
-    POINT,
-    leg_end,
-    placement_of,
-    rotation_between,
-    squared_distance,
-    stacked,
-)
-from kinetostat.machine.column import column, plain
+from kinetostat.kinematics.closing import ANGLES, POINT, leg_end, placement_of, rotation_between, squared_distance
+from kinetostat.machine.column import column, plain, stacked
 from kinetostat.machine.leg import Joint
 from kinetostat.machine.machine import Chains, Step
 from kinetostat.tolerances import LEAST_NORM_DAMPING, PARALLEL_AXES, UNDETERMINED
 
 Coordinates = dict[str, Scalar]
 """Of the platform: x, y, z (m) and roll, pitch, yaw (rad), one entry per problem; a float where it is the same."""
+
+
+def some(coordinates: Coordinates, chosen: Integers) -> Coordinates:
+    """The coordinates of some problems, by number."""
+    return {name: value if isinstance(value, float) else value[chosen] for name, value in coordinates.items()}
 
 
 @dataclass(frozen=True)
@@ -146,6 +143,11 @@ class Problems:
     def size(self) -> int:
         """How many unknowns each problem has."""
         return sum(part.columns.size for part in self.parts) + len(self.free)
+
+    @property
+    def rows(self) -> int:
+        """Number of equations of each problem."""
+        return 6 * sum(len(part.columns) for part in self.parts)
 
     @property
     def lengths(self) -> Array:

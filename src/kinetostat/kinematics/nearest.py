@@ -11,6 +11,7 @@ from kinetostat.arrays import Array, Integers
 from kinetostat.kinematics.closing import ANGLES, POINT
 from kinetostat.kinematics.leg_gaps import Problems, free_coordinates, least_norm, problems_of
 from kinetostat.machine.machine import Machine
+from kinetostat.numerics.iteration import Steps, largest, newton
 from kinetostat.tolerances import CLOSED, DEPENDENT, NEAREST_GAIN, NO_COORDINATE
 
 MOST_STEPS, MOST_CORRECTIONS = 30, 8
@@ -123,18 +124,19 @@ class _Search:
         Returns:
             Unknowns that nearly close them, NaN where that fails; the gaps that are left there, and their rates.
         """
-        unknowns, problems = start + steps, self.problems.take(np.zeros(len(steps), dtype=int))
+        count = len(steps)
+        problems = self.problems.take(np.zeros(count, dtype=int))
         enough = np.maximum(CLOSED, NEARLY_CLOSED * np.minimum(np.abs(steps).max(axis=1), LONG) ** 2)
-        last, active = np.full(len(unknowns), np.inf), np.ones(len(unknowns), dtype=bool)
-        for _ in range(MOST_CORRECTIONS):
-            left, rates = problems.gaps(unknowns, self.home)
-            gap = np.max(np.abs(left), axis=1)
-            active = (gap > enough) & (gap < CONTRACTION * last)
-            if not active.any():
-                break
-            unknowns = unknowns + np.where(active[:, None], least_norm(rates, left), 0.0)
-            last = gap
-        return np.where((gap <= enough)[:, None], unknowns, np.nan), left, rates
+        left, rates = np.zeros((count, problems.rows)), np.zeros((count, problems.rows, problems.size))
+
+        def equations(unknowns: Array, rows: Integers) -> tuple[Array, Steps]:
+            left[rows], rates[rows] = problems.take(rows).gaps(unknowns, self.home)
+            return largest(left[rows]), lambda going: least_norm(rates[rows[going]], left[rows[going]])
+
+        end = newton(
+            equations, start + steps, count, most_steps=MOST_CORRECTIONS, closed=enough, contraction=CONTRACTION
+        )
+        return np.where(end.converged[:, None], end.value, np.nan), left, rates
 
 
 def _ways(rates: Array) -> Array:

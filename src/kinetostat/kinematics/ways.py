@@ -15,7 +15,7 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import Vector
-from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.arrays import Array, Mask
 from kinetostat.kinematics.closing import ANGLES, POINT, placement_of
 from kinetostat.kinematics.leg_gaps import Coordinates, Problems
 from kinetostat.machine.column import column, plain
@@ -25,11 +25,6 @@ Way = Callable[[Array], Coordinates]
 """From the share of the way that is done in each problem [problems] to coordinates of the platform there."""
 Plan = Callable[[Problems, Coordinates], Way]
 """From problems and their goals to a way."""
-
-
-def some(coordinates: Coordinates, chosen: Integers) -> Coordinates:
-    """The coordinates of some problems, by number."""
-    return {name: value if isinstance(value, float) else value[chosen] for name, value in coordinates.items()}
 
 
 def ways(problems: Problems, goal: Coordinates) -> Iterator[tuple[Plan, Mask]]:

@@ -4,12 +4,13 @@ It is what parameters become in a batch of machines or poses. With it a formula 
 `a * c - b * b`, runs over a whole batch and skips what is zero by form.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar
-from kinetostat.arrays import AnyArray
+from kinetostat.arrays import AnyArray, Array
 
 _new = object.__new__
 
@@ -152,3 +153,10 @@ def column(values: Any) -> Any:
 def plain(values: Any) -> Any:
     """Return the array of a column; anything else as it is."""
     return values.values if values.__class__ is Column else values
+
+
+def stacked(scalars: Sequence[Scalar], count: int) -> Array:
+    """Stack scalars as columns [n x scalars]."""
+    if not scalars:
+        return np.zeros((count, 0))
+    return np.stack([np.broadcast_to(np.asarray(s, dtype=float), (count,)) for s in scalars], axis=1)

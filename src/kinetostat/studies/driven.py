@@ -14,12 +14,12 @@ from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.commanding import commanded
 from kinetostat.equilibrium.numbers import loaded_mechanism
 from kinetostat.equilibrium.stability import stabilities
-from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators, senses_of
+from kinetostat.machine.column import stacked
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.errors import InputError

@@ -17,7 +17,7 @@ from kinetostat.algebra.scalar import is_zero
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import Placed
 from kinetostat.equilibrium.chains import Chain, Masses
-from kinetostat.equilibrium.motion import Motions, cross, skew_of
+from kinetostat.numerics.motions import Motions, cross, skew_of
 
 TENSOR_ROWS = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
 """Places of the rows of an inertia tensor among xx, yy, zz, xy, xz, yz."""

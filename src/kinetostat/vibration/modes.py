@@ -18,8 +18,8 @@ import numpy as np
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.admissible import starts_of, tangent_matrices, within
 from kinetostat.equilibrium.balance import Balance, placed_leg
-from kinetostat.equilibrium.motion import skew_of
 from kinetostat.kinetostatics.quantities import MODES
+from kinetostat.numerics.motions import skew_of
 from kinetostat.tolerances import CLOSING_ROUND_OFF, EQUAL_STIFFNESSES, UNRESISTED
 from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
 

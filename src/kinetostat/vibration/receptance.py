@@ -14,9 +14,9 @@ from kinetostat.arrays import Array, Complex
 from kinetostat.equilibrium.balance import Balance, balance, free_state
 from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.solving import with_share
-from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import Response
+from kinetostat.machine.column import stacked
 from kinetostat.machine.machine import Machine
 from kinetostat.vibration.modes import Modes, damping_matrix, modes
 

@@ -20,7 +20,6 @@ from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import balance, free_state, placed_leg
 from kinetostat.equilibrium.cut import Cut, Rod, cut
 from kinetostat.equilibrium.mechanism import mechanism_of, platform_weights
-from kinetostat.equilibrium.motion import of_scalars
 from kinetostat.equilibrium.reduced import place_of, relative
 from kinetostat.equilibrium.solving import with_share
 from kinetostat.kinematics.closure import Joints, solve_joints
@@ -28,6 +27,7 @@ from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.loads import PLATFORM, moving_masses
 from kinetostat.machine.machine import Machine
+from kinetostat.numerics.motions import of_scalars
 from kinetostat.tolerances import UNRESISTED
 from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
 from kinetostat.vibration.modes import frequencies, hertz

@@ -19,11 +19,11 @@ from kinetostat.equilibrium.admissible import starts_of, tangent_matrices
 from kinetostat.equilibrium.balance import Balance, balance, free_state, placed_leg
 from kinetostat.equilibrium.chains import Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
-from kinetostat.equilibrium.motion import of_scalars, still
 from kinetostat.equilibrium.solving import with_share
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.machine import Machine
+from kinetostat.numerics.motions import of_scalars, still
 from kinetostat.tolerances import CLOSING_ROUND_OFF, UNRESISTED
 from kinetostat.vibration.inertia import PartRates, energies, leg_rates, platform_rates
 from kinetostat.vibration.modes import mass_matrix, motions_left_out, solved

@@ -14,8 +14,8 @@ import numpy as np
 from kinetostat.accuracy.errors import MachineError
 from kinetostat.accuracy.model import PLACED, ErrorModel
 from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.equilibrium.motion import Motions, cross, exponential, logarithm
 from kinetostat.kinematics.status import Status
+from kinetostat.numerics.motions import Motions, cross, exponential, logarithm
 from kinetostat.studies.identification.measurements import EULER, FAR, POSITION, TURNED, Measurements
 
 STEP = 1e-5

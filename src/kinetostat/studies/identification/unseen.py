@@ -15,7 +15,7 @@ import numpy as np
 from kinetostat.accuracy.errors import Insertion, MachineError, effects
 from kinetostat.accuracy.rows import places_of
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.motion import cross
+from kinetostat.numerics.motions import cross
 from kinetostat.studies.identification.fit import Fit
 from kinetostat.studies.identification.observed import FRAME, TARGET, Observed
 from kinetostat.tolerances import SEEN_BY_LEG

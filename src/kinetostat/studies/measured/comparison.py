@@ -15,9 +15,9 @@ from scipy.special import chdtrc
 from kinetostat.accuracy.model import PLACED, ErrorModel, error_model
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
-from kinetostat.kinematics.closing import stacked
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
+from kinetostat.machine.column import stacked
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.arguments import checked

@@ -15,7 +15,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, cos, is_zero, sin
 from kinetostat.algebra.vector import Vector, rotation_along
 from kinetostat.arrays import Array
-from kinetostat.kinematics.closing import stacked
+from kinetostat.machine.column import stacked
 
 NEXT, AFTER = [1, 2, 0], [2, 0, 1]
 """The axes that come next in turn, and after these."""

@@ -1,0 +1,1 @@
+"""Arrays of many problems: rigid motions, and iterations."""

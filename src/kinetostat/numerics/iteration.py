@@ -1,0 +1,245 @@
+"""Iterations over many problems at once: Newton's method, and damped least squares. The equations are stated elsewhere.
+
+Each problem of a batch goes its own way and ends by itself, so that its result does not depend on the others. Problems
+that have ended cost no more time.
+
+Source: Newton's method and its criteria: P. Deuflhard, Newton Methods for Nonlinear Problems (2011), sections 1.4 and
+2.1; E. Hairer and G. Wanner, Solving Ordinary Differential Equations II (1996), section IV.8. Damped least squares:
+D. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", J. SIAM 11, 1963.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from operator import add
+from typing import Any, Generic, Protocol, Self, TypeVar
+
+import numpy as np
+
+from kinetostat.arrays import Array, Integers, Mask
+
+SHRINKING = 0.1
+"""Ratio of a step to the one before it below which steps still shrink fast: Newton's method near a solution."""
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-14, 1e6
+"""Damping of least squares as shares of the mean square of the rates."""
+DAMPING_CHANGE = 10.0
+"""Factor by which damping becomes less after a step that has led nearer, and more after another one."""
+
+
+class Outcome(IntEnum):
+    """How an iteration has ended."""
+
+    CONVERGED = 0
+    DIVERGED = 1
+    OUT_OF_STEPS = 2
+
+    @property
+    def sentence(self) -> str:
+        """A sentence for people."""
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    Outcome.CONVERGED: "The equations are solved, or further steps change nothing but round-off.",
+    Outcome.DIVERGED: "A step has not led nearer to a solution, or its numbers are not finite.",
+    Outcome.OUT_OF_STEPS: "The last step that was allowed still changed something.",
+}
+
+
+class Batch(Protocol):
+    """Values of the unknowns of n problems that are more than one array."""
+
+    def at(self, rows: Integers) -> Self:
+        """Return the values of some of the problems."""
+
+    def with_part(self, rows: Integers, part: Self) -> Self:
+        """Return the values with those of some of the problems in their places."""
+
+
+Value = TypeVar("Value", bound=Array | Batch)
+"""An array with the problems first, or a `Batch`."""
+Steps = Callable[[Integers], Array]
+"""From the numbers of some problems to Newton's steps of their unknowns [problems x unknowns]."""
+
+
+@dataclass(frozen=True)
+class Solution(Generic[Value]):
+    """Results of an iteration for n problems.
+
+    Attributes:
+        value: the unknowns that were reached; where a problem has diverged, those before the step that did not lead
+            nearer.
+        outcome: `Outcome` codes [n].
+        residual: the largest residual of each problem where it was evaluated last [n].
+        steps: number of steps that were taken [n].
+    """
+
+    value: Value
+    outcome: Integers
+    residual: Array
+    steps: Integers
+
+    @property
+    def converged(self) -> Mask:
+        """Whether each problem has converged [n]."""
+        return np.asarray(self.outcome == Outcome.CONVERGED)
+
+    def __repr__(self) -> str:
+        counts = [f"{int((self.outcome == end).sum())}: {end.sentence}" for end in Outcome if end in self.outcome]
+        return (
+            f"<Solution of {len(self.outcome)} problems in up to {self.steps.max(initial=0)} steps. {' '.join(counts)}>"
+        )
+
+
+def largest(numbers: Array) -> Array:
+    """Return the largest size of a number in each row [n x m]; infinity where one is not finite."""
+    result = np.abs(numbers).max(axis=1, initial=0.0)
+    return np.where(np.isfinite(result), result, np.inf)
+
+
+def newton(
+    equations: Callable[[Value, Integers], tuple[Array, Steps]],
+    start: Value,
+    count: int,
+    *,
+    most_steps: int,
+    move: Callable[[Value, Array], Value] = add,
+    closed: float | Array = 0.0,
+    contraction: float = np.inf,
+    settled: float = 0.0,
+    round_off: float | None = None,
+    least_steps: int = 1,
+    longest: float = np.inf,
+    size: Callable[[Array], Array] = largest,
+) -> Solution[Value]:
+    """Solve n problems by Newton's method.
+
+    A problem has converged by its residual or by its steps. It has diverged where a residual has not become less as it
+    should, or where numbers are not finite. The step by which it is seen to have converged is taken as well.
+
+    Args:
+        equations: from the unknowns of some problems, and their numbers, to their largest residuals and a function that
+            makes Newton's steps for some of these.
+        start: unknowns to begin with.
+        count: number of problems, n.
+        most_steps: number of steps that are taken at most.
+        move: from unknowns and a step to the unknowns after it.
+        closed: residual at which a problem has converged, one for all or each its own [n].
+        contraction: share of the residual before it that a step may leave.
+        settled: size of a step below which a problem has converged.
+        round_off: size down to which steps are continued that still shrink fast; `settled` if None.
+        least_steps: number of steps before a problem counts as converged by their size.
+        longest: size to which a step is shortened.
+        size: of steps [n x unknowns]; the largest number if not given.
+    """
+    value, trial, rows = start, start, np.arange(count)
+    finest, limits = settled if round_off is None else round_off, np.broadcast_to(closed, (count,))
+    outcome, steps = np.full(count, int(Outcome.OUT_OF_STEPS)), np.zeros(count, dtype=np.int64)
+    residual, last = np.full((2, count), np.inf)
+    for number in range(1, most_steps + 1):
+        left, steps_of = equations(trial, rows)
+        solved = left <= limits[rows]
+        nearer = solved | (left < contraction * residual[rows])
+        outcome[rows[solved]], outcome[rows[~nearer]] = Outcome.CONVERGED, Outcome.DIVERGED
+        value, residual[rows[nearer]] = _with_part(value, rows, trial, nearer), left[nearer]
+        going = np.flatnonzero(nearer & ~solved)
+        if not going.size:
+            return Solution(value, outcome, residual, steps)
+        step, trial, rows = steps_of(going), _at(trial, going, len(rows)), rows[going]
+        length = size(step)
+        finite = np.isfinite(length)
+        still_shrinking = (length < SHRINKING * last[rows]) & (length > finest)
+        arrived = (length < settled) & ~still_shrinking & (number >= least_steps)
+        outcome[rows[arrived]], outcome[rows[~finite]] = Outcome.CONVERGED, Outcome.DIVERGED
+        last[rows], steps[rows] = length, number
+        if (length > longest).any():
+            step = step * np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
+        trial = move(trial, step)
+        value = _with_part(value, rows, trial, arrived)
+        going = np.flatnonzero(finite & ~arrived)
+        trial, rows = _at(trial, going, len(rows)), rows[going]
+        if not rows.size:
+            return Solution(value, outcome, residual, steps)
+    return Solution(_with_part(value, rows, trial, rows >= 0), outcome, residual, steps)
+
+
+def _at(value: Value, places: Integers, count: int) -> Value:
+    """Some of so many problems, by ascending places; the value itself where that is all of them."""
+    if len(places) == count:
+        return value
+    part: Any = value[places] if isinstance(value, np.ndarray) else value.at(places)
+    return part
+
+
+def _with_part(value: Value, rows: Integers, part: Any, chosen: Mask) -> Value:
+    """Unknowns with those of a part of the problems, by number, where they are chosen in it."""
+    places = np.flatnonzero(chosen)
+    if not len(places):
+        return value
+    if not isinstance(value, np.ndarray):
+        return value.with_part(rows[places], part.at(places))
+    changed = value.copy()
+    changed[rows[places]] = part[places]
+    return changed
+
+
+def least_squares(
+    equations: Callable[[Array, Integers], tuple[Array, Array]],
+    start: Array,
+    *,
+    most_steps: int,
+    settled: float,
+    closed: float,
+) -> Solution[Array]:
+    """Solve n problems by damped least squares, whose steps are Newton's near a solution and go downhill far from one.
+
+    A step is taken where it makes the sum of squares less. Damping follows: it becomes less after such a step, and more
+    after another one.
+
+    Args:
+        equations: from the unknowns of some problems [k x unknowns], and their numbers, to what is left of the
+            equations [k x m] and how the unknowns reduce it [k x m x unknowns].
+        start: unknowns to begin with [n x unknowns].
+        most_steps: number of steps that are tried at most.
+        settled: residual at which a problem has converged.
+        closed: residual below which it has converged as well if a step leads no nearer: round-off is left.
+    """
+    value, count = start.copy(), len(start)
+    left, rates = equations(value, np.arange(count))
+    damping, steps = np.full(count, FIRST_DAMPING), np.zeros(count, dtype=np.int64)
+    going = np.asarray(np.isfinite(left).all(axis=1) & np.isfinite(rates).all(axis=(1, 2)))
+    outcome = np.where(going, int(Outcome.OUT_OF_STEPS), int(Outcome.DIVERGED))
+    for _ in range(most_steps if value.shape[1] else 0):
+        rows = np.flatnonzero(going)
+        if not rows.size:
+            break
+        trial = value[rows] + damped_steps(left[rows], rates[rows], damping[rows])
+        there, rates_there = equations(trial, rows)
+        nearer = (there**2).sum(axis=1) < (left[rows] ** 2).sum(axis=1)
+        nearer &= np.isfinite(rates_there).all(axis=(1, 2))
+        taken = rows[nearer]
+        value[taken], left[taken], rates[taken] = trial[nearer], there[nearer], rates_there[nearer]
+        steps[rows] += 1
+        change = np.where(nearer, 1.0 / DAMPING_CHANGE, DAMPING_CHANGE)
+        damping[rows] = np.clip(damping[rows] * change, LEAST_DAMPING, MOST_DAMPING)
+        residual = largest(left[rows])
+        solved = (residual <= settled) | (~nearer & (residual < closed))
+        stuck = ~solved & ~(damping[rows] < MOST_DAMPING)
+        outcome[rows[solved]], outcome[rows[stuck]] = Outcome.CONVERGED, Outcome.DIVERGED
+        going[rows] = ~solved & ~stuck
+    return Solution(value, outcome, largest(left), steps)
+
+
+def damped_steps(left: Array, rates: Array, damping: Array) -> Array:
+    """Return steps of damped least squares [n x unknowns].
+
+    Args:
+        left: what is left of the equations [n x m].
+        rates: how the unknowns reduce it [n x m x unknowns].
+        damping: share of the mean square of the rates that is added to their squares [n].
+    """
+    back = np.swapaxes(rates, 1, 2)
+    square = back @ rates
+    mean = np.trace(square, axis1=1, axis2=2) / square.shape[1] + 1e-300
+    square = square + (damping * mean)[:, None, None] * np.eye(square.shape[1])
+    return np.asarray(np.linalg.solve(square, back @ left[:, :, None])[:, :, 0])
