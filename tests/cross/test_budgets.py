@@ -8,8 +8,7 @@ from kinetostat.accuracy.model import error_model
 from kinetostat.kinematics.forward import stand
 from kinetostat.machine.parameters import values
 from kinetostat.spec.tolerance_table import read_tolerances
-from kinetostat.studies.budget.inputs import inputs_of
-from kinetostat.studies.budget.toleranced import toleranced
+from kinetostat.studies.budget.tolerances import random_inputs, toleranced_parts
 
 
 @pytest.mark.parametrize("name", ["hexapod", "delta", "planar-3rpr"])
@@ -35,8 +34,8 @@ def test_drawn_machines_are_those_of_forward_kinematics():
     fields = ("base_radius", "platform_radius", "base_height")
     lines = read_tolerances({"zeros": "0.2 mm", **{f"geometry.{field}": "0.5 mm" for field in fields}})
     model = error_model(machine, {}, 1)
-    parts = toleranced(machine, model.errors, lines)
-    made = inputs_of(parts, model.rates(), model.drawn.load, 0.1)
+    parts = toleranced_parts(machine, model.errors, lines)
+    made = random_inputs(parts, model.rates(), model.drawn.load, 0.1)
     here = values(machine)
     for drawn in next(made.machines(4, 5)):
         errors = made.drawn + made.errors @ drawn
@@ -86,8 +85,8 @@ def test_what_single_contributions_leave_bounds_total_indices_and_falls_with_the
         answer = budget(machine, tolerances=lines, samples=16, exact=512)
         left.append(answer.exact.unexplained[answer.measures.index("position")])
         model = error_model(machine, {}, 1)
-        parts = toleranced(machine, model.errors, read_tolerances(lines))
-        made = inputs_of(parts, model.rates(), model.drawn.load, model.length)
+        parts = toleranced_parts(machine, model.errors, read_tolerances(lines))
+        made = random_inputs(parts, model.rates(), model.drawn.load, model.length)
         names = list(dict.fromkeys(part.line for part in parts))
         groups = [np.flatnonzero(np.array([parts[o].line == name for o in made.owner])) for name in names]
         total = total_indices(machine, made, groups)

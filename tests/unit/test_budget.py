@@ -14,12 +14,10 @@ from kinetostat.exchange.leg_by_leg import legs_of
 from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import values
 from kinetostat.spec.tolerance_table import read_tolerances
-from kinetostat.studies.budget.allocation import allocated, reach_of
+from kinetostat.studies.budget.allocation import allocation_for, reach_of
 from kinetostat.studies.budget.data import contributions_csv
-from kinetostat.studies.budget.inputs import inputs_of
-from kinetostat.studies.budget.measures import measures_of
-from kinetostat.studies.budget.spread import Measures, first_order, spread_of
-from kinetostat.studies.budget.toleranced import Toleranced, is_about, toleranced
+from kinetostat.studies.budget.spread import Measures, first_order, measures_of, spread_of
+from kinetostat.studies.budget.tolerances import TolerancedPart, is_about, random_inputs, toleranced_parts
 
 LINES = {
     "hexapod": {"joints": "0.05 mm", "zeros": "0.02 mm normal", "gains": "20 um/m", "clearances": "5 um"},
@@ -34,7 +32,7 @@ FEW = 1 << 12
 def parts_of(*groups, limit=1e-3, normal=False, cost=1.0, line=None):
     """Parts of a machine that is only a matrix of rates: a tuple of errors each."""
     return tuple(
-        Toleranced(
+        TolerancedPart(
             tuple(places), f"legs.{number}", f"number {number}", "length",
             "clearances" if len(places) > 1 else "geometry", "leg", line or str(number), limit, normal, cost,
         )
@@ -50,7 +48,7 @@ def measures(along=None):
 def inputs(parts, rates, load=None):
     """The variables of parts at a single pose."""
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
-    return inputs_of(parts, np.asarray(rates)[None], wrench[None], 1.0)
+    return random_inputs(parts, np.asarray(rates)[None], wrench[None], 1.0)
 
 
 def random_rates(errors, seed=0):
@@ -84,16 +82,16 @@ def test_shares_are_what_the_variance_loses_without_a_line(name):
 def test_drawn_machines_have_the_predicted_mean_square_and_no_worse_case(name):
     machine = load(name)
     model = error_model(machine, {}, 1)
-    parts = toleranced(machine, model.errors, read_tolerances(LINES[name]))
-    variables = inputs_of(parts, model.rates(), model.drawn.load, 1.0)
+    parts = toleranced_parts(machine, model.errors, read_tolerances(LINES[name]))
+    variables = random_inputs(parts, model.rates(), model.drawn.load, 1.0)
     rows = measures_of(np.eye(6)[None], machine.family.component_names, None, 1.0)[0]
     drawn = np.concatenate(list(variables.machines(FEW, 3)))
-    sizes = rows.sizes(rows.applied((drawn @ variables.columns[0].T)[:, :, None])[:, :, 0])
+    sizes = rows.sizes(rows.linear((drawn @ variables.columns[0].T)[:, :, None])[:, :, 0])
     _, rms, rss, worst = first_order(variables, rows)
     assert np.sqrt((sizes**2).mean(axis=0)) == pytest.approx(rms[0], rel=0.03)
     bounded = replace(variables, parts=tuple(replace(part, normal=False) for part in parts))
     even = np.concatenate(list(bounded.machines(FEW, 3)))
-    sizes = rows.sizes(rows.applied((even @ variables.columns[0].T)[:, :, None])[:, :, 0])
+    sizes = rows.sizes(rows.linear((even @ variables.columns[0].T)[:, :, None])[:, :, 0])
     assert (sizes.max(axis=0) <= worst[0] * (1 + 1e-9)).all()
     assert (rms[0] <= rss[0]).all()
     assert (rss[0] <= worst[0] * (1 + 1e-9)).all()
@@ -132,12 +130,12 @@ def test_a_free_joint_moves_evenly_in_a_disc_or_a_ball(size):
 def test_the_worst_case_is_that_of_all_corners(poses):
     """At many poses fewer directions are tried, from which steps must lead to the farthest corner."""
     rates = np.stack([random_rates(14, seed) for seed in range(poses)])
-    made = inputs_of(parts_of(*([i] for i in range(14))), rates, np.zeros((poses, 6)), 1.0)
+    made = random_inputs(parts_of(*([i] for i in range(14))), rates, np.zeros((poses, 6)), 1.0)
     rows = measures((1.0, 0.0, 0.0))
     worst = first_order(made, rows)[3]
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=14)))
     for pose in range(poses):
-        sizes = rows.sizes(signs @ rows.applied(made.columns)[pose].T)
+        sizes = rows.sizes(signs @ rows.linear(made.columns)[pose].T)
         assert worst[pose] == pytest.approx(sizes.max(axis=0), rel=1e-9)
 
 
@@ -177,8 +175,8 @@ def test_a_joint_is_free_at_poses_where_the_load_does_not_reach_it():
     load = np.array([0.0, 0, 0, 0, 0, -100.0])
     rates[1, 5, :3] = 1e-14  # at the second pose the load does no work on the first joint, at the third on neither
     rates[2, 5, :5] = 1e-14
-    whole = inputs_of(parts, rates, np.tile(load, (3, 1)), 1.0)
-    slab = inputs_of(parts, rates[2:], load[None], 1.0, others=True)
+    whole = random_inputs(parts, rates, np.tile(load, (3, 1)), 1.0)
+    slab = random_inputs(parts, rates[2:], load[None], 1.0, others=True)
     assert whole.pressed.tolist() == [[True, True, False], [False, True, False], [False, False, False]]
     assert (whole.owner == slab.owner).all()
     together = first_order(whole, measures())
@@ -231,8 +229,8 @@ def test_the_joints_of_a_strut_are_pressed_along_it():
     """The reaction of a strut between two balls has its direction, whatever else the machine does."""
     machine = load("hexapod", ["load.force=[50, 20, -400]", "pose.x=5 mm", "pose.roll=3 deg"])
     model = error_model(machine, {}, 1)
-    parts = toleranced(machine, model.errors, read_tolerances({"clearances": "5 um"}))
-    made = inputs_of(parts, model.rates(), model.drawn.load, 0.3)
+    parts = toleranced_parts(machine, model.errors, read_tolerances({"clearances": "5 um"}))
+    made = random_inputs(parts, model.rates(), model.drawn.load, 0.3)
     assert made.pressed.all()
     legs = {leg.name: leg for leg in machine.configure().legs}
     for number, part in enumerate(parts):
@@ -317,7 +315,7 @@ def test_corrections_take_away_as_much_as_they_can():
     drives[0, 3, 0], drives[0, 1, 0], drives[0, 4, 1] = 1.0, 0.5, 1.0
     rows, freedoms, parasitic = measures_of(drives, ("rx", "ry", "rz", "x", "y", "z"), None, 2.0)
     assert (freedoms, parasitic) == (2, ("rx", "rz", "z"))
-    left = rows.applied(np.concatenate([drives, np.eye(6)[None]], axis=2))[0, 6:12]
+    left = rows.linear(np.concatenate([drives, np.eye(6)[None]], axis=2))[0, 6:12]
     assert left[:, :2] == pytest.approx(np.zeros((6, 2)), abs=1e-12)
     weights = np.array([4.0] * 3 + [1.0] * 3)
     assert drives[0].T @ (weights[:, None] * left[:, 2:]) == pytest.approx(np.zeros((2, 6)), abs=1e-12)
@@ -339,7 +337,7 @@ def least(weights, costs, power, wanted=1.0):
     """An allocation of lines with given weights at each pose [poses x lines]."""
     parts = tuple(part for k, c in enumerate(costs) for part in parts_of([k], cost=c, line=str(k)))
     by = "rss" if power == 2 else "worst"
-    return allocated(parts, [{by: np.array(weights, dtype=float)}], wanted, by, "position")
+    return allocation_for(parts, [{by: np.array(weights, dtype=float)}], wanted, by, "position")
 
 
 @pytest.mark.parametrize("power", [1, 2])

@@ -11,9 +11,9 @@ from kinetostat.display import Display, number
 from kinetostat.kinematics.status import Status
 from kinetostat.spec.tolerance_table import Tolerance
 from kinetostat.studies.budget.allocation import Allocation
-from kinetostat.studies.budget.budget import DIGITS, NOTHING, Budget
+from kinetostat.studies.budget.budget import DRAWN_DIGITS, ROUND_OFF_SHARE, Budget
 from kinetostat.studies.budget.data import STATISTICS
-from kinetostat.studies.budget.toleranced import Toleranced, is_about
+from kinetostat.studies.budget.tolerances import TolerancedPart, is_about
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.tables import numeric_table, text_table
 
@@ -61,7 +61,9 @@ def shown_measures(budget: Budget, full: bool = False) -> list[str]:
         most = max(float(np.nanmax(budget.size("worst", m))) for m in of_unit)
         parasitic = name.startswith("parasitic ")
         single = parasitic and f"parasitic {'rotation' if unit == 'rad' else 'position'}" != name
-        if parasitic and ((single and not full) or float(np.nanmax(budget.size("worst", name))) <= NOTHING * most):
+        if parasitic and (
+            (single and not full) or float(np.nanmax(budget.size("worst", name))) <= ROUND_OFF_SHARE * most
+        ):
             continue
         shown.append(name)
     return shown
@@ -84,10 +86,13 @@ def sizes_table(budget: Budget, full: bool = False) -> FittedTable:
         place = budget.measures.index(name)
         scale = display.deflection(budget.units[place])
         sizes = [float(np.nanmax(budget.size(s, name))) for s in statistics]
-        cells = [number((size if size > NOTHING * sizes[-1] else 0.0) * scale.factor, digits=DIGITS) for size in sizes]
+        cells = [
+            number((size if size > ROUND_OFF_SHARE * sizes[-1] else 0.0) * scale.factor, digits=DRAWN_DIGITS)
+            for size in sizes
+        ]
         if many:
             everywhere = float(budget.spread.everywhere[place]) * scale.factor
-            cells += [str(int(np.nanargmax(budget.size("usual", name))) + 1), number(everywhere, digits=DIGITS)]
+            cells += [str(int(np.nanargmax(budget.size("usual", name))) + 1), number(everywhere, digits=DRAWN_DIGITS)]
         table.add_row(f"{name} (parasitic)" if name in budget.parasitic else name, scale.unit, *cells)
     return table
 
@@ -168,7 +173,7 @@ def _print_parts(console: Console, budget: Budget, full: bool) -> None:
         )
 
 
-def limit_of(part: Toleranced, display: Display) -> str:
+def limit_of(part: TolerancedPart, display: Display) -> str:
     """A tolerance with its unit, "0.05 mm"."""
     if part.kind == "ratio":
         return f"{number(part.limit / PER_METRE, digits=display.digits)} µm/m"
@@ -220,8 +225,8 @@ def _new_tolerance(budget: Budget, line: str, factor: float) -> str:
     return ", ".join(texts)
 
 
-def _scaled(part: Toleranced, factor: float) -> Toleranced:
-    return Toleranced(**{**vars(part), "limit": part.limit * factor})
+def _scaled(part: TolerancedPart, factor: float) -> TolerancedPart:
+    return TolerancedPart(**{**vars(part), "limit": part.limit * factor})
 
 
 def print_errors(console: Console, errors: tuple[MachineError, ...], tolerances: Mapping[str, Tolerance]) -> None:

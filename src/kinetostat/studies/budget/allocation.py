@@ -14,13 +14,12 @@ from scipy.optimize import minimize
 
 from kinetostat.arrays import Array
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.budget.inputs import Inputs
 from kinetostat.studies.budget.spread import Measures
-from kinetostat.studies.budget.toleranced import Toleranced
+from kinetostat.studies.budget.tolerances import RandomInputs, TolerancedPart
 
-MOST_POSES = 40
+MOST_DECIDING_POSES = 40
 """Poses that decide an allocation together: each is added because it exceeds the wanted error."""
-KEPT = 1e-9
+ALLOWED_EXCESS = 1e-9
 """Share of the wanted error by which a pose may exceed it: round-off of the search."""
 
 
@@ -52,12 +51,12 @@ class Allocation(Immutable):
     evenly: float
 
 
-def reach_of(inputs: Inputs, measures: Measures, measure: str) -> dict[str, Array]:
+def reach_of(inputs: RandomInputs, measures: Measures, measure: str) -> dict[str, Array]:
     """Motion of the tool by the limits of each part alone, m [n x parts], for both ways to add them up.
 
     A joint that a load presses counts with its whole clearance.
     """
-    rows = measures.applied(inputs.columns)[:, measures.places(measure)]
+    rows = measures.linear(inputs.columns)[:, measures.places(measure)]
     squares = (rows**2).sum(axis=1) * np.where(inputs.pressed[:, inputs.owner], 4.0, 1.0)
     parts = np.zeros((len(rows), len(inputs.parts)))
     np.add.at(parts.T, inputs.owner, squares.T)
@@ -68,8 +67,8 @@ def reach_of(inputs: Inputs, measures: Measures, measure: str) -> dict[str, Arra
     return {"rss": parts, "worst": farthest}
 
 
-def allocated(
-    parts: Sequence[Toleranced], reach: Sequence[Mapping[str, Array]], wanted: float, by: str, measure: str
+def allocation_for(
+    parts: Sequence[TolerancedPart], reach: Sequence[Mapping[str, Array]], wanted: float, by: str, measure: str
 ) -> Allocation:
     """Find the factors of all lines that keep an error at least cost, theory (54).
 
@@ -114,13 +113,13 @@ def _least_cost(weights: Array, costs: Array, power: int) -> Array:
     Poses are taken in as they exceed the error: most of them decide nothing.
     """
     chosen = [int(weights.sum(axis=1).argmax())]
-    for _ in range(MOST_POSES):
+    for _ in range(MOST_DECIDING_POSES):
         factors = _closed_form(weights[chosen[0]], costs, power)
         if len(chosen) > 1 or not np.isfinite(factors).all():
-            factors = _searched(weights[chosen], costs, power)
+            factors = _search(weights[chosen], costs, power)
         errors = weights @ factors**power
         farthest = int(errors.argmax())
-        if errors[farthest] <= 1.0 + KEPT or farthest in chosen:
+        if errors[farthest] <= 1.0 + ALLOWED_EXCESS or farthest in chosen:
             break
         chosen.append(farthest)
     return np.asarray(factors * min(1.0, float(errors.max()) ** (-1.0 / power)))
@@ -134,7 +133,7 @@ def _closed_form(weights: Array, costs: Array, power: int) -> Array:
     return np.asarray(shape * float((weights[known] * shape[known] ** power).sum()) ** (-1.0 / power))
 
 
-def _searched(weights: Array, costs: Array, power: int) -> Array:
+def _search(weights: Array, costs: Array, power: int) -> Array:
     """The factors at several poses: a convex problem in their logarithms."""
 
     def cost(logarithms: Array) -> tuple[float, Array]:

@@ -25,12 +25,20 @@ from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.tolerance_table import Tolerance, joined, read_tolerances
 from kinetostat.studies.attribution import ranked
-from kinetostat.studies.budget.allocation import Allocation, allocated, reach_of
-from kinetostat.studies.budget.exact import ExactSample, solved_exactly
-from kinetostat.studies.budget.inputs import Inputs, inputs_of
-from kinetostat.studies.budget.measures import PARASITIC, measures_of
-from kinetostat.studies.budget.spread import SHARE, Measures, Spread, shares, spread_of, squares_of
-from kinetostat.studies.budget.toleranced import Toleranced, toleranced
+from kinetostat.studies.budget.allocation import Allocation, allocation_for, reach_of
+from kinetostat.studies.budget.spread import (
+    PARASITIC,
+    USUAL_PERCENT,
+    ExactSample,
+    Measures,
+    Spread,
+    exact_sample,
+    measures_of,
+    shares,
+    spread_of,
+    squares_of,
+)
+from kinetostat.studies.budget.tolerances import RandomInputs, TolerancedPart, random_inputs, toleranced_parts
 from kinetostat.studies.evaluation.columns import PoseColumns
 from kinetostat.studies.evaluation.given_poses import given_poses
 from kinetostat.studies.grid.grid import GridQuestion, grid_question
@@ -46,12 +54,12 @@ POSES_AT_ONCE = 128
 MOST_AT_ONCE = 1 << 20
 """Products of poses and machines that are kept at once: each has a dozen numbers."""
 MOST_POSES = 200_000
-BY = ("rss", "worst")
+ALLOCATION_RULES = ("rss", "worst")
 STATISTICS = ("mean", "rms", "rss", "usual", "worst")
-KEYS = ("line", "leg", "group", "path")
-NOTHING = 1e-9
+SHARE_KEYS = ("line", "leg", "group", "path")
+ROUND_OFF_SHARE = 1e-9
 """Share of an error below which a part of it is round-off."""
-DIGITS = 3
+DRAWN_DIGITS = 3
 """Of errors of the tool: percentiles of drawn machines have no more."""
 
 
@@ -83,7 +91,7 @@ class Budget(Immutable):
 
     machine: Machine
     tolerances: tuple[Tolerance, ...]
-    parts: tuple[Toleranced, ...]
+    parts: tuple[TolerancedPart, ...]
     pressed: tuple[str, ...]
     sometimes: tuple[str, ...]
     poses: PoseColumns | None
@@ -144,7 +152,7 @@ class Budget(Immutable):
         Raises:
             InputError: there is no such key or measure.
         """
-        choice(key, KEYS, "key")
+        choice(key, SHARE_KEYS, "key")
         row = self.shares[self.measures.index(choice(measure or self.leading, self.measures, "measure"))]
         sums: dict[str, float] = {}
         for part, share in zip(self.parts, row.tolist(), strict=True):
@@ -227,7 +235,7 @@ def _check(poses: Any, ranges: Sequence[str], samples: int, exact: int, by: str,
             raise InputError(f"{name} is {shorten(value)}; give a whole number of machines from 1 to {most:,}.")
     if seed < 0:
         raise InputError(f"seed is {seed}; give a whole number from 0.")
-    choice(by, BY, "by")
+    choice(by, ALLOCATION_RULES, "by")
 
 
 def _power(count: int) -> int:
@@ -248,10 +256,10 @@ class _Work:
         self, machine: Machine, lines: Mapping[str, Tolerance], along: Array | None, samples: int, seed: int, many: bool
     ) -> None:
         self.machine, self.lines, self.along, self.samples, self.seed = machine, lines, along, samples, seed
-        self.parts: tuple[Toleranced, ...] = ()
+        self.parts: tuple[TolerancedPart, ...] = ()
         self.many, self.pressed = many, list[Mask]()
         self.measures: Measures | None = None
-        self.inputs: Inputs | None = None
+        self.inputs: RandomInputs | None = None
         self.freedoms, self.parasitic = 0, tuple[str, ...]()
         self.spreads: list[tuple[Mask, Spread | None]] = []
         self.reach: list[dict[str, Array]] = []
@@ -262,7 +270,7 @@ class _Work:
         """Add some poses; return their `Status` codes."""
         model = error_model(self.machine, columns, count)
         if not self.parts:
-            self.parts = toleranced(self.machine, model.errors, self.lines)
+            self.parts = toleranced_parts(self.machine, model.errors, self.lines)
         settled = np.asarray(model.drawn.status == Status.OK)
         spread = self._spread(model.at_poses(np.flatnonzero(settled))) if settled.any() else None
         self.spreads.append((settled, spread))
@@ -271,7 +279,7 @@ class _Work:
     def _spread(self, model: ErrorModel) -> Spread:
         length = float(self.machine.configure((0.0,) * _joints(self.machine)).length)
         rates = _clean(model.rates(), length)
-        inputs = inputs_of(
+        inputs = random_inputs(
             self.parts, rates, model.drawn.load, length, others=self.many and loads_platform(self.machine)
         )
         zeros = [place for place, error in enumerate(model.errors) if error.group == "zeros"]
@@ -333,13 +341,13 @@ def _answer(
         work.freedoms,
         work.parasitic,
         work.samples,
-        solved_exactly(work.machine, inputs, measures, _power(exact), work.seed) if exact else None,
+        exact_sample(work.machine, inputs, measures, _power(exact), work.seed) if exact else None,
         None,
         "",
     )
     if allocate is not None:
         wanted = positive(allocate, "length", "allocate, the wanted error,")
-        allocation = allocated(work.parts, work.reach, wanted, by, answer.leading)
+        allocation = allocation_for(work.parts, work.reach, wanted, by, answer.leading)
         answer = replace(answer, allocation=allocation)
     return replace(answer, message=_message(answer))
 
@@ -353,7 +361,7 @@ def _whole(work: _Work, size: int) -> Spread:
             if spread is not None:
                 table[settled] = getattr(spread, name)
             tables.append(table)
-    everywhere = np.percentile(np.asarray(work.largest), SHARE, axis=0)
+    everywhere = np.percentile(np.asarray(work.largest), USUAL_PERCENT, axis=0)
     return Spread(**{name: np.concatenate(tables) for name, tables in parts.items()}, everywhere=everywhere)
 
 
@@ -363,14 +371,14 @@ def _message(answer: Budget) -> str:
     usual, worst = (float(answer.size(name, leading)[pose]) for name in ("usual", "worst"))
     where = "along the direction" if leading == "along" else "at the tool point"
     many = "" if len(answer.status) == 1 else f" at the worst of {int(answer.settled.sum())} poses"
-    size, most = (_shown(answer, value, "m") for value in (usual, worst))
+    size, most = (_small_motion(answer, value, "m") for value in (usual, worst))
     first = f"95 % of all machines are off by at most {size} {where}{many} (worst case {most})."
     if not worst:
         return f"The tolerances do not move the tool {where}."
     ranked = [f"{name} ({100.0 * share:.0f} %)" for name, share in answer.shares_by("line").items() if share > 0.005]
     sentences = [first, f"The variance comes from {', '.join(ranked[:4])}."]
     if answer.freedoms < len(answer.machine.family.components):
-        sentences.append(_uncorrected(answer, pose))
+        sentences.append(_parasitic_sentence(answer, pose))
     if answer.pressed:
         some = f" ({len(answer.sometimes)} of them at some poses only)" if answer.sometimes else ""
         sentences.append(f"The load presses {len(answer.pressed)} joints to one end of their clearance{some}.")
@@ -378,21 +386,21 @@ def _message(answer: Budget) -> str:
     return " ".join([*sentences, uncounted]).strip()
 
 
-def _uncorrected(answer: Budget, pose: int) -> str:
+def _parasitic_sentence(answer: Budget, pose: int) -> str:
     """Say which part of the error no correction of the actuators takes away."""
     parts = []
     for measure, words in (("rotation", "turns by up to"), ("rz", "turns by up to"), ("position", "moves by up to")):
         name = f"{PARASITIC}{measure}"
         if name in answer.measures and not (measure == "rz" and f"{PARASITIC}rotation" in answer.measures):
             size = float(answer.size("usual", name)[pose])
-            if size > NOTHING * float(answer.size("usual", name.removeprefix(PARASITIC))[pose]):
-                parts.append(f"{words} {_shown(answer, size, answer.units[answer.measures.index(name)])}")
+            if size > ROUND_OFF_SHARE * float(answer.size("usual", name.removeprefix(PARASITIC))[pose]):
+                parts.append(f"{words} {_small_motion(answer, size, answer.units[answer.measures.index(name)])}")
     what = f"no actuator moves {' '.join(answer.parasitic)}" if answer.parasitic else "no actuator corrects all of it"
     left = f", and by parasitic motions the platform {' and '.join(parts)} (95 %)" if parts else ""
     return f"The machine has {answer.freedoms} freedoms: {what}{left}."
 
 
-def _shown(answer: Budget, value: float, unit: str) -> str:
+def _small_motion(answer: Budget, value: float, unit: str) -> str:
     """A small motion in as many digits as percentiles of drawn machines have."""
     scale = answer.machine.display.deflection(unit)
-    return with_unit(number(value * scale.factor, digits=DIGITS), scale.unit)
+    return with_unit(number(value * scale.factor, digits=DRAWN_DIGITS), scale.unit)

@@ -1,24 +1,37 @@
-"""Error of the tool by independent errors: to first order, worst case, and percentiles of drawn machines.
+"""The error of the tool by independent errors of the machine: what is measured of it, and how large it gets.
 
-Everything here is about measures: rows of numbers that are linear in the twist of the tool, and lengths of some rows.
+Measures are components of the twist of the tool, lengths of some of them, a direction, and what no actuator corrects.
+Their sizes are computed to first order, for the worst case, as percentiles of drawn machines, and for some machines by
+exact solutions; what is left between these and the first order is curvature, and what errors do only together.
 
-Source: theory (50) and (52).
+Source: theory (48), (50), (52) and (53).
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from kinetostat.accuracy.model import ErrorModel, error_model
+from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
-from kinetostat.studies.budget.inputs import Inputs
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import POSE, values
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.budget.tolerances import RandomInputs
+from kinetostat.tolerances import NO_FREEDOM
 
-SHARE = 95.0
+PARASITIC = "parasitic "
+"""Prefix of the measures of what no actuator corrects."""
+USUAL_PERCENT = 95.0
 """Percent of all machines that the usual error covers."""
 STARTS, FEW_STARTS = 200, 24
 """Directions from which the worst case of a length is searched: at a single pose, and at each of many."""
-ROUNDS = 100
+MOST_WORST_CASE_STEPS = 100
 """Steps of that search, which nearly always ends after ten."""
+SOLVED_AT_ONCE = 1024
+"""Machines that are solved together."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +53,7 @@ class Measures:
         """Of all, rows first."""
         return (*self.rows, *self.lengths)
 
-    def applied(self, twists: Array) -> Array:
+    def linear(self, twists: Array) -> Array:
         """The linear measures of twists at n poses [n x 6 x q] -> [n x rows x q]."""
         count = len(twists)
         matrix = np.stack([np.broadcast_to(row, (count, 6)) for row in self.rows.values()], axis=1)
@@ -55,6 +68,63 @@ class Measures:
         """All measures as sizes from values of the linear ones [... x rows] -> [... x measures]."""
         lengths = [np.linalg.norm(rows[..., self.places(name)], axis=-1) for name in self.lengths]
         return np.concatenate([np.abs(rows), *(length[..., None] for length in lengths)], axis=-1)
+
+
+def measures_of(
+    drives: Array, components: Sequence[str], along: Array | None, length: float
+) -> tuple[Measures, int, tuple[str, ...]]:
+    """List what is measured of the twist of the tool.
+
+    Args:
+        drives: twist of the tool per unit of each actuator, SI [n x 6 x actuators].
+        components: of the twist that the machine has.
+        along: unit vector, base axes; None if no direction is asked for.
+        length: by which rotations count beside displacements, m.
+
+    Returns:
+        The measures, how many freedoms the actuators move, and the components that none of them moves.
+    """
+    rows: dict[str, Array] = {name: np.eye(6)[COMPONENTS.index(name)] for name in components}
+    if along is not None:
+        rows["along"] = np.concatenate([np.zeros(3), along])
+    left, freedoms, parasitic = _correction_rest(drives, components, length)
+    lengths = _lengths(components, "")
+    if freedoms < len(components):
+        rows |= {f"{PARASITIC}{name}": left[:, COMPONENTS.index(name)] for name in components}
+        lengths |= _lengths(components, PARASITIC)
+    units = {name: "rad" if _turns(name) else "m" for name in (*rows, *lengths)}
+    return Measures(rows, lengths, units), freedoms, parasitic
+
+
+def _turns(name: str) -> bool:
+    return name.removeprefix(PARASITIC) in ("rx", "ry", "rz", "rotation")
+
+
+def _lengths(components: Sequence[str], prefix: str) -> dict[str, tuple[str, ...]]:
+    """The angle and the distance, where they have more than one component."""
+    parts = {
+        "rotation": tuple(f"{prefix}{name}" for name in components if _turns(name)),
+        "position": tuple(f"{prefix}{name}" for name in components if not _turns(name)),
+    }
+    return {f"{prefix}{name}": members for name, members in parts.items() if len(members) > 1}
+
+
+def _correction_rest(drives: Array, components: Sequence[str], length: float) -> tuple[Array, int, tuple[str, ...]]:
+    """The map from an error to what is left of it after small corrections of the actuators [n x 6 x 6], theory (53).
+
+    Corrections take as much away as they can, rotations times the length counting like displacements.
+    """
+    scale = np.array([length] * 3 + [1.0] * 3)
+    moved = drives * scale[:, None]
+    basis, sizes, _ = np.linalg.svd(moved, full_matrices=False)
+    counted = sizes > NO_FREEDOM * sizes.max(axis=1, initial=1e-300)[:, None]
+    basis = basis * counted[:, None]
+    left = np.eye(6) - basis @ np.swapaxes(basis, 1, 2)
+    # Without round-off, so that what is moved by no actuator is all left, and what is moved by them is not.
+    left = np.where(np.abs(left) < NO_FREEDOM, 0.0, left)
+    most = np.abs(moved).max(initial=0.0)
+    still = [name for name in components if (np.abs(moved[:, COMPONENTS.index(name)]) <= NO_FREEDOM * most).all()]
+    return left * scale / scale[:, None], int(counted.sum(axis=1).min()), tuple(still)
 
 
 @dataclass(frozen=True)
@@ -78,15 +148,15 @@ class Spread:
     everywhere: Array
 
 
-def first_order(inputs: Inputs, measures: Measures) -> tuple[Array, Array, Array, Array]:
+def first_order(inputs: RandomInputs, measures: Measures) -> tuple[Array, Array, Array, Array]:
     """Mean, root of the mean square, root sum of squares and worst case of each measure [n x measures], theory (50).
 
     Args:
         inputs: variables and what they do.
         measures: that are asked for.
     """
-    rows = measures.applied(inputs.columns)
-    shift = measures.applied(inputs.shift[:, :, None])[:, :, 0]
+    rows = measures.linear(inputs.columns)
+    shift = measures.linear(inputs.shift[:, :, None])[:, :, 0]
     squares, limits, mean = [], [], measures.sizes(shift)
     for name in measures.names:
         places = measures.places(name)
@@ -97,7 +167,7 @@ def first_order(inputs: Inputs, measures: Measures) -> tuple[Array, Array, Array
     return mean, rms, mean + np.sqrt(np.stack(limits, axis=1)), np.stack(worst, axis=1)
 
 
-def _worst(rows: Array, shift: Array, inputs: Inputs) -> Array:
+def _worst(rows: Array, shift: Array, inputs: RandomInputs) -> Array:
     """The largest length that limits allow [n], theory (52): over all directions, the sum of all that reaches there.
 
     Args:
@@ -105,8 +175,8 @@ def _worst(rows: Array, shift: Array, inputs: Inputs) -> Array:
         shift: what is there without them [n x k].
         inputs: says which variables belong together.
     """
-    alone = np.array([block[0] for block in inputs.together if len(block) == 1], dtype=int)
-    joined = [block for block in inputs.together if len(block) > 1]
+    alone = np.array([block[0] for block in inputs.blocks if len(block) == 1], dtype=int)
+    joined = [block for block in inputs.blocks if len(block) > 1]
     count, size, _ = rows.shape
     if size == 1:
         reach = np.abs(rows[:, 0, alone]).sum(axis=1) + np.abs(shift[:, 0])
@@ -114,7 +184,7 @@ def _worst(rows: Array, shift: Array, inputs: Inputs) -> Array:
     ways = np.random.default_rng(0).standard_normal((STARTS if count == 1 else FEW_STARTS, size))
     ways = np.broadcast_to(ways / np.linalg.norm(ways, axis=1)[:, None], (count, *ways.shape))
     most = np.zeros(count)
-    for _ in range(ROUNDS):
+    for _ in range(MOST_WORST_CASE_STEPS):
         # The machine that reaches farthest along a direction lies in a direction of its own, which is tried next:
         # its length never falls.
         far = np.sign(ways @ rows[:, :, alone]) @ np.swapaxes(rows[:, :, alone], 1, 2)
@@ -132,7 +202,7 @@ def _worst(rows: Array, shift: Array, inputs: Inputs) -> Array:
     return most
 
 
-def spread_of(inputs: Inputs, measures: Measures, machines: Iterable[Array]) -> tuple[Spread, Array]:
+def spread_of(inputs: RandomInputs, measures: Measures, machines: Iterable[Array]) -> tuple[Spread, Array]:
     """The error of the tool to first order, with percentiles of drawn machines.
 
     Args:
@@ -143,18 +213,18 @@ def spread_of(inputs: Inputs, measures: Measures, machines: Iterable[Array]) -> 
     Returns:
         The errors, and of each machine its largest one over all poses [machines x measures].
     """
-    rows, shift = measures.applied(inputs.columns), measures.applied(inputs.shift[:, :, None])[:, :, 0]
+    rows, shift = measures.linear(inputs.columns), measures.linear(inputs.shift[:, :, None])[:, :, 0]
     count, size, _ = rows.shape
     flat = rows.reshape(count * size, -1).T
     drawn = np.concatenate([measures.sizes((slab @ flat).reshape(len(slab), count, size) + shift) for slab in machines])
     mean, rms, rss, worst = first_order(inputs, measures)
-    usual, largest = np.percentile(drawn, SHARE, axis=0), drawn.max(axis=1)
-    return Spread(mean, rms, rss, worst, usual, np.percentile(largest, SHARE, axis=0)), largest
+    usual, largest = np.percentile(drawn, USUAL_PERCENT, axis=0), drawn.max(axis=1)
+    return Spread(mean, rms, rss, worst, usual, np.percentile(largest, USUAL_PERCENT, axis=0)), largest
 
 
-def squares_of(inputs: Inputs, measures: Measures) -> Array:
+def squares_of(inputs: RandomInputs, measures: Measures) -> Array:
     """The variance that each part brings to each measure, summed over the poses [measures x parts], theory (50)."""
-    rows = measures.applied(inputs.columns)
+    rows = measures.linear(inputs.columns)
     each = np.einsum("nkq,q->kq", rows**2, inputs.variance)
     parts = np.zeros((len(each), len(inputs.parts)))
     np.add.at(parts.T, inputs.owner, each.T)
@@ -165,3 +235,77 @@ def shares(squares: Array) -> Array:
     """Squares as shares that add up to 1 in each row; 0 where there is nothing to share."""
     whole = squares.sum(axis=1, keepdims=True)
     return np.divide(squares, whole, out=np.zeros_like(squares), where=whole > 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ExactSample(Immutable):
+    """Machines whose equations were solved exactly, at the pose of the machine.
+
+    Attributes:
+        machines: how many.
+        failed: how many of them cannot be assembled with their actuators there.
+        rms: root of the mean square of each measure [measures].
+        usual: what 95 % of them keep within [measures].
+        difference: the largest difference of a measure from its first order [measures].
+        unexplained: share of the variance that single contributions do not explain [measures]; 0 where nothing varies.
+    """
+
+    machines: int
+    failed: int
+    rms: Array
+    usual: Array
+    difference: Array
+    unexplained: Array
+
+
+def exact_sample(machine: Machine, inputs: RandomInputs, measures: Measures, count: int, seed: int) -> ExactSample:
+    """Solve machines exactly at the pose of the machine.
+
+    Args:
+        machine: as drawn.
+        inputs: variables and what they do there.
+        measures: that are asked for.
+        count: of machines, a power of 2.
+        seed: of the machines.
+
+    Raises:
+        InputError: none of them can be assembled.
+    """
+    path = next(path for path in values(machine) if path.startswith(POSE))
+    here = float(values(machine)[path])
+    exact, first = [], []
+    model: ErrorModel | None = None
+    for slab in inputs.machines(count, seed):
+        for start in range(0, len(slab), SOLVED_AT_ONCE):
+            drawn = slab[start : start + SOLVED_AT_ONCE]
+            if model is None or len(model) != len(drawn):
+                model = error_model(machine, {path: np.full(len(drawn), here)}, len(drawn))
+            moved, _ = model.displacement(inputs.drawn + drawn @ inputs.errors.T)
+            linear = inputs.shift[0] + drawn @ inputs.columns[0].T
+            exact.append(measures.linear(moved.T[None])[0].T)
+            first.append(measures.linear(linear.T[None])[0].T)
+    solved, linear = np.concatenate(exact), np.concatenate(first)
+    closed = np.isfinite(solved).all(axis=1)
+    if not closed.any():
+        raise InputError(
+            f"{machine.name}: none of the {count:,} machines can be assembled with its actuators there; make the "
+            "tolerances smaller."
+        )
+    solved, linear = solved[closed], linear[closed]
+    sizes = measures.sizes(solved)
+    return ExactSample(
+        count,
+        int((~closed).sum()),
+        np.sqrt((sizes**2).mean(axis=0)),
+        np.percentile(sizes, USUAL_PERCENT, axis=0),
+        np.abs(sizes - measures.sizes(linear)).max(axis=0),
+        _unexplained(solved, linear, measures),
+    )
+
+
+def _unexplained(solved: Array, linear: Array, measures: Measures) -> Array:
+    """The variance of what the first order leaves, over the variance [machines x rows] -> [measures]."""
+    left, whole = (solved - linear).var(axis=0), solved.var(axis=0)
+    places = [measures.places(name) for name in measures.names]
+    parts, wholes = (np.array([each[rows].sum() for rows in places]) for each in (left, whole))
+    return np.divide(parts, wholes, out=np.zeros_like(parts), where=wholes > 0.0)

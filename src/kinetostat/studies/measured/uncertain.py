@@ -16,7 +16,7 @@ from kinetostat.arrays import Array, Integers
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.tolerance_table import SIGMAS
-from kinetostat.studies.budget.toleranced import toleranced
+from kinetostat.studies.budget.tolerances import toleranced_parts
 from kinetostat.studies.identification.record import read_fit
 
 STANDING = ("zeros", "gains", "clearances")
@@ -57,7 +57,7 @@ def uncertain_of(machine: Machine, model: ErrorModel, fit: Path | None) -> Uncer
     """
     paths = {error.path: place for place, error in enumerate(model.errors)}
     fitted, values, covariance = _of_fit(machine, paths, fit) if fit else ([], np.zeros(0), np.zeros((0, 0)))
-    parts = toleranced(machine, model.errors, machine.tolerances) if machine.tolerances else ()
+    parts = toleranced_parts(machine, model.errors, machine.tolerances) if machine.tolerances else ()
     chosen = [part for part in parts if part.group not in STANDING and part.errors[0] not in fitted]
     variances = [part.limit**2 * (SIGMAS**-2 if part.normal else 1.0 / 3.0) for part in chosen]
     places = [*fitted, *(part.errors[0] for part in chosen)]

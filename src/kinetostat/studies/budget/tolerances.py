@@ -1,0 +1,339 @@
+"""The numbers of a machine that have tolerances, and random machines whose numbers lie within these.
+
+A line of [tolerances] is about a group of errors, or about a path in which * stands for anything. Where two lines are
+about the same number, the later one holds.
+
+A number between limits is one variable from -1 to 1. The free motion of a joint without load is a point in a disc or a
+ball, one variable for each direction. A load presses the joint to the end of its free motion: the reaction of the joint
+is what the load does per unit of that motion (virtual work), and the motion goes from 0 to the clearance along it. At
+poses where it has no reaction it is free.
+
+Source: theory (50) and (51).
+"""
+
+import difflib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from kinetostat.accuracy.errors import MachineError
+from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import values
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.tolerance_table import SIGMAS, Deviation, Tolerance
+from kinetostat.tolerances import NO_REACTION
+
+ERROR_GROUPS = {
+    "joints": "geometry",
+    "geometry": "geometry",
+    "zeros": "zeros",
+    "gains": "gains",
+    "clearances": "clearances",
+    "compliances": "compliances",
+    "shared": "shared",
+}
+"""Groups of errors by the names that a line may have."""
+CLEARANCE_WORD = "clearance"
+"""Part of the path of free motions of joints; paths with * are about these only where they name it."""
+TOLERANCE_EXAMPLES = {"length": "0.05 mm", "angle": "0.02 deg", "ratio": "20 um/m"}
+"""A tolerance of each kind of number, for messages."""
+WRITE = (
+    'write for example the lines joints = ["0.05 mm", "0.02 deg"] (where joints sit, how their axes stand) and zeros = '
+    '"0.02 mm" (of actuators) under [tolerances] into its file, or give --tolerance "joints=0.05 mm"'
+)
+MACHINES_AT_ONCE = 1 << 14
+"""Machines that are made at once: their numbers stay in the cache."""
+LEAST_PROBABILITY = 1e-16
+"""Probability below which no normal number is drawn: eight standard deviations."""
+
+
+@dataclass(frozen=True)
+class TolerancedPart:
+    """Numbers of a machine that may be off together: a single one, or the free motion of a joint in all directions.
+
+    Attributes:
+        errors: their places in the error model.
+        path: path of the number, as a line may name it.
+        words: for people.
+        kind: "length", "angle" or "ratio".
+        group: of the errors.
+        leg: name of its leg; empty of what legs share.
+        line: what the line is about that holds for it.
+        limit: plus and minus, SI; of a clearance, how far the joint may move from its middle.
+        normal: whether it is normally distributed, the limit being three standard deviations; else evenly.
+        cost: of its line.
+    """
+
+    errors: tuple[int, ...]
+    path: str
+    words: str
+    kind: str
+    group: str
+    leg: str
+    line: str
+    limit: float
+    normal: bool
+    cost: float
+
+    @property
+    def free(self) -> bool:
+        """Whether it is the free motion of a joint."""
+        return self.group == "clearances"
+
+
+def toleranced_parts(
+    machine: Machine, errors: Sequence[MachineError], tolerances: Mapping[str, Tolerance]
+) -> tuple[TolerancedPart, ...]:
+    """Give each error the tolerance of the last line that is about it; errors without a line are exact.
+
+    Args:
+        machine: whose numbers are the nominal sizes of its fields.
+        errors: of the model.
+        tolerances: lines, in order.
+
+    Raises:
+        InputError: there is no line, a line is about nothing, or has no value for what it is about.
+    """
+    if not tolerances:
+        raise InputError(f"{machine.name} has no tolerances, so that nothing can be off; {WRITE}.")
+    kept: dict[int, tuple[Tolerance, Deviation]] = {}
+    for line in tolerances.values():
+        places = [place for place, error in enumerate(errors) if is_about(line.about, error)]
+        if not places:
+            raise InputError(_about_nothing(machine, line, errors))
+        fitting = [(place, line.of(errors[place].kind)) for place in places]
+        known = {place: (line, deviation) for place, deviation in fitting if deviation is not None}
+        if not known:
+            kinds = list(dict.fromkeys(errors[place].kind for place in places))
+            raise InputError(
+                f'{machine.name}: tolerances.{line.about} is "{line.text}", but the numbers that it is about are '
+                f'{" and ".join(map(_plural, kinds))}; write for example "{TOLERANCE_EXAMPLES[kinds[0]]}". '
+                "`kinetostat budget MACHINE --list` shows every number that can move the tool."
+            )
+        kept = {**kept, **known}
+    sizes = values(machine)
+    return tuple(_part(machine, errors, group, kept, sizes) for group in _parts_of(errors, kept))
+
+
+def is_about(about: str, error: MachineError) -> bool:
+    """Whether a line is about an error: its group, its path or the beginning of it, or a path with *."""
+    if about in ERROR_GROUPS:
+        return error.group == ERROR_GROUPS[about]
+    if error.group == "clearances" and CLEARANCE_WORD not in about:
+        return False
+    return _fits(about, error.path) or _fits(f"{about}.*", error.path)
+
+
+def _fits(pattern: str, path: str) -> bool:
+    """Whether a path has the parts of a pattern between its stars, in this order; in linear time, whatever they are."""
+    first, *others = pattern.split("*")
+    if not others:
+        return path == pattern
+    if not path.startswith(first):
+        return False
+    place = len(first)
+    for part in others[:-1]:
+        place = path.find(part, place)
+        if place < 0:
+            return False
+        place += len(part)
+    return path.endswith(others[-1]) and len(path) - len(others[-1]) >= place
+
+
+def _parts_of(errors: Sequence[MachineError], known: Iterable[int]) -> Iterator[list[int]]:
+    """Places of errors with a tolerance; those of the clearance of a joint together."""
+    joints: dict[str, list[int]] = {}
+    for place in sorted(known):
+        error = errors[place]
+        joints.setdefault(_joint(error) if error.group == "clearances" else error.path, []).append(place)
+    yield from joints.values()
+
+
+def _joint(error: MachineError) -> str:
+    """The path of a clearance without its direction."""
+    return error.path.rpartition(".")[0]
+
+
+def _part(
+    machine: Machine,
+    errors: Sequence[MachineError],
+    places: Sequence[int],
+    known: Mapping[int, tuple[Tolerance, Deviation]],
+    sizes: Mapping[str, object],
+) -> TolerancedPart:
+    error, (line, deviation) = errors[places[0]], known[places[0]]
+    free = error.group == "clearances"
+    nominal = sizes.get(error.path, 0.0)
+    size = abs(float(nominal)) if error.kind == "length" and isinstance(nominal, int | float) else 0.0
+    try:
+        limit = deviation.within(error.kind, size)
+    except InputError as reason:
+        raise InputError(f"{machine.name}: tolerances.{line.about}: {reason}") from None
+    return TolerancedPart(
+        tuple(places),
+        _joint(error) if free else error.path,
+        error.words.partition(" along ")[0] if free else error.words,
+        error.kind,
+        error.group,
+        error.leg,
+        line.about,
+        limit,
+        deviation.spread == "normal",
+        line.cost,
+    )
+
+
+def _plural(kind: str) -> str:
+    return f"{kind}s"
+
+
+def _about_nothing(machine: Machine, line: Tolerance, errors: Sequence[MachineError]) -> str:
+    """Say that a line is about nothing, and what there is."""
+    present = [name for name, group in ERROR_GROUPS.items() if any(error.group == group for error in errors)]
+    near = difflib.get_close_matches(line.about, [*present, *(error.path for error in errors)], 1)
+    hint = f'did you mean "{near[0]}"?' if near else f"groups are {', '.join(present)}."
+    return (
+        f"{machine.name}: tolerances.{line.about} is about nothing that this machine has; {hint} `kinetostat budget "
+        "MACHINE --list` shows every path."
+    )
+
+
+@dataclass(frozen=True)
+class RandomInputs:
+    """The variables of all parts, and what they do at n poses.
+
+    Attributes:
+        parts: what has a tolerance.
+        owner: number of the part of each variable [q].
+        block: number of the block of each variable: coordinates of one point in a disc or ball [q].
+        variance: of each variable [q].
+        columns: twist of the tool when a variable is 1 [n x 6 x q].
+        shift: twist of the tool when all variables are 0: joints that a load presses to one end [n x 6].
+        errors: value of each error of the model when a variable is 1, at the first pose [errors x q].
+        drawn: value of each error when all variables are 0, at the first pose [errors].
+        pressed: which parts are joints that a load presses at each pose [n x parts].
+    """
+
+    parts: tuple[TolerancedPart, ...]
+    owner: Integers
+    block: Integers
+    variance: Array
+    columns: Array
+    shift: Array
+    errors: Array
+    drawn: Array
+    pressed: Mask
+
+    @property
+    def size(self) -> int:
+        """Number of variables."""
+        return len(self.owner)
+
+    def machines(self, count: int, seed: int) -> Iterator[Array]:
+        """Values of the variables of so many machines, slab by slab [slab x q]: Sobol points.
+
+        Args:
+            count: a power of 2.
+            seed: of the scrambling.
+        """
+        points = qmc.Sobol(self.size, scramble=True, seed=seed)
+        for start in range(0, count, MACHINES_AT_ONCE):
+            yield self._values(points.random(min(MACHINES_AT_ONCE, count - start)))
+
+    def _values(self, points: Array) -> Array:
+        """Values of the variables from points of the unit cube [m x q]."""
+        # Variable by variable, whose values then lie beside each other.
+        values = 2.0 * np.ascontiguousarray(points.T) - 1.0
+        bent = [part.normal and not part.free for part in self.parts]
+        for place in np.flatnonzero(np.array(bent)[self.owner]):
+            values[place] = ndtri(np.clip(points[:, place], LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY)) / SIGMAS
+        for size in (2, 3):
+            of_size = [places for places in self.blocks if len(places) == size]
+            if of_size:
+                values[np.array(of_size)] = _in_ball(values[np.array(of_size)])
+        return values.T
+
+    @property
+    def blocks(self) -> list[Integers]:
+        """The variables of each block."""
+        return [np.flatnonzero(self.block == number) for number in range(int(self.block.max(initial=-1)) + 1)]
+
+
+def _in_ball(cube: Array) -> Array:
+    """Even points of the cube from -1 to 1 as even points of the disc or ball [blocks x 2 or 3 x m]."""
+    first, angle = 0.5 * (cube[:, 0] + 1.0), np.pi * cube[:, 1]
+    if cube.shape[1] == 2:
+        radius = np.sqrt(first)
+        return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    radius, height = np.cbrt(first), cube[:, 2]
+    across = radius * np.sqrt(1.0 - height**2)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), radius * height], axis=1)
+
+
+def random_inputs(
+    parts: Sequence[TolerancedPart],
+    rates: Array,
+    load: Array,
+    length: float,
+    others: bool = False,
+) -> RandomInputs:
+    """State what the tolerances of a machine do at n poses.
+
+    Args:
+        parts: what has a tolerance.
+        rates: of the error model, SI [n x 6 x errors].
+        load: wrench at the tool point, base axes, N·m and N [n x 6].
+        length: a characteristic length of the machine, m.
+        others: whether there are other poses, at which joints that are free here may be pressed and pressed ones free:
+            then all of them have variables for both.
+    """
+    count, _, size = rates.shape
+    work = np.einsum("nie,ni->ne", rates, load)
+    # The most that any motion of a length can do: what is far below it is no reaction.
+    most = np.abs(load[:, 3:]).sum(axis=1) + np.abs(load[:, :3]).sum(axis=1) / length
+    owner: list[int] = []
+    block: list[int] = []
+    variance: list[float] = []
+    columns: list[Array] = []
+    errors: list[Array] = []
+    shift, drawn = np.zeros((count, 6)), np.zeros(size)
+    reacting = np.abs(work) > NO_REACTION * most[:, None]
+    pressed = np.array([part.free & reacting[:, list(part.errors)].any(axis=1) for part in parts]).T
+    for number, part in enumerate(parts):
+        places, bears = list(part.errors), pressed[:, number]
+        if bears.any() or (others and part.free):
+            reaction = work[:, places]
+            along = reaction / np.maximum(np.linalg.norm(reaction, axis=1), 1e-300)[:, None] * bears[:, None]
+            half = 0.5 * part.limit * np.einsum("nie,ne->ni", rates[:, :, places], along)
+            value = np.zeros(size)
+            value[places] = 0.5 * part.limit * along[0]
+            columns.append(half[:, :, None])
+            errors.append(value[:, None])
+            owner.append(number)
+            block.append(block[-1] + 1 if block else 0)
+            variance.append(1.0 / 3.0)
+            shift += half
+            drawn += value
+        if bears.all() and not (others and part.free):
+            continue
+        columns.append(part.limit * rates[:, :, places] * ~bears[:, None, None])
+        errors.append(part.limit * np.eye(size)[:, places] * (not bears[0]))
+        owner += [number] * len(places)
+        block += [block[-1] + 1 if block else 0] * len(places)
+        usual = 1.0 / (len(places) + 2.0)  # of each coordinate of a point in a ball; of a single one, 1/3
+        variance += [SIGMAS**-2 if part.normal and not part.free else usual] * len(places)
+    return RandomInputs(
+        tuple(parts),
+        np.array(owner),
+        np.array(block),
+        np.array(variance),
+        np.concatenate(columns, axis=2),
+        shift,
+        np.concatenate(errors, axis=1),
+        drawn,
+        pressed,
+    )
