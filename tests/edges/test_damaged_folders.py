@@ -9,9 +9,9 @@ from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
 from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
-from kinetostat.studies.file_list import LIST
 from kinetostat.studies.grid import grid
-from kinetostat.studies.study_folder import noted, read_question
+from kinetostat.studies.storage import LIST
+from kinetostat.studies.study_folder import read_history, read_question
 from refusals import refused
 from studies import SMALL
 
@@ -223,12 +223,12 @@ def test_a_finished_history_that_lost_its_end_is_seen_wherever_it_ends(kind, lis
 def test_no_bit_of_a_line_of_the_history_is_flipped_unseen(kind, undisturbed, tmp_path):
     history = (undisturbed / kind / "history.jsonl").read_bytes()
     first, rest = history[: history.index(b"\n") + 1], history[history.index(b"\n") + 1 :]
-    whole = noted(undisturbed / kind)[0]
+    whole = read_history(undisturbed / kind)[0]
     for bit in range(8 * len(first)):
         line = bytearray(first)
         line[bit // 8] ^= 1 << bit % 8
         (tmp_path / "history.jsonl").write_bytes(bytes(line) + rest)
-        records = noted(tmp_path)[0]
+        records = read_history(tmp_path)[0]
         assert all(record in whole for record in records)
         assert len(records) < len(whole), bit
 

@@ -16,10 +16,10 @@ from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
 from kinetostat.machine.loading import load
 from kinetostat.studies import result_file
-from kinetostat.studies.file_list import LIST
 from kinetostat.studies.grid import grid, stored_grid
 from kinetostat.studies.grid.grid import grid_question
 from kinetostat.studies.grid.stored_grid import answer_into
+from kinetostat.studies.storage import LIST
 from refusals import refused
 
 MACHINE = "zhang-gosselin-4dof"
@@ -313,7 +313,7 @@ def test_a_large_map_of_two_dimensions_is_drawn_thinned(tmp_path, capsys):
     assert "map.png" in capsys.readouterr().out
     assert "thinned" in (tmp_path / "map.svg").read_text("utf-8")
     with xr.open_dataset(tmp_path / "map.nc") as whole:
-        shown = result_file.thinned(tmp_path / "map.nc")
+        shown = result_file.thinned_dataset(tmp_path / "map.nc")
         assert dict(shown.sizes) == {"x": 300, "z": 3}
         xr.testing.assert_identical(shown, whole.isel({"x": slice(None, None, 3)}).load())
 

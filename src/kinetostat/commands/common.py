@@ -299,8 +299,7 @@ def list_written(output: object, written: "Sequence[Path]") -> None:
     """
     if not written:
         return
-    from kinetostat.studies.file_list import LIST
-    from kinetostat.studies.storage import list_files
+    from kinetostat.studies.storage import LIST, list_files
 
     for folder in {path.parent for path in written}:
         if folder == output or (folder / LIST).exists():

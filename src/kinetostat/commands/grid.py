@@ -212,8 +212,8 @@ def _draw(options: argparse.Namespace, dataset: "xr.Dataset", stem: str, title: 
 
 def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
     from kinetostat.engine.chunks import compute_with
-    from kinetostat.studies.file_list import differing
     from kinetostat.studies.grid.stored_grid import answer_into
+    from kinetostat.studies.storage import differing
 
     changed = differing(options.output)
     try:
@@ -239,9 +239,9 @@ def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) ->
 
 def _draw_thinned(options: argparse.Namespace, path: Path) -> list[Path]:
     """Draw a large grid of one or two dimensions, thinned to as many points as paper can show."""
-    from kinetostat.studies.result_file import thinned
+    from kinetostat.studies.result_file import thinned_dataset
 
-    dataset = thinned(path)
+    dataset = thinned_dataset(path)
     return _draw(options, dataset, path.stem, f"{dataset.attrs['machine']} (thinned)")
 
 

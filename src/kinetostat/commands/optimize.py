@@ -74,9 +74,9 @@ def _search(options: argparse.Namespace, least: int = 1) -> "Result":
     """Search with a progress bar; into the folder if there is one."""
     from kinetostat.spec.document import exists
     from kinetostat.spec.errors import InputError
-    from kinetostat.studies.file_list import differing
     from kinetostat.studies.optimisation.problem import load_problem
     from kinetostat.studies.optimisation.search import optimize, stored_problem
+    from kinetostat.studies.storage import differing
     from kinetostat.studies.study_folder import holds_study
 
     folder = Path(options.study)

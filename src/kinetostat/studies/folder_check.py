@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
-from kinetostat.studies.file_list import LIST, differing, is_damaged, listed
 from kinetostat.studies.grid.stored_grid import LAYOUT, damaged_chunks
 from kinetostat.studies.optimisation.search import ROWS
 from kinetostat.studies.result_file import RowFile, frame_is_whole
+from kinetostat.studies.storage import LIST, differing, is_damaged, read_list
 from kinetostat.studies.study_folder import (
     DATA,
     HISTORY,
@@ -15,7 +15,7 @@ from kinetostat.studies.study_folder import (
     has_checksums,
     holds_study,
     in_use,
-    noted,
+    read_history,
     read_question,
 )
 
@@ -30,7 +30,7 @@ def has_checks(folder: Path) -> bool:
 
 @dataclass(frozen=True)
 class StepsCheck:
-    """What became of the steps of a search, or of the chunks of a grid.
+    """Result of checking the steps of a search, or the chunks of a grid.
 
     Attributes:
         parts: "chunks" of a grid, or "steps" of a search.
@@ -72,7 +72,7 @@ class StepsCheck:
 
 @dataclass(frozen=True)
 class FolderCheck:
-    """What became of a folder.
+    """Result of checking a folder.
 
     Attributes:
         steps: of its long study; None if it has none.
@@ -116,21 +116,23 @@ def check_folder(folder: Path) -> FolderCheck:
         InputError: its question cannot be read.
     """
     changed = (LIST,) if is_damaged(folder) else tuple(differing(folder))
-    sums = listed(folder)
+    sums = read_list(folder)
     return FolderCheck(_steps(folder) if holds_study(folder) else None, None if sums is None else len(sums), changed)
 
 
 def _steps(folder: Path) -> StepsCheck:
     """Compare the steps or chunks of a long study with what was noted about them."""
     question = read_question(folder)
-    records = {record["chunk"]: record for record in noted(folder)[0]}
+    records = {record["chunk"]: record for record in read_history(folder)[0]}
     text = (folder / HISTORY).read_bytes() if (folder / HISTORY).exists() else b""
     torn = bool(text) and not text.endswith(b"\n") and not in_use(folder)
     broken = text.count(b"\n") + torn - len(records)
     if "optimisation" in question:
         total = max((record.get("of", 0) for record in records.values()), default=0)
         damaged = _damaged_steps(folder, question, records)
-        return _counted("steps", len(records) - damaged, damaged + broken, total, (folder / RESULT).exists(), question)
+        return _steps_check(
+            "steps", len(records) - damaged, damaged + broken, total, (folder / RESULT).exists(), question
+        )
     final = folder / str(question.get("file"))
     path = final if final.exists() else final.with_suffix(f".partial{final.suffix}")
     if LAYOUT not in question:
@@ -141,10 +143,10 @@ def _steps(folder: Path) -> StepsCheck:
     damaged = len(damaged_chunks(path, layout, records, chunk))
     total = ceil(layout["points"] / chunk)
     frame = frame_is_whole(path, layout)
-    return _counted("chunks", len(records) - damaged, damaged + broken, total, final.exists(), question, frame)
+    return _steps_check("chunks", len(records) - damaged, damaged + broken, total, final.exists(), question, frame)
 
 
-def _counted(
+def _steps_check(
     parts: str, intact: int, damaged: int, total: int, finished: bool, question: Record, frame: bool = True
 ) -> StepsCheck:
     """The check of parts of which some are known to be damaged: of a finished study, those that lack are lost."""

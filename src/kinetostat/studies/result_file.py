@@ -21,16 +21,16 @@ import xarray as xr
 
 from kinetostat.arrays import AnyArray
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.storage import KEPT, settle, writing
+from kinetostat.studies.storage import KEPT_SENTENCE, settle, writing
 from kinetostat.studies.study_folder import checksum
 
-KIND = np.dtype("<f8")
+ROW_NUMBER = np.dtype("<f8")
 """Numbers in a file of rows: float64, little-endian."""
-SPARE = 1 << 30
+SPARE_BYTES = 1 << 30
 """Bytes that are left free on a disk."""
-STEP = 1 << 24
+BYTES_AT_A_TIME = 1 << 24
 """Bytes written at a time."""
-SHOWN = 400
+VALUES_OF_A_FIGURE = 400
 """Values of an axis that a figure can show."""
 STATUS = "status"
 UNKNOWN = -1
@@ -45,7 +45,7 @@ def check_space(folder: Path, points: int, quantities: int) -> None:
     """
     place = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
     needed, free = points * (8 * quantities + 1), shutil.disk_usage(place).free
-    if needed + SPARE > free:
+    if needed + SPARE_BYTES > free:
         raise InputError(
             f'"{folder}" has room for {free / 1e9:,.1f} GB, but {points:,} points of {quantities} quantities and a '
             f"status take {needed / 1e9:,.1f} GB; lower the counts, name fewer quantities, or choose another disk."
@@ -72,12 +72,12 @@ def create(
     """
     points = prod(labels.sizes[dim] for dim in dims)
     with writing(path):
-        _try_space(path, points * (8 * len(variables) - 7) + labels.nbytes + STEP)
+        _try_space(path, points * (8 * len(variables) - 7) + labels.nbytes + BYTES_AT_A_TIME)
         labels.to_netcdf(path, engine="h5netcdf")
         with h5netcdf.File(path, "a") as file:
             for name, attributes in variables.items():
                 kind = "i1" if name == STATUS else "f8"
-                variable = file.create_variable(name, tuple(dims), kind, dcpl=_reserved())
+                variable = file.create_variable(name, tuple(dims), kind, dcpl=_reserved_block())
                 for key, value in attributes.items():
                     variable.attrs[key] = value
         with path.open("r+b") as stream:
@@ -98,7 +98,7 @@ def _try_space(path: Path, size: int) -> None:
         stream.truncate(size)
 
 
-def _reserved() -> Any:
+def _reserved_block() -> Any:
     """Storage in one block that exists from the start, and that HDF5 itself leaves alone."""
     wanted = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     wanted.set_layout(h5py.h5d.CONTIGUOUS)
@@ -110,12 +110,13 @@ def _reserved() -> Any:
 def _fill_status(stream: BinaryIO, offset: int, points: int) -> None:
     stream.seek(offset)
     stream.writelines(
-        np.full(min(STEP, points - start), UNKNOWN, dtype=np.int8).data for start in range(0, points, STEP)
+        np.full(min(BYTES_AT_A_TIME, points - start), UNKNOWN, dtype=np.int8).data
+        for start in range(0, points, BYTES_AT_A_TIME)
     )
 
 
 def _offsets(path: Path, names: Iterable[str]) -> dict[str, int]:
-    """Where the block of each variable starts, bytes."""
+    """Start of the block of each variable, bytes."""
     with h5py.File(path) as file:
         return {name: file[name].id.get_offset() for name in names}
 
@@ -160,7 +161,7 @@ def copy_run(
 
 def _width(name: str) -> int:
     """Bytes of a value."""
-    return 1 if name == STATUS else KIND.itemsize
+    return 1 if name == STATUS else ROW_NUMBER.itemsize
 
 
 class ResultFile:
@@ -188,7 +189,7 @@ class ResultFile:
             InputError: the disk is full or failing.
         """
         written = "0"
-        with writing(self._path, KEPT):
+        with writing(self._path, KEPT_SENTENCE):
             for name, offset in self._offsets.items():
                 data = np.ascontiguousarray(status if name == STATUS else values[name])
                 self._stream.seek(offset + start * data.itemsize)
@@ -202,10 +203,10 @@ class ResultFile:
         self._stream.close()
 
 
-def thinned(path: Path) -> xr.Dataset:
+def thinned_dataset(path: Path) -> xr.Dataset:
     """Read as many values of a file along each dimension as a figure can show."""
     with xr.open_dataset(path, engine="h5netcdf") as dataset:
-        steps = {dim: slice(None, None, -(-size // SHOWN)) for dim, size in dataset.sizes.items()}
+        steps = {dim: slice(None, None, -(-size // VALUES_OF_A_FIGURE)) for dim, size in dataset.sizes.items()}
         return dataset.isel(steps).load()
 
 
@@ -214,7 +215,7 @@ class RowFile:
 
     def __init__(self, path: Path, width: int) -> None:
         self._path, self._width = path, width
-        with writing(path, KEPT):
+        with writing(path, KEPT_SENTENCE):
             path.touch()
             self._stream = path.open("r+b")
 
@@ -233,12 +234,12 @@ class RowFile:
             start, count: the rows.
             check: their checksum; None if they were written without it.
         """
-        size = self._width * KIND.itemsize
+        size = self._width * ROW_NUMBER.itemsize
         self._stream.seek(start * size)
         data = self._stream.read(count * size)
         if len(data) < count * size or check not in (None, checksum(data)):
             return None
-        return np.frombuffer(data, dtype=KIND).reshape(count, self._width).astype(float)
+        return np.frombuffer(data, dtype=ROW_NUMBER).reshape(count, self._width).astype(float)
 
     def write(self, start: int, rows: AnyArray) -> str:
         """Put rows at number `start`, and return their checksum; when this returns they are on the disk.
@@ -246,9 +247,9 @@ class RowFile:
         Raises:
             InputError: the disk is full or failing.
         """
-        data = np.ascontiguousarray(rows, dtype=KIND).data.cast("B")
-        with writing(self._path, KEPT):
-            self._stream.seek(start * self._width * KIND.itemsize)
+        data = np.ascontiguousarray(rows, dtype=ROW_NUMBER).data.cast("B")
+        with writing(self._path, KEPT_SENTENCE):
+            self._stream.seek(start * self._width * ROW_NUMBER.itemsize)
             self._stream.write(data)
             settle(self._stream)
         return checksum(data)

@@ -2,35 +2,39 @@
 
 A file is written in a temporary folder beside its place, `.kinetostat-...`, and then moved there. The process holds a
 lock on that folder. If the process is killed, the lock is released, and the next writer removes the folder. What a
-command has written into a folder is listed there with checksums (`file_list`).
+command has written into a folder is listed there.
+
+The list, `kinetostat.sha256`, has a line for each file with its SHA-256, as `sha256sum --check` reads it, and begins
+with the SHA-256 of these lines: whatever becomes of a file, or of the list itself, is seen. A file that is about to be
+written again leaves the list first (`replacing`), so that a command that is killed leaves no wrong line behind.
 """
 
 import errno
+import hashlib
 import json
 import os
 import shutil
 import stat
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, BinaryIO
 
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.file_list import LIST, listed, sums_of, text_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 PREFIX = ".kinetostat-"
-"""How the names of temporary folders begin."""
+"""Beginning of the names of temporary folders."""
 ABANDONED = 24 * 3600.0
 """Age, s, after which a temporary folder counts as abandoned on systems without locks on folders."""
 UNLOCKED = -1
 """Takes the place of a handle on systems without locks on folders."""
-KEPT = "what was written before is kept, and the same command continues from there"
+KEPT_SENTENCE = "what was written before is kept, and the same command continues from there"
 """Says what remains after a failure to write into the file of a long study."""
 REASONS = {
     errno.ENOSPC: "the disk is full; make room, or choose another place",
@@ -42,7 +46,13 @@ REASONS = {
     errno.ELOOP: "it is a link that leads back to itself; choose another place",
     errno.ENAMETOOLONG: "its name is too long; choose a shorter one",
 }
-"""What is wrong, and the way out, for errors of the system that people can do something about."""
+"""The trouble and the way out, for errors of the system that people can do something about."""
+LIST = "kinetostat.sha256"
+"""Name of the list in its folder."""
+LIST_HEAD = "# written by kinetostat; SHA-256 of the lines below: "
+
+Sums = dict[str, str]
+"""SHA-256 of the files of a folder by their names."""
 
 
 @contextmanager
@@ -115,17 +125,61 @@ def list_files(folder: Path, paths: Iterable[Path]) -> None:
     Raises:
         InputError: the list cannot be written.
     """
-    sums = {name: digest for name, digest in (listed(folder) or {}).items() if (folder / name).is_file()}
-    sums |= sums_of(folder, [path.name for path in paths if path.parent == folder])
+    sums = {name: digest for name, digest in (read_list(folder) or {}).items() if (folder / name).is_file()}
+    sums |= _sums_of(folder, [path.name for path in paths if path.parent == folder])
     if sums:
-        write_bytes(folder / LIST, text_of(sums))
+        write_bytes(folder / LIST, _text_of_list(sums))
 
 
 def _unlist(path: Path) -> None:
     """Take a file out of the list of its folder, because it is about to change."""
-    sums = listed(path.parent)
+    sums = read_list(path.parent)
     if sums is not None and sums.pop(path.name, ""):
-        write_bytes(path.parent / LIST, text_of(sums))
+        write_bytes(path.parent / LIST, _text_of_list(sums))
+
+
+def read_list(folder: Path) -> Sums | None:
+    """Return what a folder's list says; None where there is none or it is damaged (see `is_damaged`)."""
+    try:
+        head, _, lines = (folder / LIST).read_bytes().partition(b"\n")
+        if head != _list_head(lines):
+            return None
+        rows = (line.partition("  ") for line in lines.decode().splitlines())
+    except (OSError, UnicodeDecodeError):
+        return None
+    return {name: digest for digest, _, name in rows}
+
+
+def is_damaged(folder: Path) -> bool:
+    """Tell whether a folder has a list that is not as it was written."""
+    return (folder / LIST).exists() and read_list(folder) is None
+
+
+def _text_of_list(sums: Mapping[str, str]) -> bytes:
+    """Return a list as its file says it."""
+    lines = "".join(f"{digest}  {name}\n" for name, digest in sorted(sums.items())).encode()
+    return _list_head(lines) + b"\n" + lines
+
+
+def _sums_of(folder: Path, names: Iterable[str]) -> Sums:
+    """Return the SHA-256 of files in a folder, without those that are not there."""
+    return {name: _sum_of_file(folder / name) for name in names if (folder / name).is_file()}
+
+
+def differing(folder: Path) -> list[str]:
+    """Return the names of the listed files that are missing, or are not as they were written, in order."""
+    wanted = read_list(folder) or {}
+    there = _sums_of(folder, wanted)
+    return sorted(name for name in wanted if there.get(name) != wanted[name])
+
+
+def _list_head(lines: bytes) -> bytes:
+    return f"{LIST_HEAD}{hashlib.sha256(lines).hexdigest()}".encode()
+
+
+def _sum_of_file(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 @contextmanager

@@ -15,13 +15,12 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.file_list import LIST
-from kinetostat.studies.storage import KEPT, settle, write_text, writing
+from kinetostat.studies.storage import KEPT_SENTENCE, LIST, settle, write_text, writing
 
 QUESTION, HISTORY = "study.json", "history.jsonl"
 
 ATTEMPTS, PAUSE = 20, 0.01
-"""How often a lock is tried before it counts as taken, and seconds between: to ask takes it for some microseconds."""
+"""Attempts to take a lock before it counts as taken, and seconds between: to ask takes it for some microseconds."""
 
 CHECK = "check"
 """Key of the checksum of a record, its last."""
@@ -34,7 +33,7 @@ CHECKED = "checksums"
 """Key of a question whose folder has checksums."""
 
 Record = dict[str, Any]
-"""What is noted about a chunk; "chunk" is its number."""
+"""The note about a chunk; "chunk" is its number."""
 
 
 def holds_study(folder: Path) -> bool:
@@ -54,7 +53,7 @@ def in_use(folder: Path) -> bool:
     return False
 
 
-def noted(folder: Path, start: int = 0) -> tuple[list[Record], int]:
+def read_history(folder: Path, start: int = 0) -> tuple[list[Record], int]:
     """Read what was noted from a place in the history on, in whole lines, and the place after it, without waiting.
 
     Args:
@@ -68,7 +67,7 @@ def noted(folder: Path, start: int = 0) -> tuple[list[Record], int]:
     except FileNotFoundError:
         return [], start
     whole = text[: text.rfind(b"\n") + 1]
-    return [record for record in map(_unsealed, whole.splitlines()) if record is not None], start + len(whole)
+    return [record for record in map(_checked_record, whole.splitlines()) if record is not None], start + len(whole)
 
 
 def read_question(folder: Path) -> Record:
@@ -79,7 +78,7 @@ def read_question(folder: Path) -> Record:
     """
     path = folder / QUESTION
     try:
-        question = _unsealed(path.read_bytes(), {})
+        question = _checked_record(path.read_bytes(), {})
     except OSError as error:
         raise InputError(f'"{path}" cannot be read: {error.strerror}; choose another folder.') from None
     if question is None:
@@ -97,12 +96,12 @@ def checksum(data: bytes | memoryview, before: str = "0") -> str:
     return f"{zlib.crc32(data, int(before, 16)):08x}"
 
 
-def _sealed(record: Record) -> Record:
-    """A record with its checksum."""
+def _with_checksum(record: Record) -> Record:
+    """Return a record with its checksum."""
     return {**record, CHECK: checksum(json.dumps(record).encode())}
 
 
-def _unsealed(text: bytes, least: Record | None = None) -> Record | None:
+def _checked_record(text: bytes, least: Record | None = None) -> Record | None:
     """Return the record in a text, without its checksum; None if it is damaged.
 
     Args:
@@ -125,8 +124,8 @@ def _unsealed(text: bytes, least: Record | None = None) -> Record | None:
 
 def _texts(record: Record) -> Iterator[bytes]:
     """The forms in which a record may stand in a file: one line of a history, or the lines of a question."""
-    yield json.dumps(_sealed(record)).encode()
-    yield json.dumps(_sealed(record), ensure_ascii=False, indent=1).encode()
+    yield json.dumps(_with_checksum(record)).encode()
+    yield json.dumps(_with_checksum(record), ensure_ascii=False, indent=1).encode()
 
 
 class StudyFolder:
@@ -172,17 +171,17 @@ class StudyFolder:
 
     def state(self, question: Record) -> None:
         """Write the question of this folder."""
-        text = json.dumps(_sealed({**question, CHECKED: "CRC-32"}), ensure_ascii=False, indent=1)
+        text = json.dumps(_with_checksum({**question, CHECKED: "CRC-32"}), ensure_ascii=False, indent=1)
         write_text(self.path / QUESTION, f"{text}\n")
 
     def records(self) -> dict[int, Record]:
-        """What was noted about the chunks that are done, by their number; a line cut short or damaged is dropped."""
+        """Return the notes about the chunks that are done, by their number; a line cut short or damaged is dropped."""
         self._history.seek(0)
         text = self._history.read()
         whole = text[: text.rfind(b"\n") + 1]
         if len(whole) < len(text):
             self._history.truncate(len(whole))
-        lines = [_unsealed(line) for line in whole.splitlines()]
+        lines = [_checked_record(line) for line in whole.splitlines()]
         records = [record for record in lines if record is not None]
         self.damaged = len(lines) - len(records)
         return {record["chunk"]: record for record in records}
@@ -191,7 +190,7 @@ class StudyFolder:
         """Forget all that was noted but these records, where others are damaged."""
         kept = list(records)
         (self.path / LIST).unlink(missing_ok=True)
-        with writing(self.path / HISTORY, KEPT):
+        with writing(self.path / HISTORY, KEPT_SENTENCE):
             self._history.truncate(0)
         for record in kept:
             self.note(record)
@@ -199,8 +198,8 @@ class StudyFolder:
     def note(self, record: Record) -> None:
         """Add a chunk that is done; when this returns it is on the disk."""
         (self.path / LIST).unlink(missing_ok=True)
-        with writing(self.path / HISTORY, KEPT):
-            self._history.write(json.dumps(_sealed(record)).encode() + b"\n")
+        with writing(self.path / HISTORY, KEPT_SENTENCE):
+            self._history.write(json.dumps(_with_checksum(record)).encode() + b"\n")
             settle(self._history)
 
 

@@ -21,7 +21,7 @@ from kinetostat.studies.optimisation.gradient import Gradient
 from kinetostat.studies.optimisation.log import Log, Step, record_of
 from kinetostat.studies.optimisation.problem import Problem, problem_of
 from kinetostat.studies.optimisation.result import Result, result_of
-from kinetostat.studies.result_file import KIND, RowFile
+from kinetostat.studies.result_file import ROW_NUMBER, RowFile
 from kinetostat.studies.study_folder import (
     DATA,
     Record,
@@ -241,8 +241,8 @@ def kept_log(problem: Problem, folder: Path, record: Record) -> Log:
         record: what was noted about the step.
     """
     log = Log(problem)
-    known = (folder / ROWS).stat().st_size // (log.width * KIND.itemsize)
-    rows = np.memmap(folder / ROWS, KIND, "r", shape=(known, log.width))[record["kept"]].astype(float)
+    known = (folder / ROWS).stat().st_size // (log.width * ROW_NUMBER.itemsize)
+    rows = np.memmap(folder / ROWS, ROW_NUMBER, "r", shape=(known, log.width))[record["kept"]].astype(float)
     log.add(rows, {**record, "kept": list(range(len(rows)))})
     return log
 

@@ -16,7 +16,7 @@ from kinetostat.studies.optimisation.log import best_feasible, front_of, knee_of
 from kinetostat.studies.optimisation.problem import Objective, Problem
 from kinetostat.studies.optimisation.result import designed
 from kinetostat.studies.optimisation.search import kept_log, stored_problem
-from kinetostat.studies.study_folder import Record, noted
+from kinetostat.studies.study_folder import Record, read_history
 from kinetostat.studio.design.runs import FAILURE, RESULT, Run, Stage
 
 EXACT = 9
@@ -90,7 +90,7 @@ class Follower:
 
     def progress(self, run: Run) -> Progress:
         """Read what is new, and return the state of the search."""
-        new, self._place = noted(self._folder, self._place)
+        new, self._place = read_history(self._folder, self._place)
         self._records += [{key: record.get(key) for key in ("best", "mean", "designs")} for record in new]
         self._last = new[-1] if new else self._last
         result = None if run.stage.active else _result(self._folder)

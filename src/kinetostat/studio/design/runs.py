@@ -20,7 +20,7 @@ from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result_data import write_result
 from kinetostat.studies.optimisation.search import begin_search, optimize, stored_problem
 from kinetostat.studies.storage import write_text
-from kinetostat.studies.study_folder import QUESTION, in_use, noted
+from kinetostat.studies.study_folder import QUESTION, in_use, read_history
 from kinetostat.studio.design.state_folder import RUNS, numbered, slug
 from kinetostat.studio.turns import make_modest
 
@@ -235,7 +235,7 @@ class Runs:
 
 def _complete(folder: Path) -> bool:
     """Return whether all steps are done and the result is written."""
-    steps, _ = noted(folder)
+    steps, _ = read_history(folder)
     return bool(steps) and len(steps) >= steps[-1].get("of", len(steps)) and (folder / RESULT).exists()
 
 
