@@ -18,7 +18,7 @@ from kinetostat.machine.loads import located_members
 from kinetostat.validation import exudyn_machine
 from kinetostat.validation.as_written import drawing
 from kinetostat.validation.comparison import KNOWN
-from kinetostat.validation.exudyn_modes import modal_frequencies, weigh
+from kinetostat.validation.exudyn_machine import modal_frequencies, weigh
 from kinetostat.validation.pieces import bodies_before
 from kinetostat.vibration.modes import frequencies
 from machines import STRETCH, cable, load_without_limits, written

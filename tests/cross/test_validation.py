@@ -17,7 +17,7 @@ from kinetostat.machine.parameters import values, with_values
 from kinetostat.validation import comparison
 from kinetostat.validation.answer import block_differences
 from kinetostat.validation.comparison import KNOWN, engines, validate
-from kinetostat.validation.pieces import Strut, end_compliance, pieces
+from kinetostat.validation.pieces import StrutPiece, end_compliance, pieces
 from kinetostat.validation.pynite_machine import extrapolate
 from machines import CASES, is_regular
 from refusals import refused
@@ -98,7 +98,7 @@ def test_a_leg_of_two_spherical_joints_is_a_strut():
     leg = two_force_leg("leg 1", Vector(0.0, 0.0, 0.0), Vector(0.1, 0.0, 0.4), 2e6, 1e6)
     (strut,) = pieces(leg)
     length = (0.1**2 + 0.4**2) ** 0.5
-    assert isinstance(strut, Strut)
+    assert isinstance(strut, StrutPiece)
     assert strut.stiffness == pytest.approx(1.0 / (1.0 / 2e6 + length / 1e6), rel=1e-14)
 
 

@@ -16,7 +16,7 @@ from kinetostat.machine.leg import Joint, Leg, Spring
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration, Plane
 from kinetostat.tolerances import COINCIDENT_HINGES
-from kinetostat.validation.pieces import Piece, Strut, array, joint_of, moves_in, pieces
+from kinetostat.validation.pieces import Piece, StrutPiece, array, joint_of, moves_in, pieces
 
 MOST_FREEDOMS = 6
 """Degrees of freedom of one body."""
@@ -160,7 +160,7 @@ class _Chain:
             self._joint(piece, self._model.platform.at if after is None else array(after))
         elif isinstance(piece, Beam):
             self._beam(piece)
-        elif isinstance(piece, Strut):
+        elif isinstance(piece, StrutPiece):
             self._strut(piece)
         else:
             self._parallelogram(piece)
@@ -219,7 +219,7 @@ class _Chain:
             for spring in springs:
                 self._free(spring.name, spring.joint, float(spring.stiffness))
 
-    def _strut(self, strut: Strut) -> None:
+    def _strut(self, strut: StrutPiece) -> None:
         """Add a rod on a ball joint: two hinges across it, as its spin does nothing, and a slide if it is compliant."""
         start, end = array(strut.start), array(strut.end)
         along = (end - start) / np.linalg.norm(end - start)

@@ -27,9 +27,9 @@ from kinetostat.validation.masses import (
     has_rotors,
     links,
     on_platform,
+    one_body,
     rotor_inertia,
     thin_rod,
-    together,
 )
 from kinetostat.validation.pieces import Piece, array, joint_of, pieces
 
@@ -69,7 +69,7 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
     places = {body.name: body.at for body in _moving(model)}
     places[model.platform.name] = np.array(reference_point(analysis))
     inertias = {
-        name: together(heavy[name]) if name in heavy else Heavy(light, at, light * gyration**2 * np.eye(3))
+        name: one_body(heavy[name]) if name in heavy else Heavy(light, at, light * gyration**2 * np.eye(3))
         for name, at in places.items()
     }
     least = min(part.mass for name, part in inertias.items() if name != model.platform.name or not carried)

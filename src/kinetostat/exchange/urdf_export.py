@@ -36,7 +36,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import replacing
 from kinetostat.tolerances import COINCIDENT_HINGES
-from kinetostat.validation.masses import Heavy, matrix_of, on_platform, thin_rod, together
+from kinetostat.validation.masses import Heavy, matrix_of, on_platform, one_body, thin_rod
 from kinetostat.validation.pieces import array
 
 TIP = "_tip"
@@ -116,7 +116,7 @@ class _Tree:
                 (parts.setdefault(link, []) if link else left).append(part)
         for name, heavy in parts.items():
             if heavy and name != BASE:
-                self._inertial(*self._links[name], together(heavy))
+                self._inertial(*self._links[name], one_body(heavy))
         if left:
             text = "Links that bend, telescope or are parallelograms have a mass that is not written here"
             self.robot.append(ElementTree.Comment(f" {text}: {sum(part.mass for part in left):.6g} kg. "))

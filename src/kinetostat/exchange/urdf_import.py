@@ -24,7 +24,7 @@ from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.validation import SCHEMA_VERSION
 from kinetostat.tolerances import COINCIDENT_HINGES, INDEPENDENT_AXES, OPEN_LOOP
 from kinetostat.units import RIGID
-from kinetostat.validation.masses import together
+from kinetostat.validation.masses import one_body
 
 CLOSING = ("fixed", "revolute", "continuous", "prismatic", "spherical")
 """Kinds of joints that may close a loop."""
@@ -94,7 +94,7 @@ class Bodies:
         self.left -= names
         if not names:
             return {}
-        whole = together([self._masses[name] for name in sorted(names)])
+        whole = one_body([self._masses[name] for name in sorted(names)])
         entries = [float(whole.inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
         return {"mass": whole.mass, "centre_of_mass": whole.centre.tolist(), "inertia": entries}
 

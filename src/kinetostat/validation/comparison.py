@@ -105,7 +105,7 @@ KNOWN = (
         ("exudyn", "scipy"),
         "kinetostat.validation.exudyn_machine",
         "multibody dynamics: rigid bodies, exact constraints and springs",
-        "kinetostat.validation.exudyn_modes",
+        "kinetostat.validation.exudyn_machine",
     ),
     Engine(
         "pynite",

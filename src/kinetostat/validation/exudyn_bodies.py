@@ -18,7 +18,7 @@ TRANSLATION_FIRST = [3, 4, 5, 0, 1, 2]
 
 
 @dataclass(frozen=True)
-class Body:
+class EngineBody:
     """A body and the place of its frame.
 
     Attributes:
@@ -51,16 +51,16 @@ class Multibody:
         self.items: Any = import_module("exudyn.itemInterface")
         self.container = self.engine.SystemContainer()
         self.system = self.container.AddSystem()
-        self.ground = Body(self.system.CreateGround(), None, np.zeros(3))
+        self.ground = EngineBody(self.system.CreateGround(), None, np.zeros(3))
         self.unit, self.preloaded = unit, preloaded
-        self.chains: list[list[Body]] = []
+        self.chains: list[list[EngineBody]] = []
 
-    def body(self, at: Array) -> Body:
+    def body(self, at: Array) -> EngineBody:
         """Add a body without mass with its frame at a point (m)."""
         node = int(self.system.AddNode(self.items.NodeRigidBodyRxyz(referenceCoordinates=[*at, 0.0, 0.0, 0.0])))
-        return Body(self._rigid(node, 0.0, np.zeros(3), np.zeros((3, 3))), node, at)
+        return EngineBody(self._rigid(node, 0.0, np.zeros(3), np.zeros((3, 3))), node, at)
 
-    def weigh(self, body: Body, mass: float, centre: Array, inertia: Array) -> None:
+    def weigh(self, body: EngineBody, mass: float, centre: Array, inertia: Array) -> None:
         """Add a mass (kg) to a body, with its centre at a point (m) and its inertia about it (kg·m² [3 x 3])."""
         if body.node is not None:
             self._rigid(body.node, mass, centre - body.at, inertia)
@@ -77,7 +77,7 @@ class Multibody:
             )
         )
 
-    def rod(self, bodies: Sequence[Body], ends: Sequence[Array], mass: float) -> None:
+    def rod(self, bodies: Sequence[EngineBody], ends: Sequence[Array], mass: float) -> None:
         """Add a straight uniform rod (kg) between points of two bodies (m), whose ends may come nearer to each other.
 
         Its points move as its ends do in proportion, so that its kinetic energy is m/6 (v1² + v1·v2 + v2²). Its ends
@@ -96,7 +96,7 @@ class Multibody:
             markers = [self.items.MarkerNodePosition(nodeNumber=node), place]
             self.system.AddObject(self.items.SphericalJoint(markerNumbers=[self.system.AddMarker(m) for m in markers]))
 
-    def rotor(self, bodies: Sequence[Body], line: tuple[Array | None, Array], inertia: float) -> None:
+    def rotor(self, bodies: Sequence[EngineBody], line: tuple[Array | None, Array], inertia: float) -> None:
         """Add what turns with the motion between two unloaded bodies, kg along a direction or kg·m² about a line.
 
         It is an element with a matrix of mass over the coordinates of both bodies, at the place where they were built.
@@ -126,14 +126,14 @@ class Multibody:
             )
         )
 
-    def marker(self, body: Body, point: Array, axes: Array) -> int:
+    def marker(self, body: EngineBody, point: Array, axes: Array) -> int:
         """Add a frame on a body, at a point (m) with the given axes as columns (base frame)."""
         place = self.engine.HT(rotation=axes, translation=point - body.at)
         return int(self.system.AddMarker(self.items.MarkerBodyRigid(bodyNumber=body.number, localHT=place)))
 
     def couple(
         self,
-        bodies: Sequence[Body],
+        bodies: Sequence[EngineBody],
         frame: tuple[Array, Array],
         constrained: Sequence[bool],
         stiffness: Array | None = None,
@@ -160,7 +160,7 @@ class Multibody:
                 spring.offset = (-preload / sizes)[TRANSLATION_FIRST].tolist()  # it carries K (u - offset)
             self.system.AddObject(spring)
 
-    def bar(self, bodies: Sequence[Body], ends: Sequence[Array], stiffness: float, preload: float = 0.0) -> None:
+    def bar(self, bodies: Sequence[EngineBody], ends: Sequence[Array], stiffness: float, preload: float = 0.0) -> None:
         """Add a spring (N/m) between a point of the near and one of the far body (m), or a bar of constant length."""
         markers = [self.marker(body, end, np.eye(3)) for body, end in zip(bodies, ends, strict=True)]
         length = float(np.linalg.norm(ends[1] - ends[0]))
@@ -175,7 +175,7 @@ class Multibody:
             )
         self.system.AddObject(bar)
 
-    def thread(self, bodies: Sequence[Body], line: tuple[Array, Array], pitch: float) -> None:
+    def thread(self, bodies: Sequence[EngineBody], line: tuple[Array, Array], pitch: float) -> None:
         """Couple the slide along a line (point in m, direction) to the turn about it: `pitch` m per rad."""
         point, axis = line
         markers, rows, rest = [], [], []

@@ -1,7 +1,9 @@
-"""The compliance of a machine by Exudyn: rigid bodies, exact constraints and springs; closed loops of any kind.
+"""The compliance and the natural frequencies of a machine by Exudyn; closed loops of any kind.
 
-The multibody system is built from points, axes and cross-sections. Six unit wrenches act on it one by one, both in its
-linearised equations and as small finite loads on the nonlinear ones. `exudyn_bodies` makes bodies and connections.
+The multibody system is built from points, axes and cross-sections: rigid bodies, exact constraints and springs, made by
+`exudyn_bodies`. Six unit wrenches act on it one by one, both in its linearised equations and as small finite loads on
+the nonlinear ones. For the frequencies masses are added: links are rods between two bodies, with the kinetic energy of
+all their points; the bodies themselves have none.
 """
 
 from collections.abc import Iterable, Sequence
@@ -11,16 +13,20 @@ import numpy as np
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
+from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Joint, Spring
 from kinetostat.machine.link import Beam, Parallelogram
-from kinetostat.machine.machine import Configuration, Plane
+from kinetostat.machine.machine import Configuration, Machine, Plane
 from kinetostat.spec.errors import InputError
-from kinetostat.tolerances import IDLE_MOTION, NEWTON_STATICS, UNBALANCED_LOAD, UNMOVED
+from kinetostat.tolerances import IDLE_MOTION, MASSLESS_MODE, NEWTON_STATICS, UNBALANCED_LOAD, UNMOVED
 from kinetostat.validation.answer import Answer, Trial
-from kinetostat.validation.exudyn_bodies import TRANSLATION_FIRST, Body, Multibody
+from kinetostat.validation.as_written import Drawing, drawing
+from kinetostat.validation.exudyn_bodies import TRANSLATION_FIRST, EngineBody, Multibody
+from kinetostat.validation.masses import has_rotors, links, on_platform, rotor_inertia
 from kinetostat.validation.pieces import (
     Piece,
-    Strut,
+    StrutPiece,
     array,
     columns,
     end_compliance,
@@ -30,8 +36,8 @@ from kinetostat.validation.pieces import (
     section_axes,
 )
 
-SHARES = (1e-3, 1e-4, 1e-5)
-"""How far finite loads move the platform: rad, or share of the machine's length."""
+MOTION_SHARES = (1e-3, 1e-4, 1e-5)
+"""Motions of the platform by finite loads: rad, or share of the machine's length."""
 VARIED = "how far loads move the platform, rad or share of the machine's length"
 EPS = float(np.finfo(float).eps)
 ALL = (True,) * 6
@@ -70,7 +76,7 @@ def _without_load(trials: tuple[Trial, ...]) -> Array | None:
     return (ratio * small.compliance - large.compliance) / (ratio - 1.0)
 
 
-def _tangent(model: Multibody, platform: Body) -> Array:
+def _tangent(model: Multibody, platform: EngineBody) -> Array:
     """C of the unloaded system; the engine linearises and projects onto what its constraints leave free."""
     model.system.Assemble()
     system = model.system.ComputeLinearizedSystem(
@@ -91,15 +97,15 @@ def _tangent(model: Multibody, platform: Body) -> Array:
     return np.asarray((free.T @ motion)[rows])
 
 
-def _finite_loads(model: Multibody, platform: Body, tangent: Array, length: float) -> Iterable[Trial]:
-    """Nonlinear statics with loads that move the platform by each of SHARES, central differences; smallest first."""
+def _finite_loads(model: Multibody, platform: EngineBody, tangent: Array, length: float) -> Iterable[Trial]:
+    """Nonlinear statics with loads that move the platform by MOTION_SHARES, central differences; smallest first."""
     system, items = model.system, model.items
     marker = model.marker(platform, platform.at, np.eye(3))
     loads = [system.AddLoad(kind(markerNumber=marker, loadVector=[0.0] * 3)) for kind in (items.Torque, items.Force)]
     system.Assemble()
     rest = system.systemData.GetODE2Coordinates()
     unit_loads = _loads_for_unit_motion(tangent, length)
-    for share in sorted(SHARES):
+    for share in sorted(MOTION_SHARES):
         compliance = np.zeros((6, 6))
         for j in np.flatnonzero(unit_loads):
             wrench = share * unit_loads[j] * np.eye(6)[j]
@@ -123,7 +129,7 @@ def _loads_for_unit_motion(tangent: Array, length: float) -> Array:
     return np.asarray(known / (np.where(felt, motion, np.max(motion)) * arms))
 
 
-def _displacement(model: Multibody, platform: Body, loads: list[Any], rest: Any, wrench: Array) -> Array | None:
+def _displacement(model: Multibody, platform: EngineBody, loads: list[Any], rest: Any, wrench: Array) -> Array | None:
     """Displacement of the platform (rad, m) under a wrench in the engine's unit of force; None without convergence."""
     system, engine = model.system, model.engine
     for load, part in zip(loads, (wrench[:3], wrench[3:]), strict=True):
@@ -152,7 +158,7 @@ def settings_of(model: Multibody) -> Any:
 
 def build(
     configuration: Configuration, reference: Vector, unit: float = 1.0, preloaded: bool = False, struts: bool = True
-) -> tuple[Multibody, Body]:
+) -> tuple[Multibody, EngineBody]:
     """Build the machine; return it and its platform, whose frame is at `reference` (base frame, m); `unit` in N.
 
     Args:
@@ -173,7 +179,7 @@ def build(
     return model, platform
 
 
-def _body(model: Multibody, at: Array, plane: Plane | None) -> Body:
+def _body(model: Multibody, at: Array, plane: Plane | None) -> EngineBody:
     """A new body; in a planar machine it is constrained to the plane."""
     body = model.body(at)
     if plane is not None:
@@ -182,7 +188,7 @@ def _body(model: Multibody, at: Array, plane: Plane | None) -> Body:
     return body
 
 
-def _leg(model: Multibody, chain: Sequence[Piece], platform: Body, plane: Plane | None) -> list[Body]:
+def _leg(model: Multibody, chain: Sequence[Piece], platform: EngineBody, plane: Plane | None) -> list[EngineBody]:
     """The bodies of one leg from ground to platform, with their connectors."""
     bodies = [model.ground]
     for piece in chain[:-1]:
@@ -203,14 +209,14 @@ def _far_point(piece: Piece, before: Array) -> Array:
     return array(piece.far if isinstance(piece, Parallelogram) else piece.end)
 
 
-def _connect(model: Multibody, piece: Piece, bodies: Sequence[Body], plane: Plane | None) -> None:
+def _connect(model: Multibody, piece: Piece, bodies: Sequence[EngineBody], plane: Plane | None) -> None:
     if isinstance(piece, Joint):
         _joint(model, piece, bodies, plane)
     elif isinstance(piece, Spring):
         _joint(model, piece.joint, bodies, plane, (float(piece.stiffness), float(piece.preload)))
     elif isinstance(piece, Beam):
         _beam(model, piece, bodies, plane)
-    elif isinstance(piece, Strut):
+    elif isinstance(piece, StrutPiece):
         model.bar(bodies, (array(piece.start), array(piece.end)), piece.stiffness, piece.preload)
     else:
         _parallelogram(model, piece, bodies, plane)
@@ -219,7 +225,7 @@ def _connect(model: Multibody, piece: Piece, bodies: Sequence[Body], plane: Plan
 def _joint(
     model: Multibody,
     joint: Joint,
-    bodies: Sequence[Body],
+    bodies: Sequence[EngineBody],
     plane: Plane | None,
     spring: tuple[float, float] | None = None,
 ) -> None:
@@ -250,7 +256,7 @@ def _axes_around(axis: Array, normal: Array | None = None) -> Array:
     return np.column_stack([x, np.cross(axis, x), axis])
 
 
-def _beam(model: Multibody, beam: Beam, bodies: Sequence[Body], plane: Plane | None) -> None:
+def _beam(model: Multibody, beam: Beam, bodies: Sequence[EngineBody], plane: Plane | None) -> None:
     """The cantilever's 6x6 stiffness at the beam's end; rigid components are constrained."""
     compliance = end_compliance(beam)
     moving = ALL if plane is None else in_plane(beam, plane.frame.rotation.z)
@@ -267,7 +273,7 @@ def _beam(model: Multibody, beam: Beam, bodies: Sequence[Body], plane: Plane | N
     model.couple(bodies, (array(beam.end), section_axes(beam)[0]), constrained, matrix if flexible else None)
 
 
-def _parallelogram(model: Multibody, piece: Parallelogram, bodies: Sequence[Body], plane: Plane | None) -> None:
+def _parallelogram(model: Multibody, piece: Parallelogram, bodies: Sequence[EngineBody], plane: Plane | None) -> None:
     """Two bars between points of the bodies, which also stay in the parallelogram's plane and parallel to it."""
     normal = np.cross(array(piece.side), array(piece.far) - array(piece.near))
     if plane is None:
@@ -275,3 +281,75 @@ def _parallelogram(model: Multibody, piece: Parallelogram, bodies: Sequence[Body
         model.couple(bodies, (array(piece.far), axes), PLANAR_JOINT)
     for near, far in piece.bars:
         model.bar(bodies, (array(near), array(far)), float(piece.bar))
+
+
+def frequencies(machine: Machine) -> Array:
+    """Return the natural frequencies of the unloaded machine at its pose, ascending, Hz; none without a mass.
+
+    Args:
+        machine: at a pose that it reaches, where nothing is free.
+
+    Raises:
+        InputError: if the machine has a part that cannot be built.
+    """
+    joints = solve_joints(machine) if machine.family.chains else None
+    response = respond(machine, joints)
+    drawn, struts = drawing(machine, response, joints), not has_rotors(machine)
+    model, _ = build(drawn.configuration, drawn.reference)
+    model.system.Assemble()
+    unit = float(np.max(np.abs(model.system.ComputeLinearizedSystem(settings_of(model))[1])))
+    model, platform = build(drawn.configuration, drawn.reference, unit, struts=struts)
+    weigh(model, platform, machine, drawn)
+    model.system.Assemble()
+    return modal_frequencies(model)
+
+
+def weigh(model: Multibody, platform: EngineBody, machine: Machine, drawn: Drawing) -> None:
+    """Add the masses of platform, payload and links to the bodies of a machine.
+
+    Args:
+        model, platform: as `build` returns them.
+        machine: says what its platform, payload and rotors weigh.
+        drawn: its legs and links at the pose.
+    """
+    for part in on_platform(machine, drawn.configuration.platform):
+        model.weigh(platform, part.mass, part.centre, part.inertia)
+    if has_rotors(machine):
+        turn_rotors(model, machine, drawn.configuration)
+    for link in links(drawn.members, drawn.configuration, struts=not has_rotors(machine)):
+        carriers = [model.chains[link.leg][number] for number in link.bodies]
+        if len(carriers) == 1:
+            model.weigh(carriers[0], link.mass, link.points[0], link.inertia)
+        elif any(body.node is not None for body in carriers):
+            model.rod(carriers, link.points, link.mass)
+
+
+def turn_rotors(model: Multibody, machine: Machine, configuration: Configuration) -> None:
+    """Add the rotors of actuators, which move as the springs of the actuators deflect.
+
+    Args:
+        model: unloaded, without struts, so that each spring of an actuator has two bodies.
+        machine: says how rotors are driven.
+        configuration: of it.
+    """
+    for leg, bodies in zip(configuration.legs, model.chains, strict=True):
+        for piece, near, far in zip(pieces(leg, configuration.plane, struts=False), bodies, bodies[1:], strict=False):
+            if isinstance(piece, Spring) and piece.actuated:
+                point, axis = piece.joint.point, array(piece.joint.axis)
+                line = None if point is None else array(point), axis
+                model.rotor((near, far), line, rotor_inertia(machine, slides=point is None))
+
+
+def modal_frequencies(model: Multibody) -> Array:
+    """Frequencies (Hz) of the engine's linearised equations about where its system is, ascending.
+
+    Motions that have no stiffness are idle here, and motions without mass have no frequency. So K is made a unit
+    matrix by its eigenvectors without the idle ones, and the eigenvalues of M in these coordinates are 1/omega².
+    """
+    mass, stiffness, *_ = model.system.ComputeLinearizedSystem(settings_of(model), projectIntoConstraintNullspace=True)
+    sizes, shapes = np.linalg.eigh(0.5 * (stiffness + np.transpose(stiffness)))
+    stiff = sizes > IDLE_MOTION * np.max(sizes)
+    softened = shapes[:, stiff] / np.sqrt(sizes[stiff])
+    periods = np.linalg.eigvalsh(softened.T @ np.asarray(mass) @ softened)[::-1]
+    felt = periods[periods > MASSLESS_MODE * np.max(periods, initial=0.0)]
+    return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(felt)))

@@ -108,7 +108,7 @@ def thin_rod(mass: float, start: Array, end: Array) -> Heavy:
     return Heavy(mass, 0.5 * (start + end), mass / 12.0 * ((span @ span) * np.eye(3) - np.outer(span, span)))
 
 
-def together(parts: Sequence[Heavy]) -> Heavy:
+def one_body(parts: Sequence[Heavy]) -> Heavy:
     """Return parts of a rigid body as one."""
     mass = sum(part.mass for part in parts)
     centre = sum((part.mass * part.centre for part in parts), np.zeros(3)) / mass

@@ -21,7 +21,7 @@ from kinetostat.validation.pieces import array
 
 
 @dataclass(frozen=True)
-class Part:
+class LegPart:
     """A part of a leg at the home pose.
 
     Attributes:
@@ -82,15 +82,15 @@ class Part:
             return replace(element, joint=_joint_at(element.joint, before))
         if isinstance(element, Parallelogram):
             near, far = moved_point(before, element.near), moved_point(after, element.far)
-            return replace(element, near=near, far=far, side=turned(before, element.side))
+            return replace(element, near=near, far=far, side=turned_direction(before, element.side))
         if isinstance(element, Beam):
             ends = moved_point(before, element.start), moved_point(before, element.end)
-            return Beam(element.name, *ends, turned(before, element.up), element.rigidity)
+            return Beam(element.name, *ends, turned_direction(before, element.up), element.rigidity)
         raise InputError(f"A {type(element).__name__} cannot be rebuilt in an independent engine.")
 
 
 @dataclass(frozen=True)
-class Body:
+class LegBody:
     """A link of a leg at the home pose, as far as it moves.
 
     Attributes:
@@ -147,8 +147,8 @@ class MovingLeg:
     """
 
     name: str
-    parts: tuple[Part, ...]
-    bodies: tuple[Body, ...]
+    parts: tuple[LegPart, ...]
+    bodies: tuple[LegBody, ...]
 
     @property
     def size(self) -> int:
@@ -217,7 +217,7 @@ def moved_point(place: Array, point: Vector) -> Vector:
     return vector(apply(place, array(point)))
 
 
-def turned(place: Array, direction: Vector) -> Vector:
+def turned_direction(place: Array, direction: Vector) -> Vector:
     """A direction under a placement."""
     return vector(place[:3, :3] @ array(direction))
 
@@ -241,7 +241,7 @@ def joint_in(element: Any) -> Any:
 def _joint_at(joint: Joint, place: Array) -> Joint:
     point = None if joint.point is None else moved_point(place, joint.point)
     carriage = None if joint.carriage is None else moved_point(place, joint.carriage)
-    return replace(joint, axis=turned(place, joint.axis), point=point, carriage=carriage)
+    return replace(joint, axis=turned_direction(place, joint.axis), point=point, carriage=carriage)
 
 
 def _bars(bars: Parallelogram) -> tuple[Array, Array]:

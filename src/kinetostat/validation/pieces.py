@@ -22,7 +22,7 @@ from kinetostat.tolerances import COINCIDENT
 
 
 @dataclass(frozen=True)
-class Strut:
+class StrutPiece:
     """A straight part between two spherical joints: it carries a force along its line; its idle spin is omitted.
 
     Attributes:
@@ -39,7 +39,7 @@ class Strut:
     preload: float = 0.0
 
 
-Piece = Joint | Spring | Beam | Parallelogram | Strut
+Piece = Joint | Spring | Beam | Parallelogram | StrutPiece
 """A connection between two bodies of a chain; springs in it are neither free nor rigid."""
 
 
@@ -94,7 +94,7 @@ def bodies_before(leg: Leg, station: Station, plane: Plane | None = None, struts
     if same == len(part):
         return same
     cut = whole[same]
-    if not isinstance(cut, Strut):
+    if not isinstance(cut, StrutPiece):
         raise InputError(f"{leg.name} has a mass within {cut.name}, which cannot be rebuilt in another program.")
     near, far = (float((end - point).norm()) for end in (cut.start, cut.end))
     return same if near < far else same + 1
@@ -156,7 +156,7 @@ def _with_struts(name: str, chain: Sequence[Piece], near: float) -> tuple[Piece,
     return tuple(result)
 
 
-def _strut(name: str, chain: Sequence[Piece], at: int, near: float) -> tuple[Strut | None, int]:
+def _strut(name: str, chain: Sequence[Piece], at: int, near: float) -> tuple[StrutPiece | None, int]:
     """The strut that begins at a position of the chain, if there is one, and the position after it."""
     first, inside = _ball(chain, at, near)
     if first is None:
@@ -165,7 +165,7 @@ def _strut(name: str, chain: Sequence[Piece], at: int, near: float) -> tuple[Str
         second, after = _ball(chain, last, near)
         if second is not None and float(np.linalg.norm(array(second - first))) > near:
             row = _in_a_row(chain[inside:last], first, second, near)
-            return (None, at) if row is None else (Strut(name, first, second, *row), after)
+            return (None, at) if row is None else (StrutPiece(name, first, second, *row), after)
     return None, at
 
 

@@ -19,11 +19,11 @@ from kinetostat.machine.link import Beam, Parallelogram, matrix_springs
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.written.joints import JOINT_TYPES
 from kinetostat.units import parse
-from kinetostat.validation.moving_legs import Body, MovingLeg, Part, joint_in, turn, unit, vector
+from kinetostat.validation.moving_legs import LegBody, LegPart, MovingLeg, joint_in, turn, unit, vector
 
 Numbers = Mapping[str, Any]
 
-ORDER = {
+FREEDOM_ORDER = {
     "cylindrical": ("rotation", "translation"),
     "universal": ("first_axis", "second_axis"),
     "spherical": ("first_axis", "second_axis", "normal"),
@@ -35,7 +35,7 @@ TRAVELS = dict.fromkeys(("prismatic", "cylindrical", "planar", "helical"), True)
 )
 """Whether the bearings of a joint go with the body that it moves, by type. A type that is not here is taken from its
 row in `JOINT_TYPES`."""
-TENSOR = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
+TENSOR_PLACES = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
 """Where the entries of a tensor are in xx, yy, zz, xy, xz, yz."""
 
 
@@ -90,7 +90,7 @@ def _put(entry: Numbers, place: Array) -> dict[str, Any]:
     placed = dict(entry)
     for key, value in entry.items():
         if key == "inertia":
-            placed[key] = place @ np.asarray(value)[np.array(TENSOR)] @ place.T
+            placed[key] = place @ np.asarray(value)[np.array(TENSOR_PLACES)] @ place.T
         elif key == "compliance":
             both = np.kron(np.diag([np.linalg.det(place), 1.0]), place)
             placed[key] = both @ np.asarray(value) @ both.T
@@ -100,8 +100,8 @@ def _put(entry: Numbers, place: Array) -> dict[str, Any]:
 
 
 def _leg(name: str, joints: Sequence[Numbers], links: Mapping[str, Numbers], document: Numbers) -> MovingLeg:
-    parts: list[Part] = []
-    bodies: list[Body] = []
+    parts: list[LegPart] = []
+    bodies: list[LegBody] = []
     for i, joint in enumerate(joints):
         parts += _joint(name, joint, document)
         if i + 1 == len(joints):
@@ -118,22 +118,22 @@ def _leg(name: str, joints: Sequence[Numbers], links: Mapping[str, Numbers], doc
     return MovingLeg(name, tuple(parts), tuple(bodies))
 
 
-def _joint(leg: str, joint: Numbers, document: Numbers) -> list[Part]:
+def _joint(leg: str, joint: Numbers, document: Numbers) -> list[LegPart]:
     """The parts of a joint: its freedoms, of which one may have springs in a row and a rod, and its bearings."""
     name, kind = PartName(leg, joint["name"]), joint["type"]
-    moving = [Part(element, moves=True) for element in _elements(name, joint)]
+    moving = [LegPart(element, moves=True) for element in _elements(name, joint)]
     if "stiffness" in joint:
         actuated = joint.get("actuated", False)
-        order = ORDER.get(kind, tuple(JOINT_TYPES[kind].motors))
+        order = FREEDOM_ORDER.get(kind, tuple(JOINT_TYPES[kind].motors))
         at = 0 if isinstance(actuated, bool) else order.index(actuated)
         freedom = joint_in(moving[at].element)
         row = _row(name, freedom, joint, bool(actuated))
         rod = _axial(joint, document)
         if rod is not None:
             begin = replace(freedom, carriage=vector(joint["point"]))
-            row.append(Part(Spring(PartName(leg, f"{joint['name']} rod"), begin, rod), rod=True))
+            row.append(LegPart(Spring(PartName(leg, f"{joint['name']} rod"), begin, rod), rod=True))
         moving[at : at + 1] = row
-    bearings = [Part(spring) for spring in _bearings(name, joint)]
+    bearings = [LegPart(spring) for spring in _bearings(name, joint)]
     travels = TRAVELS[kind] if kind in TRAVELS else JOINT_TYPES[kind].bearings_travel
     return [*moving, *bearings] if travels and "compliance" not in joint else [*bearings, *moving]
 
@@ -169,13 +169,13 @@ def _freedoms(joint: Numbers) -> list[Joint]:
     return [*freedoms, Joint(ways[0])] if kind == "cylindrical" else freedoms
 
 
-def _row(name: PartName, freedom: Joint, joint: Numbers, actuated: bool) -> list[Part]:
+def _row(name: PartName, freedom: Joint, joint: Numbers, actuated: bool) -> list[LegPart]:
     """The springs on a freedom, one or several in a row, of which the first one moves."""
     given = joint["stiffness"]
     stiffnesses = list(given.values()) if isinstance(given, dict) else [given]
     first = Spring(name, freedom, stiffnesses[0], name, actuated, not actuated, acts=joint.get("acts", ""))
     others = [Spring(name, freedom, stiffness, name, acts=joint.get("acts", "")) for stiffness in stiffnesses[1:]]
-    return [Part(first, moves=True), *map(Part, others)]
+    return [LegPart(first, moves=True), *map(LegPart, others)]
 
 
 def _axial(joint: Numbers, document: Numbers) -> float | None:
@@ -208,33 +208,33 @@ def _bearings(name: str, joint: Numbers) -> Sequence[Spring]:
     return [Spring(f"{name} {way}", freedom, k) for way, k in ways.items() for freedom in rows[way]]
 
 
-def _link(name: PartName, link: Numbers, ends: tuple[Array, Array], document: Numbers) -> list[Part]:
+def _link(name: PartName, link: Numbers, ends: tuple[Array, Array], document: Numbers) -> list[LegPart]:
     """The parts that stand for a link that deflects."""
     model = link.get("model", "rigid")
     if model == "rigid":
         return []
     if model == "matrix":
-        return [Part(spring) for spring in matrix_springs(name, link["compliance"], vector(ends[1]))]
+        return [LegPart(spring) for spring in matrix_springs(name, link["compliance"], vector(ends[1]))]
     span = ends[1] - ends[0]
     up = np.asarray(link.get("up", np.eye(3)[np.argmin(np.abs(span))]), dtype=float)
     rigidity = _rigidity(document[f"sections.{link['section']}"], model == "timoshenko")
     if model != "lumped":
-        return [Part(Beam(name, vector(ends[0]), vector(ends[1]), vector(up), rigidity))]
+        return [LegPart(Beam(name, vector(ends[0]), vector(ends[1]), vector(up), rigidity))]
     length, along, start = float(np.linalg.norm(span)), unit(span), vector(ends[0])
     y = unit(np.cross(up, along))
     turning = ((along, rigidity.torsion), (y, 3.0 * rigidity.bending_y), (np.cross(along, y), 3.0 * rigidity.bending_z))
     springs = [Spring(name, Joint(vector(axis), start), k / length) for axis, k in turning]
-    return [*map(Part, springs), Part(Spring(name, Joint(vector(along)), rigidity.axial / length))]
+    return [*map(LegPart, springs), LegPart(Spring(name, Joint(vector(along)), rigidity.axial / length))]
 
 
 def _body(
     name: str, link: Numbers, ends: tuple[Array, Array], counts: tuple[int, int], section: Numbers | None
-) -> Body:
+) -> LegBody:
     """A link with its mass: what the file gives for it, otherwise what its cross-section weighs over its length."""
     if "mass" in link:
-        return Body(name, link["mass"], ends, counts, link.get("centre_of_mass"), link.get("inertia"))
+        return LegBody(name, link["mass"], ends, counts, link.get("centre_of_mass"), link.get("inertia"))
     density = linear_density_of(section["shape"], SimpleNamespace(**section)) if section else 0.0
-    return Body(name, float(density) * float(np.linalg.norm(ends[1] - ends[0])), ends, counts)
+    return LegBody(name, float(density) * float(np.linalg.norm(ends[1] - ends[0])), ends, counts)
 
 
 def _around(axis: Array) -> Array:
