@@ -16,11 +16,11 @@ from kinetostat.studies.assembly import forward as forward
 from kinetostat.studies.budget.budget import budget as budget
 from kinetostat.studies.carrying import carrying_legs as carrying_legs
 from kinetostat.studies.command import command as command
-from kinetostat.studies.comparison.designs import compare as compare
+from kinetostat.studies.comparison import compare as compare
 from kinetostat.studies.correction.table import correction_table as correction_table
-from kinetostat.studies.evaluation.dataset import evaluate as evaluate
-from kinetostat.studies.grid.grid import evaluate_grid as evaluate_grid
-from kinetostat.studies.guidelines.guidelines import guidelines as guidelines
+from kinetostat.studies.datasets import evaluate as evaluate
+from kinetostat.studies.grid import evaluate_grid as evaluate_grid
+from kinetostat.studies.guidelines import guidelines as guidelines
 from kinetostat.studies.identification.identification import identify as identify
 from kinetostat.studies.measured.comparison import validate_measured as validate_measured
 from kinetostat.studies.optimisation.problem import load_problem as load_problem
@@ -31,7 +31,7 @@ from kinetostat.studies.sensitivity import sensitivity as sensitivity
 from kinetostat.studies.state_space import state_space as state_space
 from kinetostat.studies.under_load import under_load as under_load
 from kinetostat.studies.vibration import modes as modes
-from kinetostat.studies.workspace.workspace import workspace as workspace
+from kinetostat.studies.workspace import workspace as workspace
 from kinetostat.validation.comparison import validate as validate
 from kinetostat.views.answers import plot as plot
 from kinetostat.views.answers import save as save

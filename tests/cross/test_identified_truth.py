@@ -9,10 +9,10 @@ from kinetostat.cli import main
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.machine.loading import build
 from kinetostat.numerics.motions import exponential
-from kinetostat.studies.evaluation.given_poses import given_poses
 from kinetostat.studies.identification.identification import identified
 from kinetostat.studies.identification.measurements import POSITION, Measurements
 from kinetostat.studies.identification.next_poses import as_csv
+from kinetostat.studies.poses import given_poses
 from kinetostat.views.identification_figures import residual_figure
 from machines import load_without_limits
 from synthetic_measurements import SIGMA, found, measured, posed, truth_of, written

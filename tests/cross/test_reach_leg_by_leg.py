@@ -15,7 +15,7 @@ from kinetostat.machine.column import stacked
 from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.spec import document
-from kinetostat.studies.workspace.workspace import workspace
+from kinetostat.studies.workspace import workspace
 from machines import load_without_limits, written
 
 CRANKS = """

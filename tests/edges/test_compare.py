@@ -8,8 +8,8 @@ import pytest
 from kinetostat.cli import main
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.comparison.designs import as_json, compare, read_design
-from kinetostat.studies.grid.grid import evaluate_grid
+from kinetostat.studies.comparison import as_json, compare, read_design
+from kinetostat.studies.grid import evaluate_grid
 from kinetostat.views.comparison_figure import comparison_figure
 
 PAPER = "zhang-gosselin-4dof"

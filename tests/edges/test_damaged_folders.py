@@ -9,7 +9,7 @@ from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
 from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
-from kinetostat.studies.grid import grid
+from kinetostat.studies import grid
 from kinetostat.studies.storage import LIST
 from kinetostat.studies.study_folder import read_history, read_question
 from refusals import refused

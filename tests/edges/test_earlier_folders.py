@@ -14,7 +14,7 @@ import xarray as xr
 from kinetostat.cli import main
 from kinetostat.commands.common import DONE
 from kinetostat.machine.loading import load
-from kinetostat.studies.grid import grid
+from kinetostat.studies import grid
 
 FOLDERS = Path(__file__).parents[1] / "folders"
 SEARCHES = sorted(path.name for path in FOLDERS.glob("search-*"))

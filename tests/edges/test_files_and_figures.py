@@ -12,9 +12,9 @@ from kinetostat.cli import main
 from kinetostat.machine.loading import as_toml, build, load
 from kinetostat.spec.document import parse
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.grid.grid import evaluate_grid, failures
-from kinetostat.studies.grid.quantities import resolve_quantities
-from kinetostat.studies.guidelines.guidelines import guidelines
+from kinetostat.studies.grid import evaluate_grid, failures
+from kinetostat.studies.guidelines import guidelines
+from kinetostat.studies.quantities import resolve_quantities
 from kinetostat.studies.sensitivity import sensitivity
 from kinetostat.studies.storage import replacing, write_dataset, write_text
 from kinetostat.views.drawing import three_views

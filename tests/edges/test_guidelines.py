@@ -9,8 +9,8 @@ from kinetostat.cli import main
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.guidelines.guidelines import guidelines
-from kinetostat.studies.guidelines.sentences import as_json, statements
+from kinetostat.studies.guideline_sentences import as_json, statements
+from kinetostat.studies.guidelines import guidelines
 
 MACHINE = "zhang-gosselin-4dof"
 GRID = ["x=-2 cm:2 cm:5", "z=66 cm:70 cm:5"]

@@ -15,11 +15,10 @@ from kinetostat.commands.common import BAD_INPUT, DONE, STOPPED
 from kinetostat.engine import chunks
 from kinetostat.engine.batch import NATIVE_SLAB
 from kinetostat.machine.loading import load
-from kinetostat.studies import result_file
-from kinetostat.studies.grid import grid, stored_grid
-from kinetostat.studies.grid.grid import grid_question
-from kinetostat.studies.grid.stored_grid import answer_into
+from kinetostat.studies import grid, result_file, stored_grid
+from kinetostat.studies.grid import grid_question
 from kinetostat.studies.storage import LIST
+from kinetostat.studies.stored_grid import answer_into
 from refusals import refused
 
 MACHINE = "zhang-gosselin-4dof"
@@ -95,9 +94,9 @@ import os, signal, sys
 from pathlib import Path
 from kinetostat.engine import chunks
 from kinetostat.machine.loading import load
-from kinetostat.studies.grid.grid import grid_question
+from kinetostat.studies.grid import grid_question
 from kinetostat.studies.result_file import ResultFile
-from kinetostat.studies.grid.stored_grid import answer_into
+from kinetostat.studies.stored_grid import answer_into
 from kinetostat.studies.study_folder import StudyFolder
 
 chunks.CHUNK_NUMBERS = {slab}

@@ -9,8 +9,8 @@ from kinetostat.cli import main
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import values, with_leg, with_values
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.guidelines.guidelines import guidelines
-from kinetostat.studies.guidelines.sentences import statements
+from kinetostat.studies.guideline_sentences import statements
+from kinetostat.studies.guidelines import guidelines
 from kinetostat.studies.sensitivity import as_json, notes, sensitivity
 
 MACHINE = "zhang-gosselin-4dof"

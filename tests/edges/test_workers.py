@@ -18,7 +18,7 @@ from kinetostat.engine.points import Axis, Grid
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec.installation import adding
-from kinetostat.studies.grid import grid
+from kinetostat.studies import grid
 from refusals import refused
 
 MACHINE = "zhang-gosselin-4dof"

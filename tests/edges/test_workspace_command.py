@@ -125,7 +125,7 @@ def test_points_that_do_not_converge_count_in_the_error_and_the_assembly_mode_is
     question = ["workspace", "tripteron", "--over", "x=20 cm:80 cm:4", "--over", "y=20 cm:80 cm:4"]
     assert main([*question, "--json"]) == DONE
     assert json.loads(capsys.readouterr().out)["volume"]["unknown"] == 0.0
-    monkeypatch.setattr("kinetostat.studies.workspace.workspace.evaluate", without_answer)
+    monkeypatch.setattr("kinetostat.studies.workspace.evaluate", without_answer)
     assert main(question) == DONE
     text = " ".join(capsys.readouterr().out.split())
     assert "larger by up to 0.08 m²: in 2 of the cells a point did not converge" in text

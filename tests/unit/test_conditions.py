@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.studies.workspace.conditions import parse_condition
+from kinetostat.studies.workspace_verdicts import parse_condition
 from refusals import refused
 
 READ = [

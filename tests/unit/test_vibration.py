@@ -17,7 +17,7 @@ from kinetostat.machine.loading import bundled, changed, load
 from kinetostat.machine.loads import located_members
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.grid.grid import evaluate_grid
+from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.vibration import NOTHING_RINGS, TOO_DIFFERENT, modes
 from kinetostat.vibration.reduced import free_frequencies, light, pose_frequencies, reducible
 from machines import with_bodies

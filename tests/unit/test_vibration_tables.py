@@ -4,7 +4,7 @@ import pytest
 
 from kinetostat.machine.loading import changed, load
 from kinetostat.machine.parameters import with_leg
-from kinetostat.studies.grid.grid import evaluate_grid
+from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.vibration import modes
 from kinetostat.views.figures import curves, look_of
 from kinetostat.views.vibration import MOST_PARTS, cut_of, mode_table, share_table, strain_of

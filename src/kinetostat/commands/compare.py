@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from kinetostat.commands.common import Commands
     from kinetostat.machine.machine import Machine
-    from kinetostat.studies.comparison.designs import Comparison
+    from kinetostat.studies.comparison import Comparison
 
 
 def add_compare_commands(commands: "Commands") -> None:
@@ -83,7 +83,7 @@ def add_compare_commands(commands: "Commands") -> None:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from kinetostat.studies.comparison.designs import as_json, compare, read_design
+    from kinetostat.studies.comparison import as_json, compare, read_design
     from kinetostat.views.comparison_tables import print_comparison
 
     shown = [f"display.units={options.units}"] if options.units else []
@@ -96,7 +96,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _write(options: argparse.Namespace, result: "Comparison") -> list[Path]:
-    from kinetostat.studies.comparison.designs import as_json
+    from kinetostat.studies.comparison import as_json
     from kinetostat.studies.storage import write_json
     from kinetostat.views.comparison_figure import comparison_figure
 

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
     from kinetostat.commands.common import Commands
     from kinetostat.engine.chunks import Crew
-    from kinetostat.studies.grid.grid import GridQuestion
-    from kinetostat.studies.workspace.workspace import Workspace
+    from kinetostat.studies.grid import GridQuestion
+    from kinetostat.studies.workspace import Workspace
 
 VARY = "FIELD=from:to:count[:log]"
 MOST_WORKERS = 1024
@@ -140,7 +140,7 @@ def _carrying(options: argparse.Namespace) -> int:
 
 
 def _grid(options: argparse.Namespace, stem: str) -> int:
-    from kinetostat.studies.grid.grid import grid_question
+    from kinetostat.studies.grid import grid_question
 
     machine = load_machine(options)
     quantities = quantities_of(options, machine, options.default_quantity)
@@ -158,7 +158,7 @@ def _crew(options: argparse.Namespace) -> "Crew":
 
 def _in_memory(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
     from kinetostat.engine.chunks import compute_with
-    from kinetostat.studies.grid.grid import answer
+    from kinetostat.studies.grid import answer
 
     if options.output:
         _check_folder(options.output, options.resume)
@@ -166,7 +166,7 @@ def _in_memory(options: argparse.Namespace, question: "GridQuestion", stem: str)
         dataset = answer(question, progress, compute)
     written = _write(options, dataset, stem) if options.output else []
 
-    from kinetostat.studies.grid.grid import as_json
+    from kinetostat.studies.grid import as_json
     from kinetostat.views.grid_tables import print_dataset
 
     names = [str(name) for name in dataset.data_vars if name != "status"]
@@ -212,8 +212,8 @@ def _draw(options: argparse.Namespace, dataset: "xr.Dataset", stem: str, title: 
 
 def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) -> int:
     from kinetostat.engine.chunks import compute_with
-    from kinetostat.studies.grid.stored_grid import answer_into
     from kinetostat.studies.storage import differing
+    from kinetostat.studies.stored_grid import answer_into
 
     changed = differing(options.output)
     try:
@@ -222,7 +222,7 @@ def _stored(options: argparse.Namespace, question: "GridQuestion", stem: str) ->
     except KeyboardInterrupt:
         return stopped(f"the results so far are in {options.output}; the same command continues from there.")
     note_damage(options.output, stored.repaired, stored.unchecked, changed)
-    from kinetostat.studies.grid.stored_grid import summary_json
+    from kinetostat.studies.stored_grid import summary_json
     from kinetostat.studies.study_folder import HISTORY, QUESTION
     from kinetostat.views.grid_tables import print_stored
 
@@ -252,7 +252,7 @@ def _seed(text: str) -> int:
 
 
 def _workspace(options: argparse.Namespace) -> int:
-    from kinetostat.studies.workspace.workspace import as_json, workspace
+    from kinetostat.studies.workspace import as_json, workspace
     from kinetostat.views.grid_tables import print_workspace
 
     machine = load_machine(options)

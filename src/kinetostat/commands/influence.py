@@ -22,7 +22,7 @@ from kinetostat.commands.common import (
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
-    from kinetostat.studies.guidelines.guidelines import Guidelines
+    from kinetostat.studies.guidelines import Guidelines
     from kinetostat.studies.sensitivity import Sensitivity
 
 
@@ -82,8 +82,8 @@ def _write_sensitivity(options: argparse.Namespace, result: "Sensitivity") -> li
 
 def _guidelines(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
-    from kinetostat.studies.guidelines.guidelines import guidelines
-    from kinetostat.studies.guidelines.sentences import as_json
+    from kinetostat.studies.guideline_sentences import as_json
+    from kinetostat.studies.guidelines import guidelines
     from kinetostat.views.influence_tables import print_guidelines
 
     machine = load_machine(options)
@@ -102,7 +102,7 @@ def _guidelines(options: argparse.Namespace) -> int:
 
 
 def _write_guidelines(options: argparse.Namespace, result: "Guidelines") -> list[Path]:
-    from kinetostat.studies.guidelines.sentences import as_json
+    from kinetostat.studies.guideline_sentences import as_json
     from kinetostat.studies.storage import write_json
     from kinetostat.views.influence_figures import guideline_figures
 

@@ -19,7 +19,7 @@ from kinetostat.commands.common import (
 
 if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
-    from kinetostat.studies.evaluation.evaluation import PoseAnswers
+    from kinetostat.studies.evaluation import PoseAnswers
 
 PICTURES = (".png", ".svg", ".pdf")
 
@@ -46,8 +46,8 @@ def add_path_command(commands: "Commands") -> None:
 
 def _path(options: argparse.Namespace) -> int:
     from kinetostat.spec.errors import choice
-    from kinetostat.studies.evaluation.evaluation import answers_at, as_json
-    from kinetostat.studies.evaluation.pose_file import read_poses
+    from kinetostat.studies.evaluation import answers_at, as_json
+    from kinetostat.studies.poses import read_poses
     from kinetostat.views.path_tables import print_path
 
     for path in options.output:
@@ -68,21 +68,21 @@ def _path(options: argparse.Namespace) -> int:
 
 
 def _write_csv(path: Path, answers: "PoseAnswers") -> None:
-    from kinetostat.studies.evaluation.evaluation import as_csv
+    from kinetostat.studies.evaluation import as_csv
     from kinetostat.studies.storage import write_text
 
     write_text(path, as_csv(answers))
 
 
 def _write_json(path: Path, answers: "PoseAnswers") -> None:
-    from kinetostat.studies.evaluation.evaluation import as_json
+    from kinetostat.studies.evaluation import as_json
     from kinetostat.studies.storage import write_json
 
     write_json(path, as_json(answers))
 
 
 def _write_dataset(path: Path, answers: "PoseAnswers") -> None:
-    from kinetostat.studies.evaluation.dataset import as_dataset
+    from kinetostat.studies.datasets import as_dataset
     from kinetostat.studies.storage import write_dataset
 
     write_dataset(path, as_dataset(answers))

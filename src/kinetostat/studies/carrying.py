@@ -21,8 +21,9 @@ from kinetostat.machine.machine import Machine, springs
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.grid.grid import ABOUT_STATUS, grid_question
-from kinetostat.studies.grid.grid import as_json as of_grid
+from kinetostat.studies.datasets import ABOUT_STATUS
+from kinetostat.studies.grid import as_json as of_grid
+from kinetostat.studies.grid import grid_question
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,10 +22,9 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.driven import Driven, driven
-from kinetostat.studies.evaluation.columns import PoseColumns
-from kinetostat.studies.evaluation.given_poses import given_poses
 from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.plain_data import as_answer, no_formula
+from kinetostat.studies.poses import PoseColumns, given_poses
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,10 +22,10 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.ranges import parse_range
 from kinetostat.spec.requirements import Requirement
-from kinetostat.studies.evaluation.columns import Column, read_columns
-from kinetostat.studies.grid.axes import grid_of
-from kinetostat.studies.grid.quantities import refuse_absent
-from kinetostat.studies.workspace.conditions import Condition, parse_condition
+from kinetostat.studies.grid import grid_of
+from kinetostat.studies.poses import GivenColumn, read_columns
+from kinetostat.studies.quantities import refuse_absent
+from kinetostat.studies.workspace_verdicts import PoseCondition, parse_condition
 
 MOST_POSES = 5_000_000
 
@@ -153,7 +153,7 @@ def _poses(machine: Machine, requirement: Requirement) -> tuple[Points, list[Par
         paths = {name: find(machine.family, name).path for row in requirement.poses for name in row}
         rows = [{paths[name]: value for name, value in row.items()} for row in requirement.poses]
         columns = [
-            Column(path, np.array([row.get(path, float(here[path])) for row in rows], object))
+            GivenColumn(path, np.array([row.get(path, float(here[path])) for row in rows], object))
             for path in dict.fromkeys(paths.values())
         ]
         read = read_columns(machine, columns, lambda path, i: f"poses.{i}.{shown(path)}")
@@ -167,7 +167,7 @@ def _poses(machine: Machine, requirement: Requirement) -> tuple[Points, list[Par
     )
 
 
-def _worst(condition: Condition, amounts: Array) -> int:
+def _worst(condition: PoseCondition, amounts: Array) -> int:
     """Return the number of the worst pose: the first without a result, or the one farthest on the wrong side."""
     unanswered = np.flatnonzero(np.isnan(amounts))
     if unanswered.size:
@@ -175,7 +175,7 @@ def _worst(condition: Condition, amounts: Array) -> int:
     return int(np.argmin(amounts) if condition.comparison.startswith(">") else np.argmax(amounts))
 
 
-def _margin(condition: Condition, worst: float | None) -> float | None:
+def _margin(condition: PoseCondition, worst: float | None) -> float | None:
     if worst is None or condition.value == 0.0 or not math.isfinite(worst):
         return None
     spare = worst - condition.value if condition.comparison.startswith(">") else condition.value - worst

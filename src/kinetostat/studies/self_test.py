@@ -18,7 +18,7 @@ from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.diagnosis import InstallationCheck, UnsoundError, check_of, reinstall
-from kinetostat.studies.grid.grid import evaluate_grid
+from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.log import best_feasible
 from kinetostat.studies.optimisation.problem import load_problem

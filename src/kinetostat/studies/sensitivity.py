@@ -27,8 +27,8 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.attribution import ranked
-from kinetostat.studies.grid.quantities import refuse_absent, refuse_loaded, resolve_quantities
 from kinetostat.studies.plain_data import as_answer
+from kinetostat.studies.quantities import refuse_absent, refuse_loaded, resolve_quantities
 from kinetostat.tolerances import NO_INFLUENCE, ROUND_OFF_OF_ENTRY, ZERO_LENGTH
 from kinetostat.units import KINDS
 

@@ -32,8 +32,8 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.attribution import largest_contributors, parts_and_kinds
-from kinetostat.studies.grid.quantities import refuse_unknown_mass
 from kinetostat.studies.indices import unit_direction
+from kinetostat.studies.quantities import refuse_unknown_mass
 from kinetostat.studies.refusal import why_not
 from kinetostat.tolerances import EQUAL_FREQUENCIES
 from kinetostat.vibration.modes import Modes

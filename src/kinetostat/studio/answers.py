@@ -24,7 +24,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find, parameters, values
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis, analyze
-from kinetostat.studies.grid.quantities import without_derivatives
+from kinetostat.studies.quantities import without_derivatives
 from kinetostat.studies.sensitivity import Sensitivity, sensitivity
 from kinetostat.studies.under_load import LoadedState, under_load
 from kinetostat.studio.pulling import handles

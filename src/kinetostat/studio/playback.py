@@ -15,7 +15,7 @@ from kinetostat.arrays import Array
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.spec.document import text_of
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.evaluation.pose_file import read_poses
+from kinetostat.studies.poses import read_poses
 from kinetostat.studio.elements import icon_button, refuse, upload_field
 from kinetostat.studio.session import Session
 

@@ -115,15 +115,15 @@ KINDS = (
         "xarray.Dataset",
         "views.grid_tables.print_grid",
         "views.figures.grid_figures",
-        "studies.grid.grid.as_json",
-        {".nc": "studies.grid.grid.as_dataset"},
+        "studies.grid.as_json",
+        {".nc": "studies.grid.as_dataset"},
     ),
     Kind(
-        "studies.workspace.workspace.Workspace",
+        "studies.workspace.Workspace",
         "views.grid_tables.print_workspace",
         "views.workspace_figures.workspace_figures",
-        "studies.workspace.workspace.as_json",
-        {".nc": "studies.workspace.workspace.as_dataset"},
+        "studies.workspace.as_json",
+        {".nc": "studies.workspace.as_dataset"},
     ),
     Kind(
         "studies.sensitivity.Sensitivity",
@@ -138,10 +138,10 @@ KINDS = (
         "studies.identification.identification.as_json",
     ),
     Kind(
-        "studies.guidelines.guidelines.Guidelines",
+        "studies.guidelines.Guidelines",
         "views.influence_tables.print_guidelines",
         "views.influence_figures.guideline_figures",
-        "studies.guidelines.sentences.as_json",
+        "studies.guideline_sentences.as_json",
     ),
     Kind(
         "studies.budget.budget.Budget",
@@ -151,10 +151,10 @@ KINDS = (
         {".csv": "studies.budget.data.contributions_csv", ".nc": "studies.budget.data.as_dataset"},
     ),
     Kind(
-        "studies.comparison.designs.Comparison",
+        "studies.comparison.Comparison",
         "views.comparison_tables.print_comparison",
         "views.comparison_figure.comparison_figures",
-        "studies.comparison.designs.as_json",
+        "studies.comparison.as_json",
     ),
     Kind(
         "studies.measured.comparison.MeasuredComparison",

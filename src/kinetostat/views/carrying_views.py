@@ -11,7 +11,7 @@ from rich.console import Console
 
 from kinetostat.machine.parameters import shown
 from kinetostat.studies.carrying import Carrying
-from kinetostat.studies.grid.grid import field_of
+from kinetostat.studies.grid import field_of
 from kinetostat.views.figures import (
     STYLE,
     Drawings,

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from kinetostat.display import Display
-from kinetostat.studies.comparison.design_rows import Row
-from kinetostat.studies.comparison.designs import Comparison
+from kinetostat.studies.comparison import Comparison, DesignRow
 from kinetostat.studies.setting import frame_of
 from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, set_title
 
@@ -57,11 +56,11 @@ def comparison_figure(comparison: Comparison) -> Figure:
     return figure
 
 
-Bars = list[tuple[str, Row, Row | None]]
+Bars = list[tuple[str, DesignRow, DesignRow | None]]
 """For each group of bars: its label, the row of the bars, and the row of the dots if there are any."""
 
 
-def _compliance(rows: Sequence[Row], grid: bool) -> list[tuple[str, Bars]]:
+def _compliance(rows: Sequence[DesignRow], grid: bool) -> list[tuple[str, Bars]]:
     diagonal = [row for row in rows if (row.group.startswith("C_") if grid else row.group == "compliance")]
     panels: dict[str, Bars] = {"compliance about axes": [], "compliance along axes": []}
     for label, bar, dot in _pairs(diagonal, grid):
@@ -69,16 +68,16 @@ def _compliance(rows: Sequence[Row], grid: bool) -> list[tuple[str, Bars]]:
     return list(panels.items())
 
 
-def _scalars(comparison: Comparison, rows: Sequence[Row], grid: bool) -> list[tuple[str, Bars]]:
+def _scalars(comparison: Comparison, rows: Sequence[DesignRow], grid: bool) -> list[tuple[str, Bars]]:
     regular = [row for row in rows if (row.group if grid else row.name) == "singularity margin"]
     mass = [row for row in comparison.rows if row.name == "moving mass"]
     return [("singularity margin", _pairs(regular, grid)), ("moving mass", [("", row, None) for row in mass])]
 
 
-def _pairs(rows: Sequence[Row], grid: bool) -> Bars:
+def _pairs(rows: Sequence[DesignRow], grid: bool) -> Bars:
     if not grid:
         return [(row.name.removeprefix("C_").replace("singularity margin", ""), row, None) for row in rows]
-    groups: dict[str, dict[str, Row]] = {}
+    groups: dict[str, dict[str, DesignRow]] = {}
     for row in rows:
         groups.setdefault(row.group.removeprefix("C_").replace("singularity margin", ""), {})[row.name] = row
     return [(label, group["mean"], group["worst"]) for label, group in groups.items()]
@@ -113,7 +112,7 @@ def _bars(panel: Axes, title: str, bars: Bars, count: int, display: Display) -> 
     panel.set_ylabel(scale.label(title) if unit != "1" else f"{title} (0 to 1)")
 
 
-def _say_missing(panel: Axes, place: float, row: Row, i: int) -> None:
+def _say_missing(panel: Axes, place: float, row: DesignRow, i: int) -> None:
     """Write why a design has no bar: its mass is not known, it lacks the direction, or it is free there."""
     value = row.values[i]
     if value is None or not math.isfinite(value):
@@ -123,7 +122,7 @@ def _say_missing(panel: Axes, place: float, row: Row, i: int) -> None:
         panel.text(place, 0.02, text, transform=where, rotation=90, ha="center", fontsize=6.5, color="#666666")
 
 
-def _numbers(row: Row) -> list[float]:
+def _numbers(row: DesignRow) -> list[float]:
     return [math.nan if value is None or not math.isfinite(value) else value for value in row.values]
 
 

@@ -12,8 +12,7 @@ from rich.text import Text
 
 from kinetostat.display import Display, number
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.studies.comparison.design_rows import Better, Row
-from kinetostat.studies.comparison.designs import Comparison, SoftDirection
+from kinetostat.studies.comparison import Better, Comparison, DesignRow, SoftDirection
 from kinetostat.tolerances import AGREED
 from kinetostat.validation.comparison import Validation, frequency_difference
 from kinetostat.views.analysis_tables import matrix_table
@@ -78,7 +77,7 @@ def _abreast(console: Console, letters: str) -> Iterator[list[int]]:
 
 
 def _print_rows(
-    console: Console, title: str, letters: str, rows: Sequence[Row], display: Display, by_group: bool = False
+    console: Console, title: str, letters: str, rows: Sequence[DesignRow], display: Display, by_group: bool = False
 ) -> None:
     for shown in _abreast(console, letters):
         table = numeric_table(title, "", [letters[i] for i in shown])
@@ -93,7 +92,7 @@ def _print_rows(
         console.print(table)
 
 
-def _cell(row: Row, i: int, display: Display) -> Text:
+def _cell(row: DesignRow, i: int, display: Display) -> Text:
     """Return a value and its change against the first design; green where it is better."""
     endless = "rigid" if row.better is Better.MORE else "free"
     value, percent = display.number(row.values[i], row.unit, endless), row.percents[i]

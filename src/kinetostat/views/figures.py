@@ -22,7 +22,7 @@ from kinetostat.arrays import Array
 from kinetostat.display import Scale, number, with_unit
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.machine.parameters import entry_name, names_entries
-from kinetostat.studies.grid.grid import failures, field_of
+from kinetostat.studies.grid import failures, field_of
 from kinetostat.studies.storage import replacing
 from kinetostat.views.grid_tables import display_of, quantities_of
 from kinetostat.views.lettering import letter
@@ -76,7 +76,7 @@ def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figur
     """One panel per quantity over the two dimensions of the dataset, contours labelled with their values.
 
     Args:
-        dataset: two-dimensional, from `studies.grid.grid.evaluate_grid`.
+        dataset: two-dimensional, from `studies.grid.evaluate_grid`.
         names: which quantities.
         title: over the whole figure.
     """
@@ -109,7 +109,7 @@ def curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
     """Quantities over the one dimension of the dataset, one panel for each unit; logarithmic where the range is.
 
     Args:
-        dataset: one-dimensional, from `studies.grid.grid.evaluate_grid`.
+        dataset: one-dimensional, from `studies.grid.evaluate_grid`.
         names: which quantities.
         title: over the whole figure.
     """

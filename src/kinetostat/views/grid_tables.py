@@ -13,11 +13,10 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
 from kinetostat.machine.limits import Limits, unlimited
 from kinetostat.machine.parameters import dimension, shown
-from kinetostat.studies.grid.grid import failures, field_of
-from kinetostat.studies.grid.stored_grid import Extremes, StoredGrid
-from kinetostat.studies.workspace.region import FEWEST_CELLS
-from kinetostat.studies.workspace.verdicts import INSIDE, phrase
-from kinetostat.studies.workspace.workspace import LEFT_OUT, Workspace
+from kinetostat.studies.grid import failures, field_of
+from kinetostat.studies.stored_grid import Extremes, StoredGrid
+from kinetostat.studies.workspace import FEWEST_CELLS, LEFT_OUT, Workspace
+from kinetostat.studies.workspace_verdicts import INSIDE, phrase
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 from kinetostat.views.tables import numeric_table
 

@@ -19,9 +19,8 @@ from kinetostat.arrays import Array
 from kinetostat.kinetostatics.elements import Element
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.parameters import with_leg
-from kinetostat.studies.guidelines.guidelines import Guidelines
-from kinetostat.studies.guidelines.roles import EXCESS, stiffening
-from kinetostat.studies.guidelines.sentences import limit_of
+from kinetostat.studies.guideline_sentences import limit_of
+from kinetostat.studies.guidelines import EXCESS, Guidelines, stiffening
 from kinetostat.studies.sensitivity import PER, Sensitivity
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import COLOURS, DASHES, STYLE, Drawings, fix_layout, note_setting, set_title, slim_bar

@@ -14,10 +14,8 @@ from rich.text import Text
 from kinetostat.display import number
 from kinetostat.kinetostatics.quantities import group_of, spoken
 from kinetostat.machine.parameters import with_leg
-from kinetostat.studies.guidelines.guidelines import Guidelines
-from kinetostat.studies.guidelines.moves import Move
-from kinetostat.studies.guidelines.roles import Roles
-from kinetostat.studies.guidelines.sentences import LEAST, MATTERS, statements
+from kinetostat.studies.guideline_sentences import LEAST, MATTERS, statements
+from kinetostat.studies.guidelines import Guidelines, Move, Roles
 from kinetostat.studies.sensitivity import PER, Sensitivity, notes
 from kinetostat.units import KINDS, RIGID
 from kinetostat.views.tables import numeric_table, omitted

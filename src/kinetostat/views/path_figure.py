@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from kinetostat.arrays import Array, Integers
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, group_of, spoken
-from kinetostat.studies.evaluation.evaluation import PoseAnswers
+from kinetostat.studies.evaluation import PoseAnswers
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import STYLE, fix_layout, look_of, note_setting, set_title
 

@@ -5,7 +5,7 @@ from rich.console import Console
 
 from kinetostat.display import number
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.studies.evaluation.evaluation import PoseAnswers
+from kinetostat.studies.evaluation import PoseAnswers
 from kinetostat.views.tables import numeric_table
 
 

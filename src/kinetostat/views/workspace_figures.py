@@ -20,12 +20,18 @@ from scipy import ndimage
 
 from kinetostat.arrays import Array
 from kinetostat.kinetostatics.quantities import spoken
-from kinetostat.studies.grid.grid import field_of
-from kinetostat.studies.workspace.borders import depth
-from kinetostat.studies.workspace.conditions import Condition
-from kinetostat.studies.workspace.region import surface
-from kinetostat.studies.workspace.verdicts import BEYOND, FAILS, INSIDE, LIMIT, PLAIN, phrase
-from kinetostat.studies.workspace.workspace import BORDER, SOFTEST, Workspace
+from kinetostat.studies.grid import field_of
+from kinetostat.studies.workspace import BORDER_VARIABLES, COLOURING_QUANTITY, Workspace
+from kinetostat.studies.workspace_borders import depth, surface
+from kinetostat.studies.workspace_verdicts import (
+    BEYOND,
+    CONDITION_VERDICT,
+    INSIDE,
+    LIMIT_VERDICT,
+    STATUS_VERDICTS,
+    PoseCondition,
+    phrase,
+)
 from kinetostat.views.figures import (
     COLOURS,
     STYLE,
@@ -41,7 +47,7 @@ from kinetostat.views.grid_tables import display_of
 from kinetostat.views.usual_values import WIDE, usual_range
 
 SHADES = ("#9fd8c4", "#e4e4e4", "#555555", "#b0b0b0", "#d9c79a", "#c9c0d9", "#e3bcd1")
-KNOWN = dict(zip([*PLAIN.values(), BEYOND], SHADES, strict=True))
+KNOWN = dict(zip([*STATUS_VERDICTS.values(), BEYOND], SHADES, strict=True))
 """Colours of verdicts that need no limit and no condition."""
 LIMITED = ("#f2c77a", "#eea27a", "#f3ea9a", "#d8b98a", "#e7d3b5", "#c9a27e", "#f5dfa8", "#dcae92", "#cfc08a")
 UNMET = ("#a9d2ee", "#7fa8cf", "#c5cbe9", "#8fc4d4", "#b7c7d9", "#9db4e0")
@@ -55,14 +61,14 @@ LIGHT = np.array([-0.45, -0.7, 0.55])
 """Where the light comes from."""
 
 
-def pictures(dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[Condition], title: str) -> Drawings:
+def pictures(dataset: xr.Dataset, labels: Sequence[str], conditions: Sequence[PoseCondition], title: str) -> Drawings:
     """Return the pictures of a workspace by what is added to the file's name.
 
     Over two coordinates there is a map of the region; over three, cuts along the third coordinate and the solid. With
     more coordinates, the others stay at the values of the pose in the file.
 
     Args:
-        dataset: of `studies.workspace.workspace.Workspace`.
+        dataset: of `studies.workspace.Workspace`.
         labels: its verdicts.
         conditions: whose contours are drawn.
         title: over each picture.
@@ -102,10 +108,12 @@ def _at(dataset: xr.Dataset, dim: str) -> str:
 
 def _colours(labels: Sequence[str]) -> list[str]:
     limits, unmet = iter(LIMITED), iter(UNMET * 6)
-    return [KNOWN.get(label) or next(limits if label.startswith(LIMIT) else unmet) for label in labels]
+    return [KNOWN.get(label) or next(limits if label.startswith(LIMIT_VERDICT) else unmet) for label in labels]
 
 
-def _sections(cuts: Sequence[xr.Dataset], labels: Sequence[str], conditions: Sequence[Condition], title: str) -> Figure:
+def _sections(
+    cuts: Sequence[xr.Dataset], labels: Sequence[str], conditions: Sequence[PoseCondition], title: str
+) -> Figure:
     """One panel for each cut, filled by verdict, with the contours of the conditions."""
     columns = min(3, len(cuts))
     rows = -(-len(cuts) // columns)
@@ -113,7 +121,7 @@ def _sections(cuts: Sequence[xr.Dataset], labels: Sequence[str], conditions: Seq
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(wide * columns + 0.3, 0.9 * wide * rows + 0.9), layout="constrained")
         panels = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
-        edges: set[Condition] = set()
+        edges: set[PoseCondition] = set()
         for panel, cut in zip(panels, cuts, strict=False):
             edges |= _fill(panel, cut, labels, conditions)
             if len(cuts) > 1:
@@ -137,20 +145,24 @@ def _varied(cuts: Sequence[xr.Dataset], fallback: str) -> str:
     return next((n for n in names if len({float(cut[n]) for cut in cuts}) > 1), fallback)
 
 
-def _fill(panel: Axes, cut: xr.Dataset, labels: Sequence[str], conditions: Sequence[Condition]) -> set[Condition]:
+def _fill(
+    panel: Axes, cut: xr.Dataset, labels: Sequence[str], conditions: Sequence[PoseCondition]
+) -> set[PoseCondition]:
     """Fill a panel by verdict and draw the border of each condition; return the conditions that have one."""
     across, up = (str(dim) for dim in cut["verdict"].dims)
     (x, x_label), (y, y_label) = axis_values(cut, across), axis_values(cut, up)
     verdict = cut["verdict"].transpose(up, across).values
     fill_regions(panel, x, y, verdict, np.ones_like(verdict, dtype=bool), _colours(labels))
-    shares = [cut[f"{BORDER}{dim}"].transpose(up, across).values for dim in (up, across)]
+    shares = [cut[f"{BORDER_VARIABLES}{dim}"].transpose(up, across).values for dim in (up, across)]
     for code in sorted(np.unique(verdict), reverse=True):
         within = depth(verdict == code, shares)
         if within.min() < 0.0 < within.max():
             panel.contourf(x, y, within, levels=[0.0, 2.0], colors=[_colours(labels)[code]])
             if code == 0:
                 panel.contour(x, y, within, levels=[0.0], colors=EDGE, linewidths=0.9)
-    elsewhere = ~np.isin(verdict, [i for i, label in enumerate(labels) if label == INSIDE or label.startswith(FAILS)])
+    elsewhere = ~np.isin(
+        verdict, [i for i, label in enumerate(labels) if label == INSIDE or label.startswith(CONDITION_VERDICT)]
+    )
     edges = set()
     for condition, colour in zip(conditions, COLOURS, strict=False):
         values = np.ma.masked_where(elsewhere, cut[condition.quantity].transpose(up, across).values)
@@ -173,7 +185,7 @@ def _patches(cuts: Sequence[xr.Dataset], labels: Sequence[str]) -> list[Patch]:
     ]
 
 
-def _lines(conditions: Sequence[Condition], edges: set[Condition]) -> list[Line2D]:
+def _lines(conditions: Sequence[PoseCondition], edges: set[PoseCondition]) -> list[Line2D]:
     """Return the legend of the lines that are drawn."""
     return [
         Line2D([], [], color=colour, linestyle="--", linewidth=1.2, label=_edge(condition))
@@ -182,13 +194,13 @@ def _lines(conditions: Sequence[Condition], edges: set[Condition]) -> list[Line2
     ]
 
 
-def _edge(condition: Condition) -> str:
+def _edge(condition: PoseCondition) -> str:
     return condition.text.replace(condition.comparison, "=", 1)
 
 
-def _telling(conditions: Sequence[Condition]) -> str:
+def _telling(conditions: Sequence[PoseCondition]) -> str:
     """Choose the quantity that colours a solid: that of the first condition, else the least stiffness."""
-    return next((condition.quantity for condition in conditions), SOFTEST)
+    return next((condition.quantity for condition in conditions), COLOURING_QUANTITY)
 
 
 def _solid(dataset: xr.Dataset, dims: Sequence[str], quantity: str, title: str) -> Figure:
@@ -198,7 +210,11 @@ def _solid(dataset: xr.Dataset, dims: Sequence[str], quantity: str, title: str) 
     ends = [axis_values(dataset, dim)[0] for dim in dims]
     inside = thin["verdict"].transpose(*dims).values == 0
     # Borders hold for steps of the whole grid; a thinned one has none of its own.
-    shares = [dataset[f"{BORDER}{dim}"].transpose(*dims).values for dim in dims] if thin.sizes == dataset.sizes else []
+    shares = (
+        [dataset[f"{BORDER_VARIABLES}{dim}"].transpose(*dims).values for dim in dims]
+        if thin.sizes == dataset.sizes
+        else []
+    )
     triangles = surface(depth(inside, shares or _halves(inside)), [values for values, _ in axes])
     scale = display_of(dataset).scale(dataset[quantity].attrs["units"])
     values = scale.factor * _on(triangles, thin[quantity].transpose(*dims).values, inside, [v for v, _ in axes])

@@ -39,10 +39,9 @@ from kinetostat.studies.budget.spread import (
     squares_of,
 )
 from kinetostat.studies.budget.tolerances import RandomInputs, TolerancedPart, random_inputs, toleranced_parts
-from kinetostat.studies.evaluation.columns import PoseColumns
-from kinetostat.studies.evaluation.given_poses import given_poses
-from kinetostat.studies.grid.grid import GridQuestion, grid_question
+from kinetostat.studies.grid import GridQuestion, grid_question
 from kinetostat.studies.indices import unit_direction
+from kinetostat.studies.poses import PoseColumns, given_poses
 from kinetostat.tolerances import NO_EFFECT
 
 SAMPLES, FEW_SAMPLES = 1 << 17, 1 << 12

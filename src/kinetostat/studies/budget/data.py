@@ -3,18 +3,15 @@
 import csv
 import io
 from collections.abc import Iterable, Sequence
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.loading import as_toml
 from kinetostat.studies.budget.budget import Budget
-from kinetostat.studies.grid.grid import ABOUT_STATUS
+from kinetostat.studies.datasets import ABOUT_STATUS, origin_of
 from kinetostat.studies.plain_data import as_answer, no_formula
-from kinetostat.studies.setting import frame_of, pose_of
 from kinetostat.units import KINDS
 
 STATISTICS = {
@@ -158,12 +155,4 @@ def _labels(budget: Budget) -> xr.Dataset:
         taken = list(budget.poses.leaves)
         for field, values in zip(budget.poses.fields, budget.poses.values, strict=True):
             coordinates[field.dimension] = ("pose", values, {"units": field.unit, "field": field.path})
-    attributes = {
-        "machine": budget.machine.name,
-        "machine_file": as_toml(budget.machine),
-        "display": budget.machine.display.units,
-        "kinetostat": version("kinetostat"),
-        "frame": frame_of(budget.machine),
-        "pose": pose_of(budget.machine, taken),
-    }
-    return xr.Dataset({}, coordinates, attributes)
+    return xr.Dataset({}, coordinates, origin_of(budget.machine, taken))

@@ -22,9 +22,9 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.command import Command, answer_of, refuse_tensions
 from kinetostat.studies.correction.law import Law, shortest_law
 from kinetostat.studies.driven import Driven, driven
-from kinetostat.studies.evaluation.columns import PoseColumns
-from kinetostat.studies.grid.axes import chosen_axes, grid_of
+from kinetostat.studies.grid import chosen_axes, grid_of
 from kinetostat.studies.plain_data import as_answer
+from kinetostat.studies.poses import PoseColumns
 from kinetostat.tolerances import EXACT_LAW
 
 MOST_POINTS = 200_000

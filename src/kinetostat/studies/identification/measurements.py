@@ -16,8 +16,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, quantities
-from kinetostat.studies.evaluation.columns import Column, read_columns
-from kinetostat.studies.evaluation.pose_file import columns_of
+from kinetostat.studies.poses import GivenColumn, columns_of, read_columns
 from kinetostat.units import UnitError
 
 POSITION, TURNED, EULER = ("x", "y", "z"), ("rx", "ry", "rz"), ("roll", "pitch", "yaw")
@@ -149,9 +148,9 @@ def read_measurements(machine: Machine, path: Path, sigmas: Sigmas) -> Measureme
         raise InputError(text if text.startswith('"') else f'"{path}": {text}') from None
 
 
-def _sorted(columns: Sequence[Column]) -> dict[str, list[Column]]:
+def _sorted(columns: Sequence[GivenColumn]) -> dict[str, list[GivenColumn]]:
     """The columns by what they are about."""
-    result: dict[str, list[Column]] = {}
+    result: dict[str, list[GivenColumn]] = {}
     for column in columns:
         head, _, rest = column.name.partition(".")
         group = head if rest and head in (*GROUPS, "actuator") else "wrench" if column.name in WRENCH else ""
@@ -162,7 +161,7 @@ def _sorted(columns: Sequence[Column]) -> dict[str, list[Column]]:
     return result
 
 
-def _inner(column: Column) -> str:
+def _inner(column: GivenColumn) -> str:
     return column.name.partition(".")[2]
 
 
@@ -170,7 +169,7 @@ def _pose_names(machine: Machine) -> list[str]:
     return list(quantities(machine.family.tables["pose"]))
 
 
-def _numbers(column: Column, kinds: Mapping[str, str], where: Callable[[str, int], str], name: str = "") -> Array:
+def _numbers(column: GivenColumn, kinds: Mapping[str, str], where: Callable[[str, int], str], name: str = "") -> Array:
     """A column of measured values, SI, NaN where a cell is empty."""
     kind, result = kinds[name or _inner(column)], np.full(len(column.entries), np.nan)
     bounds = Quantity(kind, "", positive=column.name.startswith("sigma"))
@@ -250,7 +249,9 @@ def _sigma(values: Mapping[str, Array], given: Mapping[str, Array], sigmas: Sigm
     return result
 
 
-def _from_actuators(machine: Machine, columns: Sequence[Column], where: Callable[[str, int], str]) -> dict[str, Array]:
+def _from_actuators(
+    machine: Machine, columns: Sequence[GivenColumn], where: Callable[[str, int], str]
+) -> dict[str, Array]:
     """The poses of the drawn machine at given coordinates of its actuators."""
     system = system_of(machine)
     goals = np.tile([float(actuator.coordinate) for actuator in system.actuators], (len(columns[0].entries), 1))

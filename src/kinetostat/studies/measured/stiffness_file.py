@@ -13,9 +13,8 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.studies.evaluation.columns import Column
-from kinetostat.studies.evaluation.pose_file import columns_of
 from kinetostat.studies.identification.measurements import Measurements, Sigmas, read_measurements
+from kinetostat.studies.poses import GivenColumn, columns_of
 from kinetostat.units import KINDS, UnitError, parse
 
 MATRICES = ("stiffness", "compliance", "free_stiffness")
@@ -89,7 +88,7 @@ def read_stiffness(machine: Machine, path: Path, sigma: str = "", sigma_angle: s
         raise InputError(f'"{path}"{"" if str(error).startswith(",") else ":"}{error}') from None
 
 
-def _entries(machine: Machine, columns: Sequence[Column], lines: Sequence[int], sigma: str) -> list[MeasuredEntry]:
+def _entries(machine: Machine, columns: Sequence[GivenColumn], lines: Sequence[int], sigma: str) -> list[MeasuredEntry]:
     by_name = {column.name: column for column in columns}
     for name in COLUMNS[:2]:
         if name not in by_name:

@@ -10,10 +10,10 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.renamed import current_name
 from kinetostat.spec.study import TermTable
-from kinetostat.studies.grid.quantities import refuse_absent
 from kinetostat.studies.indices import three_numbers
 from kinetostat.studies.optimisation.poses import PoseSet
 from kinetostat.studies.optimisation.terms import PoseTerm, StrokeTerm, Term, VolumeTerm, parse_aggregate
+from kinetostat.studies.quantities import refuse_absent
 
 SUMS = {"compliance_sum": "compliance", "stiffness_sum": "stiffness"}
 """Weighted sums of the diagonal of C (eq. 40) and of K (eq. 39)."""

@@ -12,9 +12,8 @@ from kinetostat.machine.parameters import find, values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.study import PosesTable
-from kinetostat.studies.grid.grid import GridQuestion, grid_question
-from kinetostat.studies.workspace.region import unit_product
-from kinetostat.studies.workspace.workspace import workspace
+from kinetostat.studies.grid import GridQuestion, grid_question
+from kinetostat.studies.workspace import unit_product, workspace
 from kinetostat.units import UnitError
 
 MOST_POSES = 1_000_000

@@ -18,12 +18,12 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import current_name
 from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, read_study
 from kinetostat.studies.bundled import bundled_studies, study_of
-from kinetostat.studies.grid.quantities import refuse_loaded, without_derivatives
 from kinetostat.studies.optimisation.catalogue import known_terms, read_term, usual_goal
 from kinetostat.studies.optimisation.poses import PoseSet, read_poses
 from kinetostat.studies.optimisation.terms import Aggregate, Term, parse_aggregate
 from kinetostat.studies.optimisation.variables import Space, read_space
-from kinetostat.studies.workspace.conditions import value_of
+from kinetostat.studies.quantities import refuse_loaded, without_derivatives
+from kinetostat.studies.workspace_verdicts import value_of
 
 MACHINE = (
     "is a machine, but this command takes a study, which names the machine and says what may change and what is "

@@ -23,7 +23,7 @@ from kinetostat.kinetostatics.response import Response, respond
 from kinetostat.machine.loading import load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values, with_values
-from kinetostat.studies.guidelines.roles import equations_of_k
+from kinetostat.studies.guidelines import equations_of_k
 
 CITATION = (
     'D. Zhang and C. M. Gosselin, "Parallel kinematic machine design with kinetostatic model", Robotica 20(4), 429-438 '

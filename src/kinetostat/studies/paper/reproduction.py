@@ -25,7 +25,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.grid.grid import evaluate_grid
+from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.optimisation.problem import load_problem
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.ridges import ridge_sentences

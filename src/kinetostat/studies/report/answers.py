@@ -21,8 +21,8 @@ from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.ranges import parse_range
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.budget.budget import Budget, budget
-from kinetostat.studies.grid.grid import evaluate_grid
-from kinetostat.studies.guidelines.guidelines import Guidelines, guidelines
+from kinetostat.studies.grid import evaluate_grid
+from kinetostat.studies.guidelines import Guidelines, guidelines
 from kinetostat.studies.identification.record import FitRecord, read_fit
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.requirements import Verdict, requirements

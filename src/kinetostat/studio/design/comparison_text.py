@@ -8,8 +8,7 @@ import string
 from html import escape
 
 from kinetostat.display import DASH, Display
-from kinetostat.studies.comparison.design_rows import Better, Row
-from kinetostat.studies.comparison.designs import Comparison, SoftDirection
+from kinetostat.studies.comparison import Better, Comparison, DesignRow, SoftDirection
 from kinetostat.studio.wording import engineering, gains, heading, paragraph, table
 from kinetostat.views.tables import readable
 
@@ -57,7 +56,7 @@ def _gains(comparison: Comparison, letters: str) -> str:
     return f'<div class="gains">{"".join(columns)}</div>'
 
 
-def _gain(row: Row, k: int) -> float | None:
+def _gain(row: DesignRow, k: int) -> float | None:
     first, other = row.values[0], row.values[k]
     if first is None or other is None or not other or not math.isfinite(first) or not math.isfinite(other):
         return None
@@ -71,7 +70,7 @@ def _rows(comparison: Comparison, letters: str) -> str:
     return f'<table class="figures">{caption}<thead><tr><th></th>{head}</tr></thead><tbody>{body}</tbody></table>'
 
 
-def _row(row: Row, display: Display) -> str:
+def _row(row: DesignRow, display: Display) -> str:
     cells = []
     for i, (value, percent) in enumerate(zip(row.values, row.percents, strict=True)):
         shown = escape(engineering(value, row.unit, display))
@@ -80,7 +79,7 @@ def _row(row: Row, display: Display) -> str:
     return f'<tr><th scope="row">{escape(row.name.replace("_", " "))}</th>{"".join(cells)}</tr>'
 
 
-def _change(row: Row, percent: float | None) -> str:
+def _change(row: DesignRow, percent: float | None) -> str:
     if percent is None:
         return ""
     if abs(percent) < SAME:

@@ -11,7 +11,7 @@ from nicegui import ui
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.comparison.designs import Comparison, Design, compare
+from kinetostat.studies.comparison import Comparison, Design, compare
 from kinetostat.studio.design.comparison_text import comparison_text
 from kinetostat.studio.design.state_folder import LONGEST_NAME, LONGEST_NOTE, Favourite, Favourites
 from kinetostat.studio.elements import MAIN_BUTTON, confirm, icon_button, in_quotes, refuse

@@ -3,9 +3,8 @@
 Nothing is computed here.
 """
 
-from kinetostat.studies.guidelines.guidelines import Guidelines
-from kinetostat.studies.guidelines.roles import Roles
-from kinetostat.studies.guidelines.sentences import statements
+from kinetostat.studies.guideline_sentences import statements
+from kinetostat.studies.guidelines import Guidelines, Roles
 from kinetostat.studies.report.answers import Answers
 from kinetostat.studies.sensitivity import Sensitivity, notes
 from kinetostat.views.influence_figures import limit_figure

@@ -8,7 +8,7 @@ import xarray as xr
 from kinetostat.display import number
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.grid.grid import failures
+from kinetostat.studies.grid import failures
 from kinetostat.studies.report.answers import Answers
 from kinetostat.views.analysis_tables import (
     actuator_table,

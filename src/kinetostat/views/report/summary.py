@@ -10,7 +10,7 @@ from kinetostat.display import Display
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.attribution import by_part, ranked
-from kinetostat.studies.guidelines.sentences import statements
+from kinetostat.studies.guideline_sentences import statements
 from kinetostat.studies.optimisation.result_data import message
 from kinetostat.studies.report.answers import Answers
 from kinetostat.validation.comparison import Validation

@@ -17,9 +17,9 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import several
-from kinetostat.studies.evaluation.columns import PoseColumns
-from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
 from kinetostat.studies.plain_data import as_answer
+from kinetostat.studies.poses import PoseColumns
+from kinetostat.studies.quantities import refuse_absent, resolve_quantities
 
 MATRICES = {"K": "stiffness", "C": "compliance"}
 """Whole matrices by name, and how the names of their entries begin."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -10,28 +9,51 @@ import xarray as xr
 
 from kinetostat.engine.batch import Evaluation, Progress, evaluate, silent
 from kinetostat.engine.chunks import Compute, in_chunks, in_this_process
-from kinetostat.engine.points import Grid
+from kinetostat.engine.points import Axis, Grid
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import Parameter, dimension
+from kinetostat.machine.parameters import Parameter, dimension, find
 from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError
-from kinetostat.spec.ranges import Range
-from kinetostat.studies.grid.axes import chosen_axes, grid_of
-from kinetostat.studies.grid.quantities import refuse_absent, resolve_quantities
+from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.ranges import Range, parse_range
+from kinetostat.studies.datasets import ABOUT_STATUS, about_field, about_quantity, origin_of
 from kinetostat.studies.plain_data import as_answer
-from kinetostat.studies.setting import frame_of, pose_of
-from kinetostat.units import KINDS
+from kinetostat.studies.quantities import refuse_absent, resolve_quantities
 
 IN_MEMORY = 5_000_000
 """Points of a grid that is answered in memory: a dozen quantities of them fit in half a gigabyte."""
+MOST_DIMENSIONS = 6
+
+
+def chosen_axes(machine: Machine, ranges: Sequence[str]) -> list[tuple[Range, Parameter]]:
+    """Read the axes of a grid: ranges as written, and the parameters that they are about.
+
+    Raises:
+        InputError: an unknown field, a bad range, a field twice, or more than six dimensions.
+    """
+    ranges = several(ranges)
+    if len(ranges) > MOST_DIMENSIONS:
+        raise InputError(
+            f"the grid has {len(ranges)} dimensions; at most {MOST_DIMENSIONS} are allowed: "
+            "give the others one value each with --set."
+        )
+    wanted = [parse_range(text) for text in ranges]
+    chosen = [find(machine.family, span.field) for span in wanted]
+    taken = [leaf for parameter in chosen for leaf in parameter.leaves]
+    for leaf in taken:
+        if taken.count(leaf) > 1:
+            raise InputError(f"{leaf} is varied twice; give each field one range.")
+    return list(zip(wanted, chosen, strict=True))
+
+
+def grid_of(axes: Sequence[tuple[Range, Parameter]]) -> Grid:
+    """The points of a grid with these axes."""
+    return Grid([Axis(parameter.leaves, span.values(parameter.quantity)) for span, parameter in axes])
 
 
 @dataclass(frozen=True)
 class GridQuestion:
-    """Which quantities of which machine over which grid.
+    """A question: the quantities of a machine over a grid.
 
     Attributes:
         machine: gives all parameters that do not vary.
@@ -71,23 +93,14 @@ def grid_question(machine: Machine, ranges: Sequence[str], quantities: Sequence[
     grid = grid_of(pairs)
     names = resolve_quantities(quantities, machine.family.component_names)
     refuse_absent(machine, names, chosen)
-    origin = {
-        "machine": machine.name,
-        "machine_file": as_toml(machine),
-        "display": machine.display.units,
-        "kinetostat": version("kinetostat"),
-    }
-    attributes = {**origin, "frame": frame_of(machine), "pose": pose_of(machine, taken)}
-    labels = xr.Dataset({}, _coordinates(grid, pairs), attributes)
+    labels = xr.Dataset({}, _coordinates(grid, pairs), origin_of(machine, taken))
     return GridQuestion(machine, grid, tuple(parameter.path for parameter in chosen), tuple(names), labels)
 
 
 def _coordinates(grid: Grid, pairs: Sequence[tuple[Range, Parameter]]) -> dict[str, Any]:
     coordinates: dict[str, Any] = {}
     for axis, (span, parameter) in zip(grid.axes, pairs, strict=True):
-        kind = KINDS[parameter.quantity.kind]
-        about: dict[str, Any] = {"units": kind.unit, "long_name": parameter.quantity.meaning, "kind": kind.name}
-        about |= {"field": parameter.path, "log": int(span.logarithmic)}
+        about = {**about_field(parameter), "field": parameter.path, "log": int(span.logarithmic)}
         coordinates[parameter.dimension] = (parameter.dimension, axis.values, about)
     return coordinates
 
@@ -134,16 +147,18 @@ def answer(question: GridQuestion, progress: Progress = silent, compute: Compute
             f"the grid has {question.grid.size:,} points, more than the {IN_MEMORY:,} that are kept in memory: "
             "give -o FOLDER, into which results are written while they are computed, or lower the counts."
         )
-    evaluation = _evaluated(question, progress, compute)
+    evaluation = _evaluate_all(question, progress, compute)
     shape = question.grid.shape
-    content = {name: (question.dims, evaluation.values[name].reshape(shape), about(name)) for name in question.names}
+    content = {
+        name: (question.dims, evaluation.values[name].reshape(shape), about_quantity(name)) for name in question.names
+    }
     return question.labels.assign(content).assign(
         status=(question.dims, evaluation.status.reshape(shape), ABOUT_STATUS)
     )
 
 
-def _evaluated(question: GridQuestion, progress: Progress, compute: Compute) -> Evaluation:
-    """All points in order."""
+def _evaluate_all(question: GridQuestion, progress: Progress, compute: Compute) -> Evaluation:
+    """Evaluate all points; results are in their order, wherever they are computed."""
     if compute is in_this_process:
         return evaluate(question.machine, question.grid, question.names, progress)
     work = in_chunks(question.machine, question.grid, question.names)
@@ -163,21 +178,9 @@ def field_of(coordinate: xr.DataArray) -> str:
 
 
 def failures(dataset: xr.Dataset) -> dict[Status, int]:
-    """How many points have each status other than OK."""
+    """Count the points of each status other than OK."""
     codes, counts = np.unique(dataset["status"].values, return_counts=True)
     return {Status(int(code)): int(n) for code, n in zip(codes, counts, strict=True) if code != Status.OK}
-
-
-def about(name: str) -> dict[str, str]:
-    """Attributes of the variable of a quantity."""
-    quantity = QUANTITIES[name]
-    return {"units": quantity.unit, "symbol": quantity.symbol}
-
-
-ABOUT_STATUS = {
-    "flag_values": [int(status) for status in Status],
-    "flag_meanings": " ".join(status.word for status in Status),
-}
 
 
 def as_json(dataset: xr.Dataset) -> dict[str, Any]:

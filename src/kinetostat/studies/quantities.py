@@ -1,25 +1,25 @@
-"""Which quantities a machine has: names that people write, and those that have no value for its parts or its file."""
+"""Quantities of a machine: names that people write, and those that have no value for its parts or its file.
+
+All that is decided here follows from the file and from where the legs are, so that it costs no stiffness.
+"""
 
 import difflib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
-import numpy as np
-
+from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.equilibrium.cut import cut_machine
-from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.closure import legs_at_pose
 from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES, rest_numbers
-from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.limits import LIMITS, About
+from kinetostat.machine.limits import LIMITS, About, Parts
 from kinetostat.machine.loads import loads_platform, moving_masses
-from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.machine import Configuration, Machine, springs
 from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.renamed import current_name
 from kinetostat.units import KINDS
 
-UNDER_LOAD = tuple(limit.name for limit in LIMITS.values() if limit.about is About.LOAD)
+ACTUATOR_LOADS = tuple(limit.name for limit in LIMITS.values() if limit.about is About.LOAD)
 
 
 def resolve_quantities(names: Sequence[str], components: Sequence[str] = COMPONENTS) -> list[str]:
@@ -111,18 +111,21 @@ def refuse_absent(machine: Machine, names: Sequence[str], varied: Sequence[Param
     """
     weighing = [name for name in names if name == "mass" or QUANTITIES[name].modal]
     if weighing and not any(KINDS[parameter.quantity.kind].heavy for parameter in varied):
-        refuse_unknown_mass(machine, weighing[0], respond(machine).configuration)
+        refuse_unknown_mass(machine, weighing[0], legs_at_pose(machine))
     _refuse_unknown_cut(machine, names, [parameter.path for parameter in varied])
     wanted = [name for name in names if QUANTITIES[name].needs]
     if not wanted:
         return
-    response = replace(respond(machine), meant_loaded=False)  # whether there are such parts needs no state of rest
+    placed = legs_at_pose(machine)
+    driven = [(spring, 0.0) for spring in springs(placed) if spring.actuated and not is_zero(spring.stiffness)]
+    parts = Parts(placed.legs, placed.platform.rotation.z, machine.family.planar, actuators=driven)
     for name in wanted:
-        if np.isnan(QUANTITIES[name].value(response)) and response.status == Status.OK:
-            lacking = QUANTITIES[name].needs
-            raise InputError(f'"{name}" has no meaning here: {machine.name} lacks {lacking}; leave it out.')
+        if not any(True for _ in LIMITS[name].measure(parts)):
+            raise InputError(
+                f'"{name}" has no meaning here: {machine.name} lacks {QUANTITIES[name].needs}; leave it out.'
+            )
     loaded = loads_platform(machine) or any(parameter.path.startswith("load.") for parameter in varied)
-    for name in UNDER_LOAD:
+    for name in ACTUATOR_LOADS:
         if name in names and not loaded:
             raise InputError(
                 f'"{name}" is not known: the file of {machine.name} gives no load; add a table [load], '

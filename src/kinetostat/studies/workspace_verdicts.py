@@ -1,9 +1,13 @@
 """Verdicts on poses: whether each belongs to the workspace, why not, and which figures the inside poses demand.
 
-Verdicts follow from status, aspect and conditions; demands from the measures of the limits.
+Verdicts follow from status, aspect and conditions on quantities, which people write as "free_stiffness_z > 20 N/um";
+demands follow from the measures of the limits.
 """
 
-from collections.abc import Callable, Mapping
+import math
+import operator
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -14,18 +18,21 @@ from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.engine.batch import first_limit_passed, limits_used
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.extremes import aspect
+from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import LIMITS, Limit, Limits, limits_set
 from kinetostat.machine.machine import Machine
-from kinetostat.studies.workspace.conditions import Condition
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.renamed import current_name
+from kinetostat.studies.quantities import resolve_quantities
 from kinetostat.tolerances import SINGULAR
-from kinetostat.units import as_read
+from kinetostat.units import KINDS, UnitError, as_read, parse
 
 Poses = dict[str, Array]
 """Coordinates of poses by leaf path, SI."""
 
 INSIDE, BEYOND = "inside", "beyond a singularity"
-PLAIN = {
+STATUS_VERDICTS = {
     Status.OK: INSIDE,
     Status.OUT_OF_REACH: "out of reach",
     Status.SINGULAR: "singular",
@@ -34,13 +41,90 @@ PLAIN = {
     Status.UNDECIDED: "undecided",
 }
 """Verdicts of statuses; for a limit that is passed, the verdict names the limit."""
-LIMIT, FAILS = "limits.", "fails "
-"""How the verdicts of limits and of conditions begin."""
+LIMIT_VERDICT, CONDITION_VERDICT = "limits.", "fails "
+"""The words with which verdicts of limits and of conditions begin."""
 
 
 def phrase(label: str) -> str:
     """Write a verdict in a few words."""
-    return next((limit.phrase for limit in LIMITS.values() if label == f"{LIMIT}{limit.name}"), label)
+    return next((limit.phrase for limit in LIMITS.values() if label == f"{LIMIT_VERDICT}{limit.name}"), label)
+
+
+COMPARISONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
+CONDITION_FORM = 'write QUANTITY < VALUE or QUANTITY > VALUE, e.g. "free_stiffness_z > 20 N/um"'
+LONGEST_CONDITION = 200
+
+_CONDITION = re.compile(r"\s*([a-z_]+)\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")
+_BY_UNIT = {
+    kind.unit: kind.name
+    for kind in KINDS.values()
+    if kind.name.endswith(("stiffness", "compliance")) or kind.name in ("length", "force", "moment", "mass")
+}
+
+
+@dataclass(frozen=True)
+class PoseCondition:
+    """A quantity compared with a value.
+
+    Attributes:
+        text: as written, with single spaces.
+        quantity: its name.
+        comparison: "<", "<=", ">" or ">=".
+        value: SI.
+    """
+
+    text: str
+    quantity: str
+    comparison: str
+    value: float
+
+    def holds(self, values: Array) -> Mask:
+        """Tell at which points the quantity, given in SI, meets the condition; where it is NaN, it does not."""
+        return np.asarray(COMPARISONS[self.comparison](values, self.value))
+
+
+def parse_condition(text: str, components: Sequence[str]) -> PoseCondition:
+    """Read a condition from text.
+
+    Args:
+        text: "QUANTITY < VALUE".
+        components: that the machine has.
+
+    Raises:
+        InputError: not of that form, an unknown quantity, or a value of another kind.
+    """
+    match = _CONDITION.fullmatch(text) if len(text) <= LONGEST_CONDITION else None
+    if match is None:
+        raise InputError(f"{shorten(text)} is not a condition; {CONDITION_FORM}.")
+    given, comparison, written = match.groups()
+    name = current_name(given, "quantity")
+    if name in GROUPS:
+        raise InputError(f'"{name}" stands for several quantities; name one of {", ".join(GROUPS[name])}.')
+    resolve_quantities([name], components)
+    value = value_of(QUANTITIES[name].unit, written, f"the condition on {name}")
+    return PoseCondition(f"{name} {comparison} {written}", name, comparison, value)
+
+
+def value_of(unit: str, written: float | str | None, where: str) -> float:
+    """Read the value, SI, with which a quantity of some unit is compared; `where` it is written goes into messages.
+
+    Raises:
+        InputError: it is of another kind, or not finite.
+    """
+    try:
+        if unit in _BY_UNIT:
+            return _finite(parse(written, _BY_UNIT[unit]))
+        return _finite(float(written if written is not None else math.nan))
+    except UnitError as error:
+        raise InputError(f"in {where}, {shorten(written)}: {error}.") from None
+    except ValueError:
+        raise InputError(f"in {where}, {shorten(written)} must be a plain number, e.g. 0.05.") from None
+
+
+def _finite(value: float) -> float:
+    if not np.isfinite(value):
+        raise UnitError('no condition can ask for "rigid"; give a large value')
+    return value
 
 
 @dataclass(frozen=True)
@@ -53,7 +137,7 @@ class Judge:
     """
 
     machine: Machine
-    conditions: tuple[Condition, ...]
+    conditions: tuple[PoseCondition, ...]
 
     @cached_property
     def aspect(self) -> float:
@@ -73,10 +157,10 @@ class Judge:
     def labels(self) -> tuple[str, ...]:
         """All verdicts; "inside" is the first."""
         return (
-            *PLAIN.values(),
+            *STATUS_VERDICTS.values(),
             BEYOND,
-            *(f"{LIMIT}{name}" for name in self.limits),
-            *(f"{FAILS}{c.text}" for c in self.conditions),
+            *(f"{LIMIT_VERDICT}{name}" for name in self.limits),
+            *(f"{CONDITION_VERDICT}{c.text}" for c in self.conditions),
         )
 
     @property
@@ -100,13 +184,15 @@ class Judge:
             poses: from numbers of some of them to their coordinates.
         """
         codes = np.zeros(status.shape, dtype=np.int8)
-        for place, plain in enumerate(PLAIN):
+        for place, plain in enumerate(STATUS_VERDICTS):
             codes[status == plain] = place
         codes[(status == Status.OK) & self._beyond(values)] = self.labels.index(BEYOND)
         limited = np.flatnonzero(status == Status.JOINT_LIMIT)
         if limited.size:
-            codes.flat[limited] = len(PLAIN) + 1 + first_limit_passed(self.machine, poses(limited), self.limits)
-        for place, condition in enumerate(self.conditions, len(PLAIN) + 1 + len(self.limits)):
+            codes.flat[limited] = (
+                len(STATUS_VERDICTS) + 1 + first_limit_passed(self.machine, poses(limited), self.limits)
+            )
+        for place, condition in enumerate(self.conditions, len(STATUS_VERDICTS) + 1 + len(self.limits)):
             codes[(codes == 0) & ~condition.holds(np.asarray(values[condition.quantity]))] = place
         return codes
 

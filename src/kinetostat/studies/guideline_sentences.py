@@ -15,9 +15,7 @@ from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.display import number
 from kinetostat.kinetostatics.elements import LINKS_TOGETHER, Element
 from kinetostat.machine.parameters import with_leg
-from kinetostat.studies.guidelines.guidelines import Guidelines
-from kinetostat.studies.guidelines.moves import Move
-from kinetostat.studies.guidelines.roles import EXCESS, Roles
+from kinetostat.studies.guidelines import EXCESS, Guidelines, Move, Roles
 from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
 from kinetostat.tolerances import NO_ROLE
 

@@ -1,6 +1,9 @@
-"""Quantities at poses as a labelled dataset: what Python programs get from `evaluate`."""
+"""Datasets of quantities at poses, which Python programs get from `evaluate`, and the labels of all datasets.
 
-from collections.abc import Sequence
+Labels are attributes as the CF conventions have them: units, long names, and the meanings of flags.
+"""
+
+from collections.abc import Collection, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -8,18 +11,55 @@ import numpy as np
 import xarray as xr
 
 from kinetostat.engine.batch import Progress, silent
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.arguments import checked
-from kinetostat.studies.evaluation.evaluation import MATRICES, PoseAnswers, answers_at
-from kinetostat.studies.evaluation.given_poses import given_poses
-from kinetostat.studies.grid.grid import ABOUT_STATUS, about
+from kinetostat.studies.evaluation import MATRICES, PoseAnswers, answers_at
+from kinetostat.studies.poses import given_poses
 from kinetostat.studies.setting import frame_of, pose_of
 from kinetostat.units import KINDS
 
 # With its first dataset, xarray imports the other array libraries that it finds (pint 0.2 s, dask 0.5 s). This belongs
 # to the import of this module: then the first answer takes as long as the others.
 xr.Dataset(coords={"pose": [0]})
+
+ABOUT_STATUS = {
+    "flag_values": [int(status) for status in Status],
+    "flag_meanings": " ".join(status.word for status in Status),
+}
+"""Attributes of the variable of statuses."""
+
+
+def about_quantity(name: str) -> dict[str, str]:
+    """Attributes of the variable of a quantity."""
+    quantity = QUANTITIES[name]
+    return {"units": quantity.unit, "symbol": quantity.symbol}
+
+
+def about_field(field: Parameter) -> dict[str, Any]:
+    """Attributes of the coordinate of a field."""
+    kind = KINDS[field.quantity.kind]
+    return {"units": kind.unit, "long_name": field.quantity.meaning, "kind": kind.name}
+
+
+def origin_of(machine: Machine, varied: Collection[str] = ()) -> dict[str, str]:
+    """Attributes of a dataset: its machine with all numbers, how it is shown, and where the results hold.
+
+    Args:
+        machine: gives all that does not vary.
+        varied: leaf paths of the parameters that do.
+    """
+    return {
+        "machine": machine.name,
+        "machine_file": as_toml(machine),
+        "display": machine.display.units,
+        "kinetostat": version("kinetostat"),
+        "frame": frame_of(machine),
+        "pose": pose_of(machine, varied),
+    }
 
 
 @checked
@@ -53,21 +93,11 @@ def evaluate(
 def as_dataset(answers: PoseAnswers) -> xr.Dataset:
     """Label answers: dimensions pose, and row and column of K and C."""
     machine, poses = answers.machine, answers.poses
-    taken = [leaf for field in poses.fields for leaf in field.leaves]
-    attributes = {
-        "machine": machine.name,
-        "machine_file": as_toml(machine),
-        "kinetostat": version("kinetostat"),
-        "frame": frame_of(machine),
-        "pose": pose_of(machine, taken),
-    }
     coordinates: dict[str, Any] = {"pose": np.arange(poses.count)}
     coordinates |= {name: ("pose", values) for name, values in poses.labels.items()}
     for field, values in zip(poses.fields, poses.values, strict=True):
-        kind = KINDS[field.quantity.kind]
-        described = {"units": kind.unit, "long_name": field.quantity.meaning, "kind": kind.name, "path": field.path}
-        coordinates[field.dimension] = ("pose", values, described)
-    variables: dict[str, Any] = {name: ("pose", answers.values[name], about(name)) for name in answers.names}
+        coordinates[field.dimension] = ("pose", values, {**about_field(field), "path": field.path})
+    variables: dict[str, Any] = {name: ("pose", answers.values[name], about_quantity(name)) for name in answers.names}
     if answers.matrices:
         names = list(machine.family.component_names)
         coordinates |= {"row": names, "column": names}
@@ -75,4 +105,8 @@ def as_dataset(answers: PoseAnswers) -> xr.Dataset:
         units = "SI: N·m/rad, N/rad, N/m" if matrix == "K" else "SI: rad/(N·m), rad/N, m/N"
         described = {"long_name": f"{MATRICES[matrix]} matrix", "units": units}
         variables[matrix] = (("pose", "row", "column"), answers.matrix(matrix), described)
-    return xr.Dataset({"status": ("pose", answers.status, ABOUT_STATUS), **variables}, coordinates, attributes)
+    return xr.Dataset(
+        {"status": ("pose", answers.status, ABOUT_STATUS), **variables},
+        coordinates,
+        origin_of(machine, list(poses.leaves)),
+    )

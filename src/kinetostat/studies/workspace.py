@@ -1,9 +1,11 @@
-"""Where a machine can work: what it reaches of pose space without a singularity, within limits and conditions.
+"""The workspace of a machine: what it reaches of pose space without a singularity, within limits and conditions.
 
-What is drawn or printed of it is elsewhere (`views.workspace_figures`, `views.grid_tables`).
+Nodes of a grid are judged (`workspace_verdicts`); the volume comes from random points between them. What is drawn or
+printed of it is in `views`.
 """
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -14,7 +16,7 @@ import xarray as xr
 
 from kinetostat.arrays import Codes, Float32s, Integers, Mask
 from kinetostat.engine.batch import Progress, evaluate, silent
-from kinetostat.engine.points import Cells
+from kinetostat.engine.points import PER_CELL, Cells
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import limits_loads
@@ -25,17 +27,14 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.grid.axes import MOST_DIMENSIONS
-from kinetostat.studies.grid.grid import IN_MEMORY, GridQuestion, answer, field_of, grid_question
+from kinetostat.studies.grid import IN_MEMORY, MOST_DIMENSIONS, GridQuestion, answer, field_of, grid_question
 from kinetostat.studies.plain_data import as_answer
-from kinetostat.studies.workspace.borders import borders
-from kinetostat.studies.workspace.conditions import Condition, parse_condition
-from kinetostat.studies.workspace.region import METHOD, Volume, estimate_volume
-from kinetostat.studies.workspace.verdicts import INSIDE, Demand, Judge, Poses, demands
+from kinetostat.studies.workspace_borders import borders
+from kinetostat.studies.workspace_verdicts import INSIDE, Demand, Judge, PoseCondition, Poses, demands, parse_condition
 
-SOFTEST = "least_translational_stiffness"
+COLOURING_QUANTITY = "least_translational_stiffness"
 """Quantity by which a workspace is coloured where no condition names another."""
-BORDER = "border_"
+BORDER_VARIABLES = "border_"
 BORDER_MEANING = "share of the step to the next node at which the verdict changes, along"
 HOME_MODE = "that of the home pose"
 """The assembly mode in which machines written leg by leg are evaluated; families state theirs by their formulas."""
@@ -45,10 +44,83 @@ MOST_DEMANDS = 200_000
 """Inside nodes at which lengths, angles and loads are computed; of more nodes, evenly chosen ones."""
 
 
+UNIT_POWERS = {1: "", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶"}
+FEWEST_CELLS = 30
+"""Fewest cells from which a standard error is estimated. With fewer, both points of every cell often agree by chance,
+and the error would come out as 0."""
+
+
+@dataclass(frozen=True)
+class Volume:
+    """The volume of a region of pose space; over two coordinates, its area.
+
+    Attributes:
+        value: the volume, in the product of the SI units of the coordinates.
+        standard_error: standard error of the value, in the same unit; NaN where there are too few cells for one.
+        unit: the unit of both, e.g. "m³" or "m²·rad".
+        box: volume of all cells together.
+        cells: number of cells.
+        divided: number of cells in which one point is inside and the other outside.
+        unknown_cells: number of cells with a point of which nobody knows whether it is inside; such a point counts as
+            outside.
+    """
+
+    value: float
+    standard_error: float
+    unit: str
+    box: float
+    cells: int
+    divided: int
+    unknown_cells: int
+
+    @property
+    def unknown(self) -> float:
+        """By how much the region may be larger: the volume of the unknown cells, in the same unit."""
+        return self.box * self.unknown_cells / self.cells
+
+    @property
+    def share(self) -> float:
+        return self.value / self.box
+
+
+METHOD = "stratified sampling, two random points in each cell of the grid; error from their differences"
+
+
+def estimate_volume(inside: Mask, unknown: Mask, sizes: Sequence[float], units: Sequence[str]) -> Volume:
+    """Estimate the volume of a region from two independent, uniform random points in each cell of a grid.
+
+    The mean over both points is unbiased for any region. Cells are independent, and the variance of the mean of two
+    points is the expectation of a quarter of their squared difference. So the standard error is the volume of a cell
+    times half the square root of the number of divided cells. It falls with the number of cells to the power
+    -(d + 1)/(2 d) in d dimensions.
+
+    Args:
+        inside: whether each point lies in the region; the two points of a cell follow one another [2 x cells].
+        unknown: whether nobody knows that; such points are not inside [2 x cells].
+        sizes: size of the box along each axis, SI.
+        units: units of the axes.
+
+    Source: W. G. Cochran, Sampling Techniques (1977), section 5.3, for the variance of a stratified mean.
+    """
+    pairs = inside.reshape(-1, PER_CELL)
+    box = math.prod(sizes)
+    cell = box / len(pairs)
+    divided = int((pairs[:, 0] != pairs[:, 1]).sum())
+    value = cell * float(inside.sum()) / PER_CELL
+    error = 0.5 * cell * math.sqrt(divided) if len(pairs) >= FEWEST_CELLS else math.nan
+    unknown_cells = int(unknown.reshape(-1, PER_CELL).any(axis=1).sum())
+    return Volume(value, error, unit_product(units), box, len(pairs), divided, unknown_cells)
+
+
+def unit_product(units: Sequence[str]) -> str:
+    """Write the product of some units, e.g. "m²·rad"."""
+    return "·".join(f"{unit}{UNIT_POWERS[count]}" for unit, count in Counter(units).items())
+
+
 @former_names(found="exists", counts="nodes", joined="connected", divided="singularities_divide")
 @dataclass(frozen=True, eq=False)
 class Workspace(Immutable):
-    """Where a machine can work.
+    """The workspace of a machine over a grid of poses.
 
     Attributes:
         dataset: over the nodes of the grid: `status` (`Status` codes), `verdict` (place in `verdicts`), `connected`
@@ -73,7 +145,7 @@ class Workspace(Immutable):
     connected: float | None
     extents: dict[str, tuple[float, float]]
     demands: tuple[Demand, ...]
-    conditions: tuple[Condition, ...]
+    conditions: tuple[PoseCondition, ...]
     singularities_divide: bool
     limits: tuple[str, ...]
 
@@ -110,7 +182,9 @@ def workspace(
     if seed < 0:
         raise InputError(f"seed is {seed}; give a whole number from 0.")
     judge = Judge(machine, tuple(parse_condition(text, machine.family.component_names) for text in several(conditions)))
-    question = grid_question(machine, ranges, [*dict.fromkeys(["singularity_margin", SOFTEST, *judge.quantities])])
+    question = grid_question(
+        machine, ranges, [*dict.fromkeys(["singularity_margin", COLOURING_QUANTITY, *judge.quantities])]
+    )
     _check(question)
     total = question.grid.size + Cells(question.grid.axes).size
     nodes = answer(question, lambda done, _: progress(done, total))
@@ -123,7 +197,7 @@ def workspace(
     home = _home(question)
     connected = connected_to(inside, home) if home is not None else np.zeros_like(inside)
     return Workspace(
-        _labelled(nodes, verdict, connected, judge, volume, edges),
+        _dataset(nodes, verdict, connected, judge, volume, edges),
         judge.labels,
         {label: int((verdict == i).sum()) for i, label in enumerate(judge.labels)},
         volume,
@@ -215,7 +289,7 @@ def _extents(question: GridQuestion, inside: Mask) -> dict[str, tuple[float, flo
     return extents
 
 
-def _labelled(
+def _dataset(
     nodes: xr.Dataset, verdict: Codes, connected: Mask, judge: Judge, volume: Volume, edges: Sequence[Float32s]
 ) -> xr.Dataset:
     """The dataset of the nodes with verdicts, borders and volume."""
@@ -237,7 +311,7 @@ def _labelled(
         verdict=(dims, verdict, about), connected=(dims, connected.astype(np.int8), about_connected)
     )
     for dim, edge in zip(dims, edges, strict=False):
-        wanted[f"{BORDER}{dim}"] = (dims, edge, {"long_name": f"{BORDER_MEANING} {dim}", "units": "1"})
+        wanted[f"{BORDER_VARIABLES}{dim}"] = (dims, edge, {"long_name": f"{BORDER_MEANING} {dim}", "units": "1"})
     pose = {path: float(value) for path, value in values(judge.machine).items() if path.startswith("pose.")}
     mode = {} if judge.machine.family.chains is None else {"assembly_mode": HOME_MODE}
     uncounted = "" if judge.machine.loaded else loads_left_out(judge.machine, respond(judge.machine).configuration)

@@ -18,7 +18,8 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.grid.grid import ABOUT_STATUS, GridQuestion, about
+from kinetostat.studies.datasets import ABOUT_STATUS, about_quantity
+from kinetostat.studies.grid import GridQuestion
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.result_file import (
     STATUS,
@@ -35,12 +36,12 @@ from kinetostat.studies.study_folder import DATA, Record, StudyFolder, holds_stu
 
 MOST_NUMBERS = 10_000_000_000
 """Points times quantities of one grid: 80 GB."""
-STUDY_VERSION = 1
+GRID_STUDY_VERSION = 1
 LAYOUT = "layout"
 """Key of the layout of the file in the question of a folder."""
 
 Layout = dict[str, Any]
-"""Where the numbers of a file are, and the checksum of all else: plain data from `result_file.create`."""
+"""Places of the numbers in a file, and the checksum of all else: plain data from `result_file.create`."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,7 @@ def _taken_up(question: GridQuestion, study: StudyFolder, final: Path) -> tuple[
     """The work as the folder has it, or new work where it has none, and the layout of its file if it is known."""
     work = in_chunks(question.machine, question.grid, question.names)
     wanted = _as_record(question, final.name)
-    stored = study.question(wanted, _restated)
+    stored = study.question(wanted, _in_this_version)
     if stored is None:
         layout = _create(question, final)
         study.begin({**wanted, "chunk": work.chunk, LAYOUT: layout})
@@ -172,7 +173,7 @@ def _taken_up(question: GridQuestion, study: StudyFolder, final: Path) -> tuple[
 
 
 def _create(question: GridQuestion, final: Path) -> Layout:
-    attributes = {**{name: about(name) for name in question.names}, STATUS: _about_status()}
+    attributes = {**{name: about_quantity(name) for name in question.names}, STATUS: _about_status()}
     return create(_partial(final), question.labels, question.dims, attributes)
 
 
@@ -233,7 +234,7 @@ def _as_record(question: GridQuestion, file: str) -> Record:
         for dim, field, axis in zip(question.dims, question.fields, question.grid.axes, strict=True)
     ]
     return {
-        "study": STUDY_VERSION,
+        "study": GRID_STUDY_VERSION,
         "kinetostat": attributes["kinetostat"],
         "file": file,
         "machine": _text_of(question.machine),
@@ -242,7 +243,7 @@ def _as_record(question: GridQuestion, file: str) -> Record:
     }
 
 
-def _restated(stored: Record) -> Record:
+def _in_this_version(stored: Record) -> Record:
     """A stored question as this version writes it."""
     if "machine" not in stored:
         return stored

@@ -1,0 +1,374 @@
+"""Design guidelines of a machine: what each direction depends on, what counts as rigid, what to change.
+
+They are derived as section 4.2 of the paper does it for its machine, here for any machine, at its pose and over a grid
+of poses: from the roles of the elastic elements in each direction, and from what the parameters of the design do.
+Sentences and plain data are in `guideline_sentences`; what is printed or drawn is in `views`.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinetostat.arrays import Array, Mask
+from kinetostat.engine.batch import Progress, responses, silent
+from kinetostat.engine.derivatives import evaluate_gradient
+from kinetostat.engine.points import Points
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.elements import (
+    Element,
+    diagonal_with,
+    element_share,
+    elements,
+    rigid_from,
+    stiffness_equations,
+    with_links_together,
+    without_rounding,
+)
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import parameters, values
+from kinetostat.spec.arguments import checked
+from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.immutable import Immutable
+from kinetostat.spec.renamed import former_names
+from kinetostat.studies.grid import chosen_axes, grid_of
+from kinetostat.studies.sensitivity import (
+    Sensitivity,
+    greatest_of,
+    measure_of,
+    notes,
+    relative_sensitivity,
+    sensitivity,
+)
+from kinetostat.tolerances import NO_ROLE
+
+MOST_GUIDELINE_POSES = 10_000
+"""Poses of a grid: whole responses of all of them are kept in memory."""
+EXCESS = 0.01
+"""An element counts as rigid where its compliance adds less than this share to that of the machine with it rigid."""
+FELT = 1e-3
+"""Percent per percent below which a parameter counts as without effect on a direction."""
+AXES = "as axes of joints, whose errors are a matter of tolerances: `kinetostat sensitivity` shows them"
+"""Why directions are no parameters of the design."""
+NOT_DESIGN = ("pose", "tool", "load", "limits", "linear_density")
+"""Tables of a machine file whose values are not part of the design."""
+
+
+@dataclass(frozen=True, eq=False)
+class Roles(Immutable):
+    """What each element does to each direction, pose by pose; NaN where the direction is rigid, free or has no pose.
+
+    Attributes:
+        shares: of each entry of the diagonal of C, 0 to 1 [elements x components x poses].
+        rigid: by which factor the stiffness of an element may be multiplied until it only just counts as rigid: from
+            there on it does; infinite where nothing else is compliant, 0 where no compliance of it
+            matters [same shape].
+        gains: by which share an entry of C falls once the element is twice as stiff [same shape].
+    """
+
+    shares: Array
+    rigid: Array
+    gains: Array
+
+
+@dataclass(frozen=True)
+class Move:
+    """What one parameter of the design, or all entries of a stiffness together, does to the stiffness 1 / C_ii.
+
+    Attributes:
+        path: of the parameter.
+        percents: percent by which each direction gets stiffer per percent more of the parameter, of an angle per 0.01
+            rad; None where rigid or free.
+        stiffer, softer: share of the poses of the grid at which it does so by more than round-off; empty
+            without a grid.
+        turning: whether the parameter is an angle.
+    """
+
+    path: str
+    percents: tuple[float | None, ...]
+    stiffer: tuple[float, ...] = ()
+    softer: tuple[float, ...] = ()
+    turning: bool = False
+
+    @property
+    def matters(self) -> bool:
+        """Whether it changes any direction, here or anywhere on the grid."""
+        return self.greatest > FELT or any(self.stiffer) or any(self.softer)
+
+    @property
+    def greatest(self) -> float:
+        """Size of the greatest of the percents."""
+        return greatest_of(self.percents)
+
+
+@former_names(
+    compliance="compliance_diagonal",
+    found="elements",
+    equations="stiffness_equations",
+    moves="parameters",
+    idle="without_influence",
+    skipped="left_out",
+)
+@dataclass(frozen=True, eq=False)
+class Guidelines(Immutable):
+    """Design guidelines.
+
+    Attributes:
+        machine: the machine.
+        status: of its pose; all that follows is empty unless it is OK.
+        message: one readable paragraph.
+        components: names of the directions.
+        compliance_diagonal: the diagonal of C.
+        elements: the elastic elements, actuators first.
+        here: their roles at the pose of the file.
+        stiffness_equations: per element, its coefficients in the diagonal of K; None where K is not such a sum.
+        meaning: of the percentages in `parameters`, one sentence.
+        parameters: what the parameters of the design do, those with the largest effect first.
+        without_influence: paths of parameters that change no direction, here or anywhere on the grid.
+        left_out: paths of parameters without a derivative, and why.
+        ranges: of the grid, as written.
+        poses: how many poses of the grid have an answer, and how many there are.
+        everywhere: roles at those that have one; None without a grid.
+    """
+
+    machine: Machine
+    status: Status
+    message: str
+    components: tuple[str, ...]
+    compliance_diagonal: tuple[float, ...] = ()
+    elements: tuple[Element, ...] = ()
+    here: Roles | None = None
+    stiffness_equations: dict[str, tuple[float, ...]] | None = None
+    meaning: str = ""
+    parameters: tuple[Move, ...] = ()
+    without_influence: tuple[str, ...] = ()
+    left_out: tuple[tuple[str, str], ...] = ()
+    ranges: tuple[str, ...] = ()
+    poses: tuple[int, int] = (0, 0)
+    everywhere: Roles | None = None
+
+    def __repr__(self) -> str:
+        count = len(self.parameters)
+        return f"<Guidelines for {self.machine.name!r}: {self.status.word}, {count} parameters that matter>"
+
+    @property
+    def actuator(self) -> Element | None:
+        """The first group of actuators that all have one finite stiffness, to compare others with."""
+        alike = (part for part in self.elements if part.actuated and part.stiffness and part.stiffness < math.inf)
+        return next(alike, None)
+
+
+@checked
+def guidelines(machine: Machine, ranges: Sequence[str] = (), progress: Progress = silent) -> Guidelines:
+    """Derive what the stiffness of a machine depends on, at its pose and over a grid.
+
+    Args:
+        machine: with its pose.
+        ranges: of the grid, "FIELD=from:to:count", coordinates of the pose; none for the file's pose alone.
+        progress: receives how far the work is.
+
+    Raises:
+        InputError: a bad range, one that is not of a coordinate of the pose, or too many poses.
+    """
+    ranges = several(ranges)
+    grid = _grid(machine, ranges) if ranges else None
+    sensitivities = sensitivity(machine)
+    names = machine.family.component_names
+    if sensitivities.status is not Status.OK:
+        return Guidelines(machine, sensitivities.status, sensitivities.message, names)
+    kept, response = list(machine.family.components), respond(machine)
+    single = elements(response.configuration)
+    every = with_links_together(single)
+    whole = without_rounding(response.compliance.diagonal(), response)[kept, 0]
+    moves = moves_at(sensitivities, whole > 0.0)
+    everywhere, poses = None, (0, 0)
+    if grid is not None:
+        everywhere, poses = roles_over(machine, grid, every, kept, progress)
+        moves = with_signs(machine, grid, moves)
+    without_derivative = [pair for pair in sensitivities.without_derivative if designed(machine, pair[0])]
+    return Guidelines(
+        machine,
+        sensitivities.status,
+        sensitivities.message,
+        names,
+        tuple(whole.tolist()),
+        tuple(every),
+        roles_at(response, every, kept),
+        equations_of_k(response, single, kept),
+        next(notes(sensitivities)),
+        tuple(move for move in moves if move.matters),
+        tuple(move.path for move in moves if not move.matters),
+        (*without_derivative, *axes_left_out(sensitivities)),
+        tuple(ranges),
+        poses,
+        everywhere,
+    )
+
+
+def _grid(machine: Machine, ranges: Sequence[str]) -> Points:
+    axes = chosen_axes(machine, ranges)
+    for _, parameter in axes:
+        if not parameter.path.startswith("pose."):
+            known = ", ".join(path for path in values(machine) if path.startswith("pose."))
+            raise InputError(f"{parameter.path} is not a coordinate of the pose; --over takes {known}.")
+    grid = grid_of(axes)
+    if grid.size > MOST_GUIDELINE_POSES:
+        raise InputError(
+            f"the grid has {grid.size:,} poses; at most {MOST_GUIDELINE_POSES:,} are allowed: lower a count."
+        )
+    return grid
+
+
+def roles_at(response: Response, elements: Sequence[Element], kept: Sequence[int]) -> Roles:
+    """Compute the roles of elements.
+
+    Args:
+        response: at one pose, or at many as arrays.
+        elements: the elements.
+        kept: which of rx ry rz x y z = 0 ... 5 the machine has.
+    """
+    with np.errstate(all="ignore"):
+        whole = without_rounding(response.compliance.diagonal(), response)[kept]
+        bounded = np.isfinite(whole)
+        whole = np.where((whole > 0.0) & bounded, whole, math.nan)
+        shares, rigid, gains = [], [], []
+        for element in elements:
+            part = without_rounding(element_share(response, element), response)[kept]
+            ever = part / np.where(np.isfinite(whole), whole, 1.0) > NO_ROLE
+            factor = 1.0 / rigid_from(response, element, EXCESS)[kept]
+            rigid.append(np.where(bounded, np.where(ever, factor, 0.0), math.nan))
+            here = 0.0 if element.stiffness == math.inf else part / whole
+            shares.append(np.where(here > NO_ROLE, here, whole * 0.0))
+            gains.append(1.0 - without_rounding(diagonal_with(response, element, 0.5), response)[kept] / whole)
+    none = np.zeros((0, *np.shape(whole)))
+    return Roles(*(np.stack(np.broadcast_arrays(*rows)) if rows else none for rows in (shares, rigid, gains)))
+
+
+def roles_over(
+    machine: Machine, grid: Points, elements: Sequence[Element], kept: Sequence[int], progress: Progress
+) -> tuple[Roles, tuple[int, int]]:
+    """Compute roles at the poses of a grid that have an answer; also how many these are, and how many there are.
+
+    Args:
+        machine: gives what does not vary.
+        grid: poses.
+        elements, kept: as for `roles_at`.
+        progress: receives how far the work is.
+    """
+    response = responses(machine, grid)
+    progress(1, 2)
+    good = np.broadcast_to(np.asarray(response.status) == Status.OK, (grid.size,))
+    every = roles_at(response, elements, kept)
+    progress(2, 2)
+    shape = (len(elements), len(kept), grid.size)
+    part = [np.broadcast_to(rows, shape)[:, :, good] for rows in (every.shares, every.rigid, every.gains)]
+    return Roles(*part), (int(good.sum()), grid.size)
+
+
+def stiffening(machine: Machine, element: Element, factors: Array) -> Array:
+    """Stiffness of each direction while an element changes, as a share of the one with the element rigid.
+
+    Args:
+        machine: at its pose.
+        element: whose stiffness is multiplied.
+        factors: on its stiffness; of an element that is rigid, its stiffness itself (SI) [points].
+
+    Returns:
+        1 / C_ii over its limit [components x points]; 0 where nothing else is compliant.
+    """
+    kept, response = list(machine.family.components), respond(machine)
+    with np.errstate(all="ignore"):
+        rigid = without_rounding(diagonal_with(response, element, 0.0), response)[kept]
+        return rigid / without_rounding(diagonal_with(response, element, 1.0 / factors), response)[kept]
+
+
+def equations_of_k(
+    response: Response, elements: Sequence[Element], kept: Sequence[int]
+) -> dict[str, tuple[float, ...]] | None:
+    """Coefficients in the diagonal of K by element (eqs. 33-38), without round-off; None where K is not such a sum.
+
+    Arguments as for `roles_at`, at one pose.
+    """
+    by_element = stiffness_equations(response, elements)
+    if by_element is None:
+        return None
+    rows = {name: [float(matrix.entry(i, i)) for i in kept] for name, matrix in by_element.items()}
+    most = [max(column) for column in zip(*rows.values(), strict=True)]
+    return {
+        name: tuple(c if c > NO_ROLE * top else 0.0 for c, top in zip(row, most, strict=True))
+        for name, row in rows.items()
+    }
+
+
+def moves_at(sensitivities: Sensitivity, compliant: Mask) -> list[Move]:
+    """List what the parameters of the design do, the largest effect first; entries of one stiffness move together.
+
+    Args:
+        sensitivities: of the diagonal of C.
+        compliant: which directions are neither rigid nor free.
+    """
+    machine = sensitivities.machine
+    entries: dict[str, list[Array]] = {}
+    for parameter in sensitivities.parameters:
+        if designed(machine, parameter.path):
+            row = np.where(compliant, [math.nan if p is None else -p for p in parameter.percents], math.nan)
+            entries.setdefault(_together(machine, parameter.path), []).append(row)
+    rows = {path: np.sum(parts, axis=0) for path, parts in entries.items()}
+    quiet = [_together(machine, path) for path in sensitivities.without_influence if designed(machine, path)]
+    zero = np.where(compliant, 0.0, math.nan)
+    rows |= {path: zero for path in quiet if path not in rows}
+    kinds = _kinds(machine)
+    moves = [
+        Move(path, tuple(None if math.isnan(p) else float(p) for p in row), turning=kinds[path] == "angle")
+        for path, row in rows.items()
+    ]
+    return sorted(moves, key=lambda move: -move.greatest)
+
+
+def designed(machine: Machine, path: str) -> bool:
+    """Whether a parameter is one that a designer chooses."""
+    return path.split(".")[0] not in NOT_DESIGN and _kinds(machine)[path] != "direction"
+
+
+def axes_left_out(sensitivities: Sensitivity) -> list[tuple[str, str]]:
+    """The axes of joints that have an influence, and why they are left out."""
+    axes = (p.path.rpartition(".")[0] for p in sensitivities.parameters if p.kind == "direction")
+    return [(path, AXES) for path in dict.fromkeys(axes)]
+
+
+def _kinds(machine: Machine) -> dict[str, str]:
+    return {p.path: p.quantity.kind for p in parameters(machine.family)}
+
+
+def _together(machine: Machine, path: str) -> str:
+    """The path of a whole field where its entries are stiffnesses of springs that are one element; else the path."""
+    field = path.rpartition(".")[0]
+    whole = {p.path: p for p in parameters(machine.family)}.get(field)
+    here = values(machine)
+    if whole is None or not (whole.quantity.stiff and whole.quantity.per_leg):
+        return path
+    return field if len({here[leaf] for leaf in whole.leaves}) == 1 else path
+
+
+def with_signs(machine: Machine, grid: Points, moves: Sequence[Move]) -> list[Move]:
+    """Add to each move at which share of the poses of a grid it stiffens and softens each direction."""
+    leaves = {p.path: p.leaves for p in parameters(machine.family)}
+    paths = [leaf for move in moves for leaf in leaves[move.path]]
+    names = [f"compliance_{name}" for name in machine.family.component_names]
+    answer = evaluate_gradient(machine, grid, names, paths)
+    good = answer.status == Status.OK
+    if not good.any():
+        return list(moves)
+    length, here, kinds = float(respond(machine).configuration.length), values(machine), _kinds(machine)
+    signed = []
+    for move in moves:
+        rows = [paths.index(leaf) for leaf in leaves[move.path]]
+        sizes = np.array([measure_of(kinds[leaf], here[leaf], length)[0] for leaf in leaves[move.path]])
+        percents = relative_sensitivity(answer.gradients[:, rows], sizes[:, None], answer.values[:, None])
+        change = -np.nansum(percents, axis=1)
+        sign = np.where(np.abs(change) > FELT, np.sign(change), 0.0)[:, good]
+        stiffer, softer = (tuple((sign == wanted).mean(axis=1).tolist()) for wanted in (1.0, -1.0))
+        signed.append(replace(move, stiffer=stiffer, softer=softer))
+    return signed

@@ -1,0 +1,377 @@
+"""Poses from outside: tables of Python programs and CSV files, as SI numbers by field. Nothing is evaluated.
+
+Whatever they come from, they become columns, of which every value is checked in one place (`read_columns`). Tables of
+pandas, polars and xarray are read by what they can do, so that none of these libraries need be there.
+"""
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinetostat.arrays import Array
+from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.orientation import ANGLE, ANGLES, PURE, angles_of, from_parts, numbers_for, part_of
+from kinetostat.machine.parameters import POSE, Parameter, find, parameters
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.fields import Quantity, quantities
+from kinetostat.units import UnitError, parse
+
+MOST_GIVEN_POSES = 5_000_000
+"""Poses whose answers fit in memory: a dozen quantities of them take half a gigabyte."""
+
+
+@dataclass(frozen=True)
+class GivenColumn:
+    """A column as it was given.
+
+    Attributes:
+        name: of the field, as written.
+        entries: numbers, or texts with a unit.
+        unit: of numbers; SI where it is empty.
+    """
+
+    name: str
+    entries: Any
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class PoseColumns:
+    """Poses, all values in SI.
+
+    Attributes:
+        fields: that were given, in order.
+        values: of each of these fields [poses].
+        labels: further columns that belong to the poses, as a time; by name.
+    """
+
+    fields: tuple[Parameter, ...]
+    values: tuple[Array, ...]
+    labels: Mapping[str, Any]
+
+    @property
+    def leaves(self) -> dict[str, Array]:
+        """Values by leaf path: a field that stands for several entries gives all of them its value."""
+        pairs = zip(self.fields, self.values, strict=True)
+        return {leaf: values for field, values in pairs for leaf in field.leaves}
+
+    @property
+    def count(self) -> int:
+        """Number of poses."""
+        return len(self.values[0])
+
+
+Where = Callable[[str, int], str]
+"""From the name of a column and the number of a pose, from 0, to the words for that place."""
+
+
+def read_columns(
+    machine: Machine, columns: Sequence[GivenColumn], where: Where, labels: Mapping[str, Any] | None = None
+) -> PoseColumns:
+    """Read columns: find their fields, convert and check every value.
+
+    Args:
+        machine: whose fields they are.
+        columns: all of one length, or of length one. Orientations may be columns of a quaternion, a rotation matrix or
+            a tilt, as `quaternion.w`; they become roll, pitch and yaw.
+        where: says in messages where a value stands.
+        labels: further columns of the poses.
+
+    Raises:
+        InputError: no column, an unknown field or one twice, columns of several lengths, no pose, or a value that is
+            not finite, of another kind or not allowed.
+    """
+    if not columns:
+        raise InputError("poses has no columns; name the field that each column holds, e.g. x.")
+    columns = _with_angles(machine, columns, where)
+    fields = [_field(machine, column.name) for column in columns]
+    given = [leaf for field in fields for leaf in field.leaves]
+    for leaf in given:
+        if given.count(leaf) > 1:
+            raise InputError(f"{leaf} is given by two columns of the poses; remove one of them.")
+    pairs = list(zip(columns, fields, strict=True))
+    values = [_values(column, field.quantity, where) for column, field in pairs]
+    lengths = dict.fromkeys(len(array) for array in values)
+    count = max(lengths)
+    if set(lengths) - {1, count}:
+        shown = ", ".join(f"{column.name} {len(array)}" for column, array in zip(columns, values, strict=True))
+        raise InputError(f"the columns of the poses have several lengths ({shown}); give each one value for each pose.")
+    if min(lengths) == 0:
+        raise InputError("poses has no rows; give at least one pose.")
+    if count > MOST_GIVEN_POSES:
+        raise InputError(
+            f"there are {count:,} poses, and at most {MOST_GIVEN_POSES:,} are evaluated at once; evaluate them in "
+            "parts."
+        )
+    return PoseColumns(tuple(fields), tuple(np.broadcast_to(array, count) for array in values), labels or {})
+
+
+def _with_angles(machine: Machine, columns: Sequence[GivenColumn], where: Where) -> Sequence[GivenColumn]:
+    """Return the columns with roll, pitch and yaw in the place of those of a quaternion, a matrix or a tilt."""
+    parts: dict[str, dict[str, Array]] = {}
+    others = []
+    for column in columns:
+        form, part = part_of(column.name)
+        if not form:
+            others.append(column)
+            continue
+        if part in parts.setdefault(form, {}):
+            raise InputError(f"{form}.{part} is given by two columns of the poses; remove one of them.")
+        parts[form][part] = _values(column, ANGLE if form == "tilt" else PURE, where)
+    if not parts:
+        return columns
+    given = {column.name: column for column in others} | {form: from_parts(form, parts[form]) for form in parts}
+    named = numbers_for(quantities(machine.family.tables["pose"]), given, angles_of)
+    return [*others, *(GivenColumn(name, named[name]) for name in ANGLES)]
+
+
+def _field(machine: Machine, name: object) -> Parameter:
+    if not isinstance(name, str):
+        raise InputError(f"a column of the poses is called {shorten(name)}; name a field of the machine, e.g. x.")
+    try:
+        return find(machine.family, name)
+    except InputError as error:
+        raise InputError(f"in the columns of the poses, {error}") from None
+
+
+def _values(column: GivenColumn, quantity: Quantity, where: Where) -> Array:
+    """Return the values of a column in SI."""
+    values = _numbers(column, quantity)
+    if values is None:
+        entries = _entries(column).tolist()
+        values = np.array([_entry(column, entry, quantity, where(column.name, i)) for i, entry in enumerate(entries)])
+    # Allowed values form an interval, so that the extremes and whatever is not finite decide for all.
+    suspects = [*np.flatnonzero(~np.isfinite(values))[:1], *([values.argmin(), values.argmax()] if values.size else [])]
+    for i in suspects:
+        _check(float(values[i]), quantity, where(column.name, int(i)))
+    return values
+
+
+def _numbers(column: GivenColumn, quantity: Quantity) -> Array | None:
+    """Return the values of a column of plain numbers, SI; None where there is anything else in it."""
+    entries = _entries(column)
+    if entries.dtype.kind not in "iufUS":
+        return None
+    try:
+        return entries.astype(float) * (parse(f"1 {column.unit}", quantity.kind) if column.unit else 1.0)
+    except ValueError:  # text with a unit, or no number
+        return None
+
+
+def _entries(column: GivenColumn) -> Any:
+    try:
+        entries = np.atleast_1d(np.asarray(column.entries))
+    except ValueError:  # rows of several lengths
+        entries = np.empty((0, 0))
+    if entries.ndim > 1:
+        raise InputError(f"column {column.name} of the poses has several columns; give one value for each pose.")
+    return entries
+
+
+def _entry(column: GivenColumn, entry: Any, quantity: Quantity, place: str) -> float:
+    """Return one value in SI: a number in the column's unit, or text with a unit of its own."""
+    text = entry.strip() if isinstance(entry, str) else entry
+    if isinstance(text, str) and column.unit and text and text[-1].isdecimal():
+        text = f"{text} {column.unit}"
+    try:
+        return parse(text, quantity.kind)
+    except UnitError as error:
+        raise InputError(f"{place} is {shorten(entry)}: {error}.") from None
+
+
+def _check(value: float, quantity: Quantity, place: str) -> None:
+    if not np.isfinite(value):
+        raise InputError(f"{place} is {value:g}, which is not a finite number; give a number, or remove the pose.")
+    try:
+        quantity.check(value)
+    except UnitError as error:
+        raise InputError(f"{place} is {quantity.show(value)}: {error}.") from None
+
+
+POSE_FORMS = (
+    "give a DataFrame or a dictionary with a column for each field that changes, an array with a column for each "
+    "coordinate of the pose, an xarray Dataset, or the path of a CSV file"
+)
+
+
+def given_poses(machine: Machine, poses: Any) -> PoseColumns:
+    """Read poses that a Python program gives; see `evaluate`.
+
+    Raises:
+        InputError: they are nothing of the kind, name an unknown field, or hold a value that the field does not allow.
+    """
+    if isinstance(poses, str | Path):
+        return read_poses(machine, Path(poses))
+    labels: dict[str, Any] = {}
+    if hasattr(poses, "data_vars"):
+        columns, labels = _of_dataset(poses)
+    elif isinstance(poses, Mapping):
+        named = numbers_for(quantities(machine.family.tables["pose"]), poses, angles_of)
+        columns = [GivenColumn(name, entries) for name, entries in named.items()]
+    elif hasattr(poses, "columns"):
+        columns = [GivenColumn(name, poses[name]) for name in poses.columns]
+        labels = {"pose": np.asarray(poses.index)} if hasattr(poses, "index") else {}
+    else:
+        columns = _of_array(machine, poses)
+    return read_columns(machine, columns, lambda name, i: f"poses[{name!r}][{i}]", labels)
+
+
+def _of_dataset(dataset: Any) -> tuple[list[GivenColumn], dict[str, Any]]:
+    """Return the variables of a dataset, or its coordinates if it has none, over all its dimensions together."""
+    names = list(dataset.data_vars) or list(dataset.coords)
+    flat = [np.ravel(array) for array in np.broadcast_arrays(*_like(dataset, names))]
+    others = [name for name in dataset.coords if name not in names and dataset[name].dims == tuple(dataset.dims)]
+    labels = {str(name): dataset[name].values for name in others}
+    fields = [str(dataset[name].attrs.get("field", name)) for name in names]
+    return [GivenColumn(field, values) for field, values in zip(fields, flat, strict=True)], labels
+
+
+def _like(dataset: Any, names: Sequence[Any]) -> list[Any]:
+    """Return variables with a length of one along dimensions that they do not have."""
+    return [
+        np.expand_dims(
+            dataset[name].values, tuple(i for i, dim in enumerate(dataset.dims) if dim not in dataset[name].dims)
+        )
+        for name in names
+    ]
+
+
+def _of_array(machine: Machine, poses: Any) -> list[GivenColumn]:
+    coordinates = [p.shown for p in parameters(machine.family) if p.path.startswith(POSE)]
+    try:
+        array = np.asarray(poses, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"poses is {shorten(poses)}; {POSE_FORMS}.") from None
+    if array.ndim != 2 or array.shape[1] != len(coordinates):
+        shape = " x ".join(str(size) for size in array.shape) or "a single number"
+        raise InputError(
+            f"poses is an array of {shape}; {machine.name} needs a row for each pose with {len(coordinates)} columns: "
+            f"{', '.join(coordinates)}. To give some of them by name, use a dictionary or a DataFrame."
+        )
+    return [GivenColumn(name, values) for name, values in zip(coordinates, array.T, strict=True)]
+
+
+LARGEST_POSE_FILE = 1 << 30
+"""Bytes of a file of poses."""
+MOST_POSE_COLUMNS = 1000
+SEPARATORS = (";", "\t", ",")
+"""Looked for in this order: where a semicolon separates, a comma is the decimal sign."""
+ANSWERS = {"pose", "status", *QUANTITIES}
+"""Columns that `kinetostat path` writes beside the poses: its own files are read again without them."""
+_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\x85\u2028\u2029]")
+"""Control characters. Python drops some of them from a number, and takes others for the end of a line."""
+_HEAD = re.compile(r"(.+?)\s*(?:\[(.*)\]|\((.*)\))?")
+
+
+def read_poses(machine: Machine, path: Path) -> PoseColumns:
+    """Read poses from a CSV file.
+
+    The first line names a field in each column, with the unit in brackets if it is not SI: `x [mm], angle [deg]`.
+    Fields that no column names stay as the machine has them. Comma, semicolon or tab separate; lines that begin with #
+    are comments. Columns of answers that `kinetostat path` wrote are left out.
+
+    Args:
+        machine: whose fields they are.
+        path: of the file.
+
+    Raises:
+        InputError: the file cannot be read or holds no poses, a column is not a field of the machine, a line is too
+            short or too long, or a value is not a number of the right kind.
+    """
+    columns, numbers = columns_of(path)
+    columns = [column for column in columns if column.name not in ANSWERS]
+    try:
+        return read_columns(machine, columns, lambda name, i: f"line {numbers[i]}, column {name}")
+    except InputError as error:
+        raise InputError(f'"{path}": {error}') from None
+
+
+def columns_of(path: Path, most: int = MOST_GIVEN_POSES) -> tuple[list[GivenColumn], list[int]]:
+    """Read the columns of a CSV file as texts with the units of their heads, and the number of each line below these.
+
+    Args:
+        path: of the file.
+        most: lines below the heads that it may have.
+
+    Raises:
+        InputError: the file cannot be read or holds no lines below its heads, it has too many lines or columns, or a
+            line is too short or too long.
+    """
+    lines = _lines(path)
+    if len(lines) < 2:
+        what = "is empty" if not lines else "names columns, but has no poses below them"
+        raise InputError(f'"{path}" {what}; write a line such as x [mm], y [mm], and below it a line for each pose.')
+    separator = next((sign for sign in SEPARATORS if sign in lines[0][1]), ",")
+    wide = lines[0][1].count(separator) + 1
+    for count, bound, what in ((len(lines) - 1, most, "poses"), (wide, MOST_POSE_COLUMNS, "columns")):
+        if count > bound:
+            raise InputError(f'"{path}" has {count:,} {what}, and may have at most {bound:,}; leave some out.')
+    rows = [_cells(path, number, line, separator) for number, line in lines]
+    numbers = [number for number, _ in lines]
+    for number, cells in zip(numbers, rows, strict=True):
+        if len(cells) != len(rows[0]):
+            raise InputError(
+                f'"{path}", line {number}: the number of values is {len(cells)}, not {len(rows[0])} as above.'
+            )
+    heads = [_head(path, text) for text in rows[0]]
+    twice = next((name for name, times in Counter(name for name, _ in heads).items() if times > 1), None)
+    if twice is not None:
+        raise InputError(f'"{path}": several columns are called {shorten(twice)}; keep one of them.')
+    columns = [
+        GivenColumn(name, [_decimal(cell, separator) for cell in cells], unit)
+        for (name, unit), cells in zip(heads, zip(*rows[1:], strict=True), strict=True)
+    ]
+    return columns, numbers[1:]
+
+
+def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
+    """The cells of a line."""
+    try:
+        return next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    except csv.Error as error:
+        raise InputError(f'"{path}", line {number} cannot be read: {error}; correct it, or remove it.') from None
+
+
+def _decimal(cell: str, separator: str) -> str:
+    return cell if separator == "," else cell.replace(",", ".")
+
+
+def _lines(path: Path) -> list[tuple[int, str]]:
+    """Return the lines that hold something, each with its number in the file."""
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(LARGEST_POSE_FILE + 1)
+    except OSError as error:
+        raise InputError(f'"{path}" cannot be read: {error.strerror}; give a CSV file of poses.') from None
+    except ValueError:
+        raise InputError(f'"{path}" cannot be read: it has a null character; give a CSV file of poses.') from None
+    if len(data) > LARGEST_POSE_FILE:
+        raise InputError(f'"{path}" is larger than 1 GiB; split it into parts.')
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f'"{path}" is not text; give a CSV file of poses, saved as UTF-8.') from None
+    control = _CONTROL.search(text)
+    if control is not None:
+        line = text.count("\n", 0, control.start()) + 1
+        raise InputError(
+            f'"{path}", line {line} has the control character {control[0]!r}, which no number and no name has; remove '
+            "it, or save the file as CSV again."
+        )
+    lines = enumerate(text.splitlines(), 1)
+    return [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
+
+
+def _head(path: Path, text: str) -> tuple[str, str]:
+    """Return the name and the unit in a heading, "x [mm]" or "x (mm)"."""
+    match = _HEAD.fullmatch(text.strip())
+    if match is None:
+        raise InputError(f'"{path}": a column is called {shorten(text)}; write its name, with a unit, e.g. x [mm].')
+    return match[1], match[2] or match[3] or ""
