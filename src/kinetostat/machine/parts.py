@@ -7,7 +7,7 @@ by form is free. Arrays and traced values always give a spring, whatever numbers
 Points and axes are in the base frame.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -53,6 +53,28 @@ def bent_links(lengths: Sequence[Scalar], stiffness: Sequence[Scalar], bending: 
     Under a force at its end, a cantilever deflects there like a rigid link on a rotational spring of 3 EI / length.
     """
     return [in_series(k, rigidity, size, 3.0) for k, rigidity, size in zip(stiffness, bending, lengths, strict=True)]
+
+
+def built_in_bar(
+    name: str, axes: Iterable[Vector], point: Vector, stiffness: Sequence[Scalar], link: tuple[Scalar, Scalar, Scalar]
+) -> tuple[Spring, ...]:
+    """Return the springs of a bar at the end where it is built in: bending about two axes and torsion about the third.
+
+    Its other end bends by 3 EI / length and twists by GJ / length; each is in series with the stiffness of the seat.
+
+    Args:
+        name: of the bar.
+        axes: x and y across the bar, and z along it, base frame.
+        point: of that end, base frame, m.
+        stiffness: of its seat about these axes, N·m/rad.
+        link: E I and G J (N·m²) and the length (m) of the bar.
+    """
+    bending, torsion, length = link
+    ways = (("bending x", bending, 3.0), ("bending y", bending, 3.0), ("torsion", torsion, 1.0))
+    return tuple(
+        Spring(f"{name} {way}", Joint(axis, point), in_series(k, rigidity, length, factor))
+        for (way, rigidity, factor), axis, k in zip(ways, axes, stiffness, strict=True)
+    )
 
 
 def servo(joint: Joint, name: str, stiffness: Scalar) -> Joint | Spring:

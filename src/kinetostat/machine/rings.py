@@ -159,16 +159,18 @@ class Rings:
         return 0.5 * (self.base_radius + self.platform_radius)
 
 
+def joint_angles(ring_name: str, count: int) -> Quantity:
+    """Angles of the joints of a ring, "base" or "platform": one for each leg."""
+    meaning = f"angles of the {ring_name} joints from x, leg by leg"
+    return Quantity("angle", meaning, count=count, apart=True, per_leg=True)
+
+
 @table
 class ThreeLegs(Rings):
     """Part of a table [geometry]: rings of three legs."""
 
-    base_angles: Annotated[
-        Three, Quantity("angle", "angles of the base joints from x, leg by leg", count=3, apart=True, per_leg=True)
-    ]
-    platform_angles: Annotated[
-        Three, Quantity("angle", "angles of the platform joints from x, leg by leg", count=3, apart=True, per_leg=True)
-    ]
+    base_angles: Annotated[Three, joint_angles("base", 3)]
+    platform_angles: Annotated[Three, joint_angles("platform", 3)]
 
 
 def ends(
@@ -217,52 +219,44 @@ class Placement:
         return Configuration(self.platform, (*self.passive, *legs), (*self.closures, *closures), size)
 
 
-Placed = Callable[[Any, Any, Any], Placement]
+Place = Callable[[Any, Any, Any], Placement]
 """From the tables geometry, stiffness and pose (SI) to the platform in closed form, NaN where it cannot be."""
 
 
-def with_struts(
-    name: str, summary: str, tables: Mapping[str, type], placed: Placed, links: Sequence[LinkKind] = ()
-) -> Family:
-    """The family whose actuated legs are U-P-S: forces along lines between the joints.
+def with_struts_or_cranks(
+    name: str, summaries: tuple[str, str], tables: Mapping[str, type], place: Place, links: Sequence[LinkKind] = ()
+) -> tuple[Family, Family]:
+    """Two families of one platform: with U-P-S legs, struts, and as "NAME-rus" with R-U-S legs, cranks with rods.
+
+    Struts are forces along lines between the joints. Cranks turn in vertical planes, outward where the platform is
+    above the base; a machine is NaN where a rod does not reach.
 
     Args:
-        name, summary: as of `Family`.
-        tables: geometry (`Rings`), stiffness (with `actuator` and `leg_axial`) and pose.
-        placed: the platform and what guides it.
+        name: of the family with struts.
+        summaries: one line about each of them, for lists.
+        tables: geometry (`Rings`), stiffness (with `actuator` and `leg_axial`) and pose of the family with struts.
+        place: the platform and what guides it.
         links: of what guides it, those with a mass.
     """
 
-    def configure(geometry: Any, stiffness: Any, pose: Any) -> Configuration:
-        placement = placed(geometry, stiffness, pose)
-        return placement.moved_by(
-            two_force_legs(*placement.joints, stiffness.actuator, stiffness.leg_axial), geometry.size
-        )
+    def with_struts(geometry: Any, stiffness: Any, pose: Any) -> Configuration:
+        placement = place(geometry, stiffness, pose)
+        legs = two_force_legs(*placement.joints, stiffness.actuator, stiffness.leg_axial)
+        return placement.moved_by(legs, geometry.size)
 
-    kind = LinkKind("legs", ("leg_axial",), straight_legs)
-    return Family(name=name, summary=summary, tables=tables, configure=configure, links=(kind, *links))
-
-
-def with_cranks(
-    name: str, summary: str, tables: Mapping[str, type], placed: Placed, links: Sequence[LinkKind] = ()
-) -> Family:
-    """The family whose actuated legs are R-U-S: the same machine with cranks and rods instead of struts.
-
-    The cranks turn in vertical planes, outward where the platform is above the base. NaN where a rod does not reach.
-
-    Args:
-        name, summary, tables, placed, links: as for `with_struts`; tables are those of the family with struts.
-    """
-
-    def configure(geometry: Any, stiffness: Any, pose: Any) -> Configuration:
-        placement = placed(geometry, stiffness, pose)
+    def with_cranks(geometry: Any, stiffness: Any, pose: Any) -> Configuration:
+        placement = place(geometry, stiffness, pose)
         sides = outward(placement.joints[0], geometry.base_radius, geometry.crank_turn)
         bars = CrankLinks(geometry.crank_length, geometry.rod_length, stiffness.crank_bending, stiffness.leg_axial)
         legs, limits = crank_legs(placement.joints, sides, stiffness.actuator, bars)
         return placement.moved_by(legs, geometry.size, limits)
 
+    struts = LinkKind("legs", ("leg_axial",), straight_legs)
     cranked = {**tables, **_crank_tables(tables["geometry"], tables["stiffness"])}
-    return Family(name=name, summary=summary, tables=cranked, configure=configure, links=(*CRANK_LINKS, *links))
+    return (
+        Family(name, summaries[0], tables, with_struts, links=(struts, *links)),
+        Family(f"{name}-rus", summaries[1], cranked, with_cranks, links=(*CRANK_LINKS, *links)),
+    )
 
 
 def _crank_tables(geometry: type, stiffness: type) -> dict[str, type]:

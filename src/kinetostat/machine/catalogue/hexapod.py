@@ -8,7 +8,7 @@ from typing import Annotated
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import Displacement, Vector, rotation_x, rotation_y, rotation_z
 from kinetostat.machine.leg import RIGID
-from kinetostat.machine.rings import Placement, Rings, ends, with_cranks, with_struts
+from kinetostat.machine.rings import Placement, Rings, ends, joint_angles, with_struts_or_cranks
 from kinetostat.spec.fields import Quantity, table
 
 LEGS = 6
@@ -19,12 +19,8 @@ Six = tuple[float, float, float, float, float, float]
 class Geometry(Rings):
     """Table [geometry]; the base frame has its origin at the base centre, the platform frame at P."""
 
-    base_angles: Annotated[
-        Six, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS, per_leg=True, apart=True)
-    ]
-    platform_angles: Annotated[
-        Six, Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS, per_leg=True, apart=True)
-    ]
+    base_angles: Annotated[Six, joint_angles("base", LEGS)]
+    platform_angles: Annotated[Six, joint_angles("platform", LEGS)]
     base_height: Annotated[float, Quantity("length", "z of the base joints, base frame")] = 0.0
     platform_height: Annotated[float, Quantity("length", "z of the platform joints, platform frame (from P)")] = 0.0
 
@@ -52,7 +48,7 @@ class Pose:
     yaw: Annotated[float, Quantity("angle", "rotation about z, last")] = 0.0
 
 
-def placed(geometry: Geometry, _stiffness: Stiffness, pose: Pose) -> Placement:
+def placement(geometry: Geometry, _stiffness: Stiffness, pose: Pose) -> Placement:
     """The platform, and base and platform joints of its legs; every pose can be reached (SI, base frame)."""
     turn = rotation_z(cos(pose.yaw), sin(pose.yaw)) @ rotation_y(cos(pose.pitch), sin(pose.pitch))
     turn = turn @ rotation_x(cos(pose.roll), sin(pose.roll))
@@ -63,9 +59,12 @@ def placed(geometry: Geometry, _stiffness: Stiffness, pose: Pose) -> Placement:
 
 
 TABLES = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
-FAMILY = with_struts("hexapod", "6 U-P-S legs (Gough-Stewart); freedoms x, y, z, roll, pitch, yaw", TABLES, placed)
-
-WITH_CRANKS = with_cranks(
-    "hexapod-rus", "6 R-U-S legs with actuated cranks; freedoms x, y, z, roll, pitch, yaw", TABLES, placed
+FAMILY, WITH_CRANKS = with_struts_or_cranks(
+    "hexapod",
+    (
+        "6 U-P-S legs (Gough-Stewart); freedoms x, y, z, roll, pitch, yaw",
+        "6 R-U-S legs with actuated cranks; freedoms x, y, z, roll, pitch, yaw",
+    ),
+    TABLES,
+    placement,
 )
-"""The same machine with R-U-S legs: actuated cranks and rods in the place of struts (theory section 4)."""

@@ -7,10 +7,10 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import AXES, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector, rotation_x, rotation_y
-from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes
+from kinetostat.machine.leg import RIGID, Joint, Leg, revolutes
 from kinetostat.machine.links import LinkKind, from_origin
-from kinetostat.machine.parts import in_series, servo
-from kinetostat.machine.rings import Placement, Three, ThreeLegs, ends, with_cranks, with_struts
+from kinetostat.machine.parts import built_in_bar, servo
+from kinetostat.machine.rings import Placement, Three, ThreeLegs, ends, with_struts_or_cranks
 from kinetostat.spec.fields import Quantity, table
 
 LEGS = 3
@@ -50,20 +50,13 @@ class Pose:
     theta2: Annotated[float, Quantity("angle", "angle of the Hooke joint's second axis, about the pitched x")]
 
 
-def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
+def placement(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
     """The platform and the ram, in closed form; every pose can be reached (SI, base frame)."""
     pitch = rotation_y(cos(pose.theta1), sin(pose.theta1))
     tip = Vector(0.0, 0.0, pose.z)
     platform = Displacement(pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2)), tip)
-    # A ram that is built in bends at its tip with 3EI/L and twists with GJ/L.
-    rigidities = ((stiffness.ram_bending, 3.0), (stiffness.ram_bending, 3.0), (stiffness.ram_torsion, 1.0))
-    built_in = [
-        in_series(k, ei, abs(pose.z), factor) for k, (ei, factor) in zip(stiffness.ram, rigidities, strict=True)
-    ]
-    springs = tuple(
-        Spring(f"ram {name}", Joint(axis, ZERO), k)
-        for name, axis, k in zip(("bending x", "bending y", "torsion"), AXES, built_in, strict=True)
-    )
+    link = stiffness.ram_bending, stiffness.ram_torsion, abs(pose.z)
+    springs = built_in_bar("ram", AXES, ZERO, stiffness.ram, link)
     slide = servo(Joint(Z_AXIS, None, "ram slide"), "ram actuator", stiffness.ram_actuator)
     leg = Leg("ram", (*springs, slide, *revolutes(tip, (Y_AXIS, pitch.x), "ram Hooke joint")))
     joints = ends(geometry, geometry.base_angles, geometry.platform_angles, platform)
@@ -72,13 +65,14 @@ def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
 
 RAM = LinkKind("ram", ("ram_bending", "ram_torsion"), from_origin("ram"))
 
-
 TABLES = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
-FAMILY = with_struts(
-    "passive-leg-3dof-pu", "3 U-P-S legs and a passive P-U ram; freedoms z, theta1, theta2", TABLES, placed, (RAM,)
+FAMILY, WITH_CRANKS = with_struts_or_cranks(
+    "passive-leg-3dof-pu",
+    (
+        "3 U-P-S legs and a passive P-U ram; freedoms z, theta1, theta2",
+        "3 R-U-S legs and a passive P-U ram; freedoms z, theta1, theta2",
+    ),
+    TABLES,
+    placement,
+    (RAM,),
 )
-
-WITH_CRANKS = with_cranks(
-    "passive-leg-3dof-pu-rus", "3 R-U-S legs and a passive P-U ram; freedoms z, theta1, theta2", TABLES, placed, (RAM,)
-)
-"""The same machine with R-U-S legs: actuated cranks and rods in the place of struts (theory section 4)."""

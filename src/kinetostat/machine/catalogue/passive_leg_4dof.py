@@ -13,7 +13,7 @@ from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes
 from kinetostat.machine.links import LinkKind, listed
 from kinetostat.machine.machine import Closure
 from kinetostat.machine.parts import bent_links, servo
-from kinetostat.machine.rings import Placement, Rings, four_joints, with_cranks, with_struts
+from kinetostat.machine.rings import Placement, Rings, four_joints, with_struts_or_cranks
 from kinetostat.spec.fields import Quantity, table
 
 LEGS = 4
@@ -82,7 +82,7 @@ class Pose:
     theta6: Annotated[float, Quantity("angle", "angle of the Hooke joint's second axis, about the pitched x")]
 
 
-def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
+def placement(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
     """The platform and the passive leg, in closed form; NaN where the passive leg cannot reach (SI, base frame).
 
     The elbow lies on the +x side of the line from O to P; el2, the elevation of link 2, fixes the pitch:
@@ -126,19 +126,14 @@ def _passive_leg(
 
 PASSIVE_LINKS = LinkKind("passive_links", ("passive_link_bending",), listed("passive link", "passive_links"), count=2)
 
-
 TABLES = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
-FAMILY = with_struts(
+FAMILY, WITH_CRANKS = with_struts_or_cranks(
     "passive-leg-4dof",
-    "4 U-P-S legs and a passive R-R-Hooke leg (Zhang and Gosselin); freedoms x, z, theta5, theta6",
-    TABLES, placed, (PASSIVE_LINKS,),
-)  # fmt: skip
-
-WITH_CRANKS = with_cranks(
-    "passive-leg-4dof-rus",
-    "4 R-U-S legs and a passive R-R-Hooke leg; freedoms x, z, theta5, theta6",
+    (
+        "4 U-P-S legs and a passive R-R-Hooke leg (Zhang and Gosselin); freedoms x, z, theta5, theta6",
+        "4 R-U-S legs and a passive R-R-Hooke leg; freedoms x, z, theta5, theta6",
+    ),
     TABLES,
-    placed,
+    placement,
     (PASSIVE_LINKS,),
 )
-"""The same machine with R-U-S legs: actuated cranks and rods in the place of struts (theory section 4)."""

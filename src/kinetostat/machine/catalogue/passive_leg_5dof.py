@@ -18,7 +18,7 @@ from kinetostat.machine.catalogue.passive_leg_4dof import (
 from kinetostat.machine.leg import Joint, Leg, Spring, revolutes
 from kinetostat.machine.machine import Closure
 from kinetostat.machine.parts import bent_links, servo
-from kinetostat.machine.rings import Placement, ends, with_cranks, with_struts
+from kinetostat.machine.rings import Placement, ends, joint_angles, with_struts_or_cranks
 from kinetostat.spec.fields import Quantity, table
 
 LEGS = 5
@@ -29,13 +29,8 @@ Five = tuple[float, float, float, float, float]
 class Geometry(PassiveLinks):
     """Table [geometry]; the base frame has its origin O at the foot of the passive leg, z up."""
 
-    base_angles: Annotated[
-        Five, Quantity("angle", "angles of the base joints from x, leg by leg", count=LEGS, per_leg=True, apart=True)
-    ]
-    platform_angles: Annotated[
-        Five,
-        Quantity("angle", "angles of the platform joints from x, leg by leg", count=LEGS, per_leg=True, apart=True),
-    ]
+    base_angles: Annotated[Five, joint_angles("base", LEGS)]
+    platform_angles: Annotated[Five, joint_angles("platform", LEGS)]
 
 
 @table
@@ -61,7 +56,7 @@ class Pose:
     theta6: Annotated[float, Quantity("angle", "angle of the Hooke joint's second axis, about the pitched x")]
 
 
-def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
+def placement(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
     """The platform and the passive leg: that of the 4-dof machine in a plane tilted about x through O and P.
 
     In closed form; NaN where the passive leg cannot reach (SI, base frame).
@@ -103,16 +98,13 @@ def _passive_leg(
 
 
 TABLES = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
-FAMILY = with_struts(
-    "passive-leg-5dof", "5 U-P-S legs and a passive U-R-U leg; freedoms x, y, z, theta5, theta6",
-    TABLES, placed, (PASSIVE_LINKS,),
-)  # fmt: skip
-
-WITH_CRANKS = with_cranks(
-    "passive-leg-5dof-rus",
-    "5 R-U-S legs and a passive U-R-U leg; freedoms x, y, z, theta5, theta6",
+FAMILY, WITH_CRANKS = with_struts_or_cranks(
+    "passive-leg-5dof",
+    (
+        "5 U-P-S legs and a passive U-R-U leg; freedoms x, y, z, theta5, theta6",
+        "5 R-U-S legs and a passive U-R-U leg; freedoms x, y, z, theta5, theta6",
+    ),
     TABLES,
-    placed,
+    placement,
     (PASSIVE_LINKS,),
 )
-"""The same machine with R-U-S legs: actuated cranks and rods in the place of struts (theory section 4)."""

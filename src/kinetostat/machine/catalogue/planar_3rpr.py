@@ -41,7 +41,7 @@ class Pose:
     angle: Annotated[float, Quantity("angle", "rotation of the platform about z")]
 
 
-def placed(geometry: ThreeLegs, pose: Pose) -> tuple[Displacement, tuple[list[Vector], list[Vector]]]:
+def platform_and_joints(geometry: ThreeLegs, pose: Pose) -> tuple[Displacement, tuple[list[Vector], list[Vector]]]:
     """The platform in the x-y plane, and base and platform joints of its legs (SI, base frame)."""
     platform = Displacement(rotation_z(cos(pose.angle), sin(pose.angle)), Vector(pose.x, pose.y, 0.0))
     return platform, ends(geometry, geometry.base_angles, geometry.platform_angles, platform)
@@ -53,7 +53,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
     Args:
         geometry, stiffness, pose: SI; base frame.
     """
-    platform, joints = placed(geometry, pose)
+    platform, joints = platform_and_joints(geometry, pose)
     legs = [
         planar_leg(f"leg {i}", base, tip, k, stiffness.leg_axial)
         for i, (base, tip, k) in enumerate(zip(*joints, stiffness.actuator, strict=True), 1)

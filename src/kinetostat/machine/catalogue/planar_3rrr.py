@@ -9,7 +9,7 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import Scalar, reciprocal
 from kinetostat.algebra.vector import Z_AXIS, Vector
-from kinetostat.machine.catalogue.planar_3rpr import LEGS, Pose, placed
+from kinetostat.machine.catalogue.planar_3rpr import LEGS, Pose, platform_and_joints
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Line, PartName, Spring, numbered
 from kinetostat.machine.links import LinkKind, in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family, Plane
@@ -45,7 +45,7 @@ def configure(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Configura
     Args:
         geometry, stiffness, pose: SI; base frame.
     """
-    platform, joints = placed(geometry, pose)
+    platform, joints = platform_and_joints(geometry, pose)
     links = CrankLinks(geometry.proximal_link, geometry.distal_link, stiffness.proximal_bending, stiffness.distal_axial)
     built = [
         _leg(f"leg {i}", base, tip, k, links)

@@ -7,10 +7,10 @@ from typing import Annotated
 
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import Y_AXIS, ZERO, Displacement, rotation_x, rotation_y
-from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes
+from kinetostat.machine.leg import RIGID, Joint, Leg, revolutes
 from kinetostat.machine.links import LinkKind, from_origin
-from kinetostat.machine.parts import in_series, servo
-from kinetostat.machine.rings import Placement, Three, ThreeLegs, ends, with_cranks, with_struts
+from kinetostat.machine.parts import built_in_bar, servo
+from kinetostat.machine.rings import Placement, Three, ThreeLegs, ends, with_struts_or_cranks
 from kinetostat.spec.fields import Quantity, table
 
 LEGS = 3
@@ -49,17 +49,13 @@ class Pose:
     length: Annotated[float, Quantity("length", "from the Hooke joint to the platform point P", positive=True)]
 
 
-def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
+def placement(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
     """The platform and the tube, in closed form; every pose can be reached (SI, base frame)."""
     pitch = rotation_y(cos(pose.theta1), sin(pose.theta1))
     turn = pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2))
     platform = Displacement(turn, turn.z * pose.length)
-    rigidities = ((stiffness.tube_bending, 3.0), (stiffness.tube_bending, 3.0), (stiffness.tube_torsion, 1.0))
-    built_in = [in_series(k, r, pose.length, n) for k, (r, n) in zip(stiffness.tube, rigidities, strict=True)]
-    springs = tuple(
-        Spring(f"tube {name}", Joint(axis, platform.translation), k)
-        for name, axis, k in zip(("bending x", "bending y", "torsion"), (turn.x, turn.y, turn.z), built_in, strict=True)
-    )
+    link = stiffness.tube_bending, stiffness.tube_torsion, pose.length
+    springs = built_in_bar("tube", (turn.x, turn.y, turn.z), platform.translation, stiffness.tube, link)
     slide = servo(Joint(turn.z, None, "tube slide"), "tube actuator", stiffness.tube_actuator)
     leg = Leg("tube", (*revolutes(ZERO, (Y_AXIS, pitch.x), "tube Hooke joint"), slide, *springs))
     joints = ends(geometry, geometry.base_angles, geometry.platform_angles, platform)
@@ -68,17 +64,14 @@ def placed(geometry: Geometry, stiffness: Stiffness, pose: Pose) -> Placement:
 
 TUBE = LinkKind("tube", ("tube_bending", "tube_torsion"), from_origin("tube"))
 
-
 TABLES = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
-FAMILY = with_struts(
+FAMILY, WITH_CRANKS = with_struts_or_cranks(
     "tricept",
-    "3 U-P-S legs and a passive U-P tube (Tricept); freedoms theta1, theta2, length",
+    (
+        "3 U-P-S legs and a passive U-P tube (Tricept); freedoms theta1, theta2, length",
+        "3 R-U-S legs and a passive U-P tube; freedoms theta1, theta2, length",
+    ),
     TABLES,
-    placed,
+    placement,
     (TUBE,),
 )
-
-WITH_CRANKS = with_cranks(
-    "tricept-rus", "3 R-U-S legs and a passive U-P tube; freedoms theta1, theta2, length", TABLES, placed, (TUBE,)
-)
-"""The same machine with R-U-S legs: actuated cranks and rods in the place of struts (theory section 4)."""
