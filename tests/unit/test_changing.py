@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from kinetostat.machine.loading import changed, load, rebuilt, related
+from kinetostat.machine.loading import changed, load, read_again, related
 from kinetostat.machine.parameters import read_numbers, values
 from refusals import refused
 
@@ -55,7 +55,7 @@ def test_only_what_depends_on_other_numbers_is_checked_again():
 def test_a_rebuilt_machine_is_the_same_or_refused():
     contradictory = {"limits.shortest_leg": 0.9, "limits.longest_leg": 0.5}
     with refused("nothing lies between them"):
-        rebuilt(load(MACHINE).with_values(contradictory))
+        read_again(load(MACHINE).with_values(contradictory))
     with refused("nothing lies between them"):
         changed(load(MACHINE), contradictory)
-    assert values(rebuilt(load("tripteron"))) == values(load("tripteron"))
+    assert values(read_again(load("tripteron"))) == values(load("tripteron"))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from kinetostat.machine.loading import as_toml, build, bundled, changed, load, rebuilt
+from kinetostat.machine.loading import as_toml, build, bundled, changed, load, read_again
 from kinetostat.machine.parameters import parameters, values, with_values
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.errors import InputError
@@ -144,7 +144,7 @@ def test_a_machine_without_a_file_is_written_in_readable_units():
 
 
 def test_an_exact_check_of_all_numbers_keeps_the_file():
-    machine = rebuilt(changed(load("tripteron"), {"legs.y.slide.stiffness": 2e6}))
+    machine = read_again(changed(load("tripteron"), {"legs.y.slide.stiffness": 2e6}))
     assert as_file(machine).startswith("# Tripteron: three legs P-R-R-R")
 
 

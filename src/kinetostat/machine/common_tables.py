@@ -120,11 +120,11 @@ class NamedLoad:
 
 
 STATES = {"free": False, "loaded": True}
-"""What `state` of the table [load] may be, and whether the machine is then shown at rest under its loads."""
+"""Words of `state` in the table [load], and whether the machine is then shown at rest under its loads."""
 
 COMMON = {"tool": Tool, "drives": Drives, "damping": Damping, "cutting": Cutting, "load": Load, "limits": Limits}
 OF_VIBRATIONS = ("tool.inertia", "tool.payload_inertia", "drives.", "damping.", "cutting.")
-"""How the fields begin on which nothing depends but vibrations."""
+"""Beginnings of the fields on which nothing depends but vibrations."""
 ROUND_OFF_OF_TENSOR = 1e-4
 """Share of its size by which a tensor may miss what bodies have: files give a few digits."""
 

@@ -207,12 +207,12 @@ WHICH = {"axial rigidity": "axial", "torsional rigidity": "torsion", "bending ri
 """Kinds of rigidity, and which of a cross-section's rigidities they are."""
 MODULI = ("youngs_modulus", "shear_modulus")
 OF_MATTER = {"density": "density", "expansion": "thermal expansion"}
-"""What else a material says, and its kind of quantity."""
+"""Other properties of a material, and their kind of quantity."""
 SAME = 1e-9
 """Relative difference up to which two linear densities are one."""
 
 Known: TypeAlias = Mapping[str, float | list[float]]
-"""What cross-sections say about links beside their rigidity: a number of each of `OF_CROSS_SECTIONS`, SI, or a list of
+"""Properties of links, beside their rigidity, by cross-section: a number of each of `OF_CROSS_SECTIONS`, SI, or a list of
 them for a field with several entries; 0 where it is not known. Empty where no cross-section is written."""
 
 
@@ -229,7 +229,7 @@ def resolve(document: Document, family: Family, origin: str) -> Document:
     if not isinstance(stiffness, dict):
         return document
     resolved = {
-        name: _resolved(stiffness[name], WHICH[quantity.kind], f'"{origin}": stiffness.{name}')
+        name: _numbers_in_place(stiffness[name], WHICH[quantity.kind], f'"{origin}": stiffness.{name}')
         for name, quantity in quantities(family.tables["stiffness"]).items()
         if quantity.kind in WHICH and name in stiffness
     }
@@ -257,11 +257,11 @@ def _of_links(family: Family, table: str, resolved: Mapping[str, Known], origin:
     return numbers
 
 
-def _resolved(value: object, which: str, where: str) -> tuple[object, Known]:
+def _numbers_in_place(value: object, which: str, where: str) -> tuple[object, Known]:
     """A field as numbers, and what else the cross-sections say that stood there."""
     if not isinstance(value, list):
         return _rigidity(value, which, where) if isinstance(value, dict) else (value, {})
-    entries = [_resolved(entry, which, f"{where}, entry {i}") for i, entry in enumerate(value)]
+    entries = [_numbers_in_place(entry, which, f"{where}, entry {i}") for i, entry in enumerate(value)]
     known = {t: [float(np.max(each.get(t, 0.0))) for _, each in entries] for t in OF_CROSS_SECTIONS}
     return [number for number, _ in entries], known
 

@@ -37,7 +37,7 @@ FLAT = 1e-12
 
 @dataclass(frozen=True)
 class Rigidity:
-    """How a prismatic bar resists, from its cross-section and material; infinity where it is rigid.
+    """Resistance of a prismatic bar, from its cross-section and material; infinity where it is rigid.
 
     Attributes:
         axial: E A, N.

@@ -137,7 +137,7 @@ def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:
     return lengths
 
 
-def listed(what: str, field: str) -> Lengths:
+def of_passive_leg(what: str, field: str) -> Lengths:
     """Links whose lengths are the entries of a field of [geometry]: the path of the leg that has no actuator."""
 
     def lengths(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[Placed]:

@@ -30,7 +30,7 @@ from kinetostat.machine.parameters import POSE, Given, check_contrast, find, fin
 from kinetostat.machine.rods import driven_slides
 from kinetostat.machine.series import family_with_parts, with_named_parts
 from kinetostat.machine.written import family as written
-from kinetostat.machine.written.checking import check_numbers, completed
+from kinetostat.machine.written.checking import check_numbers, complete_plan
 from kinetostat.machine.written.document import by_name, check_paths, separate, with_parts
 from kinetostat.machine.written.plan import NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY
 from kinetostat.machine.written.tables import written_schema
@@ -143,12 +143,12 @@ def _build_family(document: Document, origin: str, settings: Sequence[str]) -> M
     family = _family(document.get("family"), origin)
     named = with_named_parts(document, family, origin)
     counts = _counts(family_with_parts(family, named))
-    changed = _overridden(named, settings, counts, tuple(quantities(family.tables["pose"])), origin)
+    changed = _with_overrides(named, settings, counts, tuple(quantities(family.tables["pose"])), origin)
     changed = with_named_parts(changed, family, origin)
     display, loaded = _display(changed, origin), _loaded(changed, origin)
     resolved = resolve(changed, family, origin)
     whole = family_with_loads(family_with_parts(family, changed), changed, origin)
-    machine = _validated(whole, resolved, origin, display)
+    machine = _validated_machine(whole, resolved, origin, display)
     placed = machine.configure()
     parts = unloaded_parts(placed.legs, placed.platform.rotation.z, family.planar)
     check_limits(machine.tables["limits"], parts, origin)
@@ -160,12 +160,12 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     named = by_name(document, origin)
     check_paths(named, settings)
     coordinates = PLANAR_POSE if named.get("space") == "planar" else SPATIAL_POSE
-    changed = with_parts(_overridden(named, settings, {}, coordinates, origin), origin)
+    changed = with_parts(_with_overrides(named, settings, {}, coordinates, origin), origin)
     display, loaded = _display(changed, origin), _loaded(changed, origin)
     plan, numbers = separate(changed, origin)
-    machine = _validated(family_with_loads(written.family_of(plan), numbers, origin), numbers, origin, display)
+    machine = _validated_machine(family_with_loads(written.family_of(plan), numbers, origin), numbers, origin, display)
     check_numbers(plan, machine.tables, origin)
-    family = family_with_loads(written.family_of(completed(plan, machine.family_tables)), numbers, origin)
+    family = family_with_loads(written.family_of(complete_plan(plan, machine.family_tables)), numbers, origin)
     whole = with_values(replace(machine, family=family), {})  # its tables are then those of this family
     chains = whole.chains()
     legs = [Leg(leg.name, tuple(s.element for s in steps)) for leg, steps in zip(plan.legs, chains.legs, strict=True)]
@@ -175,7 +175,7 @@ def _build_written(document: Document, origin: str, settings: Sequence[str]) -> 
     return replace(whole, loaded=loaded)
 
 
-def _overridden(
+def _with_overrides(
     document: Document, settings: Sequence[str], counts: Mapping[str, int], coordinates: Sequence[str], origin: str
 ) -> Document:
     """The document with overrides, and with its orientation, however it is written, in the angles of the pose."""
@@ -202,7 +202,7 @@ def _write_out(document: Document, path: str) -> None:
         table.setdefault(key, list(getattr(known, key)))
 
 
-def _validated(family: Family, document: Document, origin: str, display: Display) -> Machine:
+def _validated_machine(family: Family, document: Document, origin: str, display: Display) -> Machine:
     tables = family.every_table
     data: Any = validate(document, origin, file_model(family.name, tables), tables)
     machine = Machine(data.name, family, tables_in(data, tables), display)
@@ -315,11 +315,11 @@ def changed(machine: Machine, values: Mapping[str, Given]) -> Machine:
             contradict each other.
     """
     new = machine.with_values(values)
-    return rebuilt(new) if any(related(machine, name) for name in values) else new
+    return read_again(new) if any(related(machine, name) for name in values) else new
 
 
 def related(machine: Machine, path: str) -> bool:
-    """Whether a field is checked against others: then `rebuilt` has the last word on a change."""
+    """Whether a field is checked against others: then `read_again` has the last word on a change."""
     if form_of(path):
         return False
     parameter = find_field(machine.family, path)
@@ -328,7 +328,7 @@ def related(machine: Machine, path: str) -> bool:
     return table == "limits" or (written and table not in INDEPENDENT)
 
 
-def rebuilt(machine: Machine) -> Machine:
+def read_again(machine: Machine) -> Machine:
     """The machine as read from its own file, with every check that a file undergoes; takes some 50 ms leg by leg.
 
     Raises:

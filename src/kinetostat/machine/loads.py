@@ -18,6 +18,7 @@ from kinetostat.machine.common_tables import Load
 from kinetostat.machine.leg import Turn
 from kinetostat.machine.links import LINK_TABLES, growth_of
 from kinetostat.machine.machine import Configuration, Family, Machine, Member, springs
+from kinetostat.machine.parameters import KEPT_FAMILIES
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import quantities
@@ -27,7 +28,7 @@ PLATFORM, PAYLOAD = "platform and tool", "payload"
 
 @dataclass(frozen=True)
 class Mass:
-    """What one part weighs at a pose.
+    """The mass of one part at a pose.
 
     Attributes:
         name: of the link, or `PLATFORM`.
@@ -50,12 +51,12 @@ def moving_masses(machine: Machine, configuration: Configuration) -> list[Mass]:
         configuration: of it, at its pose.
     """
     platform = machine.tables["tool"].mass
-    links = [Mass(link.name, _weighed(link), link.leg) for link in _members(machine, configuration)]
+    links = [Mass(link.name, _known_mass(link), link.leg) for link in _members(machine, configuration)]
     return [*links, Mass(PLATFORM, None if is_zero(platform) else platform)]
 
 
 def moving_mass(machine: Machine, configuration: Configuration) -> Scalar:
-    """What all those weigh together of which a mass is known, kg; arguments as for `moving_masses`."""
+    """The sum of all masses that are known, kg; arguments as for `moving_masses`."""
     return total([mass.mass for mass in moving_masses(machine, configuration) if mass.mass is not None])
 
 
@@ -91,7 +92,7 @@ def turned_tensor(turn: Callable[[Vector], Vector], tensor: Sequence[Scalar]) ->
     return tuple(rows[i][j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
 
 
-def _weighed(link: Member) -> Scalar | None:
+def _known_mass(link: Member) -> Scalar | None:
     return None if is_zero(link.mass) else link.mass
 
 
@@ -111,8 +112,6 @@ def _members(machine: Machine, configuration: Configuration) -> list[Member]:
     return members
 
 
-KEPT = 64
-"""Families with named loads that are kept, so that machines with the same names share tables and compiled programs."""
 MOST_LOADS = 16
 """Named loads of a machine: more is a mistake."""
 
@@ -138,7 +137,7 @@ def family_with_loads(family: Family, document: Document, origin: str) -> Family
     return _with_loads(family, names) if names else family
 
 
-@lru_cache(KEPT)
+@lru_cache(KEPT_FAMILIES)
 def _with_loads(family: Family, names: tuple[str, ...]) -> Family:
     return replace(family, loads=names, recipe=(_with_loads, (family, names)))
 

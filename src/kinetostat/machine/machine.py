@@ -127,9 +127,6 @@ class Member:
     inertia: Callable[[], tuple[Scalar, ...]] | None = None
 
 
-"""Tables that every machine file may have."""
-
-
 @dataclass(frozen=True)
 class Step:
     """An element of a chain at the home pose, and whether a joint coordinate moves it."""
@@ -165,7 +162,7 @@ class Chains:
 
     @property
     def size(self) -> int:
-        """How many joint coordinates there are."""
+        """Number of joint coordinates."""
         return sum(step.moves for steps in self.legs for step in steps)
 
 
@@ -207,7 +204,7 @@ class Family:
 
     @property
     def components(self) -> tuple[int, ...]:
-        """Which of rx ry rz x y z exist."""
+        """Places of those of rx ry rz x y z that exist."""
         return (2, 3, 4) if self.planar else (0, 1, 2, 3, 4, 5)
 
     @property
@@ -224,7 +221,7 @@ class Family:
 
 @dataclass(frozen=True)
 class Written:
-    """What a machine was read from, so that saving it keeps comments, units and order.
+    """The file that a machine was read from, so that saving it keeps comments, units and order.
 
     Attributes:
         text: of its file.
@@ -335,7 +332,7 @@ class Machine(Immutable):
 
     @property
     def reference(self) -> str:
-        """What K, C and the load are given at: "tool point T" if the file has a tool, else "platform point P"."""
+        """The reference point of K, C and the load: "tool point T" if the file has a tool, else "platform point P"."""
         return "tool point T" if any(self.tables["tool"].offset) else "platform point P"
 
     def tool_point(self, platform: Displacement) -> Vector:

@@ -67,7 +67,7 @@ def from_parts(form: str, parts: Mapping[str, Array]) -> Any:
         )
     if form == "tilt":
         return parts
-    columns = np.stack(_together([parts[part] for part in PARTS[form]], form), axis=1)
+    columns = np.stack(_of_one_length([parts[part] for part in PARTS[form]], form), axis=1)
     return columns.reshape(-1, 3, 3) if form == "rotation" else columns
 
 
@@ -139,11 +139,11 @@ def _of_tilts(value: object, where: str) -> Array:
     if not isinstance(value, Mapping) or not {"azimuth", "angle"} <= value.keys() <= set(TILT):
         raise InputError(f"{where} is {shorten(value)}; give {FORMS['tilt']} (torsion may be left out: 0).")
     given = {"torsion": 0.0, **value}
-    azimuth, angle, torsion = _together([_angle_values(given[name], f"{where}.{name}") for name in TILT], where)
+    azimuth, angle, torsion = _of_one_length([_angle_values(given[name], f"{where}.{name}") for name in TILT], where)
     return _about_z(azimuth) @ _about_y(angle) @ _about_z(torsion - azimuth)
 
 
-def _together(arrays: Sequence[Array], where: str) -> Sequence[Array]:
+def _of_one_length(arrays: Sequence[Array], where: str) -> Sequence[Array]:
     """Arrays of one length from arrays [n] and [1]."""
     try:
         return np.broadcast_arrays(*arrays)

@@ -16,19 +16,19 @@ from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, leaves, quantities
 from kinetostat.units import KINDS, RIGID, UnitError
 
-KEPT = 64
-"""Families whose parameters are kept: machines leg by leg have one each."""
+KEPT_FAMILIES = 64
+"""Families that caches keep, so that machines with one plan share parameters, tables and compiled programs."""
 FULL_TURN = 2.0 * math.pi
-BEYOND = 100.0
-"""How many times the longest of all other lengths a length may be."""
+MOST_TIMES = 100.0
+"""Greatest plausible ratio of a length to the longest of all others."""
 CONTRAST = 1e22
-"""By which factor stiffnesses in one machine may differ, in SI: from 1e24 on round-off hides the stiffer."""
-SOFTEST = 100.0
+"""Factor by which stiffnesses of one machine may differ, in SI: from 1e24 on round-off hides the stiffer."""
+SOFTEST_PLAUSIBLE = 100.0
 """N/m: a part that gives 10 mm under 1 N can be neither a drive nor a link of a machine."""
 
 
 class HasFields(Protocol):
-    """What a family is here: tables of fields under a name."""
+    """A family as this module sees it: tables of fields under a name."""
 
     @property
     def name(self) -> str:
@@ -40,7 +40,7 @@ class HasFields(Protocol):
 
 
 class HasNumbers(Protocol):
-    """What a machine is here: a family with numbers in its tables. `machine.machine` imports this module."""
+    """A machine as this module sees it: a family with numbers in its tables. `machine.machine` imports this module."""
 
     @property
     def family(self) -> Any:
@@ -129,7 +129,7 @@ def parameters(family: HasFields) -> tuple[Parameter, ...]:
     return _parameters(tuple(family.every_table.items()))
 
 
-@lru_cache(KEPT)
+@lru_cache(KEPT_FAMILIES)
 def _parameters(tables: tuple[tuple[str, type], ...]) -> tuple[Parameter, ...]:
     known = []
     for table, fields in tables:
@@ -303,9 +303,9 @@ def doubts(machine: HasNumbers) -> Iterator[str]:
         if kind == "angle" and abs(value) > FULL_TURN * (1.0 + 1e-9):
             yield f'{path} is {value:g} rad, more than a turn; if degrees are meant, write "{value:g} deg".'
         others = [abs(v) for _, other, k, v in numbers if k == kind == "length" and other != field]
-        if 0.0 < BEYOND * max(others, default=0.0) < abs(value):
-            yield f'{path} is {value:g} m, over {BEYOND:g} times all others; if mm are meant, write "{value:g} mm".'
-        if kind == "linear stiffness" and 0.0 < value < SOFTEST:
+        if 0.0 < MOST_TIMES * max(others, default=0.0) < abs(value):
+            yield f'{path} is {value:g} m, over {MOST_TIMES:g} times all others; if mm are meant, write "{value:g} mm".'
+        if kind == "linear stiffness" and 0.0 < value < SOFTEST_PLAUSIBLE:
             yield f'{path} is {value:g} N/m, next to nothing; if N/um are meant, write "{value:g} N/um".'
 
 

@@ -23,11 +23,11 @@ from kinetostat.spec.requirements import requirement_lines
 from kinetostat.spec.tolerance_table import TABLE as TOLERANCES
 from kinetostat.spec.tolerance_table import tolerance_lines
 
-LONGEST = 1 << 17
+LONGEST_EDITED_TEXT = 1 << 17
 """Characters of a file that is edited: tomlkit needs a second for as many."""
-ROUNDS = 3
+MOST_EDITS = 3
 """Edits until the machine is the same: one as a rule, two where a link's cross-section becomes a number and a mass."""
-NAMED = ("joints", "links")
+TABLES_WITH_NAMES = ("joints", "links")
 """Tables of a leg whose entries have names."""
 
 
@@ -38,11 +38,11 @@ def as_file(machine: Machine) -> str:
         machine: whose file, where it was read from one, keeps its comments, units and order.
     """
     written = machine.written
-    kept = _edited(written, machine) if written and len(written.text) <= LONGEST else None
+    kept = _edited_text(written, machine) if written and len(written.text) <= LONGEST_EDITED_TEXT else None
     return as_toml(machine, readable=True) if kept is None else kept
 
 
-def _edited(written: Written, machine: Machine) -> str | None:
+def _edited_text(written: Written, machine: Machine) -> str | None:
     """Return the text with the numbers of the machine; None where editing does not lead to it."""
     try:
         document = tomlkit.parse(written.text)
@@ -53,18 +53,18 @@ def _edited(written: Written, machine: Machine) -> str | None:
             home = _place(document, table)
             if isinstance(home, dict | list):  # else one value stands for all entries, and one of them was set
                 _put(home, key, setting_value(text.strip()))
-        for _ in range(ROUNDS):
+        for _ in range(MOST_EDITS):
             text = tomlkit.dumps(document)
             present = build(text, machine.name)
-            if _same(present, machine):
+            if _is_same(present, machine):
                 return text
-            _bring(document, present, machine)
+            _write_differences(document, present, machine)
     except (TOMLKitError, InputError, LookupError, TypeError, ValueError):
         return None
     return None
 
 
-def _same(first: Machine, second: Machine) -> bool:
+def _is_same(first: Machine, second: Machine) -> bool:
     alike = first.name == second.name and first.family.literals == second.family.literals
     alike = (
         alike
@@ -76,7 +76,7 @@ def _same(first: Machine, second: Machine) -> bool:
     return alike and first.family.name == second.family.name and values(first) == values(second)
 
 
-def _bring(document: Any, present: Machine, machine: Machine) -> None:
+def _write_differences(document: Any, present: Machine, machine: Machine) -> None:
     """Write all that differs between the machine in the document and the wanted one."""
     if machine.name != present.name:
         _put(document, "name", machine.name)
@@ -134,7 +134,7 @@ def _inside(at: Any, key: str) -> Any:
     if isinstance(at, list):
         named = [entry for entry in at if isinstance(entry, dict) and entry.get("name") == key]
         return named[0] if named else at[int(key)]
-    lists = (_inside(at[inner], key) for inner in NAMED if inner in at and key not in at)
+    lists = (_inside(at[inner], key) for inner in TABLES_WITH_NAMES if inner in at and key not in at)
     return at[key] if key in at else next((entry for entry in lists if entry is not None), None)
 
 

@@ -14,13 +14,12 @@ from typing import Any
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.machine.leg import Element, Leg, PartName, Spring
 from kinetostat.machine.machine import Configuration, Family
+from kinetostat.machine.parameters import KEPT_FAMILIES
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Field, made_table, optional, quantities
 from kinetostat.units import KINDS
 
-KEPT = 64
-"""Families with parts that are kept, so that machines with the same parts share tables and compiled programs."""
 MOST_PARTS = 12
 """Parts of a series: more is a mistake."""
 
@@ -58,7 +57,7 @@ def parts(value: object, where: str) -> dict[str, object]:
 
 
 def label(key: str) -> str:
-    """What people call a part: its key with spaces."""
+    """The name of a part for people: its key with spaces."""
     return key.replace("_", " ")
 
 
@@ -139,7 +138,7 @@ def _stiffnesses(family: Family) -> set[str]:
     return {name for name, quantity in known.items() if KINDS[quantity.kind].name.endswith("stiffness")}
 
 
-@lru_cache(KEPT)
+@lru_cache(KEPT_FAMILIES)
 def _family_with_parts(family: Family, series: tuple[tuple[str, tuple[str, ...]], ...]) -> Family:
     whole = family.tables["stiffness"]
     known, by_field = quantities(whole), dict(series)
@@ -159,16 +158,16 @@ def _family_with_parts(family: Family, series: tuple[tuple[str, tuple[str, ...]]
     return replace(
         family,
         tables=tables,
-        configure=partial(_configured, family, series),
+        configure=partial(_configuration, family, series),
         recipe=(_family_with_parts, (family, series)),
     )
 
 
-class Row(tuple[tuple[str, Scalar], ...]):
+class SeriesStiffness(tuple[tuple[str, Scalar], ...]):
     """Key and stiffness of the parts of a series, where a family has the stiffness of one actuator."""
 
 
-def _configured(family: Family, series: tuple[tuple[str, tuple[str, ...]], ...], **tables: Any) -> Configuration:
+def _configuration(family: Family, series: tuple[tuple[str, tuple[str, ...]], ...], **tables: Any) -> Configuration:
     """The machine at its pose, with the parts of each series as springs in the place of one."""
     whole, rest = family.tables["stiffness"], tables["stiffness"]
     known, given = quantities(whole), dict(vars(rest))
@@ -176,9 +175,11 @@ def _configured(family: Family, series: tuple[tuple[str, tuple[str, ...]], ...],
         numbers = tables.pop(f"stiffness.{field}")
         columns = [getattr(numbers, key) for key in keys]
         if known[field].count is None:
-            given[field] = Row(zip(keys, columns, strict=True))
+            given[field] = SeriesStiffness(zip(keys, columns, strict=True))
         else:
-            given[field] = tuple(Row(zip(keys, entries, strict=True)) for entries in zip(*columns, strict=True))
+            given[field] = tuple(
+                SeriesStiffness(zip(keys, entries, strict=True)) for entries in zip(*columns, strict=True)
+            )
     configuration = family.configure(**{**tables, "stiffness": whole(**given)})
     return replace(configuration, legs=tuple(_in_parts(leg) for leg in configuration.legs))
 
@@ -187,5 +188,5 @@ def _in_parts(leg: Leg) -> Leg:
     chain: list[Element] = []
     for element in leg.chain:
         row = element.stiffness if isinstance(element, Spring) else None
-        chain += springs_in_a_row(element, row) if isinstance(row, Row) else (element,)  # type: ignore[arg-type]
+        chain += springs_in_a_row(element, row) if isinstance(row, SeriesStiffness) else (element,)  # type: ignore[arg-type]
     return replace(leg, chain=tuple(chain))

@@ -13,7 +13,7 @@ from dataclasses import replace
 from urllib.parse import quote, urlencode
 
 from kinetostat.machine.common_tables import STATES
-from kinetostat.machine.loading import as_toml, build, bundled, changed, load, rebuilt
+from kinetostat.machine.loading import as_toml, build, bundled, changed, load, read_again
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.spec.document import LARGEST_FILE
@@ -72,7 +72,7 @@ def memory_of(query: Iterable[tuple[str, str]]) -> Memory:
         return Memory(origin, name)
     numbers = dict(changes)
     state = choice(numbers.pop(STATE, origin.state), STATES, f"{STATE} in the address")
-    return Memory(origin, name, rebuilt(replace(changed(origin, numbers), loaded=STATES[state])))
+    return Memory(origin, name, read_again(replace(changed(origin, numbers), loaded=STATES[state])))
 
 
 def _packed(text: str) -> str:

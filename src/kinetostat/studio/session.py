@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from kinetostat.kinetostatics.response import respond
-from kinetostat.machine.loading import build, bundled, load, rebuilt, related
+from kinetostat.machine.loading import build, bundled, load, read_again, related
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, values
 from kinetostat.machine.saving import as_file
@@ -145,7 +145,7 @@ class Session:
         dragged, self._dragged = self._dragged, ()
         if any(path != TEXT and related(self.machine, path) for path in dragged):
             try:
-                self.machine = rebuilt(self.machine)
+                self.machine = read_again(self.machine)
             except InputError:
                 self.machine = self._past.pop()
                 raise

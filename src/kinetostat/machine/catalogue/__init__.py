@@ -99,18 +99,18 @@ def _machine(content: Mapping[str, Any]) -> Machine:
 
 def _of_family(family: Family) -> tuple[Any, ...]:
     if family.recipe is not None:
-        return _made, family.recipe
+        return _family_by_recipe, family.recipe
     if family_named(family.name) is not family:
         raise InputError(f'family "{family.name}" cannot be pickled before it is registered; call register(family).')
-    return _named, (family.name,)
+    return _family_by_name, (family.name,)
 
 
-def _made(recipe: Callable[..., Family], given: tuple[Any, ...]) -> Family:
+def _family_by_recipe(recipe: Callable[..., Family], given: tuple[Any, ...]) -> Family:
     """Make a family by its recipe."""
     return recipe(*given)
 
 
-def _named(name: str) -> Family:
+def _family_by_name(name: str) -> Family:
     """Return the family of a name."""
     family = family_named(name)
     if family is None:

@@ -10,7 +10,7 @@ from kinetostat.algebra.lines import apex
 from kinetostat.algebra.scalar import Scalar, cos, sin
 from kinetostat.algebra.vector import Y_AXIS, Displacement, Rotation, Vector, rotation_x, rotation_y
 from kinetostat.machine.leg import RIGID, Joint, Leg, Spring, revolutes
-from kinetostat.machine.links import LinkKind, listed
+from kinetostat.machine.links import LinkKind, of_passive_leg
 from kinetostat.machine.machine import Closure
 from kinetostat.machine.parts import bent_links, servo
 from kinetostat.machine.rings import Placement, Rings, four_joints, with_struts_or_cranks
@@ -124,7 +124,9 @@ def _passive_leg(
     return Leg("passive leg", chain)
 
 
-PASSIVE_LINKS = LinkKind("passive_links", ("passive_link_bending",), listed("passive link", "passive_links"), count=2)
+PASSIVE_LINKS = LinkKind(
+    "passive_links", ("passive_link_bending",), of_passive_leg("passive link", "passive_links"), count=2
+)
 
 TABLES = {"geometry": Geometry, "stiffness": Stiffness, "pose": Pose}
 FAMILY, WITH_CRANKS = with_struts_or_cranks(

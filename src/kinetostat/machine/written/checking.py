@@ -1,4 +1,8 @@
-"""What the numbers of a machine written leg by leg must fulfil, and which freedoms of its legs are idle."""
+"""Checks of machines written leg by leg: chains that reach the platform, numbers that make sense, idle freedoms.
+
+Names of bodies other than base and platform are known within their leg only. The same name elsewhere may be a slip or a
+body that two legs share, which cannot be written: messages then say so, and never advise what would be another machine.
+"""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -93,7 +97,7 @@ def _check_link(
         raise InputError(f"{where}: up points along the link; give another direction.")
 
 
-def completed(plan: Plan, tables: Mapping[str, Any]) -> Plan:
+def complete_plan(plan: Plan, tables: Mapping[str, Any]) -> Plan:
     """The plan with what its numbers tell of each leg: its closed form, idle freedoms, and joints about one point.
 
     Freedoms are idle that depend on others by form: as the file writes them, up to round-off. Near such a form a leg is
@@ -107,7 +111,7 @@ def completed(plan: Plan, tables: Mapping[str, Any]) -> Plan:
     for leg, steps in zip(plan.legs, home.legs, strict=True):
         placed, _ = place(steps, remaining)
         freedoms = [joint for element in placed for joint in element.freedoms]
-        idle = _dependent(freedoms, plan.planar, home.home.translation, float(home.length))
+        idle = _dependent_freedoms(freedoms, plan.planar, home.home.translation, float(home.length))
         centred = rows_about_one_point([_centre(joint) for joint in freedoms])
         legs.append(replace(leg, idle=idle, centred=centred, inverse=closed_form(leg.name, steps)))
     return replace(plan, legs=tuple(legs))
@@ -120,8 +124,8 @@ def _centre(joint: Joint) -> tuple[float, ...] | None:
     return tuple(map(float, joint.point.components()))
 
 
-def _dependent(freedoms: Sequence[Joint], planar: bool, reference: Vector, length: float) -> tuple[int, ...]:
-    """Which freedoms depend on those before and beside them (twists out of a plane count as given)."""
+def _dependent_freedoms(freedoms: Sequence[Joint], planar: bool, reference: Vector, length: float) -> tuple[int, ...]:
+    """Numbers of the freedoms that depend on those before and beside them; twists out of a plane count as given."""
     absent = Plane().absent if planar else ()
     twists = [joint.twist(reference).components() for joint in (*absent, *freedoms)]
     if not freedoms:

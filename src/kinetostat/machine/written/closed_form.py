@@ -56,7 +56,7 @@ class ParallelAxes:
         both = _turn(axis, upper, span - bent)
         whole = _turn(axis, lower, motion.rotation.apply(lower))
         amounts: list[Scalar | Turn] = [0.0] * len(movers)
-        turns = (lower_turn, _between(lower_turn, both), _between(both, whole))
+        turns = (lower_turn, _remaining_turn(lower_turn, both), _remaining_turn(both, whole))
         for i, turn in zip(self.revolutes, turns, strict=True):
             amounts[i] = Turn(turn.cosine, self.signs[i] * turn.sine)
         if self.slide is not None:
@@ -64,7 +64,7 @@ class ParallelAxes:
         return amounts, closure
 
     def _triangle(self, axis: Vector, lower: Vector, upper: Vector, span: Vector) -> tuple[Vector, Closure]:
-        """Where the lower link points, and the condition for the two links to bridge the span."""
+        """Direction of the lower link, and the condition for the two links to bridge the span."""
         near, far, square = lower.dot(lower), upper.dot(upper), span.dot(span)
         shrink = reciprocal(square)
         along = 0.5 * (1.0 + (near - far) * shrink)
@@ -91,8 +91,8 @@ def _turn(axis: Vector, old: Vector, new: Vector) -> Turn:
     return Turn(old.dot(new) * size, axis.dot(old.cross(new)) * size)
 
 
-def _between(first: Turn, whole: Turn) -> Turn:
-    """What is left of a turn after the first part of it."""
+def _remaining_turn(first: Turn, whole: Turn) -> Turn:
+    """The rest of a turn after the first part of it."""
     return Turn(
         whole.cosine * first.cosine + whole.sine * first.sine,
         whole.sine * first.cosine - whole.cosine * first.sine,

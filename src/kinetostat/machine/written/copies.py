@@ -19,8 +19,8 @@ from kinetostat.machine.written.plan import Copies, JointPlan, LegPlan, Matrix
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.units import UnitError, parse
 
-KEYS = ("copies", "angles", "mirrored")
-"""What a leg may say about its copies."""
+COPY_KEYS = ("copies", "angles", "mirrored")
+"""Fields of a leg about its copies."""
 SNAP = 1e-15
 """Distance from 0, 1/2 or 1 at which a cosine or sine is meant to be that number: multiples of 30 deg are exact."""
 
@@ -30,7 +30,7 @@ MOST_COPIES = 24
 
 @dataclass(frozen=True)
 class Placing:
-    """How a copy lies: mirrored in the x-z plane of the base if it is, then turned about its z axis.
+    """Placement of a copy: mirrored in the x-z plane of the base if it is, then turned about its z axis.
 
     Attributes:
         cosine, sine: of the angle of the turn.
@@ -57,7 +57,7 @@ class Placing:
 
 
 def placings(copies: Copies, where: str) -> list[Placing]:
-    """How each of the copies lies, the first one first; mirror images follow the copies that they mirror.
+    """Placement of each of the copies, the first one first; mirror images follow the copies that they mirror.
 
     Raises:
         InputError: an angle that is not one; names the leg.
@@ -65,7 +65,11 @@ def placings(copies: Copies, where: str) -> list[Placing]:
     turns = copies.count // 2 if copies.mirrored else copies.count
     angles = [_angle(angle, where) for angle in copies.angles] or [2.0 * math.pi * i / turns for i in range(turns)]
     images = (False, True) if copies.mirrored else (False,)
-    return [Placing(_exact(math.cos(a)), _exact(math.sin(a)), image) for a in angles for image in images]
+    return [
+        Placing(_without_round_off(math.cos(a)), _without_round_off(math.sin(a)), image)
+        for a in angles
+        for image in images
+    ]
 
 
 def _angle(angle: object, where: str) -> float:
@@ -75,13 +79,13 @@ def _angle(angle: object, where: str) -> float:
         raise InputError(f"{where}: an entry of angles is {shorten(angle)}: {error}.") from None
 
 
-def _exact(number: float) -> float:
+def _without_round_off(number: float) -> float:
     near = round(2.0 * number) / 2.0
     return near + 0.0 if abs(number - near) < SNAP else number
 
 
 def copies_in(leg: dict[str, Any], where: str) -> Copies | None:
-    """What a leg says about its copies, taken out of it; None if it says nothing.
+    """Take out of a leg its fields about copies; None if it has none.
 
     Raises:
         InputError: no number of copies, or one that does not go with the angles; names the leg.
@@ -108,7 +112,7 @@ def copies_in(leg: dict[str, Any], where: str) -> Copies | None:
     return Copies(count, tuple(angles), mirrored)
 
 
-def copied(leg: LegPlan, copies: Copies | None, where: str) -> tuple[LegPlan, ...]:
+def legs_of(leg: LegPlan, copies: Copies | None, where: str) -> tuple[LegPlan, ...]:
     """The legs that a written leg stands for: itself, or its copies, numbered from 1.
 
     Raises:
@@ -133,7 +137,7 @@ def joint_numbers(leg: LegPlan, joint: JointPlan, tables: Mapping[str, Any]) -> 
     data = tables[leg.table(joint.name)]
     if leg.placing is None:
         return data
-    return SimpleNamespace(**{name: _placed(value, leg.placing) for name, value in vars(data).items()})
+    return SimpleNamespace(**{name: _number_in_copy(value, leg.placing) for name, value in vars(data).items()})
 
 
 def matrix_in(leg: LegPlan, matrix: Matrix) -> Matrix:
@@ -151,5 +155,5 @@ def inertia_in(leg: LegPlan, tensor: Sequence[Scalar]) -> tuple[Scalar, ...]:
     return tuple(tensor) if leg.placing is None else turned_tensor(leg.placing.vector, tensor)
 
 
-def _placed(value: Any, placing: Placing) -> Any:
+def _number_in_copy(value: Any, placing: Placing) -> Any:
     return placing.vector(Vector(*value)).components() if isinstance(value, tuple) else value

@@ -13,8 +13,15 @@ import numpy as np
 from kinetostat.machine.cross_section import MATERIALS, SHAPES
 from kinetostat.machine.series import is_series, parts
 from kinetostat.machine.written.checking import check_chain
-from kinetostat.machine.written.copies import KEYS, copied, copies_in
-from kinetostat.machine.written.joints import JOINT_TYPES, ONE_FREEDOM, SEAT, directed, needs_axis, stiffness_kind
+from kinetostat.machine.written.copies import COPY_KEYS, copies_in, legs_of
+from kinetostat.machine.written.joints import (
+    JOINT_TYPES,
+    ONE_FREEDOM,
+    SEAT,
+    needs_axis,
+    stiffness_kind,
+    write_directions,
+)
 from kinetostat.machine.written.plan import (
     BASE,
     CABLE,
@@ -39,7 +46,7 @@ MOST_LEGS, MOST_JOINTS = 24, 24
 """Legs of a machine and joints of a leg: more is a mistake, and the equations would take minutes."""
 
 CABLE_KEYS = ("from", "to", "stiffness", "preload")
-"""What is written about a cable: its ends, base frame at the home pose, and its winch; the preload may be left out."""
+"""Fields of a cable: its ends, base frame at the home pose, and its winch; the preload may be left out."""
 
 SYMMETRIC = 1e-9
 """Relative difference up to which a compliance matrix counts as symmetric and as free of negative eigenvalues."""
@@ -54,20 +61,20 @@ def by_name(document: Document, origin: str) -> Document:
     result = copy.deepcopy(document)
     legs = result.get("legs")
     if isinstance(legs, list):
-        result["legs"] = legs = _named(legs, f'"{origin}"', "leg")
+        result["legs"] = legs = _entries_by_name(legs, f'"{origin}"', "leg")
     named = _checked_legs(legs, origin)
     for name, leg in named.items():
         if "type" in leg:
             named[name] = leg = _cable(leg, f'"{origin}": leg "{name}"', result.get("space") == "planar")
         if "joints" in leg:
-            named[name] = _merged(leg, f'"{origin}": leg "{name}"')
+            named[name] = _parts_by_name(leg, f'"{origin}": leg "{name}"')
     return with_parts(result, origin)
 
 
 def _cable(leg: dict[str, Any], where: str, planar: bool) -> dict[str, Any]:
     """The joints of a leg that is written as a cable: two ends, and between them an actuator that only pulls."""
     choice(leg.get("type"), (CABLE,), f"{where}: type")
-    for key in leg.keys() - {"type", *CABLE_KEYS, *KEYS, "name"}:
+    for key in leg.keys() - {"type", *CABLE_KEYS, *COPY_KEYS, "name"}:
         raise InputError(f"{where}: {key} is not known; a cable has {', '.join(CABLE_KEYS)}, and may have copies.")
     missing = [key for key in CABLE_KEYS[:3] if key not in leg]
     if missing:
@@ -114,13 +121,13 @@ def with_parts(document: Document, origin: str) -> Document:
     return document
 
 
-def _merged(leg: dict[str, Any], where: str) -> dict[str, Any]:
+def _parts_by_name(leg: dict[str, Any], where: str) -> dict[str, Any]:
     """Joints and links of a leg in one table by name."""
     joints, links = leg.pop("joints"), leg.pop("links", {})
     if isinstance(joints, list):
-        joints = _named(joints, where, "joint")
+        joints = _entries_by_name(joints, where, "joint")
     if isinstance(links, list):
-        links = _named(links, where, "link")
+        links = _entries_by_name(links, where, "link")
     if not isinstance(joints, dict) or not isinstance(links, dict):
         raise InputError(f"{where}: joints must be a list of tables with a name each, links a table of tables.")
     for name in links:
@@ -132,7 +139,7 @@ def _merged(leg: dict[str, Any], where: str) -> dict[str, Any]:
     return {**leg, **joints, **links}
 
 
-def _named(entries: list[Any], where: str, what: str) -> dict[str, Any]:
+def _entries_by_name(entries: list[Any], where: str, what: str) -> dict[str, Any]:
     by_key: dict[str, Any] = {}
     for i, entry in enumerate(entries, 1):
         name = entry.get("name") if isinstance(entry, dict) else None
@@ -157,7 +164,7 @@ def check_paths(document: Document, settings: Iterable[str]) -> None:
         table, *names = setting.partition("=")[0].strip().split(".")
         at: Any = document.get(table)
         for name in names[:2] if table == "legs" else ():
-            if isinstance(at, dict) and name not in at and not (name in KEYS and name == names[1]):
+            if isinstance(at, dict) and name not in at and not (name in COPY_KEYS and name == names[1]):
                 choice(name, at, f"--set {shorten(setting)}: the name after {table}")
             at = at.get(name) if isinstance(at, dict) else None
             table = f"{table}.{name}"
@@ -209,7 +216,7 @@ def _legs(written: dict[str, Any], origin: str, shapes: Mapping[str, str]) -> tu
     for name, leg in written.items():
         where = f'"{origin}": leg "{name}"'
         copies = copies_in(leg, where)
-        legs += copied(_leg(name, leg, as_written, where, shapes), copies, where)
+        legs += legs_of(_leg(name, leg, as_written, where, shapes), copies, where)
     names = [leg.name for leg in legs]
     for name in names:
         if names.count(name) > 1:
@@ -226,7 +233,7 @@ def _leg(name: str, leg: dict[str, Any], legs: Mapping[str, Any], where: str, sh
         raise InputError(f"{where}: {key} is {shorten(leg[key])}; a leg holds joints and links, each a table.")
     if not 1 <= len(joints) <= MOST_JOINTS:
         raise InputError(f"{where} has {len(joints)} joints; it needs 1 to {MOST_JOINTS}, from base to platform.")
-    directed(joints, where)
+    write_directions(joints, where)
     plans = tuple(_joint(key, part, f'{where}, joint "{key}"', shapes) for key, part in joints.items())
     check_chain(name, plans, legs, where)
     for place, plan in enumerate(plans):

@@ -16,6 +16,7 @@ from kinetostat.machine.link import Beam, any_up, lumped_springs, matrix_springs
 from kinetostat.machine.links import growth_of
 from kinetostat.machine.loads import turned_tensor
 from kinetostat.machine.machine import Chains, Configuration, Family, Member, Plane, Step
+from kinetostat.machine.parameters import KEPT_FAMILIES
 from kinetostat.machine.series import springs_in_a_row
 from kinetostat.machine.written.copies import direction_in, inertia_in, joint_numbers, matrix_in
 from kinetostat.machine.written.joints import JOINT_TYPES, departure, own_axis
@@ -24,11 +25,8 @@ from kinetostat.machine.written.struts import rod_of, with_rods
 from kinetostat.machine.written.tables import tables_of
 from kinetostat.tolerances import LEAST_LENGTH, ONE_PLACE
 
-KEPT = 64
-"""Families that are kept, so that machines with one plan share tables, models of files, and compiled programs."""
 
-
-@lru_cache(KEPT)
+@lru_cache(KEPT_FAMILIES)
 def family_of(plan: Plan) -> Family:
     """The family of all machines with this plan."""
     return Family(
@@ -181,13 +179,13 @@ def members(plan: Plan, joints: Sequence[Scalar | Turn] | None = None, **tables:
 
 
 Carrier = tuple[Displacement, int, int]
-"""How a link is displaced from the home pose, and how many elements of its leg carry its beginning and its end."""
+"""Displacement of a link from the home pose, and how many elements of its leg carry its beginning and its end."""
 
 
 def _carriers(
     plan: Plan, leg: LegPlan, tables: Mapping[str, Any], joints: Iterator[Scalar | Turn]
 ) -> list[Carrier | None]:
-    """Where the links of a leg are at the coordinates of its joints."""
+    """Placements of the links of a leg at the coordinates of its joints."""
     motion, carried = Displacement(IDENTITY, ZERO), 0
     carriers: list[Carrier | None] = []
     for moving, flexible in _parts_at_home(plan, leg, tables):

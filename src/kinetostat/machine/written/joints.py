@@ -239,7 +239,7 @@ JOINT_TYPES = {
 """Types of joints by the name that machine files give them."""
 
 MOTORS = tuple(dict.fromkeys(name for kind in JOINT_TYPES.values() for name in kind.motors))
-"""What `actuated` may say of joints with several freedoms."""
+"""Words of `actuated` for joints with several freedoms."""
 
 
 def stiffness_kind(kind: str, motor: str) -> str:
@@ -255,7 +255,7 @@ ONE_FREEDOM = tuple(name for name, kind in JOINT_TYPES.items() if kind.stiffness
 AXIS_FIELDS = ("axis", "first_axis", "second_axis")
 
 
-def directed(joints: Mapping[str, dict[str, Any]], where: str) -> None:
+def write_directions(joints: Mapping[str, dict[str, Any]], where: str) -> None:
     """Put numbers in the place of names of joints, and both axes in the place of a universal joint's shaft.
 
     Args:
@@ -269,12 +269,12 @@ def directed(joints: Mapping[str, dict[str, Any]], where: str) -> None:
         for key in AXIS_FIELDS:
             if isinstance(joint.get(key), str):
                 other = choice(joint[key], joints, f'{where}, joint "{name}": {key}, which may name a joint,')
-                joint[key] = _between(joint, joints[other], joint[key])
+                joint[key] = _direction_to(joint, joints[other], joint[key])
         if joint.get("type") == "universal" and "axis" in joint and not {"first_axis", "second_axis"} & joint.keys():
             joint |= _cross_of(joint.pop("axis"))
 
 
-def _between(joint: Mapping[str, Any], other: Mapping[str, Any], given: str) -> list[float] | str:
+def _direction_to(joint: Mapping[str, Any], other: Mapping[str, Any], given: str) -> list[float] | str:
     """From the point of one joint to that of another; as it was given if they are not points, which `spec` refuses."""
     try:
         ends = [[parse(entry, "length") for entry in each.get("point", ())] for each in (joint, other)]

@@ -1,4 +1,4 @@
-"""What a machine written leg by leg consists of, apart from its numbers: legs, joints, links and their models."""
+"""The plan of a machine written leg by leg, which is all but its numbers: legs, joints, links and their models."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,12 +22,12 @@ LINK_MODELS = {
     "timoshenko": "beam that deflects in shear as well",
     "matrix": "a 6x6 compliance of its own, of its end against its beginning, at the end",
 }
-"""How a link may deflect."""
+"""Models of a link, by which it deflects."""
 
 CABLE = "cable"
-"""What the `type` of a leg may say."""
+"""The only `type` of a leg."""
 ONE_SIDED = ("pulls", "pushes")
-"""What `acts` may say: a cable pulls its ends together, a prop pushes them apart; neither does the other."""
+"""Words of `acts`: a cable pulls its ends together, a prop pushes them apart; neither does the other."""
 
 SPATIAL_POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 PLANAR_POSE = ("x", "y", "yaw")
@@ -94,7 +94,7 @@ class LinkPlan:
 
 @dataclass(frozen=True, eq=False)
 class Copies(Immutable):
-    """What a file says about the copies of a leg.
+    """Copies of a leg, as a file has them.
 
     Attributes:
         count: how many legs there are.
@@ -164,7 +164,7 @@ class Plan(Immutable):
 
 
 def literals(plan: Plan) -> dict[str, dict[str, object]]:
-    """What machine files with this plan say beside numbers, by table: they then have it back."""
+    """Everything but numbers in machine files with this plan, by table, for writing such a file."""
     tables: dict[str, dict[str, object]] = {"": {"space": "planar" if plan.planar else "spatial"}}
     for name, shape in plan.shapes.items():
         material = plan.materials[name]

@@ -25,7 +25,7 @@ UNPOINTED = ("prismatic", "fixed")
 
 
 @dataclass(frozen=True)
-class Rod:
+class StrutRod:
     """The rod of a strut in a chain at the home pose; in a placed chain a spring stands for it.
 
     Attributes:
@@ -55,7 +55,7 @@ class Rod:
         """Nothing that a drawing shows."""
         return ()
 
-    def displaced(self, motion: Displacement) -> "Rod":
+    def displaced(self, motion: Displacement) -> "StrutRod":
         """The rod after a rigid displacement of what carries it; what comes first in a leg begins on the base."""
         return replace(self, actuator=self.actuator.displaced(motion))
 
@@ -65,7 +65,7 @@ class Rod:
         return replace(self.actuator, name=self.part, part=self.part, stiffness=stiffness, actuated=False, hinge=False)
 
 
-def rod_of(name: str, slide: JointPlan, actuator: Spring, data: Any, plan: Plan, tables: Mapping[str, Any]) -> Rod:
+def rod_of(name: str, slide: JointPlan, actuator: Spring, data: Any, plan: Plan, tables: Mapping[str, Any]) -> StrutRod:
     """The rod of a strut.
 
     Args:
@@ -78,10 +78,10 @@ def rod_of(name: str, slide: JointPlan, actuator: Spring, data: Any, plan: Plan,
     section = slide.cross_section
     shape, sizes = (plan.shapes[section], tables[f"sections.{section}"]) if section else ("", None)
     axial = rigidity_of(shape, sizes, False).axial if section else data.axial_rigidity
-    return Rod(PartName(name, f"{slide.name} rod"), actuator, Vector(*data.point), axial)
+    return StrutRod(PartName(name, f"{slide.name} rod"), actuator, Vector(*data.point), axial)
 
 
-def with_rods(steps: Sequence[Step], placed: Sequence[Element | Rod]) -> tuple[Element, ...]:
+def with_rods(steps: Sequence[Step], placed: Sequence[Element | StrutRod]) -> tuple[Element, ...]:
     """A placed chain with springs in the place of its rods.
 
     Args:
@@ -94,7 +94,7 @@ def with_rods(steps: Sequence[Step], placed: Sequence[Element | Rod]) -> tuple[E
     ]
     whole: list[Element] = []
     for i, element in enumerate(placed):
-        if isinstance(element, Rod):
+        if isinstance(element, StrutRod):
             start = [element.start, *chain.from_iterable(centres[:i])][-1]
             whole.append(element.spring(start, next(chain.from_iterable(centres[i:]))))
         else:

@@ -1,4 +1,4 @@
-"""What a file of a machine written leg by leg may hold: the tables of numbers that a plan has, and the JSON Schema."""
+"""Files of machines written leg by leg: the tables of numbers that a plan has, and the JSON Schema."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ WEIGHT = {
         )
     ),
 }
-"""What a link may say about its mass; each needs those before it."""
+"""Fields of a link about its mass; each needs those before it."""
 
 
 def tables_of(plan: Plan) -> dict[str, type]:
