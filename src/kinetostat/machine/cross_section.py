@@ -212,7 +212,7 @@ SAME = 1e-9
 """Relative difference up to which two linear densities are one."""
 
 Known: TypeAlias = Mapping[str, float | list[float]]
-"""Properties of links, beside their rigidity, by cross-section: a number of each of `OF_CROSS_SECTIONS`, SI, or a list of
+"""Properties of links from cross-sections, beside rigidity: a number of each of `OF_CROSS_SECTIONS`, SI, or a list of
 them for a field with several entries; 0 where it is not known. Empty where no cross-section is written."""
 
 
