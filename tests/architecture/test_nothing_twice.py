@@ -55,6 +55,7 @@ def defined_in(tree):
             yield node.name
     for node in tree.body:
         targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        targets = [each for target in targets for each in getattr(target, "elts", [target])]
         yield from (one.id for one in targets if isinstance(one, ast.Name) and one.id[:2] != "__")
 
 

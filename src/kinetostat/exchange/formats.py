@@ -78,9 +78,9 @@ KNOWN = (
         "solids of the machine as exact bodies, an assembly for CAD programs",
         (".stp",),
     ),
-    Format("csv", ".csv", "results_files.write_csv", "results at the pose, a number a line with its unit"),
-    Format("netcdf", ".nc", "results_files.write_netcdf", "results at the pose, labelled, with units"),
-    Format("mat", ".mat", "results_files.write_mat", "K, C, pose and reference point for MATLAB"),
+    Format("csv", ".csv", "results.write_csv", "results at the pose, a number a line with its unit"),
+    Format("netcdf", ".nc", "results.write_netcdf", "results at the pose, labelled, with units"),
+    Format("mat", ".mat", "results.write_mat", "K, C, pose and reference point for MATLAB"),
     Format(
         "modes",
         ".csv",

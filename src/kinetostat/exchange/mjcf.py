@@ -14,8 +14,7 @@ import numpy as np
 from kinetostat.arrays import Array
 from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model, build
-from kinetostat.exchange.mjcf_pace import IMPEDANCE, LEAST_STEPS, Pace, pace_of
-from kinetostat.exchange.mjcf_vibration import vibrating_pace
+from kinetostat.exchange.mjcf_pace import IMPEDANCE, LEAST_STEPS, Pace, pace_of, vibrating_pace
 from kinetostat.exchange.results import reference_point
 from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.analysis import Analysis

@@ -1,24 +1,44 @@
-"""Masses, time step, armature and damping of a machine in MuJoCo. Static deflections depend on none of them.
+"""Masses, time step, armature and damping of a machine in MuJoCo: as it comes to rest soon, or as it vibrates.
 
-Accuracy and the time to come to rest do. MuJoCo's constraints are soft: a closed loop has a compliance of about
-(1 - d) t² / m, with d at most 0.9999 and t at least two time steps. So the step follows from how large that compliance
-may be compared with the machine's.
+Static deflections depend on none of them; accuracy and the time to come to rest do. MuJoCo's constraints are soft: a
+closed loop has a compliance of about (1 - d) t² / m, with d at most 0.9999 and t at least two time steps. So the step
+follows from how large that compliance may be compared with the machine's.
+
+A machine that vibrates has its own masses, no damping, and steps for its fastest springs. Its links are spread over the
+bodies of `mjcf_model`: a rod that belongs to one body is rigid, a strut is two halves that slide along each other, and
+a link that bends is two rigid halves.
 
 Source: MuJoCo documentation, Computation, section on the constraint model (impedance and reference acceleration).
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from kinetostat.arrays import Array
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model
 from kinetostat.exchange.results import reference_point
-from kinetostat.machine.loads import PLATFORM, Mass
+from kinetostat.kinematics.closure import solve_joints
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.leg import Joint, Spring
+from kinetostat.machine.loads import PLATFORM, Mass, located_members
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
-from kinetostat.tolerances import RIGID_BLOCK, SOFT_CONSTRAINT
-from kinetostat.validation.masses import Heavy
+from kinetostat.tolerances import COINCIDENT, COINCIDENT_HINGES, RIGID_BLOCK, SOFT_CONSTRAINT
+from kinetostat.validation.masses import (
+    Heavy,
+    HeavyLink,
+    has_rotors,
+    links,
+    on_platform,
+    one_body,
+    rotor_inertia,
+    thin_rod,
+)
+from kinetostat.validation.pieces import Piece, array, joint_of, pieces
 
 NOMINAL_MASS = 1.0
 """kg, of every body where no mass is known: deflections do not depend on it."""
@@ -112,3 +132,150 @@ def _masses(model: Model, known: Sequence[Mass]) -> dict[str, float]:
 def _share(body: Body, bodies: Sequence[Body], known: Sequence[Mass]) -> float:
     masses = [float(p.mass) for p in known if p.mass is not None and p.leg == body.leg]
     return sum(masses) / sum(other.leg == body.leg for other in bodies)
+
+
+LIGHT = 2e-5
+"""Mass of a body that has none, as a share of all known masses: the engine moves none without a mass."""
+THIN = 1e-3
+"""Radius of gyration of a rod about its own axis, as a share of its length: the engine turns none without inertia."""
+BETWEEN_SPRINGS = 1e-3
+"""Inertia between springs in a row, as a share of what hangs on them: the engine turns none without inertia."""
+STEPS_OF_SPRING = 8.0
+"""Steps in a period of the fastest spring with what hangs on it; pi of them are the limit of stability."""
+
+
+def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
+    """Return the machine's masses on its bodies, and a time step that follows all of its springs.
+
+    Args:
+        analysis: of the machine.
+        model: of its bodies.
+
+    Raises:
+        InputError: if nothing has a mass.
+    """
+    machine = analysis.machine
+    joints = solve_joints(machine) if machine.family.chains else None
+    response = respond(machine, joints)
+    carried, armatures = tuple(on_platform(machine, response.configuration.platform)), _rotors(machine, model)
+    members = located_members(machine, response.configuration, None if joints is None else joints.coordinates)
+    heavy = _on_bodies(model, response, links(members, response.configuration), armatures)
+    known = sum(part.mass for parts in (carried, *heavy.values()) for part in parts)
+    if known == 0.0:
+        raise InputError(
+            'Nothing of this machine has a mass, so that it cannot vibrate; give it one, e.g. --set tool.mass="5 kg".'
+        )
+    gyration = GYRATION * float(analysis.characteristic_length or 1.0)
+    light = LIGHT * known
+    places = {body.name: body.at for body in _moving(model)}
+    places[model.platform.name] = np.array(reference_point(analysis))
+    inertias = {
+        name: one_body(heavy[name]) if name in heavy else Heavy(light, at, light * gyration**2 * np.eye(3))
+        for name, at in places.items()
+    }
+    least = min(part.mass for name, part in inertias.items() if name != model.platform.name or not carried)
+    step = min([step_for(analysis, least, gyration), *_steps(_moving(model), inertias, armatures)])
+    slowest = 2.0 * math.pi * math.sqrt(max(compliances(analysis, gyration)) * known)
+    return Pace(step, 0.0, 10.0 * slowest, inertias, armatures, carried)
+
+
+def _moving(model: Model) -> list[Body]:
+    """The bodies of the legs."""
+    return [body for body in model.world.every() if body is not model.world]
+
+
+def _rotors(machine: Machine, model: Model) -> dict[str, float]:
+    """What rotors add to the joints of their actuators, by the names of these."""
+    if not has_rotors(machine):
+        return {}
+    driven = [freedom for body in _moving(model) for freedom in body.freedoms if freedom.actuated]
+    return {freedom.name: rotor_inertia(machine, slides=freedom.point is None) for freedom in driven}
+
+
+def _on_bodies(
+    model: Model, response: Response, parts: Iterable[HeavyLink], armatures: dict[str, float]
+) -> dict[str, list[Heavy]]:
+    """What the links put on each body, by its name; what stretches evenly changes the armature of its slide."""
+    heavy: dict[str, list[Heavy]] = {}
+    configuration = response.configuration
+    chains = [pieces(leg, configuration.plane) for leg in configuration.legs]
+    for link in parts:
+        for body, part in _spread(link, model, chains[link.leg], armatures):
+            heavy.setdefault(body.name, []).append(part)
+    return heavy
+
+
+def _spread(
+    link: HeavyLink, model: Model, between: Sequence[Piece], armatures: dict[str, float]
+) -> Iterator[tuple[Body, Heavy]]:
+    """Give the bodies that carry a link and what each carries: both bars of a parallelogram half of it."""
+    chain, first, last = model.chains[link.leg], link.bodies[0], link.bodies[-1]
+    if len(link.points) == 1:
+        yield chain[first], Heavy(link.mass, link.points[0], link.inertia)
+        return
+    start, end = link.points
+    while first < last and _turns_at(between[first], start):
+        first += 1
+    while first < last and _turns_at(between[last - 1], end):
+        last -= 1
+    bars = model.bars.get((link.leg, first), []) if last == first + 1 else []
+    pairs = bars or [(chain[first], chain[last])]
+    for near, far in pairs:
+        shift = near.at - start if len(pairs) > 1 else np.zeros(3)
+        yield from _halves((near, far), (start + shift, end + shift), link.mass / len(pairs), armatures)
+
+
+def _halves(
+    bodies: tuple[Body, Body], ends: tuple[Array, Array], mass: float, armatures: dict[str, float]
+) -> Iterator[tuple[Body, Heavy]]:
+    """Give a rod to one body, or half of it to each of two.
+
+    Two halves of a rod, one of which slides by q against the other, have m/12 q² more kinetic energy than a rod that
+    stretches evenly: so the slide has the armature -m/6.
+    """
+    (near, far), (start, end) = bodies, ends
+    if near is far:
+        yield near, rod(mass, start, end)
+        return
+    for slide in far.freedoms:
+        if slide.point is None and abs(slide.axis @ (end - start)) > (1.0 - COINCIDENT) * np.linalg.norm(end - start):
+            armatures[slide.name] = armatures.get(slide.name, 0.0) - mass / 6.0
+    middle = 0.5 * (start + end)
+    yield near, rod(0.5 * mass, start, middle)
+    yield far, rod(0.5 * mass, middle, end)
+
+
+def _turns_at(piece: Piece, point: Array) -> bool:
+    """Whether a piece leaves a point where it is, so that the bodies on both sides of it carry the point."""
+    if not isinstance(piece, Joint | Spring):
+        return False
+    joint = joint_of(piece)
+    if joint.point is None or joint.pitch != 0.0:
+        return False
+    return float(np.linalg.norm(np.cross(array(joint.point) - point, array(joint.axis)))) < COINCIDENT_HINGES
+
+
+def rod(mass: float, start: Array, end: Array) -> Heavy:
+    """Return a straight uniform rod (kg) between two points (m)."""
+    span, thin = end - start, thin_rod(mass, start, end)
+    return Heavy(mass, thin.centre, thin.inertia + mass * THIN**2 * np.outer(span, span))
+
+
+def _steps(bodies: list[Body], inertias: dict[str, Heavy], armatures: dict[str, float]) -> Iterator[float]:
+    """Give a time step for each spring, s; springs in a row on one body get a little inertia between them."""
+    for body in bodies:
+        for freedom in body.freedoms:
+            if freedom.stiffness > 0.0:
+                size = _about(freedom, inertias[body.name])
+                if len(body.freedoms) > 1:
+                    size *= BETWEEN_SPRINGS
+                    armatures[freedom.name] = armatures.get(freedom.name, 0.0) + size
+                yield 2.0 * math.pi * math.sqrt(size / freedom.stiffness) / STEPS_OF_SPRING
+
+
+def _about(freedom: Freedom, part: Heavy) -> float:
+    """The inertia of a body that a freedom moves, kg or kg·m²."""
+    if freedom.point is None:
+        return part.mass
+    arm = np.cross(part.centre - freedom.point, freedom.axis)
+    return float(freedom.axis @ part.inertia @ freedom.axis + part.mass * (arm @ arm))

@@ -13,8 +13,7 @@ import numpy as np
 import xarray as xr
 from scipy.io import savemat
 
-from kinetostat.exchange.results import ROTATIONS
-from kinetostat.exchange.results_files import write_lines
+from kinetostat.exchange.results import ROTATIONS, write_lines
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
