@@ -19,6 +19,7 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.loading import as_toml
+from kinetostat.machine.machine import Machine
 from kinetostat.machine.machine import springs as springs_of
 from kinetostat.machine.parameters import parameters, values
 from kinetostat.studies.analysis import Analysis
@@ -89,18 +90,20 @@ def as_dataset(analysis: Analysis) -> xr.Dataset:
         "axis": list(AXES),
         "base_axis": list(AXES),
     }
-    attributes = {
+    answer = {"status": analysis.status.word, "message": analysis.message, "axes": analysis.axes}
+    attributes = {**origin_of(machine, analysis.axes), **answer, "order": " ".join(names)}
+    return xr.Dataset(variables, coordinates, attributes)
+
+
+def origin_of(machine: Machine, axes: str = "base") -> dict[str, Any]:
+    """Return attributes of a dataset: the machine with its file, the frame of the numbers, and the program."""
+    return {
         "machine": machine.name,
         "family": machine.family.name,
-        "status": analysis.status.word,
-        "message": analysis.message,
-        "axes": analysis.axes,
-        "frame": frame_of(machine, analysis.axes),
+        "frame": frame_of(machine, axes),
         "machine_file": as_toml(machine),
         "kinetostat": version("kinetostat"),
-        "order": " ".join(names),
     }
-    return xr.Dataset(variables, coordinates, attributes)
 
 
 def pose_of(analysis: Analysis) -> dict[str, Variable]:
@@ -238,8 +241,13 @@ def _unit(dataset: xr.Dataset, name: str, row: str, column: str) -> str:
 
 def write_mat(analysis: Analysis, path: Path) -> list[Path]:
     """Write K, C, pose and reference point as a MATLAB file (level 5)."""
+    return write_matlab(matlab_variables(analysis), path)
+
+
+def write_matlab(variables: dict[str, Any], path: Path) -> list[Path]:
+    """Write variables as a MATLAB file (level 5)."""
     with replacing(path) as temporary:
-        savemat(temporary, matlab_variables(analysis), appendmat=False, long_field_names=True, oned_as="column")
+        savemat(temporary, variables, appendmat=False, long_field_names=True, oned_as="column")
     return [path]
 
 

@@ -5,22 +5,17 @@ The suffix of the file decides which of the two it is.
 
 from collections.abc import Sequence
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.io import savemat
 
-from kinetostat.exchange.results import ROTATIONS, write_lines
-from kinetostat.machine.loading import as_toml
-from kinetostat.machine.machine import Machine
+from kinetostat.exchange.results import ROTATIONS, origin_of, write_lines, write_matlab
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
-from kinetostat.studies.setting import frame_of
 from kinetostat.studies.state_space import StateSpace, state_space
-from kinetostat.studies.storage import replacing, write_dataset
+from kinetostat.studies.storage import write_dataset
 from kinetostat.studies.vibration import Vibration, modes
 
 NETCDF = ".nc"
@@ -90,7 +85,7 @@ def modes_dataset(vibration: Vibration) -> xr.Dataset:
         "part": parts,
         "direction": ("mode", [mode.direction for mode in rows]),
     }
-    about = _about(vibration.machine) | {"loaded": int(vibration.loaded), "damping_assumed": int(vibration.assumed)}
+    about = origin_of(vibration.machine) | {"loaded": int(vibration.loaded), "damping_assumed": int(vibration.assumed)}
     return xr.Dataset(variables, coordinates, about)
 
 
@@ -100,16 +95,6 @@ def _strain(mode: Any) -> Any:
 
 def _kinetic(mode: Any) -> Any:
     return mode.kinetic
-
-
-def _about(machine: Machine) -> dict[str, Any]:
-    return {
-        "machine": machine.name,
-        "family": machine.family.name,
-        "frame": frame_of(machine, "base"),
-        "machine_file": as_toml(machine),
-        "kinetostat": version("kinetostat"),
-    }
 
 
 def write_state_space(
@@ -129,8 +114,7 @@ def write_state_space(
     if path.suffix.lower() == NETCDF:
         write_dataset(path, state_space_dataset(answer))
     else:
-        with replacing(path) as temporary:
-            savemat(temporary, matlab_variables(answer), appendmat=False, long_field_names=True, oned_as="column")
+        write_matlab(matlab_variables(answer), path)
     return [path]
 
 
@@ -156,7 +140,7 @@ def state_space_dataset(answer: StateSpace) -> xr.Dataset:
             "input_unit": ("input", [port.unit for port in answer.inputs]),
             "output_unit": ("output", [port.unit for port in answer.outputs]),
         },
-        _about(answer.machine) | {"damping_assumed": int(answer.assumed)},
+        origin_of(answer.machine) | {"damping_assumed": int(answer.assumed)},
     )
 
 
