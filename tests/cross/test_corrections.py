@@ -11,9 +11,8 @@ from scipy.interpolate import RegularGridInterpolator
 from kinetostat import command, correction_table, save
 from kinetostat.cli import main
 from kinetostat.equilibrium.balance import free_state
-from kinetostat.equilibrium.numbers import loaded_mechanism
 from kinetostat.equilibrium.solving import at_rest
-from kinetostat.kinetostatics.response import respond
+from kinetostat.equilibrium.state import MachineState
 from kinetostat.machine.actuators import senses_of
 from kinetostat.machine.parameters import with_values
 from kinetostat.views.notebook import html_of
@@ -35,7 +34,7 @@ def test_corrections_cut_the_error_over_the_workspace_by_a_thousand(counts, by_l
     between = RegularGridInterpolator(table.axes, table.corrections)
     corrections = table.law.at(values) if by_law else between(np.stack(values, axis=1))
     placed = with_values(machine, {f"pose.{k}": values for k, values in poses.items()})
-    mechanism, _ = loaded_mechanism(placed, respond(placed), None, 40)
+    mechanism = MachineState(placed, 40).mechanism
     off = []
     for amounts in (np.zeros((40, 3)), corrections * np.array(senses_of(machine.configure()), dtype=float)):
         moved = at_rest(mechanism, replace(free_state(mechanism), amounts=amounts)).balance.state.platform.translation

@@ -18,6 +18,7 @@ from kinetostat.engine.kernel import Fill, fill_some, slab_fill
 from kinetostat.engine.loaded import Way, loaded_fill, way_of
 from kinetostat.engine.points import ConsecutivePoints, Points, Population
 from kinetostat.equilibrium.numbers import states_of_rest
+from kinetostat.equilibrium.state import states_at
 from kinetostat.kinematics.limits import Check, load_checks
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, needs_state, rest_numbers
@@ -284,7 +285,6 @@ def _limit_checks(machine: Machine, columns: Mapping[str, Array]) -> Iterator[tu
         part = slice(start, min(start + slab, size))
         with np.errstate(all="ignore"):
             here = {path: column[part] for path, column in columns.items()}
-            posed = with_values(machine, here)
-            response = respond(posed)
-            loads = states_of_rest(machine, here, part.stop - start).loads if judged_at_rest else ()
-            yield part, (*response.checks, *load_checks(posed, response.configuration, loads))
+            state = states_at(machine, here, part.stop - start)
+            loads = states_of_rest(state).loads if judged_at_rest else ()
+            yield part, (*state.free.checks, *load_checks(state.machine, state.free.configuration, loads))

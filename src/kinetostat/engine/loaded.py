@@ -26,10 +26,11 @@ from kinetostat.engine.kernel import (
 )
 from kinetostat.engine.trace import Runnable
 from kinetostat.equilibrium.cut import cut_machine
-from kinetostat.equilibrium.numbers import check_loads, loaded_numbers
+from kinetostat.equilibrium.numbers import loaded_numbers
+from kinetostat.equilibrium.state import check_loads, states_at
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 from kinetostat.vibration.modes import frequencies
@@ -151,16 +152,16 @@ def _response_with_states(
 ) -> Response:
     """The response at some points, with what quantities need of states of rest and of vibrations."""
     wanted = [QUANTITIES[name] for name in quantities]
-    posed = with_values(machine, columns)
-    response = respond(posed)
+    state = states_at(machine, columns, count)
+    response = state.free
     if any(quantity.modal and not quantity.loaded and not quantity.cut for quantity in wanted):
-        response = replace(response, frequencies=list(pose_frequencies(posed, response, count).T))
+        response = replace(response, frequencies=list(pose_frequencies(state).T))
     if any(quantity.cut for quantity in wanted):
-        pressure = posed.tables["cutting"].pressure
-        response = replace(response, softest=cut_receptances(posed, response, count), cutting_pressure=pressure)
+        pressure = state.machine.tables["cutting"].pressure
+        response = replace(response, softest=cut_receptances(state), cutting_pressure=pressure)
     if at_rest := rest_numbers(machine, quantities):
         further = {"frequency": frequencies} if "frequency" in at_rest else None
-        loaded, status = loaded_numbers(machine, columns, count, further)
+        loaded, status = loaded_numbers(state, further)
         response = replace(response, loaded={name: values.T for name, values in loaded.items()}, status=status)
     return response
 

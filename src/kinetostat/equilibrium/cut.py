@@ -16,8 +16,7 @@ from kinetostat.algebra.scalar import Scalar, is_zero, total
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.chains import Chain, together
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
-from kinetostat.kinematics.closure import solve_joints
-from kinetostat.kinetostatics.response import respond
+from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
 
@@ -118,9 +117,9 @@ def cut_machine(machine: Machine, varying: Collection[str] = ()) -> Cut | None:
     load = machine.tables["load"]
     if any(path in varying or math.isfinite(getattr(load, path.partition(".")[2])) for path in TENSIONS):
         return None
-    joints = solve_joints(machine) if machine.family.chains else None
+    state = state_of(machine)
     with np.errstate(all="ignore"):
-        machine_cut = cut(mechanism_of(machine, respond(machine, joints), joints))
+        machine_cut = cut(mechanism_of(machine, state.free, state.joints))
     if machine_cut is None or not machine.loaded:
         return machine_cut
     carrier, driven = machine_cut.carrier, machine_cut.mechanism.driven

@@ -21,8 +21,9 @@ from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import LegTerms, leg_terms, placed_leg, platform_load
 from kinetostat.equilibrium.cut import Cut, Rod, cut
 from kinetostat.equilibrium.mechanism import mechanism_of
-from kinetostat.equilibrium.numbers import FREE, borne, greatest_loads
+from kinetostat.equilibrium.numbers import borne, greatest_loads
 from kinetostat.equilibrium.solving import LONGEST_STEP
+from kinetostat.equilibrium.state import HELD_BY_LOADS
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response
@@ -246,7 +247,7 @@ class Reduced:
             result |= greatest_loads(loads)
             at_rest = borne(self.machine, response, loads, at_rest)
         code = where(good, at_rest, int(Status.NOT_CONVERGED))
-        for kept in sorted(set(Status) - set(FREE)):
+        for kept in sorted(set(Status) - set(HELD_BY_LOADS)):
             code = where(abs(response.place_status - float(kept)) < 0.5, int(kept), code)
         return result, code
 

@@ -16,7 +16,6 @@ from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model, build
 from kinetostat.exchange.mjcf_pace import IMPEDANCE, LEAST_STEPS, Pace, pace_of, vibrating_pace
 from kinetostat.exchange.results import reference_point
-from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_text
 from kinetostat.validation.masses import Heavy
@@ -63,7 +62,7 @@ def text_of(analysis: Analysis, vibrating: bool = False) -> str:
     Raises:
         InputError: if the machine has a part that MuJoCo has no counterpart for, or no mass that could vibrate.
     """
-    model = build(respond(analysis.machine).configuration)
+    model = build(analysis.state.free.configuration)
     pace = vibrating_pace(analysis, model) if vibrating else pace_of(analysis, model)
     middle, extent = _middle_and_extent(model)
     radius = THICKNESS * extent

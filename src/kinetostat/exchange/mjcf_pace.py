@@ -20,8 +20,7 @@ import numpy as np
 from kinetostat.arrays import Array
 from kinetostat.exchange.mjcf_model import Body, Freedom, Model
 from kinetostat.exchange.results import reference_point
-from kinetostat.kinematics.closure import solve_joints
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Joint, Spring
 from kinetostat.machine.loads import PLATFORM, Mass, located_members
 from kinetostat.machine.machine import Machine
@@ -155,8 +154,7 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
         InputError: if nothing has a mass.
     """
     machine = analysis.machine
-    joints = solve_joints(machine) if machine.family.chains else None
-    response = respond(machine, joints)
+    joints, response = analysis.state.joints, analysis.state.free
     carried, armatures = tuple(on_platform(machine, response.configuration.platform)), _rotors(machine, model)
     members = located_members(machine, response.configuration, None if joints is None else joints.coordinates)
     heavy = _on_bodies(model, response, links(members, response.configuration), armatures)

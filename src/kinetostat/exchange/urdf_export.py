@@ -25,8 +25,8 @@ from kinetostat.arrays import Array
 from kinetostat.exchange.formats import one_line
 from kinetostat.exchange.leg_by_leg import compliance_at
 from kinetostat.exchange.results import reference_point
-from kinetostat.kinematics.closure import Joints, solve_joints
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinematics.closure import Joints
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.loads import located_members
@@ -207,10 +207,9 @@ class _Tree:
 def texts_of(analysis: Analysis) -> tuple[str, str]:
     """Return the URDF, with all joint coordinates zero at the pose, and the YAML of its closed loops."""
     machine = analysis.machine
-    joints = solve_joints(machine) if machine.family.chains else None
-    response = respond(machine, joints)
+    response = analysis.state.free
     tree = _Tree(analysis, response.configuration)
-    tree.weigh(machine, response, joints)
+    tree.weigh(machine, response, analysis.state.joints)
     ElementTree.indent(tree.robot, "  ")
     text = '<?xml version="1.0"?>\n' + ElementTree.tostring(tree.robot, encoding="unicode") + "\n"
     lists = {

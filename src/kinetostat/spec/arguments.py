@@ -20,6 +20,7 @@ R = TypeVar("R")
 
 CLASSES = {
     "Machine": "a machine, as load(...) and build(...) return one",
+    "MachineState": "a machine in a state, as state_of(...) returns one",
     "Problem": "a problem, as load_problem(...) returns one",
     "Family": "a Family, as docs/extending.md shows",
     "bool": "True or False",
@@ -162,7 +163,8 @@ def _plain(value: Any) -> Any:
 
 def words_of(parameter: inspect.Parameter) -> str:
     """Return what to give for a parameter of a public function."""
-    return CLASSES.get(getattr(parameter.annotation, "__name__", ""), "") or WORDS[parameter.name]
+    names = (getattr(part, "__name__", "") for part in _parts(parameter.annotation))
+    return next((CLASSES[name] for name in names if name in CLASSES), "") or WORDS[parameter.name]
 
 
 Misfit = tuple[str, object] | None

@@ -16,19 +16,19 @@ from kinetostat.algebra.screw import COMPONENTS, Screw
 from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import IDENTITY, Rotation
 from kinetostat.arrays import Array
-from kinetostat.kinematics.closure import solve_joints
-from kinetostat.kinematics.mobility import Mobility, mobility
+from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.kinematics.mobility import Mobility
 from kinetostat.kinematics.singularity import actuator_jacobian, columns, conditioning, describe, independent
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, stiffness_matrix
 from kinetostat.kinetostatics.conditioning import twist_condition
 from kinetostat.kinetostatics.internal import InternalLoads, internal_loads
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.actuators import Actuator
 from kinetostat.machine.limits import unlimited
-from kinetostat.machine.loads import Mass, loads_left_out
-from kinetostat.machine.machine import Configuration, Machine, springs
-from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.machine.loads import Mass
+from kinetostat.machine.machine import Machine, springs
+from kinetostat.machine.parameters import values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.immutable import Immutable
@@ -37,7 +37,6 @@ from kinetostat.studies.attribution import Contribution, Softest, by_part, contr
 from kinetostat.studies.indices import Along, Indices, indices_json, indices_of, stiffness_along
 from kinetostat.studies.loads import LoadCase, load_case
 from kinetostat.studies.plain_data import as_answer, stiffness_of_spring
-from kinetostat.studies.refusal import why_not
 from kinetostat.studies.rounding import clean_matrix, clean_statics
 from kinetostat.studies.unanswered import known_fields, standing_fields
 from kinetostat.tolerances import CLOSING_ROUND_OFF
@@ -49,8 +48,6 @@ Rows = list[list[float]]
 
 AXES = ("base", "platform")
 """Axes in which results are given."""
-NEARBY = 0.03
-"""How far from the pose general mobility is looked for: share of the characteristic length; in angles, rad."""
 
 
 @former_names(shares="attribution", internal="internal_loads", length="characteristic_length", mass="moving_mass")
@@ -59,7 +56,7 @@ class Analysis(Immutable):
     """Stiffness of a machine at one pose; matrices at the tool point T (P itself unless there is a tool), SI.
 
     Attributes:
-        machine: the machine, with its pose.
+        state: the machine at its pose, in the state that is meant.
         status: of the pose. Unless it is OK, attribution, indices and loads are unknown, and the rest only where the
             machine has no place; K and C are known at singular poses as far as they are finite.
         message: what is special about the pose, or why it has no answer; one paragraph.
@@ -89,7 +86,7 @@ class Analysis(Immutable):
         characteristic_length: in m; it makes rotations comparable with translations.
     """
 
-    machine: Machine
+    state: MachineState
     status: Status
     message: str
     components: tuple[str, ...] = COMPONENTS
@@ -120,6 +117,11 @@ class Analysis(Immutable):
 
     def __repr__(self) -> str:
         return f"<Analysis of {self.machine.name!r}: {self.status.word}, components {' '.join(self.components)}>"
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, with its pose."""
+        return self.state.machine
 
     @property
     def moving_mass(self) -> float | None:
@@ -207,34 +209,25 @@ class Analysis(Immutable):
 
 
 @checked
-def analyze(machine: Machine, axes: str = "base") -> Analysis:
+def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     """Analyse a machine at its pose: K, C, attribution, indices, mobility and loads.
 
     A pose that is singular or cannot be reached raises no error: `status` and `message` say what is the case.
 
     Args:
-        machine: the machine, with its pose, tool and load.
+        machine: the machine, with its pose, tool and load; or its state, as `state_of` returns it.
         axes: "base", or "platform" for results in platform axes.
 
     Raises:
         InputError: if `axes` is neither "base" nor "platform", or `machine` is not a machine.
     """
     choice(axes, AXES, "axes")
-    joints = solve_joints(machine) if machine.family.chains else None
-    response = respond(machine, joints)
-    if machine.loaded:
-        from kinetostat.equilibrium.numbers import judged_at_rest  # most machines are not; it takes as long as the rest
-
-        response = judged_at_rest(machine, response)
-    status = Status(int(response.status))
+    state = state_of(machine)
+    machine, response, status = state.machine, state.response, state.status
     configuration = response.configuration
-    # Other poses tell what sort of singularity it is; they cost three more ways from the home pose, and reach has none.
-    judged = status in (Status.OK, Status.SINGULAR)
-    nearby = _nearby(machine, float(configuration.length)) if judged else []
     turn = IDENTITY if axes == "base" else configuration.platform.rotation.inverse()
     if status is not Status.OK:
-        message, known = why_not(machine, response, nearby), known_fields(machine, response, nearby, joints, turn)
-        return Analysis(machine, status, message, machine.family.component_names, axes, **known)
+        return Analysis(state, status, state.refusal, machine.family.component_names, axes, **known_fields(state, turn))
     # Screws are cleaned before they are turned, where an exact zero is easy to tell, and once more after it, because
     # turning adds round-off of its own.
     response = replace(response, statics=clean_statics(response.statics))
@@ -243,15 +236,15 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
     kept = machine.family.components
     compliance_rows, stiffness_rows = _rows(compliance, kept), _rows(stiffness, kept)
     all_springs, length = springs(configuration), float(configuration.length)
-    known = standing_fields(machine, response, joints)
+    known = standing_fields(state)
     extremes = conditioning(response.legs, length, response.guide)
     load = load_case(response, statics, turn)
     indices = indices_of(stiffness_rows, compliance_rows, length, kept)
     weakest = {name: softest(block, name, all_springs, statics) for name, block in (indices.free or {}).items()}
     return Analysis(
-        machine,
+        state,
         status,
-        _message(machine, response, known["rigid"], known["free"], stiffness_rows is not None, load),
+        _message(state, response, known["rigid"], known["free"], stiffness_rows is not None, load),
         components=machine.family.component_names,
         axes=axes,
         stiffness=stiffness_rows,
@@ -262,7 +255,7 @@ def analyze(machine: Machine, axes: str = "base") -> Analysis:
         attribution=contributions(all_springs, statics, stiffness, compliance, kept),
         indices=indices,
         softest={name: direction for name, direction in weakest.items() if direction is not None},
-        mobility=mobility(configuration, nearby, response.reference),
+        mobility=state.mobility,
         internal_loads=internal_loads([leg.name for leg in configuration.legs], response.legs, length, response.guide),
         load=load,
         wrench_condition=float(extremes[0] / extremes[-1]),
@@ -289,21 +282,6 @@ def _rows(matrix: Symmetric6, kept: tuple[int, ...]) -> Rows | None:
     """Return the rows and columns of the machine's components, without round-off, or None if an entry is not finite."""
     rows = [[float(matrix.entry(i, j)) for j in kept] for i in kept]
     return clean_matrix(rows) if all(math.isfinite(entry) for row in rows for entry in row) else None
-
-
-def _nearby(machine: Machine, length: float) -> list[Configuration]:
-    """Return the machine at up to three poses near its pose: those that it can reach, of three that are tried.
-
-    Mobility is a rank, and a rank can drop at a special pose, so that other poses must show what holds in general. They
-    are random, so that none lies on a symmetry of the machine, but the seed is fixed, so that they never change.
-    `length` is the characteristic length.
-    """
-    kinds = {p.path: p.quantity.kind for p in parameters(machine.family) if p.path.startswith("pose.")}
-    reach = {path: NEARBY * (length if kind == "length" else 1.0) for path, kind in kinds.items()}
-    here, rng = values(machine), np.random.default_rng(0)
-    poses = [{path: here[path] + r * float(rng.uniform(-1, 1)) for path, r in reach.items()} for _ in range(3)]
-    answers = [respond(with_values(machine, pose)) for pose in poses]
-    return [answer.configuration for answer in answers if Status(int(answer.status)) is Status.OK]
 
 
 def _turned(statics: Statics, turn: Rotation) -> Statics:
@@ -337,14 +315,22 @@ def _rank(response: Response, statics: Statics, compliance_infinite: bool) -> in
 
 
 def _message(
-    machine: Machine,
+    state: MachineState,
     response: Response,
     rigid: tuple[str, ...],
     free: tuple[str, ...],
     finite: bool,
     load: LoadCase | None,
 ) -> str:
-    """Say what is special about a pose that has been analysed; `finite` tells whether K is finite."""
+    """Say what is special about a pose that has been analysed; `finite` tells whether K is finite.
+
+    Args:
+        state: of the machine.
+        response: of it, its statics without round-off.
+        rigid, free: names of the springs that are so.
+        finite: whether K is finite.
+        load: effects of the machine's load.
+    """
     sentences = []
     if not finite and not rigid:
         sentences.append("At this pose a leg is rigid against some load: K is infinite against it, and C is exact.")
@@ -362,8 +348,7 @@ def _message(
     if load and load.unheld:
         sentences.append(load.unheld)
     sentences = sentences or [Status.OK.sentence]
-    uncounted = "" if machine.loaded else loads_left_out(machine, response.configuration)
-    more = (uncounted, unlimited(machine.tables["limits"]))
+    more = (state.left_out, unlimited(state.machine.tables["limits"]))
     return " ".join([*sentences, *(sentence for sentence in more if sentence)])
 
 

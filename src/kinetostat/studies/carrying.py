@@ -15,6 +15,7 @@ from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.numbers import states_of_rest
+from kinetostat.equilibrium.state import states_at
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine, springs
@@ -99,7 +100,7 @@ def _slab(machine: Machine, columns: dict[str, Array], legs: int) -> tuple[Any, 
     """Which legs carry at some points [points x legs], and `Status` codes [points]."""
     count = len(next(iter(columns.values())))
     carries = np.zeros((count, legs), dtype=bool)
-    states = states_of_rest(machine, columns, count)
+    states = states_of_rest(states_at(machine, columns, count))
     if states.equations is not None and states.judged is not None:
         pairs = zip(states.equations.mechanism.legs, states.equations.legs, strict=True)
         slack = [((leg.sign != 0.0) & (terms.carrying == 0.0)).any(axis=1) for leg, terms in pairs]

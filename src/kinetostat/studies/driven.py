@@ -12,12 +12,11 @@ from kinetostat.arrays import Array, Mask
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.commanding import commanded
-from kinetostat.equilibrium.numbers import loaded_mechanism
 from kinetostat.equilibrium.stability import stabilities
-from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.equilibrium.state import SOUGHT_NO_REST, MachineState, states_at
+from kinetostat.kinematics.closure import Joints
 from kinetostat.kinematics.forward import leg_names
-from kinetostat.kinematics.status import PLACELESS, Status
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.actuators import Actuator, actuators_of, joint_actuators, senses_of
 from kinetostat.machine.column import stacked
 from kinetostat.machine.machine import Machine
@@ -87,7 +86,7 @@ def driven(machine: Machine, columns: Mapping[str, Array], count: int, progress:
         progress: receives how far the work is.
 
     Raises:
-        InputError: as for `loaded_mechanism`; or no pose is reached, or the machine has no actuator.
+        InputError: as for `MachineState.mechanism`; or no pose is reached, or the machine has no actuator.
     """
     slabs = []
     for start in range(0, count, SLAB):
@@ -117,12 +116,13 @@ def _nowhere(actuators: tuple[Actuator, ...], count: int) -> Driven:
 
 def _slab(machine: Machine, columns: Mapping[str, Array], count: int) -> Driven | None:
     """Some poses at once; None where the machine has no state of rest to look for at any of them."""
-    status = np.broadcast_to(respond(with_values(machine, columns)).status, (count,))
-    rows = np.flatnonzero(~np.isin(status, (*PLACELESS, Status.UNDECIDED)))
+    state = states_at(machine, columns, count)
+    status = np.broadcast_to(state.free.status, (count,))
+    rows = np.flatnonzero(~np.isin(status, SOUGHT_NO_REST))
     if not len(rows):
         return None
     placed = {path: column[rows] for path, column in columns.items()}
-    here = _at(with_values(machine, placed), machine, placed, len(rows))
+    here = _at(state.at(rows), machine, placed)
     if len(rows) == count:
         return here
     whole = _nowhere(here.actuators, count)
@@ -131,12 +131,10 @@ def _slab(machine: Machine, columns: Mapping[str, Array], count: int) -> Driven 
     return whole
 
 
-def _at(posed: Machine, machine: Machine, columns: Mapping[str, Array], count: int) -> Driven:
-    """The poses of a machine with columns, all of which it reaches."""
-    joints = solve_joints(posed) if posed.family.chains else None
-    response = respond(posed, joints)
-    mechanism, _ = loaded_mechanism(posed, response, joints, count)
-    actuators, stands, senses = _actuators(machine, columns, response, joints, count)
+def _at(state: MachineState, machine: Machine, columns: Mapping[str, Array]) -> Driven:
+    """The states of a machine at poses all of which it reaches."""
+    mechanism, count = state.mechanism, state.count
+    actuators, stands, senses = _actuators(machine, columns, state.free, state.joints, count)
     known = [actuator.name for actuator in actuators]
     chosen = [known.index(name) for name in mechanism.actuators]
     actuators, stands, senses = [actuators[i] for i in chosen], stands[:, chosen], senses[:, chosen]

@@ -5,38 +5,34 @@ from collections.abc import Sequence
 
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.buckling import Strut
-from kinetostat.equilibrium.limit import Limit, limit_of
+from kinetostat.equilibrium.limit import Limit
 from kinetostat.equilibrium.stability import Stability
+from kinetostat.equilibrium.state import MachineState
 from kinetostat.kinematics.singularity import describe
 from kinetostat.machine.machine import Machine
 
 ADVICE = "Reduce the load, stiffen what moves, or preload what only pulls."
 
 
-def about_rest(
-    machine: Machine, equations: Balance, judged: Stability, slack: Sequence[str], struts: Sequence[Strut]
-) -> str:
+def about_rest(state: MachineState, judged: Stability, slack: Sequence[str]) -> str:
     """Say what is special about a state of rest.
 
     Args:
-        machine: that is at rest.
-        equations: there.
+        state: of the machine that is at rest.
         judged: what the springs make of it.
         slack: names of legs in which a spring carries nothing.
-        struts: with what presses them.
     """
-    sentences = [*_about_stability(equations, judged)]
+    sentences = [*_about_stability(judged, state.limit)]
     if slack:
         sentences.append(f"Slack, so that they carry nothing: {', '.join(slack)}.")
-    bent = sorted((strut for strut in struts if strut.bends_away), key=lambda strut: strut.factor)
+    bent = sorted((strut for strut in state.struts if strut.bends_away), key=lambda strut: strut.factor)
     if bent:
-        sentences.append(_bends_away(machine, bent[0], len(bent) - 1))
+        sentences.append(_bends_away(state.machine, bent[0], len(bent) - 1))
     return " ".join(sentences) or "At rest and stable."
 
 
-def _about_stability(equations: Balance, judged: Stability) -> list[str]:
+def _about_stability(judged: Stability, limit: Limit | None) -> list[str]:
     """That the machine is not stable, or has passed a state in which it was not, and how it gives way there."""
-    limit = limit_of(equations.mechanism)
     if not judged.stable:
         stands = how_it_gives_way(limit)
         return [f"The machine is not stable under this load: the least disturbance moves it away. {stands} {ADVICE}"]

@@ -14,10 +14,10 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import PointTable
-from kinetostat.equilibrium.numbers import judged_at_rest
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS, QUANTITIES, needs_state, rest_numbers
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.common_tables import OF_VIBRATIONS
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, parameters, shown, values
@@ -25,7 +25,6 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.analysis import analyze
 from kinetostat.studies.attribution import ranked
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.quantities import refuse_absent, refuse_loaded, resolve_quantities
@@ -172,26 +171,28 @@ class Sensitivity(Immutable):
 
 
 @checked
-def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -> Sensitivity:
+def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("compliance",)) -> Sensitivity:
     """Compute how indices of a machine at its pose depend on each design parameter and pose coordinate.
 
     Derivatives are exact. In a machine written leg by leg, the joints follow each change so that the legs stay closed.
 
     Args:
-        machine: with its pose.
+        machine: with its pose, or its state, as `state_of` returns it.
         quantities: names of quantities or groups.
 
     Raises:
         InputError: an unknown quantity, or one that the machine cannot have.
     """
+    state = state_of(machine)
+    machine = state.machine
     names = tuple(resolve_quantities(quantities, machine.family.component_names))
     if not names:
         raise InputError("quantities names none; give at least one quantity or group.")
     refuse_loaded(machine, names)
     refuse_absent(machine, names)
-    response = judged_at_rest(machine, respond(machine))
+    response = state.response
     if int(response.status) == Status.JOINT_LIMIT:
-        return Sensitivity(machine, Status.JOINT_LIMIT, analyze(machine).message)
+        return Sensitivity(machine, Status.JOINT_LIMIT, state.refusal)
     here = values(machine)
     candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(machine, p, names, here)]
     by = [p.path for p in candidates if not math.isinf(here[p.path])]
@@ -200,7 +201,7 @@ def sensitivity(machine: Machine, quantities: Sequence[str] = ("compliance",)) -
     answer = evaluate_gradient(machine, PointTable({column: np.array([here[column]])}), names, by)
     status = Status(int(answer.status[0]))
     if status is not Status.OK:
-        return Sensitivity(machine, status, FAR_AWAY if status is Status.NOT_CONVERGED else analyze(machine).message)
+        return Sensitivity(machine, status, FAR_AWAY if status is Status.NOT_CONVERGED else state.refusal)
     length = float(response.configuration.length)
     indices = tuple(
         _without_round_off(machine, name, value, response)

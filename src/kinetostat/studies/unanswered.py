@@ -7,7 +7,6 @@ Source: theory sections 2 and 5; a pseudo-inverse of K in units of the character
 """
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,25 +14,19 @@ import numpy as np
 from kinetostat.algebra.screw import Screw
 from kinetostat.algebra.vector import Rotation
 from kinetostat.arrays import Array
-from kinetostat.kinematics.closure import Joints
+from kinetostat.equilibrium.state import MachineState
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.loads import moving_masses
-from kinetostat.machine.machine import Configuration, Machine, springs
+from kinetostat.machine.machine import Machine, springs
 from kinetostat.studies.assembly import actuators_at
-from kinetostat.studies.refusal import known_mobility
 from kinetostat.studies.rounding import clean_matrix
 from kinetostat.tolerances import FREE_COMPONENT, MOST_LEG_CONTRAST, ROUND_OFF_OF_ENTRY, SINGULAR
 
 
-def standing_fields(machine: Machine, response: Response, joints: Joints | None) -> dict[str, Any]:
-    """Return the fields of an `Analysis` that are known wherever a machine stands, answer or not.
-
-    Args:
-        machine: with its pose.
-        response: of it.
-        joints: its coordinates if it is written leg by leg.
-    """
+def standing_fields(state: MachineState) -> dict[str, Any]:
+    """Return the fields of an `Analysis` that are known wherever a machine stands, answer or not."""
+    response = state.free
     configuration = response.configuration
     every = springs(configuration)
     turn = configuration.platform.rotation
@@ -42,8 +35,8 @@ def standing_fields(machine: Machine, response: Response, joints: Joints | None)
         "platform": (tuple(float(c) for c in configuration.platform.translation.components()), [list(r) for r in rows]),
         "rigid": tuple(spring.name for spring in every if math.isinf(spring.stiffness)),
         "free": tuple(spring.name for spring in every if spring.stiffness == 0.0),
-        "masses": tuple(moving_masses(machine, configuration)),
-        "actuators": actuators_at(machine, joints),
+        "masses": tuple(moving_masses(state.machine, configuration)),
+        "actuators": actuators_at(state.machine, state.joints),
         "singularity_margin": float(response.singularity_margin),
         "leg_singularity_margin": min((float(leg.singularity_margin) for leg in response.legs), default=1.0),
         "platform_singularity_margin": float(response.statics.singularity_margin),
@@ -51,25 +44,20 @@ def standing_fields(machine: Machine, response: Response, joints: Joints | None)
     }
 
 
-def known_fields(
-    machine: Machine, response: Response, nearby: Sequence[Configuration], joints: Joints | None, turn: Rotation
-) -> dict[str, Any]:
+def known_fields(state: MachineState, turn: Rotation) -> dict[str, Any]:
     """Return the fields of an `Analysis` that are known at a pose without an answer; none where it has no place.
 
     Args:
-        machine: with its pose.
-        response: of it.
-        nearby: the machine at poses around it, to tell what holds in general.
-        joints: its coordinates if it is written leg by leg.
+        state: of the machine.
         turn: from base axes to those of K and C.
     """
-    status = Status(int(response.status))
-    if Status(int(response.joint_status)) is not Status.OK or status in PLACELESS:
+    response = state.free
+    if Status(int(response.joint_status)) is not Status.OK or state.status in PLACELESS:
         return {}
-    fields = standing_fields(machine, response, joints)
-    if status is Status.SINGULAR:
-        fields["mobility"] = known_mobility(response, nearby)
-    return fields | _matrices(machine, response, turn) if status is Status.SINGULAR else fields
+    fields = standing_fields(state)
+    if state.status is not Status.SINGULAR:
+        return fields
+    return fields | {"mobility": state.mobility} | _matrices(state.machine, response, turn)
 
 
 def _matrices(machine: Machine, response: Response, turn: Rotation) -> dict[str, Any]:

@@ -15,27 +15,23 @@ from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import Balance, balance, free_state
-from kinetostat.equilibrium.buckling import Strut, struts
-from kinetostat.equilibrium.limit import limit_of
+from kinetostat.equilibrium.buckling import Strut
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.numbers import actuator_loads_at_rest, loaded_mechanism
 from kinetostat.equilibrium.shape import loaded_links
 from kinetostat.equilibrium.solving import Rest, at_rest, solve, with_share
-from kinetostat.equilibrium.stability import stability
+from kinetostat.equilibrium.stability import Stability
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.equilibrium.tangent import compliance, elastic_stiffness, inverse
-from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.limits import Check, load_checks, why_beyond, within
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.deflected import DeflectedLink
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.limits import About
-from kinetostat.machine.loads import located_members
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.loaded_sentences import about_rest, moving_legs, why_no_rest, why_no_tensions
 from kinetostat.studies.plain_data import as_answer
-from kinetostat.studies.refusal import why_not
 from kinetostat.studies.rounding import clean_matrix, clean_screw
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY, UNMOVED_TOOL
 
@@ -70,7 +66,7 @@ class LoadedState(Immutable):
     """A machine at rest under gravity, its preload and its table [load]; base axes, at the loaded tool point, SI.
 
     Attributes:
-        machine: at the pose that it has without loads.
+        state: of the machine, at the pose that it has without loads.
         rest: whether it comes to rest, and whether it stays there: with stable springs, and struts that do not bend;
             then whether it keeps to its limits, those of the loads of its actuators at rest among them.
         message: what is special about it, or why there is no state of rest.
@@ -91,7 +87,7 @@ class LoadedState(Immutable):
         links: of all legs, with the exact motions of their ends.
     """
 
-    machine: Machine
+    state: MachineState
     rest: Rest
     message: str
     components: tuple[str, ...]
@@ -109,12 +105,17 @@ class LoadedState(Immutable):
     residual: float = 0.0
     links: tuple[DeflectedLink, ...] = ()
 
+    @property
+    def machine(self) -> Machine:
+        """The machine, at the pose that it has without loads."""
+        return self.state.machine
+
     def __repr__(self) -> str:
         return f"<{self.machine.name!r} under load: {self.rest.word}>"
 
 
 @checked
-def under_load(machine: Machine) -> LoadedState:
+def under_load(machine: Machine | MachineState) -> LoadedState:
     """Find the state in which a machine is at rest under its loads, with exact geometry.
 
     The free state is the machine at its pose with relaxed springs. Loads are the wrench of [load], the weight of all
@@ -122,27 +123,22 @@ def under_load(machine: Machine) -> LoadedState:
     where it would have to do the other.
 
     Args:
-        machine: with its pose and loads.
+        machine: with its pose and loads; or its state, as `state_of` returns it.
 
     Raises:
         InputError: there is gravity but nothing says a mass, or bounds of tensions contradict each other.
     """
-    joints = solve_joints(machine) if machine.family.chains else None
-    response = respond(machine, joints)
-    names = machine.family.component_names
-    if int(response.status) in PLACELESS:
-        return LoadedState(machine, Rest.NO_REST, why_not(machine, response, []), names)
-    if response.undecided:
-        return LoadedState(machine, Rest.UNDECIDED, Status.UNDECIDED.sentence, names)
-    mechanism, balanced = loaded_mechanism(machine, response, joints)
-    if not balanced[0]:
-        return LoadedState(machine, Rest.NO_REST, why_no_tensions(machine), names)
-    solution = at_rest(mechanism)
-    if not solution.settled[0]:
-        return _without_rest(machine, mechanism)
-    members = located_members(machine, response.configuration, None if joints is None else joints.coordinates)
-    pressed = struts(response.configuration.legs, members, response.reference, solution.balance)
-    return _state(machine, response, solution.balance, tuple(pressed))
+    state = state_of(machine)
+    names = state.machine.family.component_names
+    if int(state.free.status) in PLACELESS:
+        return LoadedState(state, Rest.NO_REST, state.refusal, names)
+    if state.free.undecided:
+        return LoadedState(state, Rest.UNDECIDED, Status.UNDECIDED.sentence, names)
+    if not state.balanced[0]:
+        return LoadedState(state, Rest.NO_REST, why_no_tensions(state.machine), names)
+    if state.at_rest is None or state.stability is None:
+        return _without_rest(state)
+    return _at_rest(state, state.at_rest, state.stability)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,19 +159,19 @@ class LoadCurve(Immutable):
     loads: Array
 
 
-def load_curve(machine: Machine, shares: Sequence[float] = SHARES) -> LoadCurve:
+def load_curve(machine: Machine | MachineState, shares: Sequence[float] = SHARES) -> LoadCurve:
     """Follow the state of rest while the loads grow, each share from the one before.
 
     Args:
-        machine: that comes to rest under all of them.
+        machine: that comes to rest under all of them, or its state.
         shares: of the loads, from the least to the greatest.
 
     Raises:
         InputError: as for `under_load`.
     """
-    joints = solve_joints(machine) if machine.family.chains else None
-    mechanism, _ = loaded_mechanism(machine, respond(machine, joints), joints)
-    parts, state = list(machine.family.components), free_state(mechanism)
+    start = state_of(machine)
+    mechanism = start.mechanism
+    parts, state = list(start.machine.family.components), free_state(mechanism)
     moved, loads = [], []
     for share in shares:
         solution = at_rest(with_share(mechanism, share, preload=1.0), state)
@@ -186,27 +182,27 @@ def load_curve(machine: Machine, shares: Sequence[float] = SHARES) -> LoadCurve:
     return LoadCurve(np.array(shares), np.array(moved), tuple(s.name for s in springs), np.array(loads))
 
 
-def _state(machine: Machine, response: Response, equations: Balance, pressed: tuple[Strut, ...]) -> LoadedState:
+def _at_rest(state: MachineState, equations: Balance, judged: Stability) -> LoadedState:
+    machine, response, pressed = state.machine, state.free, state.struts
     mechanism, parts = equations.mechanism, list(machine.family.components)
     units, square = mechanism.twist_units[0], np.ix_(parts, parts)
     compliances = compliance(equations)
     soft = (compliances * mechanism.compliance_units)[0][square]
     springs_alone = (elastic_stiffness(equations, compliances) / mechanism.compliance_units)[0][square]
-    judged = stability(equations)
-    states = _springs(equations)
-    slack = tuple(dict.fromkeys(state.leg for state in states if state.slack))
+    springs = _springs(equations)
+    slack = tuple(dict.fromkeys(spring.leg for spring in springs if spring.slack))
     moving = moving_legs(equations, judged)
-    checks = _limits_at_rest(machine, response, equations)
+    checks = _limits_at_rest(state)
     stays = judged.stable and not any(strut.bends_away for strut in pressed)
     passed = [] if within(checks) else [why_beyond(checks, machine.display)]
     return LoadedState(
-        machine,
+        state,
         Rest.UNSTABLE if not stays else Rest.JOINT_LIMIT if passed else Rest.OK,
-        " ".join([about_rest(machine, equations, judged, slack, pressed), *passed]),
+        " ".join([about_rest(state, judged, slack), *passed]),
         machine.family.component_names,
         _in_si(mechanism, equations.state.platform.amounts()[0], parts),
         _linear(response, mechanism, parts),
-        tuple(states),
+        tuple(springs),
         slack,
         _cleaned(springs_alone),
         _cleaned(inverse(soft[None])[0]),
@@ -220,11 +216,10 @@ def _state(machine: Machine, response: Response, equations: Balance, pressed: tu
     )
 
 
-def _limits_at_rest(machine: Machine, response: Response, equations: Balance) -> list[Check]:
+def _limits_at_rest(state: MachineState) -> list[Check]:
     """The limits of geometry as they are at the pose, and those of the loads of actuators with what these carry."""
-    loads = [(spring, float(size[0])) for spring, size in actuator_loads_at_rest(equations)]
-    at_the_pose = [check for check in response.checks if check.limit.about is not About.LOAD]
-    return [*at_the_pose, *load_checks(machine, response.configuration, loads)]
+    at_the_pose = [check for check in state.free.checks if check.limit.about is not About.LOAD]
+    return [*at_the_pose, *load_checks(state.machine, state.free.configuration, state.actuator_loads)]
 
 
 def _largest_wrench(equations: Balance) -> float:
@@ -284,16 +279,16 @@ def _cleaned(stiffness: Array) -> list[list[float]] | None:
     return clean_matrix(np.where(negligible, 0.0, stiffness).tolist())
 
 
-def _without_rest(machine: Machine, mechanism: Mechanism) -> LoadedState:
+def _without_rest(state: MachineState) -> LoadedState:
     """A machine that comes to no rest, with the state in which it stood last while its loads grew."""
-    names, parts, limit = machine.family.component_names, list(machine.family.components), limit_of(mechanism)
-    message = why_no_rest(machine, limit)
+    family, limit = state.machine.family, state.limit
+    names, parts, message = family.component_names, list(family.components), why_no_rest(state.machine, limit)
     if limit is None:
-        return LoadedState(machine, Rest.NO_REST, message, names)
-    mode = (limit.judged.mode * mechanism.twist_units[0])[parts]
+        return LoadedState(state, Rest.NO_REST, message, names)
+    mode = (limit.judged.mode * state.mechanism.twist_units[0])[parts]
     legs = moving_legs(limit.balance, limit.judged) if mode.any() else []
     return LoadedState(
-        machine, Rest.NO_REST, message, names, factor=limit.share, mode=tuple(mode.tolist()), mode_legs=tuple(legs)
+        state, Rest.NO_REST, message, names, factor=limit.share, mode=tuple(mode.tolist()), mode_legs=tuple(legs)
     )
 
 

@@ -14,16 +14,12 @@ from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array, Complex
 from kinetostat.equilibrium.admissible import starts_of
-from kinetostat.equilibrium.balance import Balance, balance, free_state
-from kinetostat.equilibrium.mechanism import mechanism_of
-from kinetostat.equilibrium.numbers import loaded_mechanism
+from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.shape import loaded_links
-from kinetostat.equilibrium.solving import at_rest, with_share
-from kinetostat.equilibrium.stability import stability
-from kinetostat.kinematics.closure import solve_joints
+from kinetostat.equilibrium.state import SOUGHT_NO_REST, MachineState, state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.deflected import Deflection
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.loads import moving_masses
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.machine import springs as springs_of
@@ -34,15 +30,12 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.attribution import largest_contributors, parts_and_kinds
 from kinetostat.studies.indices import unit_direction
 from kinetostat.studies.quantities import refuse_unknown_mass
-from kinetostat.studies.refusal import why_not
 from kinetostat.tolerances import EQUAL_FREQUENCIES
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.modes import modes as solved_modes
 from kinetostat.vibration.receptance import ASSUMED_RATIO, Damper, Softest, along, damper, least_real_part, receptance
 from kinetostat.vibration.shares import effective_masses, kinetic_shares, strain_shares
 
-HELD_BY_LOADS = (Status.SINGULAR, Status.JOINT_LIMIT)
-"""Statuses without loads that a machine at rest under its loads may have."""
 SMALL = 1e-6
 """Size of the motion by which shapes are read off the exact motions of the links, rad or in machine lengths."""
 MOST_SHOWN = 12
@@ -104,7 +97,7 @@ class Vibration(Immutable):
     """The natural vibrations of a machine at its pose.
 
     Attributes:
-        machine: with its masses.
+        state: of the machine, with its masses.
         status: of the pose.
         message: what is the case, in a sentence or two.
         components: names of the components of twists: rx ry rz x y z, or rz x y.
@@ -120,7 +113,7 @@ class Vibration(Immutable):
         lowest, highest: ends of the range of the response, Hz; None for about the first six modes.
     """
 
-    machine: Machine
+    state: MachineState
     status: Status
     message: str
     components: tuple[str, ...]
@@ -135,6 +128,11 @@ class Vibration(Immutable):
     cutting_pressure: float | None = None
     lowest: float | None = None
     highest: float | None = None
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, with its pose and its masses."""
+        return self.state.machine
 
     def __repr__(self) -> str:
         return f"<Vibration of {self.machine.name!r}: {self.status.word}, {len(self.modes)} modes>"
@@ -189,7 +187,7 @@ class Vibration(Immutable):
 
 @checked
 def modes(
-    machine: Machine,
+    machine: Machine | MachineState,
     along: Sequence[float] = (),
     cutting_pressure: float | str | None = None,
     lowest: float | str | None = None,
@@ -198,7 +196,8 @@ def modes(
     """Find the natural vibrations of a machine at its pose, about its state under load where `machine.loaded` is set.
 
     Args:
-        machine: with its pose; its masses are those of [tool], of its links and of its drives.
+        machine: with its pose, or its state, as `state_of` returns it; its masses are those of [tool], of its links
+            and of its drives.
         along: direction in which the tool is pushed, base axes; that of [cutting] if empty.
         cutting_pressure: cutting force per area of the chip, N/m² or with a unit; that of [cutting] if None.
         lowest, highest: ends of the range of the response, Hz or with a unit; about the first six modes if None.
@@ -207,7 +206,8 @@ def modes(
         InputError: nothing says a mass, rotors have an inertia and nothing says how far they turn, a direction is zero,
             a pressure has no direction, or the range is empty.
     """
-    cutting = machine.tables["cutting"]
+    state = state_of(machine)
+    cutting = state.machine.tables["cutting"]
     if along:
         unit_direction(along, "along")
     direction = tuple(along) or (tuple(cutting.direction) if any(cutting.direction) else ())
@@ -224,7 +224,7 @@ def modes(
     if pressure is not None and not direction:
         raise InputError("cutting_pressure needs the direction across the cut; give along as well, e.g. 1,0,0.")
     return replace(
-        _modes_at_pose(machine),
+        _modes_in(state),
         direction=direction,
         cutting_pressure=pressure or cutting.pressure or None,
         lowest=low,
@@ -232,32 +232,25 @@ def modes(
     )
 
 
-def _modes_at_pose(machine: Machine) -> Vibration:
-    joints = solve_joints(machine) if machine.family.chains else None
-    response = respond(machine, joints)
-    refuse_unknown_mass(machine, "modes", response.configuration)
-    names, status = machine.family.component_names, Status(int(response.status))
-    if status is not Status.OK and not (machine.loaded and status in HELD_BY_LOADS):
-        return Vibration(machine, status, why_not(machine, response, []), names)
-    if machine.loaded:
-        mechanism, balanced = loaded_mechanism(machine, response, joints)
-        rest = at_rest(mechanism)
-        if not (balanced[0] and rest.settled[0] and stability(rest.balance).stable):
-            message = f"{machine.name} comes to no stable rest under its loads; `kinetostat analyze --loaded` says why."
-            return Vibration(machine, Status.NO_REST, message, names, loaded=True)
-        equations = rest.balance
-    else:
-        mechanism = with_share(mechanism_of(machine, response, joints), 0.0)
-        equations = balance(mechanism, free_state(mechanism))
+def _modes_in(state: MachineState) -> Vibration:
+    machine, names, status = state.machine, state.machine.family.component_names, state.status
+    refuse_unknown_mass(machine, "modes", state.free.configuration)
+    if status is not Status.OK and (not machine.loaded or status in SOUGHT_NO_REST):
+        return Vibration(state, status, state.refusal, names)
+    equations = state.equations
+    if equations is None:
+        message = f"{machine.name} comes to no stable rest under its loads; `kinetostat analyze --loaded` says why."
+        return Vibration(state, Status.NO_REST, message, names, loaded=True)
     solution = solved_modes(equations)
     if solution is None:
-        return Vibration(machine, Status.SINGULAR, TOO_DIFFERENT, names)
+        return Vibration(state, Status.SINGULAR, TOO_DIFFERENT, names)
     if not solution.squares.size:
-        return Vibration(machine, Status.OK, NOTHING_RINGS, names)
-    return _vibration(machine, response, equations, solution)
+        return Vibration(state, Status.OK, NOTHING_RINGS, names)
+    return _vibration(state, equations, solution)
 
 
-def _vibration(machine: Machine, response: Response, equations: Balance, solution: Modes) -> Vibration:
+def _vibration(state: MachineState, equations: Balance, solution: Modes) -> Vibration:
+    machine, response = state.machine, state.free
     table = machine.tables["damping"]
     friction = equations.mechanism.legs and any(leg.dampers.any() for leg in equations.mechanism.legs)
     assumed = not (friction or table.ratio or table.per_mass or table.per_stiffness)
@@ -269,7 +262,7 @@ def _vibration(machine: Machine, response: Response, equations: Balance, solutio
     shown = tuple(_modes(machine, response, equations, solution, damping))
     message, names = _message(machine, response, shown), machine.family.component_names
     return Vibration(
-        machine, Status.OK, message, names, machine.loaded, shown, sum(known), uncounted, assumed, solution, damping
+        state, Status.OK, message, names, machine.loaded, shown, sum(known), uncounted, assumed, solution, damping
     )
 
 

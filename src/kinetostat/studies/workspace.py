@@ -17,10 +17,9 @@ import xarray as xr
 from kinetostat.arrays import Codes, Float32s, Integers, Mask
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import PER_CELL, Cells
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import limits_loads
-from kinetostat.machine.loads import loads_left_out
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.arguments import checked
@@ -314,7 +313,7 @@ def _dataset(
         wanted[f"{BORDER_VARIABLES}{dim}"] = (dims, edge, {"long_name": f"{BORDER_MEANING} {dim}", "units": "1"})
     pose = {path: float(value) for path, value in values(judge.machine).items() if path.startswith("pose.")}
     mode = {} if judge.machine.family.chains is None else {"assembly_mode": HOME_MODE}
-    uncounted = "" if judge.machine.loaded else loads_left_out(judge.machine, respond(judge.machine).configuration)
+    uncounted = state_of(judge.machine).left_out
     left_out = {LEFT_OUT: uncounted} if uncounted and limits_loads(judge.machine.tables["limits"]) else {}
     return wanted.assign_attrs({**figures, "volume_method": METHOD, **mode, **left_out, **pose})
 

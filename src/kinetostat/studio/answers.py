@@ -13,11 +13,11 @@ import numpy as np
 from kinetostat.arrays import Array
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Axis, Grid
-from kinetostat.equilibrium.numbers import judged_at_rest
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.kinematics.singularity import free_twist
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.common_tables import Load
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Machine
@@ -71,8 +71,8 @@ class Picture:
 
 def picture(request: PictureRequest) -> Picture:
     """Draw the machine at its pose; at a singular pose, together with the motion that stays free."""
-    response = judged_at_rest(request.machine, respond(request.machine))
-    status = Status(int(response.status))
+    state = state_of(request.machine)
+    response, status = state.response, state.status
     if status is not Status.OK and not _drawable(status, response):
         return Picture(status, None)
     scene = scenes.machine_scene(request.machine, response.configuration, request.sizes)
@@ -138,11 +138,12 @@ class Report:
 
 def report(request: ReportRequest) -> Report:
     """Analyse the machine at its pose and make the solids that are drawn over it."""
-    analysis = analyze(request.machine)
+    state = state_of(request.machine)
+    analysis = analyze(state)
     unplaced = analysis.status in PLACELESS
-    placed = () if unplaced else respond(request.machine).configuration.legs
+    placed = () if unplaced else state.free.configuration.legs
     legs = {str(spring.of): leg.name for leg in placed for spring in leg.springs}
-    loaded, refused = _at_rest(request.machine) if request.machine.loaded else (None, "")
+    loaded, refused = _at_rest(state) if request.machine.loaded else (None, "")
     if loaded is None:
         solids, factor = overlays_of(analysis, request.sizes, request.exaggeration)
     else:
@@ -151,10 +152,10 @@ def report(request: ReportRequest) -> Report:
     return Report(analysis, legs, request.sizes, data, factor, loaded, refused)
 
 
-def _at_rest(machine: Machine) -> tuple[LoadedState | None, str]:
+def _at_rest(state: MachineState) -> tuple[LoadedState | None, str]:
     """The machine under its loads, or why these are refused."""
     try:
-        return under_load(machine), ""
+        return under_load(state), ""
     except InputError as error:
         return None, str(error)
 

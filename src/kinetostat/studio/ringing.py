@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from kinetostat.arrays import Array, Complex
-from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.vibration import Vibration, frequency_range, modes
@@ -65,4 +64,4 @@ def swing(request: SwingRequest) -> list[dict[str, Any]]:
     shape, machine = request.answer.modes[request.number].shape, request.answer.machine
     if shape is None:
         return []
-    return swing_data(machine, respond(machine).configuration, request.sizes, shape)
+    return swing_data(machine, request.answer.state.free.configuration, request.sizes, shape)

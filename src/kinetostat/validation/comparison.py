@@ -17,12 +17,9 @@ import numpy as np
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.balance import balance, free_state
-from kinetostat.equilibrium.mechanism import mechanism_of
-from kinetostat.equilibrium.solving import with_share
-from kinetostat.kinematics.closure import solve_joints
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import values
 from kinetostat.spec.arguments import checked
@@ -223,10 +220,10 @@ def validate(machine: Machine, engine: str | None = None) -> Validation:
         InputError: if there is no such engine, no compliance to compare, or a part that the engine cannot have.
     """
     chosen = choose(engine)
-    joints = solve_joints(machine) if machine.family.chains else None
-    response = respond(machine, joints)
+    state = state_of(machine)
+    response = state.free
     ours = _our_compliance(response)
-    drawn = drawing(machine, response, joints)
+    drawn = drawing(machine, response, state.joints)
     answer = chosen.solve(drawn.configuration, drawn.reference)
     length = float(response.configuration.length)
     uncertainty = _uncertainty(answer, ours, length)
@@ -264,9 +261,7 @@ def frequency_pairs(machine: Machine, engine: Engine) -> tuple[tuple[float, floa
     Raises:
         InputError: if the machine has a part that the engine cannot have.
     """
-    joints = solve_joints(machine) if machine.family.chains else None
-    mechanism = with_share(mechanism_of(machine, respond(machine, joints), joints), 0.0)
-    counted = frequencies(balance(mechanism, free_state(mechanism)))[0].tolist()
+    counted = frequencies(state_of(machine).relaxed)[0].tolist()
     ours = [frequency for frequency in counted if math.isfinite(frequency)]
     if not ours or not engine.modes:
         return ()

@@ -13,8 +13,7 @@ import numpy as np
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
-from kinetostat.kinematics.closure import solve_joints
-from kinetostat.kinetostatics.response import respond
+from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.leg import Joint, Spring
 from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Configuration, Machine, Plane
@@ -292,9 +291,8 @@ def frequencies(machine: Machine) -> Array:
     Raises:
         InputError: if the machine has a part that cannot be built.
     """
-    joints = solve_joints(machine) if machine.family.chains else None
-    response = respond(machine, joints)
-    drawn, struts = drawing(machine, response, joints), not has_rotors(machine)
+    state = state_of(machine)
+    drawn, struts = drawing(machine, state.free, state.joints), not has_rotors(machine)
     model, _ = build(drawn.configuration, drawn.reference)
     model.system.Assemble()
     unit = float(np.max(np.abs(model.system.ComputeLinearizedSystem(settings_of(model))[1])))

@@ -12,12 +12,8 @@ import numpy as np
 
 from kinetostat.arrays import Array, Complex
 from kinetostat.equilibrium.balance import Balance, balance, free_state
-from kinetostat.equilibrium.mechanism import mechanism_of
-from kinetostat.equilibrium.solving import with_share
-from kinetostat.kinematics.closure import solve_joints
-from kinetostat.kinetostatics.response import Response
+from kinetostat.equilibrium.state import MachineState
 from kinetostat.machine.column import stacked
-from kinetostat.machine.machine import Machine
 from kinetostat.vibration.modes import Modes, damping_matrix, modes
 
 ASSUMED_RATIO = 0.02
@@ -131,18 +127,15 @@ def _lowest(modes: Modes, damping: Damper, direction: Array, frequencies: Array)
     return int(np.argmin(along(receptance(modes, damping, frequencies), direction).real))
 
 
-def cut_receptances(machine: Machine, response: Response, count: int) -> Array:
+def cut_receptances(state: MachineState) -> Array:
     """The least real part of the receptance across the cut at n poses, m/N [n]; NaN where nothing holds the machine.
 
     Poses are taken in turn: a few milliseconds each.
 
     Args:
-        machine: at n poses, with its tables [cutting] and [damping].
-        response: the response of the machine at its pose.
-        count: of poses, n.
+        state: of a machine with its tables [cutting] and [damping], at n poses.
     """
-    joints = solve_joints(machine) if machine.family.chains else None
-    mechanism = with_share(mechanism_of(machine, response, joints, count), 0.0)
+    machine, mechanism, count = state.machine, state.relaxed.mechanism, state.count
     table, result = machine.tables["damping"], np.full(count, np.nan)
     directions = stacked(machine.tables["cutting"].direction, count)
     damping = stacked([table.ratio, table.per_mass, table.per_stiffness], count)

@@ -17,14 +17,15 @@ from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.algebra.solve import Row, eliminated
 from kinetostat.algebra.symmetric import eigenvalues
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.balance import balance, free_state, placed_leg
+from kinetostat.equilibrium.balance import placed_leg
 from kinetostat.equilibrium.cut import Cut, Rod, cut
 from kinetostat.equilibrium.mechanism import mechanism_of, platform_weights
 from kinetostat.equilibrium.reduced import place_of, relative
 from kinetostat.equilibrium.solving import with_share
-from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.quantities import MODES
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.loads import PLATFORM, moving_masses
 from kinetostat.machine.machine import Machine
 from kinetostat.numerics.motions import of_scalars
@@ -40,12 +41,11 @@ MAKES_MASSIVE = re.compile(r"linear_density\.|drives\.rotor_inertia|legs\..*\.ma
 
 def reducible(machine: Machine, varying: Collection[str] = ()) -> bool:
     """Whether `free_frequencies` takes a machine wherever its varying parameters (leaf paths) are."""
-    joints = solve_joints(machine) if machine.family.chains else None
+    state = state_of(machine)
     with np.errstate(all="ignore"):
-        response = respond(machine, joints)
-        if platform_alone(machine, varying):
+        if platform_alone(state, varying):
             return True
-        machine_cut = cut(with_share(mechanism_of(machine, response, joints), 0.0))
+        machine_cut = cut(state.relaxed.mechanism)
         return machine_cut is not None and not leaves_plane(machine, machine_cut)
 
 
@@ -54,9 +54,10 @@ def leaves_plane(machine: Machine, machine_cut: Cut) -> bool:
     return machine.family.planar and any(spring is not None for spring in machine_cut.carrier.springs)
 
 
-def platform_alone(machine: Machine, varying: Collection[str] = ()) -> bool:
+def platform_alone(machine: Machine | MachineState, varying: Collection[str] = ()) -> bool:
     """Whether no leg has a mass or a rotor wherever the varying parameters (leaf paths) are."""
-    return light(machine, respond(machine)) and not any(MAKES_MASSIVE.match(path) for path in varying)
+    state = state_of(machine)
+    return light(state.machine, state.free) and not any(MAKES_MASSIVE.match(path) for path in varying)
 
 
 def light(machine: Machine, response: Response) -> bool:
@@ -82,18 +83,11 @@ def free_frequencies(machine: Machine, response: Response, joints: Joints | None
     return frequencies_at(machine_cut, [0.0] * machine_cut.carrier.size, sloped)
 
 
-def pose_frequencies(machine: Machine, response: Response, count: int) -> Array:
-    """The same of any machine at n poses, by NumPy [n x MODES]; NaN where springs do not hold it.
-
-    Args:
-        machine: at n poses: with columns of them.
-        response: the response of the machine at its pose.
-        count: of poses, n.
-    """
+def pose_frequencies(state: MachineState) -> Array:
+    """The same of any machine at n poses, by NumPy [n x MODES]; NaN where springs do not hold it."""
+    machine, response, count = state.machine, state.free, state.count
     if not light(machine, response):
-        joints = solve_joints(machine) if machine.family.chains else None
-        mechanism = with_share(mechanism_of(machine, response, joints, count), 0.0)
-        return frequencies(balance(mechanism, free_state(mechanism)))
+        return frequencies(state.relaxed)
     entries = [entry for row in platform_matrix(machine, response) for entry in row]
     size = len(machine.family.components)
     matrices = of_scalars(entries, count).reshape(count, size, size)

@@ -16,12 +16,13 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, total
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.admissible import starts_of, tangent_matrices
-from kinetostat.equilibrium.balance import Balance, balance, free_state, placed_leg
+from kinetostat.equilibrium.balance import Balance, placed_leg
 from kinetostat.equilibrium.chains import Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.solving import with_share
-from kinetostat.kinematics.closure import Joints, solve_joints
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.equilibrium.state import MachineState
+from kinetostat.kinematics.closure import Joints
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
 from kinetostat.numerics.motions import of_scalars, still
 from kinetostat.tolerances import CLOSING_ROUND_OFF, UNRESISTED
@@ -45,9 +46,8 @@ def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
         the legs. NaN where springs do not hold the machine, or where a link has an inertia about an axis about which it
         is free to spin.
     """
-    joints = solve_joints(machine) if machine.family.chains else None
-    mechanism = with_share(mechanism_of(machine, respond(machine, joints), joints, count), 0.0)
-    equations = balance(mechanism, free_state(mechanism))
+    equations = MachineState(machine, count).relaxed
+    mechanism = equations.mechanism
     elastic, geometric, conditions = tangent_matrices(equations)
     stiff, mass, closing = elastic + geometric, mass_matrix(equations), conditions.shape[1]
     held_still = np.concatenate([conditions, motions_left_out(equations)], axis=1)

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from kinetostat.arrays import Array
 from kinetostat.display import Scale, number
 from kinetostat.kinetostatics.deflected import Deflection
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.under_load import LoadedState, load_curve
@@ -41,7 +41,7 @@ def load_figure(state: LoadedState, title: str = "{}: under growing load") -> Fi
         state: of the machine under its whole load.
         title: over the figure, with braces for the name of the machine.
     """
-    machine, curve = state.machine, load_curve(state.machine)
+    machine, curve = state.machine, load_curve(state.state)
     display, share = machine.display, 100.0 * curve.shares
     groups = [
         ([i for i, name in enumerate(state.components) if name.startswith("r")], "rotation", "rad"),
@@ -77,7 +77,7 @@ def shape_figure(state: LoadedState, title: str = "{}: under load") -> Figure:
         state: of a machine that is at rest.
         title: over the figure, with braces for the name of the machine.
     """
-    machine, response = state.machine, respond(state.machine)
+    machine, response = state.machine, state.state.free
     moved, named = motions_of(state, response), ("without loads", "at rest under load")
     return moved_figure(machine, response, moved, title.format(machine.name), named, state.slack_legs)
 

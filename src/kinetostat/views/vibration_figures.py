@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from kinetostat.arrays import Array
-from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.setting import setting_of
 from kinetostat.studies.vibration import DRAWN, Vibration, frequency_range
 from kinetostat.views.figures import COLOURS, DASHES, STYLE, fix_layout, note_setting, set_title
@@ -123,4 +122,4 @@ def shape_figure(answer: Vibration, number: int, title: str = "{}: mode {} at {}
     if mode.shape is None:
         raise IndexError(number)
     heading = title.format(machine.name, number + 1, machine.display.show(mode.frequency, "Hz"))
-    return moved_figure(machine, respond(machine), mode.shape, heading, ("at rest", "in the mode"), size=ANY_SIZE)
+    return moved_figure(machine, answer.state.free, mode.shape, heading, ("at rest", "in the mode"), size=ANY_SIZE)

@@ -11,6 +11,7 @@ import xarray as xr
 from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, evaluate, silent
 from kinetostat.engine.points import PointTable
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.kinetostatics.response import respond
@@ -115,22 +116,23 @@ def gather(
     record = read_fit(fit) if fit else None
     if record:
         record.check(machine, drawn=False)
-    analysis = analyze(machine)
+    here = state_of(machine)
+    analysis = analyze(here)
     if analysis.status is not Status.OK:
         return Answers(machine, analysis, result=result)
     over = list(ranges) or usual_ranges(machine, MAP_POINTS)
     refused: dict[str, str] = {}
     if not over:
         refused["maps"] = "No coordinate of the pose can change by itself here, so that there is nothing to map."
-    judged, state = requirements(machine), under_load(machine) if machine.loaded else None
+    judged, state = requirements(machine), under_load(here) if machine.loaded else None
     built = budget(machine) if machine.tolerances else None
-    rings = modes(machine) if machine.tables["tool"].mass or machine.tables["tool"].payload else None
+    rings = modes(here) if machine.tables["tool"].mass or machine.tables["tool"].payload else None
     progress(1, STEPS)
     maps = evaluate_grid(machine, over, list(_diagonal(machine))) if over and "maps" not in without else None
     first = "loaded_frequency_1" if machine.loaded else "frequency_1"
     frequencies = evaluate_grid(machine, over, [first]) if maps is not None and rings and rings.modes else None
     progress(2, STEPS)
-    ranked = sensitivity(machine) if "sensitivity" not in without else None
+    ranked = sensitivity(here) if "sensitivity" not in without else None
     progress(3, STEPS)
     advice = _advice(machine, over) if "guidelines" not in without else None
     progress(5, STEPS)

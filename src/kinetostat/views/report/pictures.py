@@ -15,7 +15,6 @@ from typing import Any
 
 from matplotlib.figure import Figure as Drawing
 
-from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.vibration import Vibration
 from kinetostat.views.figures import as_svg
@@ -80,7 +79,7 @@ class Shown:
 def shown(analysis: Analysis, vibration: Vibration | None = None) -> Shown:
     """Build the solids of an analysed machine with its overlays, and the swings of its modes where these are known."""
     machine = analysis.machine
-    configuration = respond(machine).configuration
+    configuration = analysis.state.free.configuration
     sizes = proportions_of(machine, configuration)
     overlays, factor = overlays_of(analysis, sizes)
     swings = [

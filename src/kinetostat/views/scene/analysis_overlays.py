@@ -14,7 +14,7 @@ from kinetostat.algebra.vector import IDENTITY, Displacement, Vector, rotation_a
 from kinetostat.kinetostatics.deflected import Deflection, deflected_links
 from kinetostat.kinetostatics.indices import Principal
 from kinetostat.kinetostatics.loading import deflection
-from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.under_load import LoadedState
@@ -49,7 +49,7 @@ def overlays_of(
     """
     if analysis.indices is None:
         return [], None
-    machine, response = analysis.machine, respond(analysis.machine)
+    machine, response = analysis.machine, analysis.state.free
     configuration = response.configuration
     solids = compliance_overlays(machine, configuration, sizes, analysis.indices.principal_compliances)
     if analysis.load is None:
@@ -72,7 +72,7 @@ def loaded_overlays(
     """
     if not state.displacement:
         return [], None
-    response = respond(state.machine)
+    response = state.state.free
     moved = motions_of(state, response)
     chosen = factor or exaggeration_of(response, moved, sizes.diagonal)
     return deflection_overlays(state.machine, response.configuration, sizes, moved, chosen)

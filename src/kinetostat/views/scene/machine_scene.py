@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.refusal import why_not
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import BASE_FRAME, Configuration, Machine
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.refusal import why_not
 from kinetostat.views.scene import overlays, shapes
 from kinetostat.views.scene.anatomy import Anatomy, anatomy, together
 from kinetostat.views.scene.leg_solids import joint_radius, leg_solids, rail_ends

@@ -1,0 +1,309 @@
+"""A machine in a state: free, with relaxed springs, or at rest under its loads. Every question about a pose reads it.
+
+What follows from a pose is computed when it is first asked for, and kept: where the legs are, their screws, K and C,
+what moves, the equations at rest, and how the machine stands there. A state is made once and handed on, so that no two
+answers solve for the same joints. What is not about a pose, and what an answer says in words, has no place here.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from kinetostat.algebra.scalar import total
+from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.equilibrium.balance import Balance, balance, free_state
+from kinetostat.equilibrium.buckling import Strut, struts
+from kinetostat.equilibrium.limit import Limit, limit_of
+from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
+from kinetostat.equilibrium.solving import at_rest, with_share
+from kinetostat.equilibrium.stability import Stability, stability
+from kinetostat.equilibrium.tensions import tensioned
+from kinetostat.kinematics.closure import Joints, solve_joints
+from kinetostat.kinematics.limits import load_checks, within
+from kinetostat.kinematics.mobility import Mobility
+from kinetostat.kinematics.status import PLACELESS, Status
+from kinetostat.kinetostatics.quantities import rest_numbers
+from kinetostat.kinetostatics.refusal import known_mobility, why_not
+from kinetostat.kinetostatics.response import Response, respond
+from kinetostat.machine.column import Column, stacked
+from kinetostat.machine.leg import Spring
+from kinetostat.machine.links import growth_of
+from kinetostat.machine.loads import loads_left_out, located_members
+from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.parameters import POSE, parameters, values, with_values
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.immutable import Immutable
+
+HELD_BY_LOADS = (Status.OK, Status.SINGULAR)
+"""Statuses without loads at which a machine may come to rest: tension and weight hold where springs do not."""
+SOUGHT_NO_REST = (*PLACELESS, Status.UNDECIDED)
+"""Statuses without loads at which nobody can look for a rest: no place, or no knowing what carries a load."""
+NEARBY = 0.03
+"""How far from the pose general mobility is looked for: share of the characteristic length; in angles, rad."""
+
+
+@dataclass(frozen=True, eq=False)
+class MachineState(Immutable):
+    """A machine at its pose, or at n poses, with all that follows from it.
+
+    `machine.loaded` says which state is meant: free, or at rest under all loads of the file. What is `free`, `relaxed`
+    or about limits and motions is known of both; what is at rest is solved for where somebody asks.
+
+    Attributes:
+        machine: with its pose and its loads, or with columns of n poses.
+        count: of poses, n.
+    """
+
+    machine: Machine
+    count: int = 1
+
+    def __repr__(self) -> str:
+        return f"<{self.machine.name!r}, {'at rest under its loads' if self.machine.loaded else 'free'}>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return MachineState, (self.machine, self.count)
+
+    def at(self, rows: Integers) -> "MachineState":
+        """The states at some of the poses [rows]; this one where these are all of them."""
+        if len(rows) == self.count:
+            return self
+        columns = {p: value.values[rows] for p, value in values(self.machine).items() if isinstance(value, Column)}
+        return MachineState(with_values(self.machine, columns), len(rows))
+
+    @cached_property
+    def joints(self) -> Joints | None:
+        """Joint coordinates that close the legs; None of a family that places its legs in closed form."""
+        return solve_joints(self.machine) if self.machine.family.chains else None
+
+    @cached_property
+    def free(self) -> Response:
+        """The free machine: placed legs with their screws, K and C, and its limits as far as they are about it."""
+        return respond(self.machine, self.joints)
+
+    @cached_property
+    def response(self) -> Response:
+        """The free machine, judged in the state that is meant: limits compare what actuators carry there.
+
+        Nothing changes where nothing limits the loads of actuators, where the machine comes to no rest, and where its
+        loads say too little: the answer about its rest says so.
+        """
+        if "actuators" not in rest_numbers(self.machine, ()) or int(self.free.status) not in HELD_BY_LOADS:
+            return self.free
+        try:
+            stands = self.stands
+        except InputError:
+            return self.free
+        if not stands:
+            return self.free
+        checks = load_checks(self.machine, self.free.configuration, self.actuator_loads)
+        passed = int(self.free.status) == Status.OK and not within(checks)
+        status = Status.JOINT_LIMIT if passed else self.free.status
+        return replace(self.free, status=status, checks=(*self.free.checks, *checks))
+
+    @cached_property
+    def status(self) -> Status:
+        """Status of the pose."""
+        return Status(int(self.response.status))
+
+    @cached_property
+    def nearby(self) -> list[Configuration]:
+        """The machine at up to three poses near its pose, to tell what holds in general from what is special here."""
+        return _nearby(self.machine, float(self.free.configuration.length))
+
+    @cached_property
+    def mobility(self) -> Mobility | None:
+        """What can move, and what sort of pose it is; None where the joints have no place."""
+        return known_mobility(self.free, self.nearby)
+
+    @cached_property
+    def refusal(self) -> str:
+        """Why the pose has no answer, and what to change, in a sentence or two; empty where it has one."""
+        if self.status is Status.OK:
+            return ""
+        return why_not(self.machine, self.response, self.nearby if self.status is Status.SINGULAR else [])
+
+    @cached_property
+    def left_out(self) -> str:
+        """Which loads of the file do not count in the state that is meant, in a sentence; empty where all do."""
+        return "" if self.machine.loaded else loads_left_out(self.machine, self.free.configuration)
+
+    @cached_property
+    def relaxed(self) -> Balance:
+        """The equations of the free state, without loads and preloads."""
+        mechanism = with_share(mechanism_of(self.machine, self.free, self.joints, self.count), 0.0)
+        return balance(mechanism, free_state(mechanism))
+
+    @cached_property
+    def _loads(self) -> tuple[Mechanism, Mask]:
+        return _loaded_mechanism(self.machine, self.free, self.joints, self.count)
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The machine with all its loads and the tensions that its file leaves open, as rows of screw motions.
+
+        Raises:
+            InputError: there is gravity but nothing says a mass, or bounds of tensions contradict each other.
+        """
+        return self._loads[0]
+
+    @property
+    def balanced(self) -> Mask:
+        """Where tensions within their bounds hold the loads; everywhere if none are to be chosen [n]."""
+        return self._loads[1]
+
+    @cached_property
+    def at_rest(self) -> Balance | None:
+        """The equations where the machine is at rest under its loads at a single pose, stable or not.
+
+        None where the machine has no place, where rigid parts leave undecided what carries a load, or where it comes to
+        no rest.
+
+        Raises:
+            InputError: as for `mechanism`.
+        """
+        if int(self.free.status) in PLACELESS or self.free.undecided or not self.balanced[0]:
+            return None
+        solution = at_rest(self.mechanism)
+        return solution.balance if solution.settled[0] else None
+
+    @cached_property
+    def stability(self) -> Stability | None:
+        """Whether the machine stays where it is at rest, and how far its loads may grow; None without a rest."""
+        return None if self.at_rest is None else stability(self.at_rest)
+
+    @property
+    def stands(self) -> bool:
+        """Whether the machine comes to rest under its loads and its springs hold it there."""
+        return self.stability is not None and self.stability.stable
+
+    @property
+    def equations(self) -> Balance | None:
+        """The equations in the state that is meant, at a single pose; None where it comes to no stable rest."""
+        if not self.machine.loaded:
+            return self.relaxed
+        return self.at_rest if self.stands else None
+
+    @cached_property
+    def limit(self) -> Limit | None:
+        """The state in which the machine stands last while its loads grow, up to all of them; None if it never does."""
+        return limit_of(self.mechanism)
+
+    @cached_property
+    def struts(self) -> tuple[Strut, ...]:
+        """What presses each strut whose E I is known at rest; none without a rest."""
+        if self.at_rest is None:
+            return ()
+        configuration, joints = self.free.configuration, None if self.joints is None else self.joints.coordinates
+        members = located_members(self.machine, configuration, joints)
+        return tuple(struts(configuration.legs, members, self.free.reference, self.at_rest))
+
+    @cached_property
+    def actuator_loads(self) -> list[tuple[Spring, float]]:
+        """Every actuator with the size of what it carries at rest, N or N·m; none without a rest."""
+        loads = [] if self.at_rest is None else actuator_loads_at_rest(self.at_rest)
+        return [(spring, float(size[0])) for spring, size in loads]
+
+
+def state_of(machine: Machine | MachineState) -> MachineState:
+    """The state of a machine at its pose; a state that has been made already is handed on as it is."""
+    return machine if isinstance(machine, MachineState) else MachineState(machine)
+
+
+def states_at(machine: Machine, columns: Mapping[str, Array], count: int) -> MachineState:
+    """The states of a machine at n poses.
+
+    Args:
+        machine: gives all parameters that do not vary.
+        columns: values of those that vary by leaf path, SI [n].
+        count: n.
+    """
+    return MachineState(with_values(machine, columns), count)
+
+
+def _nearby(machine: Machine, length: float) -> list[Configuration]:
+    """Return the machine at up to three poses near its pose: those that it can reach, of three that are tried.
+
+    Mobility is a rank, and a rank can drop at a special pose, so that other poses must show what holds in general. They
+    are random, so that none lies on a symmetry of the machine, but the seed is fixed, so that they never change.
+    `length` is the characteristic length.
+    """
+    kinds = {p.path: p.quantity.kind for p in parameters(machine.family) if p.path.startswith(POSE)}
+    reach = {path: NEARBY * (length if kind == "length" else 1.0) for path, kind in kinds.items()}
+    here, rng = values(machine), np.random.default_rng(0)
+    poses = [{path: here[path] + r * float(rng.uniform(-1, 1)) for path, r in reach.items()} for _ in range(3)]
+    answers = [respond(with_values(machine, pose)) for pose in poses]
+    return [answer.configuration for answer in answers if Status(int(answer.status)) is Status.OK]
+
+
+def actuator_loads_at_rest(equations: Balance) -> list[tuple[Spring, Array]]:
+    """Return every actuator with the size of what it carries in a state, N or N·m [n]."""
+    mechanism = equations.mechanism
+    holding = total([terms.holding for terms in equations.legs])
+    units = [mechanism.force * (1.0 if spring.joint.point is None else mechanism.length) for spring in mechanism.driven]
+    return [(spring, abs(load) * unit) for spring, load, unit in zip(mechanism.driven, holding.T, units, strict=False)]
+
+
+def _loaded_mechanism(
+    machine: Machine, response: Response, joints: Joints | None, count: int = 1
+) -> tuple[Mechanism, Mask]:
+    """The mechanism of a machine with its loads, see `mechanism_of`, with the tensions that its file leaves open.
+
+    Returns:
+        The mechanism, and where tensions within their bounds hold its loads; everywhere if none are to be chosen [n].
+
+    Raises:
+        InputError: there is gravity but nothing says a mass, or bounds of tensions contradict each other.
+    """
+    mechanism = mechanism_of(machine, response, joints, count)
+    check_loads(machine, count, mechanism.weighs)
+    load = machine.tables["load"]
+    least, most = (stacked([getattr(load, f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
+    if np.isinf(least).all() and np.isinf(most).all():
+        return mechanism, np.ones(count, dtype=bool)
+    least = np.where(np.isinf(least), 0.0, least)
+    if (least > most).any():
+        show = machine.display.show
+        raise InputError(
+            f"{machine.name}: load.min_tension is {show(float(least.max()), 'N')}, more than load.max_tension, "
+            f"{show(float(most.min()), 'N')}; lower the one or raise the other."
+        )
+    if not any(leg.sign.any() for leg in mechanism.legs):
+        raise InputError(
+            f"{machine.name}: load.min_tension and load.max_tension bound what only pulls or only pushes, which no "
+            'spring does; write acts = "pulls" at an actuator, or a leg of type = "cable".'
+        )
+    return tensioned(mechanism, least / mechanism.force, most / mechanism.force)
+
+
+def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:
+    """Refuse loads at n poses that say too little.
+
+    Args:
+        machine: with its loads.
+        count: of poses, n.
+        weighs: whether any of its masses is known.
+
+    Raises:
+        InputError: there is gravity but nothing says a mass, or it turns about no axis; links are warmer, but nothing
+            says how they grow.
+    """
+    load = machine.tables["load"]
+    if not weighs and np.any(stacked(load.gravity, count)):
+        raise InputError(
+            f"{machine.name}: load.gravity pulls at masses, but none is known; give the platform's as [tool] mass, or "
+            "links a cross-section with a density."
+        )
+    for kind in machine.family.links:
+        tables = (getattr(machine.tables[table], kind.name) for table in ("expansion", "temperature_rise"))
+        expansions, rises = (entries if isinstance(entries, tuple) else (entries,) for entries in tables)
+        for expansion, rise in zip(expansions, rises, strict=True):
+            growth_of(expansion, float(np.abs(stacked([rise], count)).max(initial=0.0)), kind.name)
+    turned = np.any(stacked([load.gravity_angle], count))
+    if turned and not stacked(load.gravity_axis, count).any(axis=1).all():
+        raise InputError(
+            f"{machine.name}: load.gravity_axis is [0, 0, 0], so that gravity cannot be turned by load.gravity_angle; "
+            "give the axis of the base about which the machine is tilted, e.g. [1, 0, 0]."
+        )
