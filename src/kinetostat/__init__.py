@@ -18,6 +18,7 @@ _HOMES = {
     "forward": "kinetostat.studies.assembly",
     "under_load": "kinetostat.studies.under_load",
     "modes": "kinetostat.studies.vibration",
+    "state_of": "kinetostat.equilibrium.state",
     "state_space": "kinetostat.studies.state_space",
     "carrying_legs": "kinetostat.studies.carrying",
     "command": "kinetostat.studies.command",
@@ -71,7 +72,7 @@ __all__ = [
     "InputError", "Machine", "Status", "analyze", "budget", "build", "bundled", "carrying_legs", "changed", "command",
     "compare", "correction_table", "evaluate", "evaluate_grid", "export", "forward", "guidelines", "identify", "load",
     "load_problem", "machine_picture", "modes", "optimize", "plot", "register", "report", "reproduce", "requirements",
-    "save", "sensitivity", "state_space", "under_load", "validate", "validate_measured", "workspace",
+    "save", "sensitivity", "state_of", "state_space", "under_load", "validate", "validate_measured", "workspace",
 ]  # fmt: skip
 
 

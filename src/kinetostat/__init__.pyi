@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from kinetostat.equilibrium.state import state_of as state_of
 from kinetostat.exchange.formats import export as export
 from kinetostat.kinematics.status import Status as Status
 from kinetostat.machine.catalogue import register as register

@@ -34,6 +34,7 @@ from kinetostat.machine.links import growth_of
 from kinetostat.machine.loads import loads_left_out, located_members
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import POSE, parameters, values, with_values
+from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 
@@ -207,6 +208,7 @@ class MachineState(Immutable):
         return [(spring, float(size[0])) for spring, size in loads]
 
 
+@checked
 def state_of(machine: Machine | MachineState) -> MachineState:
     """The state of a machine at its pose; a state that has been made already is handed on as it is."""
     return machine if isinstance(machine, MachineState) else MachineState(machine)

@@ -1,4 +1,7 @@
-"""Refusals: the sentence that says why a pose has no answer, and what to change."""
+"""The sentence that says why a pose has no answer, and what to change.
+
+Source of what it puts into words: theory sections 2 and 9, and (24)-(27) for what moves.
+"""
 
 import math
 from collections.abc import Sequence
