@@ -12,8 +12,7 @@ from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.document import parse
-from kinetostat.spec.study import read_study
-from kinetostat.spec.study_text import study_toml
+from kinetostat.spec.study import read_study, study_toml
 from kinetostat.studies.bundled import bundled_studies
 from refusals import refused
 

@@ -3,8 +3,7 @@
 import pytest
 
 from kinetostat.spec.document import parse
-from kinetostat.spec.study import read_study
-from kinetostat.spec.study_text import study_toml
+from kinetostat.spec.study import read_study, study_toml
 from kinetostat.studies.bundled import bundled_studies, study_of
 
 ODD = """

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinetostat.spec.text_bounds import DEEPEST, check_bounds
+from kinetostat.spec.document import DEEPEST, check_bounds
 from refusals import refused
 
 PIECES = ['"', '"""', "'", "'''", "\\", "#", "\n", ".", "=", ",", "[", "]", "{", "}", "a", " ", '"b"', "1.5", "x = "]

@@ -4,7 +4,6 @@ Actuators with springs in a row become series of parts; whatever else deflects b
 link, which is exact. Points, axes and matrices are in the base frame at the pose, which is the file's home pose.
 """
 
-import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,7 +25,7 @@ from kinetostat.machine.loads import turned_tensor
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.rods import driven_slides, rods
 from kinetostat.machine.written.plan import BASE, NAME, PLATFORM, SPATIAL_POSE
-from kinetostat.spec.document import Document, toml_key
+from kinetostat.spec.document import Document, toml_key, toml_pairs, toml_value
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import LARGEST_OTHER, quantities
 from kinetostat.spec.validation import SCHEMA_VERSION
@@ -318,20 +317,12 @@ def _text(document: Document, machine: Machine) -> str:
         f"# {machine.name}, leg by leg at the pose of its file, which is the home pose here. Numbers are in SI.",
         "# Links as a 6x6 are those of this pose; masses of links are not carried over.",
     ]
-    lines += [f"{key} = {_toml(value)}" for key, value in document.items() if not isinstance(value, dict | list)]
+    lines += [f"{key} = {toml_value(value)}" for key, value in document.items() if not isinstance(value, dict | list)]
     for key, table in document.items():
         if isinstance(table, dict):
-            lines += ["", f"[{key}]", *(f"{name} = {_toml(value)}" for name, value in table.items())]
+            lines += ["", f"[{key}]", *toml_pairs(table)]
     for leg in document["legs"]:
-        lines += ["", "[[legs]]", f"name = {_toml(leg['name'])}", "joints = ["]
-        lines += [f"  {_toml(joint)}," for joint in leg["joints"]] + ["]"]
-        lines += [f"links.{toml_key(name)} = {_toml(link)}" for name, link in leg.get("links", {}).items()]
+        lines += ["", "[[legs]]", f"name = {toml_value(leg['name'])}", "joints = ["]
+        lines += [f"  {toml_value(joint)}," for joint in leg["joints"]] + ["]"]
+        lines += [f"links.{toml_key(name)} = {toml_value(link)}" for name, link in leg.get("links", {}).items()]
     return "\n".join(lines) + "\n"
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{toml_key(key)} = {_toml(entry)}" for key, entry in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(_toml(entry) for entry in value) + "]"
-    return json.dumps(value, ensure_ascii=False)

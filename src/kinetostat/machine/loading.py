@@ -263,11 +263,11 @@ def as_toml(machine: Machine, readable: bool = False) -> str:
     """
     lines = [
         f"schema = {SCHEMA_VERSION}",
-        f"name   = {json.dumps(machine.name, ensure_ascii=False)}",
+        f"name   = {documents.toml_value(machine.name)}",
         f'family = "{machine.family.name}"',
     ]
     literals = machine.family.literals
-    lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get("", {}).items()]
+    lines += documents.toml_pairs(literals.get("", {}))
     if machine.loaded:
         literals = {**literals, "load": {"state": machine.state}}
     for name in [*machine.tables, *(name for name in literals if name and name not in machine.tables)]:
@@ -275,11 +275,11 @@ def as_toml(machine: Machine, readable: bool = False) -> str:
         if table is not None and name not in literals and _left_out(machine.family.every_table[name], table):
             continue
         lines += ["", f"[{'.'.join(documents.toml_key(part) for part in name.split('.'))}]"]
-        lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in literals.get(name, {}).items()]
+        lines += documents.toml_pairs(literals.get(name, {}))
         lines += _quantity_lines(machine.family.every_table[name], table, readable) if table is not None else []
     if machine.display != ENGINEERING:
-        units = json.dumps(machine.display.units, ensure_ascii=False)
-        lines += ["", "[display]", f"units = {units}", f"digits = {machine.display.digits}"]
+        shown = {"units": machine.display.units, "digits": machine.display.digits}
+        lines += ["", "[display]", *documents.toml_pairs(shown)]
     return "\n".join([*lines, *requirement_lines(machine.requirements), *tolerance_lines(machine.tolerances)]) + "\n"
 
 

@@ -1,18 +1,37 @@
-"""Read machine and study files safely as text, and override values in them. `spec.validation` interprets them."""
+"""Machine and study files as text: reading them safely, overriding values, and writing values.
+
+What a document means is decided in `spec.validation`. A parser's time and memory can grow faster than its text: a key
+of n parts takes Python's n^2 steps and as much memory, so 100 kB of `a.a.a...` would stop a server. So one pass over
+the text, in linear time, counts what matters before it is parsed; it knows strings and comments nothing else.
+"""
 
 import copy
 import json
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from kinetostat.spec.errors import InputError, several, shorten
-from kinetostat.spec.text_bounds import DEEPEST, check_bounds
 
 LARGEST_FILE = 1 << 20
 """Largest file that is read, bytes. A machine file has a few hundred; a megabyte is a mistake or an attack."""
+
+DEEPEST = 8
+"""Most levels of nested tables and lists, and most parts of a key; a machine file has three or four."""
+MOST_ENTRIES = 30_000
+"""Most keys, parts of keys, values of lists and brackets together; machines of forty legs have some thousand."""
+
+_TOKEN = re.compile(
+    r'"""(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5}|\Z)'  # an open string reaches to the end, where the parser refuses it
+    r"|'''(?:[^']|'(?!''))*+(?:'{3,5}|\Z)"
+    r'|"(?:[^"\\\n]|\\.)*+"?'
+    r"|'[^'\n]*+'?"
+    r"|\#[^\n]*+"
+    r"|[.=,\[\]{}]|\n++",
+    re.DOTALL,
+)
 
 Document = dict[str, Any]
 
@@ -86,6 +105,40 @@ def parse(text: str, origin: str) -> Document:
     if _deeper_than(document, DEEPEST):
         raise InputError(f'"{origin}" is nested too deeply; it should have tables of values and lists.')
     return document
+
+
+def check_bounds(text: str, origin: str) -> None:
+    """Check that a text has no more entries, and no deeper keys and brackets, than a machine or study needs.
+
+    Args:
+        text: TOML, or what should be.
+        origin: names it in messages.
+
+    Raises:
+        InputError: it has.
+    """
+    entries = depth = parts = 0
+    for token in _TOKEN.finditer(text):
+        match text[token.start()]:
+            case ".":
+                entries, parts = entries + 1, parts + 1
+            case "=" | ",":
+                entries, parts = entries + 1, 0
+            case "[" | "{":
+                entries, depth, parts = entries + 1, depth + 1, 0
+            case "]" | "}":
+                depth, parts = max(depth - 1, 0), 0
+            case "\n":
+                parts = 0
+        if parts >= DEEPEST or depth > DEEPEST + 1:
+            raise InputError(
+                f'"{origin}" is nested too deeply: a key of more than {DEEPEST} parts, or brackets in more than '
+                f"{DEEPEST} others; it should have tables of values and lists."
+            )
+        if entries > MOST_ENTRIES:
+            raise InputError(
+                f'"{origin}" has more than {MOST_ENTRIES:,} keys and values; it should describe one machine or study.'
+            )
 
 
 def _deeper_than(document: Any, levels: int) -> bool:
@@ -182,3 +235,18 @@ def _index(entries: list[Any], key: str, path: str) -> int:
 def toml_key(name: str) -> str:
     """Return a name as it must stand in the header of a TOML table: in quotes unless it is a plain word."""
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
+
+
+def toml_pairs(table: Mapping[str, Any]) -> Iterator[str]:
+    """The lines "key = value" of a table."""
+    for key, value in table.items():
+        yield f"{toml_key(key)} = {toml_value(value)}"
+
+
+def toml_value(value: object) -> str:
+    """Return a value as TOML in one line, also a table or a list."""
+    if isinstance(value, dict):
+        return f"{{ {', '.join(toml_pairs(value))} }}"
+    if isinstance(value, list):
+        return f"[{', '.join(toml_value(entry) for entry in value)}]"
+    return json.dumps(value, ensure_ascii=False)

@@ -3,13 +3,12 @@
 Which quantities and fields exist depends on the machine and is checked where the requirements are judged.
 """
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, TypeAlias
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
 
-from kinetostat.spec.document import Document, override, toml_key
+from kinetostat.spec.document import Document, override, toml_key, toml_value
 from kinetostat.spec.errors import InputError, several, shorten
 
 TABLE = "requirements"
@@ -107,16 +106,6 @@ def requirement_lines(requirements: Mapping[str, Requirement]) -> Iterator[str]:
 
 def _text(requirement: Requirement) -> str:
     demand: Any = requirement.demand if len(requirement.demand) > 1 else requirement.demand[0]
-    parts = [f"demand = {_json(demand)}"]
-    if not requirement.over and not requirement.poses:
-        return _json(demand)
-    if requirement.over:
-        parts.append(f"over = {_json(requirement.over)}")
-    if requirement.poses:
-        poses = ([f"{toml_key(key)} = {_json(value)}" for key, value in pose.items()] for pose in requirement.poses)
-        parts.append(f"poses = [{', '.join('{ ' + ', '.join(pose) + ' }' for pose in poses)}]")
-    return f"{{ {', '.join(parts)} }}"
-
-
-def _json(value: object) -> str:
-    return json.dumps(value, ensure_ascii=False)
+    where = {"over": requirement.over, "poses": requirement.poses}
+    written = {name: entries for name, entries in where.items() if entries}
+    return toml_value({"demand": demand, **written} if written else demand)

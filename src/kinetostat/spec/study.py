@@ -1,17 +1,18 @@
-"""Study files: what people may write about an optimisation, and what is wrong with it. Nothing is looked up or solved.
+"""Study files: reading what people may write about an optimisation, what is wrong with it, and writing it again.
 
-Which fields and quantities exist depends on the machine and is checked where the problem is built.
+Nothing is looked up or solved: which fields and quantities exist depends on the machine, and is checked where the
+problem is built.
 """
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from kinetostat.spec.document import Document, override
+from kinetostat.spec.document import Document, override, toml_pairs
 from kinetostat.spec.errors import PRINTABLE, InputError, cut, first_mistakes, shorten
-from kinetostat.spec.requirements import Requirements
+from kinetostat.spec.requirements import Requirements, requirement_lines
 
 MOST_POPULATION = 100_000
 MOST_GENERATIONS = 100_000
@@ -240,3 +241,25 @@ def _field(path: Sequence[str]) -> str:
 def _hint(path: Sequence[str]) -> str:
     about = _field(path)
     return f" ({about})" if about != "it is needed" else ""
+
+
+TABLES = ("set", "poses", "optimizer", "robustness")
+LISTS = ("variables", "objectives", "constraints")
+
+
+def study_toml(study: StudyFile) -> str:
+    """The TOML text of a study; what is as it would be without being written is left out."""
+    content = study.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+    lines = ["schema = 1", *toml_pairs({key: content[key] for key in ("name", "machine")})]
+    lines += _table("[set]", content.get("set", {}))
+    for name in LISTS:
+        for table in content.get(name, []):
+            lines += _table(f"[[{name}]]", table)
+    for name in TABLES[1:]:
+        lines += _table(f"[{name}]", content.get(name, {}))
+    lines += requirement_lines(study.requirements)
+    return "\n".join(lines) + "\n"
+
+
+def _table(head: str, table: Mapping[str, Any]) -> list[str]:
+    return ["", head, *toml_pairs(table)] if table else []

@@ -3,14 +3,13 @@
 Which numbers a line is about depends on the machine, and is looked up in `studies.budget.tolerances`.
 """
 
-import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from kinetostat.spec.document import Document, setting_value, toml_key
+from kinetostat.spec.document import Document, setting_value, toml_key, toml_value
 from kinetostat.spec.errors import PRINTABLE, InputError, several, shorten
 from kinetostat.spec.tolerance_classes import GRADES, within_class, within_grade
 from kinetostat.units import UnitError, parse
@@ -265,6 +264,6 @@ def tolerance_lines(tolerances: Mapping[str, Tolerance]) -> Iterator[str]:
     yield from ("", f"[{TABLE}]")
     for about, line in tolerances.items():
         texts = [deviation.text for deviation in line.deviations]
-        value = json.dumps(texts if len(texts) > 1 else texts[0], ensure_ascii=False)
-        whole = value if line.cost == 1.0 else f"{{ tolerance = {value}, cost = {line.cost!r} }}"
-        yield f"{toml_key(about)} = {whole}"
+        value = texts if len(texts) > 1 else texts[0]
+        whole = value if line.cost == 1.0 else {"tolerance": value, "cost": line.cost}
+        yield f"{toml_key(about)} = {toml_value(whole)}"

@@ -9,7 +9,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file
 from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.study_text import study_toml
+from kinetostat.spec.study import study_toml
 from kinetostat.studies.bundled import bundled_studies, is_study
 from kinetostat.studies.optimisation.problem import Problem, load_problem
 from kinetostat.studies.optimisation.search import stored_problem

@@ -15,8 +15,7 @@ from kinetostat.machine.saving import as_file
 from kinetostat.spec.document import Document, parse, text_of
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Quantity
-from kinetostat.spec.study import OptimizerTable, StudyFile, read_study
-from kinetostat.spec.study_text import study_toml
+from kinetostat.spec.study import OptimizerTable, StudyFile, read_study, study_toml
 from kinetostat.studies.bundled import study_of
 from kinetostat.studies.optimisation.catalogue import ALONG
 from kinetostat.studies.optimisation.problem import Problem, problem_of, settings_of
