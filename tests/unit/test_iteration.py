@@ -18,7 +18,7 @@ def roots(values, rows):
 CRITERIA = {
     "by the residual": {"closed": 1e-12, "contraction": 1.0},
     "by the steps": {"settled": 1e-8},
-    "by the steps down to round-off": {"settled": 1e-8, "round_off": 1e-14, "least_steps": 2},
+    "by the step that is foreseen": {"settled": 1e-8, "round_off": 1e-14},
     "by short steps": {"settled": 1e-8, "longest": 0.5},
 }
 

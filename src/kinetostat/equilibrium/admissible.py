@@ -47,7 +47,7 @@ def tangent_matrices(equations: Balance) -> tuple[Array, Array, Array]:
 def gaps_of(equations: Balance) -> Array:
     """The largest gap of each leg's closing equations, rad or in units of the length [n]."""
     ways = equations.mechanism.ways.shape[1]
-    ends = [equations.left[:, end - ways : end] for end in equations.starts[1:]]
+    ends = [equations.left[:, end - ways : end] for end in equations.mechanism.starts[1:]]
     return np.asarray(np.abs(np.concatenate(ends, axis=1)).max(axis=1, initial=0.0))
 
 
@@ -151,7 +151,7 @@ def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Arr
 
 def places_of(equations: Balance) -> tuple[Integers, Integers]:
     """The places of the twist and all coordinates among the unknowns, and those of the wrenches of the legs."""
-    ways, starts = equations.mechanism.ways.shape[1], equations.starts
+    ways, starts = equations.mechanism.ways.shape[1], equations.mechanism.starts
     every = np.arange(starts[-1])
     carried = np.concatenate([every[end - ways : end] for end in starts[1:]])
     return np.setdiff1d(every, carried), carried

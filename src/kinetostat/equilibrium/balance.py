@@ -15,6 +15,7 @@ import numpy as np
 from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.chains import Chain
 from kinetostat.equilibrium.mechanism import Mechanism
+from kinetostat.numerics.iteration import largest
 from kinetostat.numerics.motions import (
     Motions,
     brackets,
@@ -44,7 +45,7 @@ class State:
     wrenches: tuple[Array, ...]
     amounts: Array
 
-    def taken(self, rows: Integers) -> "State":
+    def at(self, rows: Integers) -> "State":
         """The state at some of the poses [rows]."""
         return State(
             Motions(self.platform.rotation[rows], self.platform.translation[rows]),
@@ -53,8 +54,8 @@ class State:
             self.amounts[rows],
         )
 
-    def replaced(self, rows: Integers, part: "State") -> "State":
-        """The state with that of some of the poses [rows] in its place; given amounts stay as they are."""
+    def with_part(self, rows: Integers, part: "State") -> "State":
+        """The state with that of some of the poses [rows] in its place."""
 
         def put(old: Array, values: Array) -> Array:
             result = np.array(old)
@@ -66,7 +67,7 @@ class State:
             Motions(put(here.rotation, there.rotation), put(here.translation, there.translation)),
             tuple(map(put, self.coordinates, part.coordinates)),
             tuple(map(put, self.wrenches, part.wrenches)),
-            self.amounts,
+            put(self.amounts, part.amounts),
         )
 
 
@@ -261,15 +262,6 @@ class Balance:
     load: Array
     load_change: Array
 
-    @property
-    def starts(self) -> list[int]:
-        """Where the unknowns of each leg begin, and where the last ones end."""
-        ways = self.mechanism.ways.shape[1]
-        starts = [ways]
-        for leg in self.mechanism.legs:
-            starts.append(starts[-1] + leg.size + ways)
-        return starts
-
     def platform_rates(self, loaded: bool = True) -> Array:
         """Rates of the platform's equations by its twist [n x ways x ways].
 
@@ -296,7 +288,7 @@ class Balance:
 
     def by_actuators(self) -> Array:
         """Rates of the equations by the amounts of the actuators [n x unknowns x actuators]."""
-        ways, starts = self.mechanism.ways, self.starts
+        ways, starts = self.mechanism.ways, self.mechanism.starts
         count = self.state.amounts.shape[1]
         result = np.zeros((len(self.left), starts[-1], count))
         for leg, terms, start in zip(self.mechanism.legs, self.legs, starts, strict=False):
@@ -305,24 +297,23 @@ class Balance:
             result[:, wrench] = ways.T @ terms.driven[:, :, :count]
         return result
 
-    def moved(self, step: Array) -> State:
-        """The state after a step of the unknowns [n x unknowns]."""
-        ways, size = self.mechanism.ways, self.mechanism.ways.shape[1]
-        coordinates, wrenches = [], []
-        for k, (leg, start) in enumerate(zip(self.mechanism.legs, self.starts, strict=False)):
-            coordinates.append(self.state.coordinates[k] + step[:, start : start + leg.size])
-            wrenches.append(self.state.wrenches[k] + step[:, start + leg.size : start + leg.size + size] @ ways.T)
-        platform = exponential(step[:, :size] @ ways.T) @ self.state.platform
-        return State(platform, tuple(coordinates), tuple(wrenches), self.state.amounts)
 
-    def motion_of(self, step: Array) -> Array:
-        """The largest motion in a step of the unknowns, rad and units of the length [n]."""
-        moving = np.concatenate(
-            [step[:, : self.mechanism.ways.shape[1]]]
-            + [step[:, s : s + leg.size] for leg, s in zip(self.mechanism.legs, self.starts, strict=False)],
-            axis=1,
-        )
-        return np.asarray(np.abs(moving).max(axis=1, initial=0.0))
+def state_after(mechanism: Mechanism, state: State, step: Array) -> State:
+    """Return the state after a step of the unknowns [n x unknowns]."""
+    ways, size = mechanism.ways, mechanism.ways.shape[1]
+    coordinates, wrenches = [], []
+    for k, (leg, start) in enumerate(zip(mechanism.legs, mechanism.starts, strict=False)):
+        coordinates.append(state.coordinates[k] + step[:, start : start + leg.size])
+        wrenches.append(state.wrenches[k] + step[:, start + leg.size : start + leg.size + size] @ ways.T)
+    platform = exponential(step[:, :size] @ ways.T) @ state.platform
+    return State(platform, tuple(coordinates), tuple(wrenches), state.amounts)
+
+
+def motion_of(mechanism: Mechanism, step: Array) -> Array:
+    """Return the largest motion in a step of the unknowns, rad and units of the length [n]."""
+    moving = [step[:, : mechanism.ways.shape[1]]]
+    moving += [step[:, s : s + leg.size] for leg, s in zip(mechanism.legs, mechanism.starts, strict=False)]
+    return largest(np.concatenate(moving, axis=1))
 
 
 def balance(mechanism: Mechanism, state: State) -> Balance:

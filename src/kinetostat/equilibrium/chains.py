@@ -70,7 +70,7 @@ class Masses:
     uncoupled: Array
     inertia: Array
 
-    def taken(self, rows: Integers) -> "Masses":
+    def at(self, rows: Integers) -> "Masses":
         """The masses at some of n poses [rows]."""
         return replace(self, **{name: getattr(self, name)[rows] for name in ("point", "mass", "uncoupled", "inertia")})
 

@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinetostat.arrays import Array
+from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.balance import free_state
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.solving import Solution, at_rest, solve
+from kinetostat.equilibrium.solving import Equilibria, at_rest, solve
+from kinetostat.numerics.iteration import Steps, largest, newton
 from kinetostat.numerics.motions import logarithm
 from kinetostat.tolerances import COMMANDED, UNRESISTED
 
@@ -31,7 +32,7 @@ class Commanded:
         rates: twist of the platform per unit of each amount, at the origin [n x 6 x actuators].
     """
 
-    solution: Solution
+    solution: Equilibria
     off: Array
     before: Array
     rates: Array
@@ -39,16 +40,19 @@ class Commanded:
 
 def commanded(mechanism: Mechanism) -> Commanded:
     """Find the amounts of least norm; a pose that actuators cannot reach exactly is reached as nearly as they can."""
-    state, ways = free_state(mechanism), mechanism.ways
-    solution = at_rest(mechanism, state)
-    before = logarithm(solution.balance.state.platform)
-    for _ in range(MOST_CORRECTIONS):
-        equations = solution.balance
-        off = logarithm(equations.state.platform) @ ways
-        rates = solve(equations, -equations.by_actuators())[:, : ways.shape[1]]
-        change = -np.einsum("nac,nc->na", np.linalg.pinv(rates, rcond=UNRESISTED), off)
-        change = np.where(solution.settled[:, None], change, 0.0)
-        solution = at_rest(mechanism, replace(equations.state, amounts=equations.state.amounts + change))
-        if np.abs(change).max(initial=0.0) < COMMANDED:
-            break
-    return Commanded(solution, logarithm(solution.balance.state.platform), before, ways @ rates)
+    ways, count = mechanism.ways, len(mechanism.length)
+    state, settled = free_state(mechanism), np.zeros(count, dtype=bool)
+    rates, before = np.zeros((count, ways.shape[1], len(mechanism.driven))), np.full((count, 6), np.nan)
+
+    def equations(amounts: Array, rows: Integers) -> tuple[Array, Steps]:
+        nonlocal state
+        rest = at_rest(mechanism.at(rows), replace(state.at(rows), amounts=amounts))
+        state, settled[rows] = state.with_part(rows, rest.state), rest.settled
+        off = logarithm(rest.state.platform)
+        before[rows] = np.where(np.isnan(before[rows]), off, before[rows])
+        rates[rows] = solve(rest.balance, -rest.balance.by_actuators())[:, : ways.shape[1]]
+        change = -np.einsum("nac,nc->na", np.linalg.pinv(rates[rows], rcond=UNRESISTED), off @ ways)
+        return np.where(rest.settled, largest(off), np.nan), lambda going: change[going]
+
+    newton(equations, state.amounts, count, most_steps=MOST_CORRECTIONS, settled=COMMANDED)
+    return Commanded(Equilibria(mechanism, state, settled), logarithm(state.platform), before, ways @ rates)

@@ -10,10 +10,11 @@ Source: theory section 12. Units, axes and origin are those of `mechanism`.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from kinetostat.arrays import Array, Mask
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.admissible import (
     Admissible,
     admissible,
@@ -23,8 +24,9 @@ from kinetostat.equilibrium.admissible import (
     tangent_matrices,
     within,
 )
-from kinetostat.equilibrium.balance import Balance, State, balance, potential
+from kinetostat.equilibrium.balance import Balance, State, balance, potential, state_after
 from kinetostat.equilibrium.mechanism import Mechanism
+from kinetostat.numerics.iteration import Steps, newton
 from kinetostat.tolerances import CLOSED, NEARLY_AT_REST, ZERO_PIVOT
 
 MOST_STEPS = 200
@@ -57,34 +59,40 @@ def descent_from(mechanism: Mechanism, start: State) -> State:
     for _ in range(MOST_STEPS):
         if not len(rows):
             break
-        part = mechanism.taken(rows)
-        step = _step(part, state.taken(rows), radius[rows])
+        part = mechanism.at(rows)
+        step = _step(part, state.at(rows), radius[rows])
         before = step.equations.state
-        there, closed = _closed_state(part, step.equations.moved(step.unknowns))
+        there, closed = _closed_state(part, state_after(part, before, step.unknowns))
         fall = potential(part, before, before.platform) - potential(part, there, before.platform)
         share = np.where(closed, fall, -1.0) / np.maximum(step.fall, ZERO_PIVOT)
         lower = share > LEAST_SHARE
         wider = np.where(share > GOOD_SHARE, np.maximum(radius[rows], 2.0 * step.size), radius[rows])
         radius[rows] = np.where(lower, np.minimum(wider, LONGEST_STEP), 0.25 * step.size)
-        state = state.replaced(rows, before).replaced(rows[lower], there.taken(np.flatnonzero(lower)))
+        state = state.with_part(rows, before).with_part(rows[lower], there.at(np.flatnonzero(lower)))
         rows = rows[step.size > NEARLY_AT_REST]
     return state
 
 
-def _closed_state(mechanism: Mechanism, state: State) -> tuple[State, Mask]:
+def _closed_state(mechanism: Mechanism, start: State) -> tuple[State, Mask]:
     """Close the legs by small motions, and say where that was done [n]."""
-    for _ in range(MOST_CLOSINGS):
-        equations = balance(mechanism, state)
-        gaps = gaps_of(equations)
-        if not (gaps > CLOSED).any():
-            break
-        unknowns = np.zeros_like(equations.left)
-        moving, carried = places_of(equations)
-        for part in admissible(equations, tangent_matrices(equations)[2]):
-            shift = part.inverse @ equations.left[part.rows][:, carried, None]
-            unknowns[part.rows[:, None], moving] = -shift[:, :, 0]
-        state = equations.moved(np.where((gaps > CLOSED)[:, None], unknowns, 0.0))
-    return state, gaps <= CLOSED
+    count = len(mechanism.length)
+
+    def equations(state: State, rows: Integers) -> tuple[Array, Steps]:
+        there = balance(mechanism if len(rows) == count else mechanism.at(rows), state)
+        return gaps_of(there), lambda going: _closing_steps(there)[going]
+
+    end = newton(equations, start, count, move=partial(state_after, mechanism), most_steps=MOST_CLOSINGS, closed=CLOSED)
+    return end.value, end.converged
+
+
+def _closing_steps(equations: Balance) -> Array:
+    """The least motions that close the legs to first order, as steps of the unknowns [n x unknowns]."""
+    unknowns = np.zeros_like(equations.left)
+    moving, carried = places_of(equations)
+    for part in admissible(equations, tangent_matrices(equations)[2]):
+        shift = part.inverse @ equations.left[part.rows][:, carried, None]
+        unknowns[part.rows[:, None], moving] = -shift[:, :, 0]
+    return unknowns
 
 
 @dataclass(frozen=True)
@@ -114,7 +122,7 @@ def _step(mechanism: Mechanism, state: State, radius: Array) -> _Step:
     for part in parts:
         left = equations.left[part.rows][:, moving, None]
         unknowns[part.rows[:, None], carried] = (np.swapaxes(part.inverse, 1, 2) @ left)[:, :, 0]
-    equations = balance(mechanism, equations.moved(unknowns))
+    equations = balance(mechanism, state_after(mechanism, state, unknowns))
     unknowns = np.zeros_like(unknowns)
     for part in parts:
         model = _model(equations, part)

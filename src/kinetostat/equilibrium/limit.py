@@ -11,7 +11,7 @@ import numpy as np
 from kinetostat.arrays import Array, Mask
 from kinetostat.equilibrium.balance import Balance, State, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.solving import at_rest, newton, with_share
+from kinetostat.equilibrium.solving import at_rest, states_near, with_share
 from kinetostat.equilibrium.stability import Stability, stabilities, stability
 from kinetostat.numerics.motions import logarithm
 from kinetostat.tolerances import AT_REST, ZERO_PIVOT
@@ -67,7 +67,7 @@ def limit_of(mechanism: Mechanism) -> Limit | None:
     if not any(leg.sign.any() for leg in mechanism.legs):
         return reached
     shares = _shares(0.0, FEW)
-    solution = at_rest(with_share(mechanism.taken(np.zeros(FEW, dtype=np.int64)), shares, preload=1.0))
+    solution = at_rest(with_share(mechanism.at(np.zeros(FEW, dtype=np.int64)), shares, preload=1.0))
     stands = np.flatnonzero(solution.settled & stabilities(solution.balance).stable)
     if not len(stands):
         return reached
@@ -108,12 +108,12 @@ def _standing(mechanism: Mechanism, shares: Array, last: Limit | None) -> Limit 
         last: the state from which each of them is sought; the free state if None.
     """
     rows = np.zeros(len(shares), dtype=np.int64)
-    every, start = mechanism.taken(rows), (free_state(mechanism) if last is None else last.balance.state).taken(rows)
+    every, start = mechanism.at(rows), (free_state(mechanism) if last is None else last.balance.state).at(rows)
     loaded = with_share(every, shares, preload=1.0)
-    solution = newton(loaded, start, MOST_ITERATIONS)
+    solution = states_near(loaded, start, MOST_ITERATIONS)
     stands = solution.settled & stabilities(solution.balance).stable
     if last is not None:
-        stands &= _near(with_share(every, last.share, preload=1.0), start, loaded, solution.balance.state)
+        stands &= _near(with_share(every, last.share, preload=1.0), start, loaded, solution.state)
     count = int(np.cumprod(stands).sum())
     if not count:
         return None
@@ -126,7 +126,7 @@ def _near(before: Mechanism, start: State, after: Mechanism, end: State) -> Mask
 
     Where a cable goes slack on the way, the one holds up to there and the other one from there.
     """
-    ahead, behind = (newton(loads, state, 1).balance.state for loads, state in ((after, start), (before, end)))
+    ahead, behind = (states_near(loads, state, 1).state for loads, state in ((after, start), (before, end)))
     pairs = ((ahead, start), (end, behind), (end, start))
     first, last, moved = (logarithm(a.platform @ b.platform.inverse()) for a, b in pairs)
     across = last - first

@@ -58,12 +58,12 @@ class Mechanism:
     force: Array
     weighs: bool
 
-    def taken(self, rows: Integers) -> "Mechanism":
+    def at(self, rows: Integers) -> "Mechanism":
         """The mechanism at some of its poses [rows]."""
         return replace(
             self,
-            legs=tuple(_taken(leg, rows) for leg in self.legs),
-            platform=self.platform.taken(rows),
+            legs=tuple(_leg_at(leg, rows) for leg in self.legs),
+            platform=self.platform.at(rows),
             growth=self.growth[rows],
             wrench=self.wrench[rows],
             pushed=self.pushed[rows],
@@ -72,6 +72,18 @@ class Mechanism:
             length=self.length[rows],
             force=self.force[rows],
         )
+
+    @property
+    def starts(self) -> list[int]:
+        """Where the coordinates and then the wrench of each leg begin among the unknowns, and where the last ones end.
+
+        Before them stands the twist of the platform.
+        """
+        ways = self.ways.shape[1]
+        starts = [ways]
+        for leg in self.legs:
+            starts.append(starts[-1] + leg.size + ways)
+        return starts
 
     @property
     def actuators(self) -> tuple[str, ...]:
@@ -94,9 +106,9 @@ def _wrench_units(length: Array, force: Array) -> Array:
     return np.stack([force * length] * 3 + [force] * 3, axis=1)
 
 
-def _taken(leg: Chain, rows: Integers) -> Chain:
+def _leg_at(leg: Chain, rows: Integers) -> Chain:
     parts = {name: getattr(leg, name)[rows] for name in ("twists", "stiffness", "preload", "idle", "rotors", "dampers")}
-    return replace(leg, masses=leg.masses.taken(rows), **parts)
+    return replace(leg, masses=leg.masses.at(rows), **parts)
 
 
 def mechanism_of(machine: Machine, response: Response, joints: Joints | None, count: int | None = 1) -> Mechanism:

@@ -5,6 +5,7 @@ Source: theory section 12. Units, axes and origin are those of `mechanism`.
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 
@@ -12,13 +13,14 @@ import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.admissible import finite_solution, solve_over_admissible
-from kinetostat.equilibrium.balance import Balance, State, balance, free_state
+from kinetostat.equilibrium.balance import Balance, State, balance, free_state, motion_of, state_after
 from kinetostat.equilibrium.descent import descent_from
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.stability import stabilities
+from kinetostat.numerics.iteration import Steps, largest, newton
 from kinetostat.tolerances import AT_REST, STIFFEST_LEG
 
-MOST_ITERATIONS = 25
+MOST_STEPS_OF_LOAD = 25
 """Of Newton's method for one step of the load."""
 LONGEST_STEP = 0.2
 """Motion in one iteration, rad or in units of the machine's length: beyond it, the linear equations mean little."""
@@ -42,23 +44,36 @@ class Rest(IntEnum):
 
 
 @dataclass(frozen=True)
-class Solution:
-    """Equilibria at n poses.
+class Equilibria:
+    """States that were reached at n poses.
 
     Attributes:
-        balance: the equations at the states that were reached.
+        mechanism: with its load.
+        state: those that were reached.
         settled: where these are at rest [n].
     """
 
-    balance: Balance
+    mechanism: Mechanism
+    state: State
     settled: Mask
+
+    @cached_property
+    def balance(self) -> Balance:
+        """The equations at the states."""
+        return balance(self.mechanism, self.state)
 
     def at(self, rows: Integers) -> Balance:
         """The equations at some of the poses [rows]."""
-        return balance(self.balance.mechanism.taken(rows), self.balance.state.taken(rows))
+        return balance(self.mechanism.at(rows), self.state.at(rows))
+
+    def with_part(self, rows: Integers, part: "Equilibria") -> "Equilibria":
+        """The states with those of some of the poses [rows] in their places."""
+        settled = self.settled.copy()
+        settled[rows] = part.settled
+        return Equilibria(self.mechanism, self.state.with_part(rows, part.state), settled)
 
 
-def at_rest(mechanism: Mechanism, start: State | None = None) -> Solution:
+def at_rest(mechanism: Mechanism, start: State | None = None) -> Equilibria:
     """Find the states of rest under the full load.
 
     Newton's steps come first. Springs that carry loads of one sign only change the stiffness when they go slack, so
@@ -70,35 +85,35 @@ def at_rest(mechanism: Mechanism, start: State | None = None) -> Solution:
         start: a state nearby; the free state if None.
     """
     state = start or free_state(mechanism)
-    reached = newton(mechanism, state)
+    reached = states_near(mechanism, state)
     if any(leg.sign.any() for leg in mechanism.legs):
         return _by_descent(mechanism, state, reached)
     for steps in LOAD_STEPS[1:]:
         rows = np.flatnonzero(~reached.settled)
         if not len(rows):
             break
-        part = mechanism.taken(rows)
+        part = mechanism.at(rows)
         state_of_part = replace(free_state(part), amounts=state.amounts[rows])
         for number in range(1, steps + 1):
-            solution = newton(with_share(part, number / steps), state_of_part)
-            state_of_part = solution.balance.state
+            solution = states_near(with_share(part, number / steps), state_of_part)
+            state_of_part = solution.state
             if not solution.settled.any():
                 break
-        reached = _put(mechanism, reached, rows, solution)
+        reached = reached.with_part(rows, replace(solution, mechanism=part))
     return reached
 
 
-def _by_descent(mechanism: Mechanism, start: State, reached: Solution) -> Solution:
+def _by_descent(mechanism: Mechanism, start: State, reached: Equilibria) -> Equilibria:
     """The states to which a descent leads where those that were reached are not at rest or not stable."""
     rows = np.flatnonzero(~(reached.settled & stabilities(reached.balance).stable))
     if not len(rows):
         return reached
-    part = mechanism.taken(rows)
-    solution = newton(part, descent_from(part, start.taken(rows)))
+    part = mechanism.at(rows)
+    solution = states_near(part, descent_from(part, start.at(rows)))
     better = solution.settled & (~reached.settled[rows] | stabilities(solution.balance).stable)
     chosen = np.flatnonzero(better)
-    settled = Solution(solution.at(chosen), solution.settled[chosen])
-    return _put(mechanism, reached, rows[chosen], settled) if len(chosen) else reached
+    settled = Equilibria(part.at(chosen), solution.state.at(chosen), solution.settled[chosen])
+    return reached.with_part(rows[chosen], settled) if len(chosen) else reached
 
 
 def with_share(mechanism: Mechanism, share: float | Array, preload: float | None = None) -> Mechanism:
@@ -121,37 +136,33 @@ def with_share(mechanism: Mechanism, share: float | Array, preload: float | None
     return replace(mechanism, legs=legs, **loads)
 
 
-def _put(mechanism: Mechanism, reached: Solution, rows: Integers, part: Solution) -> Solution:
-    """The solution with some of its poses replaced."""
-    settled = reached.settled.copy()
-    settled[rows] = part.settled
-    return Solution(balance(mechanism, reached.balance.state.replaced(rows, part.balance.state)), settled)
-
-
-def newton(mechanism: Mechanism, state: State, iterations: int = MOST_ITERATIONS) -> Solution:
-    """Find the states of rest near given ones, without steps of the load.
+def states_near(mechanism: Mechanism, start: State, most_steps: int = MOST_STEPS_OF_LOAD) -> Equilibria:
+    """Find the states of rest near given ones by Newton's method, without steps of the load.
 
     Args:
         mechanism: with its load.
-        state: to begin with.
-        iterations: at most.
+        start: states to begin with.
+        most_steps: number of steps that are taken at most.
     """
-    equations = balance(mechanism, state)
-    settled = np.zeros(len(mechanism.length), dtype=bool)
-    last = np.full(len(mechanism.length), np.inf)
-    for _ in range(iterations):
-        step = solve(equations, -equations.left[:, :, None])[:, :, 0]
-        motion = equations.motion_of(step)
-        # Steps that no longer shrink are round-off, once they are as small as that. The first one may only find what
-        # the legs carry and move nothing.
-        shrinking = (motion < 0.1 * last) & (motion > 1e-3 * AT_REST)
-        settled = (motion < AT_REST) & ~shrinking & np.isfinite(last) | settled
-        step = step * np.minimum(1.0, LONGEST_STEP / np.maximum(motion, 1e-300))[:, None]
-        step = np.where(np.isfinite(step) & ~settled[:, None], step, 0.0)
-        if settled.all():
-            break
-        equations, last = balance(mechanism, equations.moved(step)), motion
-    return Solution(equations, settled)
+    count = len(mechanism.length)
+
+    def equations(state: State, rows: Integers) -> tuple[Array, Steps]:
+        there = balance(mechanism if len(rows) == count else mechanism.at(rows), state)
+        return largest(there.left), lambda going: solve(there, -there.left[:, :, None])[going, :, 0]
+
+    # The first step may only find what the legs carry and move nothing, so that one step alone shows nothing.
+    end = newton(
+        equations,
+        start,
+        count,
+        move=partial(state_after, mechanism),
+        most_steps=most_steps,
+        settled=AT_REST,
+        round_off=1e-3 * AT_REST,
+        longest=LONGEST_STEP,
+        size=partial(motion_of, mechanism),
+    )
+    return Equilibria(mechanism, end.value, end.converged)
 
 
 def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
@@ -166,7 +177,7 @@ def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
         right: right sides.
         loaded: with what loads and wrenches do by turning.
     """
-    size, starts = equations.mechanism.ways.shape[1], equations.starts
+    size, starts = equations.mechanism.ways.shape[1], equations.mechanism.starts
     whole, total = equations.platform_rates(loaded), right[:, :size]
     parts, stiffest = [], np.zeros(len(right))
     for number, (start, end) in enumerate(pairwise(starts)):
@@ -190,6 +201,6 @@ def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
     softest = np.linalg.svd(whole[sound], compute_uv=False)[:, -1]
     rows = sound[stiffest[sound] > STIFFEST_LEG * softest]
     if len(rows):
-        there = balance(equations.mechanism.taken(rows), equations.state.taken(rows))
+        there = balance(equations.mechanism.at(rows), equations.state.at(rows))
         result[rows] = solve_over_admissible(there, right[rows], loaded)
     return result

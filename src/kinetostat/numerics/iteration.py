@@ -19,7 +19,7 @@ import numpy as np
 from kinetostat.arrays import Array, Integers, Mask
 
 SHRINKING = 0.1
-"""Ratio of a step to the one before it below which steps still shrink fast: Newton's method near a solution."""
+"""Ratio of a step to the one before it below which steps shrink fast, as those of Newton's method near a solution."""
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-14, 1e6
 """Damping of least squares as shares of the mean square of the rates."""
 DAMPING_CHANGE = 10.0
@@ -108,7 +108,6 @@ def newton(
     contraction: float = np.inf,
     settled: float = 0.0,
     round_off: float | None = None,
-    least_steps: int = 1,
     longest: float = np.inf,
     size: Callable[[Array], Array] = largest,
 ) -> Solution[Value]:
@@ -127,13 +126,13 @@ def newton(
         closed: residual at which a problem has converged, one for all or each its own [n].
         contraction: share of the residual before it that a step may leave.
         settled: size of a step below which a problem has converged.
-        round_off: size down to which steps are continued that still shrink fast; `settled` if None.
-        least_steps: number of steps before a problem counts as converged by their size.
+        round_off: if given, steps that still shrink fast are continued until the next one, which is foreseen from the
+            last two as their quadratic convergence has it, would be as small as that.
         longest: size to which a step is shortened.
         size: of steps [n x unknowns]; the largest number if not given.
     """
     value, trial, rows = start, start, np.arange(count)
-    finest, limits = settled if round_off is None else round_off, np.broadcast_to(closed, (count,))
+    limits = np.broadcast_to(closed, (count,))
     outcome, steps = np.full(count, int(Outcome.OUT_OF_STEPS)), np.zeros(count, dtype=np.int64)
     residual, last = np.full((2, count), np.inf)
     for number in range(1, most_steps + 1):
@@ -148,8 +147,11 @@ def newton(
         step, trial, rows = steps_of(going), _at(trial, going, len(rows)), rows[going]
         length = size(step)
         finite = np.isfinite(length)
-        still_shrinking = (length < SHRINKING * last[rows]) & (length > finest)
-        arrived = (length < settled) & ~still_shrinking & (number >= least_steps)
+        arrived = length < settled
+        if round_off is not None:
+            ratio = length / np.maximum(last[rows], 1e-300)
+            enough = np.where(ratio < SHRINKING, length * ratio * ratio <= round_off, arrived)
+            arrived = enough & (number > 1)
         outcome[rows[arrived]], outcome[rows[~finite]] = Outcome.CONVERGED, Outcome.DIVERGED
         last[rows], steps[rows] = length, number
         if (length > longest).any():

@@ -140,7 +140,7 @@ def cut_receptances(state: MachineState) -> Array:
     directions = stacked(machine.tables["cutting"].direction, count)
     damping = stacked([table.ratio, table.per_mass, table.per_stiffness], count)
     for row in range(count):
-        here = mechanism.taken(np.array([row]))
+        here = mechanism.at(np.array([row]))
         equations = balance(here, free_state(here))
         solution = modes(equations)
         if solution is not None:
