@@ -95,7 +95,7 @@ def judge(path: Path, exact: Answer, length: float) -> Verdict:
         return Verdict(analysis.status, {})
     response = respond(machine, joints)
     stiffness = np.array(response.stiffness.rows(), dtype=float)
-    mechanism = with_share(mechanism_of(machine, response, joints), 0.0)
+    mechanism = with_share(mechanism_of(machine, response.configuration, joints), 0.0)
     solution = at_rest(mechanism)
     stands = bool(solution.settled.all()) and stability(solution.balance).stable
     at_zero_load = compliance(solution.balance)[0] * mechanism.compliance_units[0]

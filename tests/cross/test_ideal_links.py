@@ -71,7 +71,7 @@ def test_the_loaded_machine_without_its_load_has_the_same_compliance(name):
     """
     machine = case(name)
     joints = solve_joints(machine)
-    mechanism = with_share(mechanism_of(machine, respond(machine, joints), joints), 0.0)
+    mechanism = with_share(mechanism_of(machine, respond(machine, joints).configuration, joints), 0.0)
     solution = at_rest(mechanism)
     assert solution.settled.all()
     assert stability(solution.balance).stable

@@ -207,7 +207,7 @@ def test_frequencies_about_the_loaded_state_are_those_of_exudyn(what):
         machine = build(document, "legs")
     free = EXUDYN.frequencies(machine)
     joints = solve_joints(machine) if machine.family.chains else None
-    loaded = frequencies(at_rest(mechanism_of(machine, respond(machine, joints), joints)).balance)[0]
+    loaded = frequencies(at_rest(mechanism_of(machine, respond(machine, joints).configuration, joints)).balance)[0]
     engine = Engine(machine)
     weigh(engine.model, engine.platform, machine, drawing(machine, engine.response, engine.joints))
     engine.model.system.Assemble()

@@ -16,7 +16,7 @@ from machines import STRETCH, cable, written
 def vibration(machine, loaded=False):
     """The modes of a machine with relaxed springs, or at rest under its loads."""
     joints = solve_joints(machine) if machine.family.chains else None
-    mechanism = mechanism_of(machine, respond(machine, joints), joints)
+    mechanism = mechanism_of(machine, respond(machine, joints).configuration, joints)
     if loaded:
         return modes(at_rest(mechanism).balance)
     relaxed = with_share(mechanism, 0.0)

@@ -109,7 +109,7 @@ def test_mujoco_vibrates_at_the_frequency_of_the_third_mode(name):
     mujoco = pytest.importorskip("mujoco")
     machine = load(name, VIBRATING[name])
     response = respond(machine)
-    mechanism = mechanism_of(machine, response, None)
+    mechanism = mechanism_of(machine, response.configuration, None)
     answer = modes(balance(mechanism, free_state(mechanism)))
     wanted, shape = answer.frequencies[2], answer.tool[:, 2]
     model = mujoco.MjModel.from_xml_string(text_of(analyze(machine), vibrating=True))

@@ -287,4 +287,4 @@ def _limit_checks(machine: Machine, columns: Mapping[str, Array]) -> Iterator[tu
             here = {path: column[part] for path, column in columns.items()}
             state = states_at(machine, here, part.stop - start)
             loads = states_of_rest(state).loads if judged_at_rest else ()
-            yield part, (*state.free.checks, *load_checks(state.machine, state.free.configuration, loads))
+            yield part, (*state.free.checks, *load_checks(state.machine, state.configuration, loads))

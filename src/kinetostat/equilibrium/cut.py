@@ -119,7 +119,7 @@ def cut_machine(machine: Machine, varying: Collection[str] = ()) -> Cut | None:
         return None
     state = state_of(machine)
     with np.errstate(all="ignore"):
-        machine_cut = cut(mechanism_of(machine, state.free, state.joints))
+        machine_cut = cut(mechanism_of(machine, state.configuration, state.joints))
     if machine_cut is None or not machine.loaded:
         return machine_cut
     carrier, driven = machine_cut.carrier, machine_cut.mechanism.driven

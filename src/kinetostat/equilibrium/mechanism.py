@@ -19,10 +19,9 @@ from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.chains import Chain, Given, Masses, Units, Weight, chain_of
 from kinetostat.equilibrium.drives import with_drives
 from kinetostat.kinematics.closure import Joints
-from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring, Turn
 from kinetostat.machine.loads import gravity_of, located_members, platform_masses, turned_tensor
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.numerics.motions import of_scalars
 
 
@@ -111,17 +110,19 @@ def _leg_at(leg: Chain, rows: Integers) -> Chain:
     return replace(leg, masses=leg.masses.at(rows), **parts)
 
 
-def mechanism_of(machine: Machine, response: Response, joints: Joints | None, count: int | None = 1) -> Mechanism:
+def mechanism_of(
+    machine: Machine, configuration: Configuration, joints: Joints | None, count: int | None = 1
+) -> Mechanism:
     """The mechanism of a machine at its pose, or at n poses.
 
     Args:
         machine: with its pose, or columns of n poses.
-        response: of it.
+        configuration: where everything is.
         joints: coordinates that close its legs, if it is written leg by leg.
         count: of poses, n; None for numbers of any kind as they are, traced ones for instance: its arrays then hold
             them as objects, for one pose.
     """
-    configuration, origin = response.configuration, response.reference
+    origin = machine.reference_point(configuration)
     length = of_scalars([configuration.length], count)[:, 0]
     known = [_linear(spring, configuration.length) for leg in configuration.legs for spring in leg.springs]
     typical = _typical(of_scalars(known, count))

@@ -175,7 +175,7 @@ def reduced_machine(machine: Machine, response: Response, joints: Joints | None)
         response: of it without them.
         joints: coordinates that close its legs, if it is written leg by leg.
     """
-    machine_cut = cut(mechanism_of(machine, response, joints, None))
+    machine_cut = cut(mechanism_of(machine, response.configuration, joints, None))
     if machine_cut is None:
         raise ValueError("loops that rods do not cut have no equations over scalars")
     return Reduced(machine, machine_cut, machine.family.components)

@@ -80,9 +80,14 @@ class MachineState(Immutable):
         return solve_joints(self.machine) if self.machine.family.chains else None
 
     @cached_property
+    def configuration(self) -> Configuration:
+        """The machine placed at its pose, with relaxed springs."""
+        return self.machine.configure(() if self.joints is None else self.joints.coordinates)
+
+    @cached_property
     def free(self) -> Response:
-        """The free machine: placed legs with their screws, K and C, and its limits as far as they are about it."""
-        return respond(self.machine, self.joints)
+        """The free machine: screws of its legs, K and C, and its limits as far as they are about it."""
+        return respond(self.machine, self.joints, self.configuration)
 
     @cached_property
     def response(self) -> Response:
@@ -99,7 +104,7 @@ class MachineState(Immutable):
             return self.free
         if not stands:
             return self.free
-        checks = load_checks(self.machine, self.free.configuration, self.actuator_loads)
+        checks = load_checks(self.machine, self.configuration, self.actuator_loads)
         passed = int(self.free.status) == Status.OK and not within(checks)
         status = Status.JOINT_LIMIT if passed else self.free.status
         return replace(self.free, status=status, checks=(*self.free.checks, *checks))
@@ -112,7 +117,7 @@ class MachineState(Immutable):
     @cached_property
     def nearby(self) -> list[Configuration]:
         """The machine at up to three poses near its pose, to tell what holds in general from what is special here."""
-        return _nearby(self.machine, float(self.free.configuration.length))
+        return _nearby(self.machine, float(self.configuration.length))
 
     @cached_property
     def mobility(self) -> Mobility | None:
@@ -129,17 +134,17 @@ class MachineState(Immutable):
     @cached_property
     def left_out(self) -> str:
         """Which loads of the file do not count in the state that is meant, in a sentence; empty where all do."""
-        return "" if self.machine.loaded else loads_left_out(self.machine, self.free.configuration)
+        return "" if self.machine.loaded else loads_left_out(self.machine, self.configuration)
 
     @cached_property
     def relaxed(self) -> Balance:
         """The equations of the free state, without loads and preloads."""
-        mechanism = with_share(mechanism_of(self.machine, self.free, self.joints, self.count), 0.0)
+        mechanism = with_share(mechanism_of(self.machine, self.configuration, self.joints, self.count), 0.0)
         return balance(mechanism, free_state(mechanism))
 
     @cached_property
     def _loads(self) -> tuple[Mechanism, Mask]:
-        return _loaded_mechanism(self.machine, self.free, self.joints, self.count)
+        return _loaded_mechanism(self.machine, self.configuration, self.joints, self.count)
 
     @property
     def mechanism(self) -> Mechanism:
@@ -197,7 +202,7 @@ class MachineState(Immutable):
         """What presses each strut whose E I is known at rest; none without a rest."""
         if self.at_rest is None:
             return ()
-        configuration, joints = self.free.configuration, None if self.joints is None else self.joints.coordinates
+        configuration, joints = self.configuration, None if self.joints is None else self.joints.coordinates
         members = located_members(self.machine, configuration, joints)
         return tuple(struts(configuration.legs, members, self.free.reference, self.at_rest))
 
@@ -249,7 +254,7 @@ def actuator_loads_at_rest(equations: Balance) -> list[tuple[Spring, Array]]:
 
 
 def _loaded_mechanism(
-    machine: Machine, response: Response, joints: Joints | None, count: int = 1
+    machine: Machine, configuration: Configuration, joints: Joints | None, count: int = 1
 ) -> tuple[Mechanism, Mask]:
     """The mechanism of a machine with its loads, see `mechanism_of`, with the tensions that its file leaves open.
 
@@ -259,7 +264,7 @@ def _loaded_mechanism(
     Raises:
         InputError: there is gravity but nothing says a mass, or bounds of tensions contradict each other.
     """
-    mechanism = mechanism_of(machine, response, joints, count)
+    mechanism = mechanism_of(machine, configuration, joints, count)
     check_loads(machine, count, mechanism.weighs)
     load = machine.tables["load"]
     least, most = (stacked([getattr(load, f"{end}_tension")], count)[:, 0] for end in ("min", "max"))

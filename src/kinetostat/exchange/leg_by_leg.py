@@ -14,8 +14,8 @@ import numpy as np
 
 from kinetostat.algebra.vector import Rotation, Vector
 from kinetostat.arrays import Array
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.mobility import task_coordinates
-from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.common_tables import Load, Tool
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring
 from kinetostat.machine.limits import LIMITS, limits_set, unloaded_parts
@@ -77,7 +77,7 @@ def document_of(machine: Machine, built: Configuration | None = None) -> Documen
     Raises:
         InputError: it cannot be placed at its pose.
     """
-    configuration = built or respond(machine).configuration
+    configuration = built or state_of(machine).configuration
     if not all(np.isfinite(_numbers(point)).all() for leg in configuration.legs for point in leg.path):
         raise InputError(f"{machine.name} cannot be placed at its pose; change [pose] until `kinetostat check` is ok.")
     turn, point = configuration.platform.rotation, configuration.platform.translation
@@ -110,7 +110,7 @@ def _limits_as_built(limits: dict[str, float], machine: Machine, built: Configur
         built: where its legs are as built, at the home pose.
     """
     parted = [leg.name for leg in built.legs if _is_parted(leg)]
-    drawn = [rod for rod in rods(respond(machine).configuration.legs) if rod.telescopic and rod.leg in parted]
+    drawn = [rod for rod in rods(state_of(machine).configuration.legs) if rod.telescopic and rod.leg in parted]
     rams = [(rod.leg, 0.0) for rod in drawn]
     rams += [(leg.name, 0.0) for leg in built.legs for _ in driven_slides(leg.chain)]
     every = unloaded_parts(built.legs, built.platform.rotation.z, machine.family.planar, rams)

@@ -62,7 +62,7 @@ def text_of(analysis: Analysis, vibrating: bool = False) -> str:
     Raises:
         InputError: if the machine has a part that MuJoCo has no counterpart for, or no mass that could vibrate.
     """
-    model = build(analysis.state.free.configuration)
+    model = build(analysis.state.configuration)
     pace = vibrating_pace(analysis, model) if vibrating else pace_of(analysis, model)
     middle, extent = _middle_and_extent(model)
     radius = THICKNESS * extent

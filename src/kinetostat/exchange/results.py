@@ -16,7 +16,7 @@ import xarray as xr
 from scipy.io import savemat
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.kinetostatics.response import respond
+from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
@@ -86,7 +86,7 @@ def as_dataset(analysis: Analysis) -> xr.Dataset:
         "component": names,
         "spring": [contribution.spring for contribution in analysis.attribution],
         "part": ("spring", [contribution.part for contribution in analysis.attribution]),
-        "spring_unit": ("spring", [_spring_unit(spring) for spring in springs_of(respond(machine).configuration)]),
+        "spring_unit": ("spring", [_spring_unit(spring) for spring in springs_of(state_of(machine).configuration)]),
         "axis": list(AXES),
         "base_axis": list(AXES),
     }

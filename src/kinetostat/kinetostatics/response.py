@@ -82,16 +82,17 @@ class Response:
         return bool(self.statics.doubt > 0.5 and self.singularity_margin > SINGULAR)
 
 
-def respond(machine: Machine, joints: Joints | None = None) -> Response:
+def respond(machine: Machine, joints: Joints | None = None, configuration: Configuration | None = None) -> Response:
     """Compute K, C and the status of a machine at its pose.
 
     Args:
         machine: with its pose.
         joints: where its joints are, if known; otherwise they are found where the family has no closed form.
+        configuration: where everything is then, if known.
     """
     if joints is None:
         joints = solve_joints(machine) if machine.family.chains else CLOSED_FORM
-    configuration = machine.configure(joints.coordinates)
+    configuration = configuration or machine.configure(joints.coordinates)
     reference, guide, legs, statics = _statics(machine, configuration)
     singularity_margin: Scalar = 1.0
     for leg in legs:
@@ -140,8 +141,7 @@ def _statics(
     machine: Machine, configuration: Configuration
 ) -> tuple[Vector, tuple[Wrench, ...], tuple[LegScrews, ...], Statics]:
     """The tool point, the guide of a planar machine, the screws of all legs, and how springs share loads."""
-    reference, length = machine.tool_point(configuration.platform), configuration.length
-    reference = reference if configuration.plane is None else configuration.plane.nearest(reference)
+    reference, length = machine.reference_point(configuration), configuration.length
     absent, guide = _out_of_plane(configuration, reference)
     legs = tuple(leg.screws(reference, length, absent) for leg in configuration.legs)
     return reference, guide, legs, solve_statics(legs, length, guide)

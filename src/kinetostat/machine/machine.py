@@ -339,6 +339,11 @@ class Machine(Immutable):
         """The tool point T in the base frame, m: P itself unless the file has a table [tool]."""
         return platform.apply(Vector(*self.tables["tool"].offset))
 
+    def reference_point(self, configuration: Configuration) -> Vector:
+        """The point of K, C and all screws in the base frame, m: the tool point, in the plane of a planar machine."""
+        point = self.tool_point(configuration.platform)
+        return point if configuration.plane is None else configuration.plane.nearest(point)
+
 
 def _wrench(table: Any) -> Wrench:
     return Wrench(Vector(*table.moment), Vector(*table.force))

@@ -15,9 +15,8 @@ from kinetostat.arrays import Array
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.numbers import states_of_rest
-from kinetostat.equilibrium.state import states_at
+from kinetostat.equilibrium.state import state_of, states_at
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine, springs
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
@@ -68,7 +67,7 @@ def carrying_legs(machine: Machine, ranges: Sequence[str], progress: Progress = 
             `under_load` refuses.
     """
     question = grid_question(machine, ranges, ["slack_springs"])
-    placed = respond(machine).configuration
+    placed = state_of(machine).configuration
     if not any(spring.acts for spring in springs(placed)):
         raise InputError(
             f'all legs of {machine.name} pull and push, so that all of them carry; write acts = "pulls" at an '

@@ -15,6 +15,7 @@ from kinetostat.arrays import Array, Mask
 from kinetostat.engine.batch import Progress, responses, silent
 from kinetostat.engine.derivatives import evaluate_gradient
 from kinetostat.engine.points import Points
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.elements import (
     Element,
@@ -361,7 +362,7 @@ def with_signs(machine: Machine, grid: Points, moves: Sequence[Move]) -> list[Mo
     good = answer.status == Status.OK
     if not good.any():
         return list(moves)
-    length, here, kinds = float(respond(machine).configuration.length), values(machine), _kinds(machine)
+    length, here, kinds = float(state_of(machine).configuration.length), values(machine), _kinds(machine)
     signed = []
     for move in moves:
         rows = [paths.index(leaf) for leaf in leaves[move.path]]

@@ -219,7 +219,7 @@ def _at_rest(state: MachineState, equations: Balance, judged: Stability) -> Load
 def _limits_at_rest(state: MachineState) -> list[Check]:
     """The limits of geometry as they are at the pose, and those of the loads of actuators with what these carry."""
     at_the_pose = [check for check in state.free.checks if check.limit.about is not About.LOAD]
-    return [*at_the_pose, *load_checks(state.machine, state.free.configuration, state.actuator_loads)]
+    return [*at_the_pose, *load_checks(state.machine, state.configuration, state.actuator_loads)]
 
 
 def _largest_wrench(equations: Balance) -> float:

@@ -234,7 +234,7 @@ def modes(
 
 def _modes_in(state: MachineState) -> Vibration:
     machine, names, status = state.machine, state.machine.family.component_names, state.status
-    refuse_unknown_mass(machine, "modes", state.free.configuration)
+    refuse_unknown_mass(machine, "modes", state.configuration)
     if status is not Status.OK and (not machine.loaded or status in SOUGHT_NO_REST):
         return Vibration(state, status, state.refusal, names)
     equations = state.equations

@@ -141,7 +141,7 @@ def report(request: ReportRequest) -> Report:
     state = state_of(request.machine)
     analysis = analyze(state)
     unplaced = analysis.status in PLACELESS
-    placed = () if unplaced else state.free.configuration.legs
+    placed = () if unplaced else state.configuration.legs
     legs = {str(spring.of): leg.name for leg in placed for spring in leg.springs}
     loaded, refused = _at_rest(state) if request.machine.loaded else (None, "")
     if loaded is None:

@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 from nicegui import events, ui
 
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
@@ -144,7 +144,7 @@ class StudioPage:
         self.machines.set_options(options, value=self.session.name or OTHER)
         self._listening = True
         ui.page_title(f"{machine.name} · kinetostat studio")
-        self._sizes = proportions_of(machine, respond(self.session.origin).configuration)
+        self._sizes = proportions_of(machine, state_of(self.session.origin).configuration)
         self._axes = free_axes(machine)
         self.playback.clear()
         self._leave_front()

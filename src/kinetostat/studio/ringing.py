@@ -64,4 +64,4 @@ def swing(request: SwingRequest) -> list[dict[str, Any]]:
     shape, machine = request.answer.modes[request.number].shape, request.answer.machine
     if shape is None:
         return []
-    return swing_data(machine, request.answer.state.free.configuration, request.sizes, shape)
+    return swing_data(machine, request.answer.state.configuration, request.sizes, shape)

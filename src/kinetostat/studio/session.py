@@ -6,7 +6,7 @@ No element of a page is known here, so that tests drive a session directly.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from kinetostat.kinetostatics.response import respond
+from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.loading import build, bundled, load, read_again, related
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, values
@@ -61,7 +61,7 @@ class Session:
         machine, self.name = memory.origin, memory.name
         self.origin = machine
         self.machine = memory.now or machine
-        length = float(respond(machine).configuration.length)
+        length = float(state_of(machine).configuration.length)
         self._controls = {control.path: control for control in controls(machine, length)}
         self.exaggeration = memory.exaggeration
         self._past = [*memory.past]

@@ -27,7 +27,7 @@ from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.loads import PLATFORM, moving_masses
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.numerics.motions import of_scalars
 from kinetostat.tolerances import UNRESISTED
 from kinetostat.vibration.inertia import energies, leg_rates, platform_inertia
@@ -57,12 +57,12 @@ def leaves_plane(machine: Machine, machine_cut: Cut) -> bool:
 def platform_alone(machine: Machine | MachineState, varying: Collection[str] = ()) -> bool:
     """Whether no leg has a mass or a rotor wherever the varying parameters (leaf paths) are."""
     state = state_of(machine)
-    return light(state.machine, state.free) and not any(MAKES_MASSIVE.match(path) for path in varying)
+    return light(state.machine, state.configuration) and not any(MAKES_MASSIVE.match(path) for path in varying)
 
 
-def light(machine: Machine, response: Response) -> bool:
+def light(machine: Machine, configuration: Configuration) -> bool:
     """Whether no leg has a mass or a rotor with inertia, by form."""
-    links = [part for part in moving_masses(machine, response.configuration) if part.name != PLATFORM]
+    links = [part for part in moving_masses(machine, configuration) if part.name != PLATFORM]
     return all(link.mass is None for link in links) and is_zero(machine.tables["drives"].rotor_inertia)
 
 
@@ -75,9 +75,9 @@ def free_frequencies(machine: Machine, response: Response, joints: Joints | None
         joints: coordinates that close its legs, if it is written leg by leg.
         sloped: whether derivatives will be taken.
     """
-    if light(machine, response):
+    if light(machine, response.configuration):
         return in_order(eigenvalues(platform_matrix(machine, response), sloped))
-    machine_cut = cut(with_share(mechanism_of(machine, response, joints, None), 0.0))
+    machine_cut = cut(with_share(mechanism_of(machine, response.configuration, joints, None), 0.0))
     if machine_cut is None:
         raise ValueError("loops that rods do not cut have no frequencies over scalars")
     return frequencies_at(machine_cut, [0.0] * machine_cut.carrier.size, sloped)
@@ -86,7 +86,7 @@ def free_frequencies(machine: Machine, response: Response, joints: Joints | None
 def pose_frequencies(state: MachineState) -> Array:
     """The same of any machine at n poses, by NumPy [n x MODES]; NaN where springs do not hold it."""
     machine, response, count = state.machine, state.free, state.count
-    if not light(machine, response):
+    if not light(machine, response.configuration):
         return frequencies(state.relaxed)
     entries = [entry for row in platform_matrix(machine, response) for entry in row]
     size = len(machine.family.components)

@@ -143,4 +143,4 @@ def vibrating(machine: Machine, response: Response, joints: Joints | None, most:
         joints: coordinates that close its legs, if it is written leg by leg.
         most: how many modes.
     """
-    return Vibrating(with_share(mechanism_of(machine, response, joints, None), 0.0), most)
+    return Vibrating(with_share(mechanism_of(machine, response.configuration, joints, None), 0.0), most)

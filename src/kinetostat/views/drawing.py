@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from kinetostat.algebra.vector import Vector
-from kinetostat.kinetostatics.response import respond
+from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.tolerances import SAME_TO_THE_EYE
@@ -34,8 +34,8 @@ def three_views(machine: Machine, title: str) -> Figure:
         machine: at its pose; P is marked, and T where the machine has a tool.
         title: above the figure.
     """
-    response = respond(machine)
-    configuration, tool = response.configuration, response.reference
+    configuration = state_of(machine).configuration
+    tool = machine.reference_point(configuration)
     with mpl.rc_context(STYLE):
         figure = views_of(configuration, partial(_draw_view, configuration, tool))
         set_title(figure, title)

@@ -14,7 +14,6 @@ from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
-from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find, parameters, values
@@ -167,7 +166,7 @@ def usual_ranges(machine: Machine, count: int) -> list[str]:
     kinds = FAR if any(map(is_set, vars(limited).values())) else NEAR
     coordinates = [p for p in parameters(machine.family) if p.path.startswith("pose.") and len(p.leaves) == 1]
     ordered = sorted(coordinates, key=lambda p: p.quantity.kind != "length")
-    length, ranges = float(respond(machine).configuration.length), []
+    length, ranges = float(state_of(machine).configuration.length), []
     for parameter in ordered:
         reach = kinds[parameter.quantity.kind] * (length if parameter.quantity.kind == "length" else 1.0)
         low, high = _extent(machine, parameter, reach)

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 from nicegui import events, ui
 
-from kinetostat.kinetostatics.response import respond
+from kinetostat.equilibrium.state import state_of
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find, values
 from kinetostat.spec.errors import InputError
@@ -155,7 +155,7 @@ class StudyForm:
         machine = self.draft.machine
         if machine is None:
             return self._session.controls
-        length = float(respond(machine).configuration.length)
+        length = float(state_of(machine).configuration.length)
         return {control.path: control for control in controls(machine, length)}
 
     def _variable(self, place: int, table: dict[str, Any], known: dict[str, Control]) -> None:

@@ -79,7 +79,7 @@ class Shown:
 def shown(analysis: Analysis, vibration: Vibration | None = None) -> Shown:
     """Build the solids of an analysed machine with its overlays, and the swings of its modes where these are known."""
     machine = analysis.machine
-    configuration = analysis.state.free.configuration
+    configuration = analysis.state.configuration
     sizes = proportions_of(machine, configuration)
     overlays, factor = overlays_of(analysis, sizes)
     swings = [

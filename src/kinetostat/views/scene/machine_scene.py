@@ -4,9 +4,9 @@ import math
 from collections.abc import Sequence
 
 from kinetostat.algebra.vector import Displacement, Vector
+from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.refusal import why_not
-from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import BASE_FRAME, Configuration, Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.views.scene import overlays, shapes
@@ -30,12 +30,13 @@ def scene_of(machine: Machine) -> Scene:
     Raises:
         InputError: the pose does not place every part; the message says why.
     """
-    response = respond(machine)
-    points = [point for leg in response.configuration.legs for point in leg.path]
+    state = state_of(machine)
+    configuration = state.configuration
+    points = [point for leg in configuration.legs for point in leg.path]
     placed = all(math.isfinite(c) for point in points for c in point.components())
-    if Status(int(response.status)) not in DRAWN or not placed:
-        raise InputError(f"The machine cannot be drawn at this pose. {why_not(machine, response, ())}")
-    return machine_scene(machine, response.configuration, proportions_of(machine, response.configuration))
+    if Status(int(state.free.status)) not in DRAWN or not placed:
+        raise InputError(f"The machine cannot be drawn at this pose. {why_not(machine, state.free, ())}")
+    return machine_scene(machine, configuration, proportions_of(machine, configuration))
 
 
 def machine_scene(machine: Machine, configuration: Configuration, sizes: Proportions) -> Scene:
