@@ -11,13 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinetostat.accuracy.closing import Errors, Place, followed, placed
+from kinetostat.accuracy.closing import Errors, followed
 from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.accuracy.rows import Row
 from kinetostat.accuracy.screws import independent, scaled
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
 from kinetostat.arrays import Array
+from kinetostat.kinematics.chain import PlacedChain, closing_gap
 from kinetostat.kinematics.closing import pose_of
 from kinetostat.kinetostatics.response import compliance_at
 from kinetostat.machine.column import stacked
@@ -25,7 +26,7 @@ from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import POSE
-from kinetostat.numerics.motions import Motions, exponential, logarithm, still
+from kinetostat.numerics.motions import Motions, exponential, still
 from kinetostat.spec.errors import InputError
 
 REACHED = 1e-9
@@ -107,11 +108,11 @@ def _configuration_near(
         for number, row in enumerate(rows.legs)
     ]
     every = zip(rows.legs, coordinates, links, strict=True)
-    gaps = [_gap(target, placed(row, q, e).end, rows.length) for row, q, e in every]
+    gaps = [_gap(target, row.chain.placed(q, errors=e).end, rows.length) for row, q, e in every]
     platform = target
     if max(gaps) > REACHED:
         platform, coordinates = _driven_legs(model, values, links)
-    places = [placed(row, q, e) for row, q, e in zip(rows.legs, coordinates, links, strict=True)]
+    places = [row.chain.placed(q, errors=e) for row, q, e in zip(rows.legs, coordinates, links, strict=True)]
     parts = zip(rows.configuration.legs, rows.legs, places, links, strict=True)
     legs = [_leg(leg, row, place, link) for leg, row, place, link in parts]
     softer = {e.path: 1.0 + v for e, v in zip(model.errors, values, strict=True) if e.group == "compliances"}
@@ -138,7 +139,7 @@ def _home_pose(machine: Machine) -> dict[str, Array]:
 
 def _gap(target: Motions, end: Motions, length: float) -> float:
     """Distance of the end of a leg from its target, rad or in units of the length."""
-    return float(np.abs(scaled(logarithm(target @ end.inverse()), length)).max())
+    return float(np.abs(scaled(closing_gap(target, end), length)).max())
 
 
 def _driven_legs(model: ErrorModel, values: Array, links: Errors) -> tuple[Motions, list[Array]]:
@@ -160,7 +161,7 @@ def _displacement(motion: Motions) -> Displacement:
     return Displacement(Rotation(*columns), Vector(*motion.translation.T))
 
 
-def _leg(leg: Leg, row: Row, place: Place, errors: dict[int, Array]) -> Leg:
+def _leg(leg: Leg, row: Row, place: PlacedChain, errors: dict[int, Array]) -> Leg:
     """A leg with every element displaced by what carries it."""
     chain: list[Element] = []
     for element, behind in zip(leg.chain, row.carried, strict=True):
@@ -203,7 +204,7 @@ def _moving(element: Element, behind: int, row: Row) -> bool:
     return isinstance(element, Spring) and element.actuated and behind < len(row.twists)
 
 
-def _carrying(place: Place, errors: dict[int, Array], behind: int) -> Motions:
+def _carrying(place: PlacedChain, errors: dict[int, Array], behind: int) -> Motions:
     before = place.before[behind]
     return before @ exponential(errors[behind]) if behind in errors else before
 

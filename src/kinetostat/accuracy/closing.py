@@ -7,15 +7,17 @@ first [n]; screws are at the base origin in base axes, SI, unless said otherwise
 Source: theory (45) to (48).
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kinetostat.accuracy.rows import Row, Rows, places_of
 from kinetostat.accuracy.screws import Screws, independent, moved_to, scaled
-from kinetostat.arrays import Array, Mask
-from kinetostat.numerics.motions import Motions, cross, each_about, exponential, logarithm, still
+from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.kinematics.chain import PlacedChain, closing_gap
+from kinetostat.numerics.iteration import Steps, largest, newton, with_rows
+from kinetostat.numerics.motions import Motions, cross, exponential, logarithm
 
 SETTLED = 1e-8
 """Motion of the last step of Newton's method, rad or in units of the machine's length: the next one would be about its
@@ -36,67 +38,40 @@ Errors = list[dict[int, Array]]
 where it is the same at all poses."""
 
 
-@dataclass(frozen=True)
-class Place:
-    """A leg somewhere.
-
-    Attributes:
-        before: the displacement from the home place of what each number of motions carries, before the errors there.
-        end: of the platform's end.
-        screws: of its coordinates in place, per unit [n x 6 x coordinates].
-    """
-
-    before: tuple[Motions, ...]
-    end: Motions
-    screws: Array
-
-
-def placed(row: Row, coordinates: Array, errors: dict[int, Array]) -> Place:
-    """Follow a leg from base to platform, theory (45).
-
-    Args:
-        row: the leg at its home place.
-        coordinates: of its joints, rad or m [n x coordinates].
-        errors: displacements that stand behind a number of motions [n x 6].
-    """
-    count, twists = len(coordinates), np.array(row.twists).reshape(-1, 6)
-    motion, before, screws = still(count), [], np.zeros((count, 6, row.size))
-    steps = each_about(twists, coordinates[:, row.coordinate])
-    for number, (step, which) in enumerate(zip(steps, row.coordinate, strict=True)):
-        before.append(motion)
-        motion = _with(motion, errors.get(number))
-        screws[:, :, which] += motion.twist(twists[number, None])
-        motion = motion @ step
-    before.append(motion)
-    return Place(tuple(before), _with(motion, errors.get(len(twists))), screws)
-
-
-def _with(motion: Motions, error: Array | None) -> Motions:
-    return motion if error is None else motion @ exponential(error)
-
-
-def followed(row: Row, target: Motions, length: float, errors: dict[int, Array] | None = None) -> Array:
+def followed(row: Row, target: Motions, length: float, errors: Mapping[int, Array] | None = None) -> Array:
     """Coordinates with which a leg takes the platform to a displacement, or near it [n x coordinates], rad or m.
 
     All of its coordinates move, actuators too, by least-norm steps along a screw motion from the home place.
     """
-    whole = logarithm(target)
-    coordinates = np.zeros((len(whole), row.size))
+    whole, chain, given = logarithm(target), row.chain, errors or {}
     units = np.where(row.slides, length, 1.0)
-    chosen = independent(scaled(placed(row, places_of(row, length), {}).screws, length, axis=1))
+    chosen = independent(scaled(chain.rates(chain.placed(places_of(row, length))), length, axis=1))
     far = float(np.abs(scaled(whole, length)).max(initial=0.0, where=np.isfinite(whole)))
     stages = min(max(int(np.ceil(far / STAGE)), 1), STAGES)
+    coordinates = np.zeros((len(whole), row.size))
     for stage in range(1, stages + 1):
-        goal = exponential(whole * (stage / stages))
-        for _ in range(MOST_STEPS if stage == stages else 3):
-            at = placed(row, coordinates, errors or {})
-            gap = scaled(logarithm(goal @ at.end.inverse()), length)
-            rates = scaled(at.screws, length, axis=1) * units
-            step = Screws(rates, chosen).steps(gap) * units
-            coordinates = coordinates + step
-            if np.abs(step / units).max(initial=0.0) < (SETTLED if stage == stages else NEAR):
-                break
+        goal, last = exponential(whole * (stage / stages)), stage == stages
+
+        def equations(joints: Array, poses: Integers, goal: Motions = goal) -> tuple[Array, Steps]:
+            at = chain.placed(joints, errors=errors_at(given, poses))
+            gap = scaled(closing_gap(goal.at(poses), at.end), length)
+            rates = scaled(chain.rates(at), length, axis=1) * units
+            return largest(gap), lambda going: Screws(rates, chosen).steps(gap)[going]
+
+        coordinates = newton(
+            equations,
+            coordinates,
+            len(whole),
+            move=lambda joints, step: joints + step * units,
+            most_steps=MOST_STEPS if last else 3,
+            settled=SETTLED if last else NEAR,
+        ).value
     return coordinates
+
+
+def errors_at(errors: Mapping[int, Array], poses: Integers) -> dict[int, Array]:
+    """The errors of a leg at some poses; those that are the same everywhere stay as they are."""
+    return {behind: error if len(error) == 1 else error[poses] for behind, error in errors.items()}
 
 
 @dataclass(frozen=True)
@@ -130,7 +105,7 @@ class Holding:
         return np.swapaxes(np.concatenate([basis[..., :3] + cross(tool[:, None], forces), forces], axis=2), 1, 2)
 
 
-def free_screws(row: Row, rows: Rows, at: Place, tool: Array) -> Array:
+def free_screws(row: Row, rows: Rows, at: PlacedChain, tool: Array) -> Array:
     """The screws of what moves freely in a leg, at points, in units of the length [n x 6 x freedoms].
 
     Args:
@@ -139,7 +114,7 @@ def free_screws(row: Row, rows: Rows, at: Place, tool: Array) -> Array:
         at: where the leg is.
         tool: the points, m [n x 3].
     """
-    free = at.screws[:, :, list(row.free)] * np.where(
+    free = row.chain.rates(at)[:, :, list(row.free)] * np.where(
         np.array(row.slides, dtype=bool)[list(row.free)], rows.length, 1.0
     )
     absent = np.broadcast_to(rows.absent.T, (len(free), 6, len(rows.absent)))
@@ -152,7 +127,7 @@ def _units(row: Row, length: float) -> Array:
     return np.array([length if row.slides[place] else 1.0 for place in row.free])
 
 
-def freed(rows: Rows, places: Sequence[Place], tool: Array, chosen: Sequence[tuple[int, ...]]) -> list[Screws]:
+def freed(rows: Rows, places: Sequence[PlacedChain], tool: Array, chosen: Sequence[tuple[int, ...]]) -> list[Screws]:
     """Free screws of each leg at its place, at tool points [n x 3]; `chosen` as of `Screws`."""
     every = zip(rows.legs, places, chosen, strict=True)
     return [Screws(free_screws(row, rows, at, tool), which) for row, at, which in every]
@@ -213,8 +188,8 @@ def _solved(matrices: Array, right: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class State:
-    """Place of a machine with errors.
+class ClosedLegs:
+    """Where the legs of a machine with errors close on its platform, at n poses.
 
     Attributes:
         platform: displacement of the platform from its home place.
@@ -226,15 +201,25 @@ class State:
     coordinates: tuple[Array, ...]
     settled: Mask
 
+    def at(self, poses: Integers) -> "ClosedLegs":
+        """The legs at some of the poses."""
+        return ClosedLegs(self.platform.at(poses), tuple(q[poses] for q in self.coordinates), self.settled[poses])
+
+    def with_part(self, poses: Integers, part: "ClosedLegs") -> "ClosedLegs":
+        """The legs with those at some of the poses in their places."""
+        pairs = zip(self.coordinates, part.coordinates, strict=True)
+        coordinates = tuple(with_rows(q, poses, values) for q, values in pairs)
+        return ClosedLegs(self.platform.with_part(poses, part.platform), coordinates, self.settled)
+
 
 def closed(
     rows: Rows,
-    start: State,
+    start: ClosedLegs,
     errors: Errors,
     tool_home: Array,
     chosen: Sequence[tuple[int, ...]],
     soft: Sequence[Array],
-) -> State:
+) -> ClosedLegs:
     """Close the legs with their errors while their actuators stand still: Newton's method, theory (48).
 
     Args:
@@ -245,25 +230,34 @@ def closed(
         chosen: see `freed`.
         soft: see `holding`.
     """
-    platform, coordinates, length = start.platform, list(start.coordinates), rows.length
-    settled = np.zeros(len(platform.translation), dtype=bool)
-    for _ in range(MOST_STEPS):
-        places = [placed(row, q, e) for row, q, e in zip(rows.legs, coordinates, errors, strict=True)]
-        tool = platform.point(np.broadcast_to(tool_home, (len(settled), 3)))
+    length, legs = rows.length, rows.legs
+
+    def equations(there: ClosedLegs, poses: Integers) -> tuple[Array, Steps]:
+        given = [errors_at(error, poses) for error in errors]
+        places = [row.chain.placed(q, errors=e) for row, q, e in zip(legs, there.coordinates, given, strict=True)]
+        tool = _tool_at(there.platform, tool_home)
         free = freed(rows, places, tool, chosen)
-        hold = holding(rows, free, tool, soft)
-        gaps = [scaled(moved_to(logarithm(at.end @ platform.inverse()), tool), length) for at in places]
-        twist = sum((hold.twist(i, gap[:, None])[:, 0] for i, gap in enumerate(gaps)), np.zeros((len(settled), 6)))
-        largest = np.abs(twist).max(axis=1)
-        for number, (row, screws, gap) in enumerate(zip(rows.legs, free, gaps, strict=True)):
-            step = screws.steps(twist - gap)[:, : len(row.free)]
-            largest = np.maximum(largest, np.abs(step).max(axis=1, initial=0.0))
-            new = coordinates[number].copy()
-            new[:, list(row.free)] += step * _units(row, length)
-            coordinates[number] = new
+        hold = holding(rows, free, tool, [compliance[poses] for compliance in soft])
+        gaps = [-scaled(moved_to(closing_gap(there.platform, at.end), tool), length) for at in places]
+        twist = sum((hold.twist(i, gap[:, None])[:, 0] for i, gap in enumerate(gaps)), np.zeros((len(poses), 6)))
+        every = zip(legs, free, gaps, strict=True)
+        joints = [screws.steps(twist - gap)[:, : len(row.free)] for row, screws, gap in every]
+        step = np.concatenate([twist, *joints], axis=1)
+        return largest(np.concatenate(gaps, axis=1)), lambda going: step[going]
+
+    def move(there: ClosedLegs, step: Array) -> ClosedLegs:
+        twist, *joints = np.split(step, np.cumsum([6, *(len(row.free) for row in legs[:-1])]), axis=1)
         back = np.concatenate([twist[:, :3], twist[:, 3:] * length], axis=1)
-        platform = exponential(moved_to(back, -tool)) @ platform
-        settled = largest < SETTLED
-        if settled.all() or not np.isfinite(largest).any():
-            break
-    return State(platform, tuple(coordinates), settled)
+        platform = exponential(moved_to(back, -_tool_at(there.platform, tool_home))) @ there.platform
+        coordinates = [q.copy() for q in there.coordinates]
+        for row, values, change in zip(legs, coordinates, joints, strict=True):
+            values[:, list(row.free)] += change * _units(row, length)
+        return ClosedLegs(platform, tuple(coordinates), there.settled)
+
+    count = len(start.settled)
+    end = newton(equations, start, count, move=move, most_steps=MOST_STEPS, settled=SETTLED)
+    return replace(end.value, settled=end.converged)
+
+
+def _tool_at(platform: Motions, tool_home: Array) -> Array:
+    return platform.point(np.broadcast_to(tool_home, (len(platform.translation), 3)))

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinetostat.accuracy.closing import free_screws, placed
+from kinetostat.accuracy.closing import free_screws
 from kinetostat.accuracy.rows import Row, Rows, Unit, places_of, rows_of
 from kinetostat.accuracy.screws import Screws, independent, moved_to, scaled
 from kinetostat.algebra.vector import AXES, ZERO, Vector
@@ -97,7 +97,7 @@ def errors_of(rows: Rows) -> list[Source]:
 
 def effects(row: Row, rows: Rows, sources: Sequence[Source], coordinates: Array) -> Array:
     """The work of the leg's wrenches on its errors at random coordinates [samples * wrenches x errors]."""
-    at = placed(row, coordinates, {})
+    at = row.chain.placed(coordinates)
     tool = at.end.point(np.broadcast_to(rows.point, (len(coordinates), 3)))
     screws = free_screws(row, rows, at, tool)
     wrenches = Screws(screws, independent(screws)).wrenches

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from kinetostat.accuracy.closing import Errors, State, closed, followed, free_screws, freed, holding, placed
+from kinetostat.accuracy.closing import ClosedLegs, Errors, closed, followed, free_screws, freed, holding
 from kinetostat.accuracy.errors import Insertion, MachineError, Source, errors_of, shared_errors
 from kinetostat.accuracy.rows import Row, Rows, places_of, rows_of
 from kinetostat.accuracy.screws import independent, scaled
@@ -67,7 +67,7 @@ class DrawnMachine:
     """
 
     status: Codes
-    state: State
+    state: ClosedLegs
     tool: Array
     axes: Array
     actuators: Array
@@ -77,12 +77,7 @@ class DrawnMachine:
 
     def at_poses(self, rows: Integers) -> "DrawnMachine":
         """The machine at some of the poses [rows]."""
-        platform = self.state.platform
-        state = State(
-            Motions(platform.rotation[rows], platform.translation[rows]),
-            tuple(q[rows] for q in self.state.coordinates),
-            self.state.settled[rows],
-        )
+        state = self.state.at(rows)
         springs = tuple(FlexibleSpring(spring.twist[rows], spring.compliance[rows]) for spring in self.springs)
         return DrawnMachine(
             self.status[rows],
@@ -117,7 +112,7 @@ class ErrorModel:
     rows: Rows
     tool_home: Array
     independent: tuple[tuple[int, ...], ...]
-    _last_state: dict[bytes, State] = field(default_factory=dict)
+    _last_state: dict[bytes, ClosedLegs] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.drawn.status)
@@ -154,7 +149,7 @@ class ErrorModel:
                 motions[i.leg][i.behind] = motions[i.leg].get(i.behind, np.zeros((1, 6))) + amount[:, None] * i.twist
         return motions
 
-    def closed_state(self, values: Array) -> State:
+    def closed_state(self, values: Array) -> ClosedLegs:
         """Place all legs with errors [errors] or [n x errors], theory (48).
 
         The state at the last values is kept, because a fit asks for it again.
@@ -223,14 +218,14 @@ class ErrorModel:
     def _tool_at(self, platform: Motions) -> Array:
         return platform.point(np.broadcast_to(self.tool_home, (len(self), 3)))
 
-    def _rates_at(self, state: State, errors: Errors, wanted: Collection[int] | None = None) -> Array:
+    def _rates_at(self, state: ClosedLegs, errors: Errors, wanted: Collection[int] | None = None) -> Array:
         tool, length, legs = self._tool_at(state.platform), self.rows.length, self.rows.legs
         by_place: dict[tuple[int, int], list[tuple[int, Insertion]]] = {}
         for number, (_, insertions) in enumerate(self.sources):
             for i in insertions if wanted is None or number in wanted else ():
                 by_place.setdefault((i.leg, i.behind), []).append((number, i))
         with np.errstate(all="ignore"):
-            places = [placed(row, q, e) for row, q, e in zip(legs, state.coordinates, errors, strict=True)]
+            places = [row.chain.placed(q, errors=e) for row, q, e in zip(legs, state.coordinates, errors, strict=True)]
             free = freed(self.rows, places, tool, self.independent)
             hold = holding(self.rows, free, tool, self.drawn.leg_compliances)
             result = np.zeros((len(self), 6, len(self.errors)))
@@ -310,7 +305,7 @@ def error_model(
     if response.configuration.plane is not None:
         tool_home = np.where([1, 1, 0], tool_home, rows.point)
     tool = platform.point(np.broadcast_to(tool_home, (count, 3)))
-    state = State(platform, coordinates, np.ones(count, dtype=bool))
+    state = ClosedLegs(platform, coordinates, np.ones(count, dtype=bool))
     wrench = stacked(response.load.components(), count) if load is None else np.broadcast_to(load, (count, 6))
     wrench = np.asarray(wrench, dtype=float)
     leg_compliances = _leg_compliances(response, rows, count)
@@ -344,7 +339,7 @@ def _mark_other_placements(rows: Rows, coordinates: Sequence[Array], actuators: 
 def _independent_screws(row: Row, rows: Rows) -> tuple[int, ...]:
     """Choose the free screws of a leg that are independent wherever it is; it carries six wrenches less these."""
     coordinates = places_of(row, rows.length)
-    return independent(free_screws(row, rows, placed(row, coordinates, {}), np.zeros((len(coordinates), 3))))
+    return independent(free_screws(row, rows, row.chain.placed(coordinates), np.zeros((len(coordinates), 3))))
 
 
 def _leg_compliances(response: Response, rows: Rows, count: int) -> tuple[Array, ...]:

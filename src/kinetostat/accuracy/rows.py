@@ -16,6 +16,7 @@ import numpy as np
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array
+from kinetostat.kinematics.chain import Chain
 from kinetostat.machine.actuators import actuators_of, joint_actuators, senses_of
 from kinetostat.machine.leg import Element, Joint, Leg, Spring
 from kinetostat.machine.link import Parallelogram
@@ -107,9 +108,10 @@ class Row:
         return tuple(i for i in range(self.size) if i not in self.driven)
 
     @cached_property
-    def follows(self) -> Array:
-        """1 where a motion follows a coordinate, else 0 [motions x coordinates]."""
-        return (np.array(self.coordinate, dtype=int)[:, None] == np.arange(self.size)).astype(float)
+    def chain(self) -> Chain:
+        """Its motions, once all of them are known."""
+        twists = np.array(self.twists, dtype=float).reshape(1, -1, 6)
+        return Chain(twists, tuple(self.coordinate), (-1,) * len(self.twists), self.size)
 
     def add(self, kind: str, name: str, joints: Sequence[Joint], drive: Drive | None = None) -> None:
         """Add a joint of one motion, or of several about one point, from its freedoms."""

@@ -13,15 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinetostat.arrays import Array, Integers
-from kinetostat.equilibrium.chains import Chain
+from kinetostat.equilibrium.chains import ElasticLeg
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.numerics.iteration import largest
+from kinetostat.kinematics.chain import PlacedChain, closing_gap
+from kinetostat.numerics.iteration import largest, with_rows
 from kinetostat.numerics.motions import (
     Motions,
     brackets,
     cross,
-    each_along,
-    each_twist,
     exponential,
     logarithm,
     skew_of,
@@ -48,7 +47,7 @@ class State:
     def at(self, rows: Integers) -> "State":
         """The state at some of the poses [rows]."""
         return State(
-            Motions(self.platform.rotation[rows], self.platform.translation[rows]),
+            self.platform.at(rows),
             tuple(values[rows] for values in self.coordinates),
             tuple(values[rows] for values in self.wrenches),
             self.amounts[rows],
@@ -56,18 +55,11 @@ class State:
 
     def with_part(self, rows: Integers, part: "State") -> "State":
         """The state with that of some of the poses [rows] in its place."""
-
-        def put(old: Array, values: Array) -> Array:
-            result = np.array(old)
-            result[rows] = values
-            return result
-
-        here, there = self.platform, part.platform
         return State(
-            Motions(put(here.rotation, there.rotation), put(here.translation, there.translation)),
-            tuple(map(put, self.coordinates, part.coordinates)),
-            tuple(map(put, self.wrenches, part.wrenches)),
-            put(self.amounts, part.amounts),
+            self.platform.with_part(rows, part.platform),
+            tuple(with_rows(q, rows, values) for q, values in zip(self.coordinates, part.coordinates, strict=True)),
+            tuple(with_rows(w, rows, values) for w, values in zip(self.wrenches, part.wrenches, strict=True)),
+            with_rows(self.amounts, rows, part.amounts),
         )
 
 
@@ -109,33 +101,13 @@ class LegTerms:
     by_given: Array
 
 
-@dataclass(frozen=True)
-class Placed:
-    """Where the parts of a leg are, at n poses.
-
-    Attributes:
-        motions: displacement of what lies before each of its motions, and of its end.
-        screws: of each motion where it is [n x motions x 6].
-    """
-
-    motions: tuple[Motions, ...]
-    screws: Array
-
-
-def placed_leg(leg: Chain, coordinates: Array, amounts: Array) -> Placed:
-    """Move a leg by its coordinates [n x coordinates] and by all given amounts [n x amounts]."""
-    placed = [still(len(coordinates))]
-    if not leg.coordinate:
-        return Placed(tuple(placed), leg.twists)
-    pairs = zip(leg.coordinate, leg.given, strict=True)
-    moved = [amounts[:, driven] if by < 0 else coordinates[:, by] for by, driven in pairs]
-    for step in each_along(leg.twists, np.stack(moved, axis=1)):
-        placed.append(placed[-1] @ step)
-    return Placed(tuple(placed), each_twist(placed[:-1], leg.twists))
-
-
 def leg_terms(
-    leg: Chain, coordinates: Array, wrench: Array, amounts: Array, gravity: Array, placed: Placed | None = None
+    leg: ElasticLeg,
+    coordinates: Array,
+    wrench: Array,
+    amounts: Array,
+    gravity: Array,
+    placed: PlacedChain | None = None,
 ) -> LegTerms:
     """Evaluate a leg.
 
@@ -147,14 +119,13 @@ def leg_terms(
         gravity: [n x 3].
         placed: where its parts are, if that is known.
     """
-    placed = placed or placed_leg(leg, coordinates, amounts)
+    placed = placed or leg.chain.placed(coordinates, amounts)
     screws = placed.screws
-    weight, change = _weight(leg, placed.motions, screws, gravity)
+    weight, change = _weight(leg, placed.before, screws, gravity)
     # A screw changes with the motions before it, so that the work of the wrench on it does.
     changing = np.einsum("nc,njkc->nkj", wrench, brackets(screws))
     change = change - np.tril(changing, -1)
-    follows = leg.follows(leg.coordinate, leg.size)
-    drives = leg.follows(leg.given, amounts.shape[1])
+    follows, drives = leg.chain.follows, leg.chain.driven(amounts.shape[1])
     loads = leg.stiffness * coordinates + leg.preload
     stiffness = leg.stiffness
     if leg.sign.any():
@@ -162,8 +133,8 @@ def leg_terms(
         loads, stiffness = np.where(carries, loads, 0.0), np.where(carries, stiffness, 0.0)
     work = np.einsum("nfc,nc->nf", screws, wrench)
     return LegTerms(
-        placed.motions[-1],
-        np.swapaxes(screws, 1, 2) @ follows,
+        placed.end,
+        leg.chain.rates(placed),
         np.swapaxes(screws, 1, 2) @ drives,
         loads,
         (work - weight) @ drives,
@@ -174,7 +145,7 @@ def leg_terms(
     )
 
 
-def _weight(leg: Chain, placed: Sequence[Motions], screws: Array, gravity: Array) -> tuple[Array, Array]:
+def _weight(leg: ElasticLeg, placed: Sequence[Motions], screws: Array, gravity: Array) -> tuple[Array, Array]:
     """Gradient of the potential of a leg's weight by its motions [n x motions], and the gradient's rates."""
     count, motions = screws.shape[:2]
     kind = np.result_type(screws, gravity, leg.masses.mass)
@@ -236,7 +207,7 @@ def potential(mechanism: Mechanism, state: State, before: Motions) -> Array:
             energy = np.where(leg.sign == 0.0, energy, 0.5 * np.maximum(leg.sign * loads, 0.0) ** 2 / stiffness)
         result += energy.sum(axis=1)
         if leg.masses.carried:
-            placed = placed_leg(leg, coordinates, amounts).motions
+            placed = leg.chain.placed(coordinates, amounts).before
             for i, carried in enumerate(leg.masses.carried):
                 force, point = mechanism.gravity * leg.masses.mass[:, i, None], leg.masses.point[:, i]
                 result -= np.einsum("nc,nc->n", force, placed[carried].point(point) - point)
@@ -325,7 +296,7 @@ def balance(mechanism: Mechanism, state: State) -> Balance:
     for leg, coordinates, wrench in zip(mechanism.legs, state.coordinates, state.wrenches, strict=True):
         terms.append(leg_terms(leg, coordinates, wrench, amounts, mechanism.gravity))
         carried = carried + wrench
-        left += [terms[-1].left, -logarithm(state.platform @ terms[-1].end.inverse()) @ ways]
+        left += [terms[-1].left, -closing_gap(state.platform, terms[-1].end) @ ways]
     return Balance(
         mechanism, state, tuple(terms), np.concatenate([(carried - load) @ ways, *left], axis=1), load, change
     )

@@ -13,6 +13,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.kinematics.chain import Chain
 from kinetostat.machine.leg import Element, Joint, Leg, Spring, Station
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Member
@@ -91,15 +92,13 @@ def together(masses: Sequence[Masses]) -> Masses:
 
 
 @dataclass(frozen=True)
-class Chain:
-    """A leg as a row of screw motions.
+class ElasticLeg:
+    """A leg as a row of screw motions with its springs, masses and friction.
 
     Attributes:
-        name: of the leg.
-        twists: unit twist of each motion in the free state [n x motions x 6].
-        coordinate: which coordinate of the leg each motion follows [motions]; -1 where its amount is given.
-        given: which of the given amounts of the machine each motion follows [motions]: those of its actuators, then
-            the growths of its links; -1 where a coordinate moves it.
+        name: its name.
+        chain: its motions in the free state; given amounts are those of the machine's actuators, then the growths of
+            its links.
         springs: the spring of each coordinate [coordinates]; None of a passive one.
         stiffness: of each coordinate, 0 of a passive one [n x coordinates].
         preload: what each carries where it is zero [n x coordinates].
@@ -116,9 +115,7 @@ class Chain:
     """
 
     name: str
-    twists: Array
-    coordinate: tuple[int, ...]
-    given: tuple[int, ...]
+    chain: Chain
     springs: tuple[Spring | None, ...]
     stiffness: Array
     preload: Array
@@ -140,14 +137,10 @@ class Chain:
         """Which coordinates are flexure hinges, which pull back to the home pose [coordinates]."""
         return np.array([spring is not None and not is_zero(spring.returns) for spring in self.springs], dtype=bool)
 
-    def follows(self, which: tuple[int, ...], count: int) -> Array:
-        """1 where a motion follows a coordinate, or a given amount [motions x count]; 0 elsewhere.
-
-        Args:
-            which: `coordinate` or `given`.
-            count: how many there are.
-        """
-        return (np.array(which, dtype=int)[:, None] == np.arange(count)).astype(float)
+    def at(self, rows: Integers) -> "ElasticLeg":
+        """The leg at some of n poses [rows]."""
+        parts = {name: getattr(self, name)[rows] for name in ("stiffness", "preload", "idle", "rotors", "dampers")}
+        return replace(self, chain=self.chain.at(rows), masses=self.masses.at(rows), **parts)
 
 
 @dataclass(frozen=True)
@@ -343,7 +336,9 @@ class _Row:
                 self.preload[coordinate] = self.preload[coordinate] + returned
 
 
-def chain_of(leg: Leg, units: Units, amounts: Given, members: Sequence[Member], travels: Sequence[Array] = ()) -> Chain:
+def elastic_leg(
+    leg: Leg, units: Units, amounts: Given, members: Sequence[Member], travels: Sequence[Array] = ()
+) -> ElasticLeg:
     """Read a leg as a row of motions.
 
     Args:
@@ -364,23 +359,21 @@ def chain_of(leg: Leg, units: Units, amounts: Given, members: Sequence[Member], 
     row.carried.append((0, len(row.twists)))
     for number, element in enumerate(leg.chain, 1):
         row.add(element, number)
-    count, masses = len(units.length), row.masses()
-    idle = np.zeros((count, len(row.springs), len(row.springs)))
-    if units.count is not None:
-        idle = _idle(row.twists, row.coordinate, row.springs, count)
-    return Chain(
+    count, masses, size = len(units.length), row.masses(), len(row.springs)
+    twists = np.stack(row.twists, axis=1) if row.twists else np.zeros((count, 0, 6))
+    chain = Chain(twists, tuple(row.coordinate), tuple(row.given), size)
+    idle = np.zeros((count, size, size)) if units.count is None else _idle(chain, row.springs)
+    return ElasticLeg(
         leg.name,
-        np.stack(row.twists, axis=1) if row.twists else np.zeros((count, 0, 6)),
-        tuple(row.coordinate),
-        tuple(row.given),
+        chain,
         tuple(row.springs),
         np.stack(row.stiffness, axis=1) if row.stiffness else np.zeros((count, 0)),
         np.stack(row.preload, axis=1) if row.preload else np.zeros((count, 0)),
         np.array([SIGNS[spring.acts] if spring else 0.0 for spring in row.springs]),
         idle,
         units.masses(masses),
-        np.zeros((count, len(row.springs))),
-        np.zeros((count, len(row.springs))),
+        np.zeros((count, size)),
+        np.zeros((count, size)),
         _rod(leg, units, [weight.point for weight in masses]),
         tuple(whole for _, whole in row.carried),
     )
@@ -404,18 +397,16 @@ def _rod(leg: Leg, units: Units, weights: Sequence[Vector]) -> tuple[Array, Arra
     return near, far
 
 
-def _idle(twists: Sequence[Array], coordinate: Sequence[int], springs: Sequence[Spring | None], count: int) -> Array:
+def _idle(chain: Chain, springs: Sequence[Spring | None]) -> Array:
     """Motions of the passive coordinates that leave the leg's end where it is, to first order [n x c x c]."""
     passive = [i for i, spring in enumerate(springs) if spring is None]
+    count = len(chain.twists)
     result = np.zeros((count, len(springs), len(springs)))
     if not passive:
         return result
-    columns = np.stack(
-        [sum((t for t, c in zip(twists, coordinate, strict=True) if c == i), np.zeros((count, 6))) for i in passive],
-        axis=2,
-    )
-    columns = np.where(np.isfinite(columns), columns, 0.0)  # where a pose has no place, nothing is idle
-    _, sizes, rows = np.linalg.svd(columns, full_matrices=True)
+    # Where a pose has no place, nothing is idle.
+    twists = np.where(np.isfinite(chain.twists), chain.twists, 0.0)
+    _, sizes, rows = np.linalg.svd(np.swapaxes(twists, 1, 2) @ chain.follows[:, passive], full_matrices=True)
     weights = np.zeros((count, len(passive)))
     weights[:, : sizes.shape[1]] = sizes
     kept = rows * (weights < DEPENDENT)[:, :, None]

@@ -14,9 +14,10 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, total
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.chains import Chain, together
+from kinetostat.equilibrium.chains import ElasticLeg, together
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.state import state_of
+from kinetostat.kinematics.chain import Chain
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
 
@@ -34,7 +35,7 @@ class Rod:
         given: by how much longer they would be free to be: what their preloads have stretched, less the rod's growth.
         sign: of the loads that it can carry, 0 for both.
         driven: its springs that are actuators.
-        rotor: inertia that its drive adds along it, as `Chain.rotors`.
+        rotor: inertia that its drive adds along it, as `ElasticLeg.rotors`.
     """
 
     near: Array
@@ -57,7 +58,7 @@ class Cut:
     """
 
     mechanism: Mechanism
-    carrier: Chain
+    carrier: ElasticLeg
     rods: tuple[Rod, ...]
 
 
@@ -71,8 +72,10 @@ def cut(mechanism: Mechanism) -> Cut | None:
     for leg in mechanism.legs:
         if leg.rod is None:
             continue
-        slides = [n for n in range(leg.twists.shape[1]) if all(is_zero(c) for c in leg.twists[0, n, :3].tolist())]
-        springs = [leg.coordinate[n] for n in slides if leg.coordinate[n] >= 0]
+        slides = [
+            n for n in range(leg.chain.twists.shape[1]) if all(is_zero(c) for c in leg.chain.twists[0, n, :3].tolist())
+        ]
+        springs = [leg.chain.coordinate[n] for n in slides if leg.chain.coordinate[n] >= 0]
         if not springs:
             return None  # nothing of it deflects
         heavy = [i for i, carried in enumerate(leg.masses.carried) if carried > slides[0]]
@@ -80,27 +83,27 @@ def cut(mechanism: Mechanism) -> Cut | None:
         if all(leg.springs[number] is not None for number in springs):
             soft = [1.0 / leg.stiffness[0, number] for number in springs]
             given = [a * leg.preload[0, number] for a, number in zip(soft, springs, strict=True)]
-            given += [-mechanism.growth[0, n] for n in (i - len(mechanism.actuators) for i in leg.given) if n >= 0]
+            given += [
+                -mechanism.growth[0, n] for n in (i - len(mechanism.actuators) for i in leg.chain.given) if n >= 0
+            ]
             signs = [float(leg.sign[number]) for number in springs if leg.sign[number]]
             rotors = [rotor for rotor in leg.rotors[0].tolist() if not is_zero(rotor)]
             if rotors and len(springs) > 1:
                 return None  # a rotor between two springs has a motion of its own
-            driven = tuple(mechanism.driven[i] for i in leg.given if 0 <= i < len(mechanism.driven))
+            driven = tuple(mechanism.driven[i] for i in leg.chain.given if 0 <= i < len(mechanism.driven))
             sign = signs[0] if signs else 0.0
             rods.append(Rod(*leg.rod, total(soft), total(given), sign, driven, total(rotors)))
     return Cut(replace(mechanism, platform=together(masses)), carrier, tuple(rods))
 
 
-def _free_motions(mechanism: Mechanism) -> Chain:
+def _free_motions(mechanism: Mechanism) -> ElasticLeg:
     """A chain without springs in all motions that there are: slides first, so that turns are about the tool point."""
     ways = mechanism.ways.T[::-1].astype(object)
     size = len(ways)
     nothing = np.zeros((1, size))
-    return Chain(
+    return ElasticLeg(
         "platform",
-        ways[None],
-        tuple(range(size)),
-        (-1,) * size,
+        Chain(ways[None], tuple(range(size)), (-1,) * size, size),
         (None,) * size,
         nothing,
         nothing,
@@ -123,5 +126,5 @@ def cut_machine(machine: Machine, varying: Collection[str] = ()) -> Cut | None:
     if machine_cut is None or not machine.loaded:
         return machine_cut
     carrier, driven = machine_cut.carrier, machine_cut.mechanism.driven
-    known = all(driven[n] in carrier.springs for n in carrier.given if 0 <= n < len(driven))
+    known = all(driven[n] in carrier.springs for n in carrier.chain.given if 0 <= n < len(driven))
     return machine_cut if known else None  # no coordinate says what a rigid actuator carries

@@ -15,12 +15,12 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.chains import Chain, Units
+from kinetostat.equilibrium.chains import ElasticLeg, Units
 from kinetostat.machine.leg import Spring
 from kinetostat.spec.errors import InputError
 
 
-def with_drives(leg: Chain, units: Units, drives: Any, damping: Any) -> Chain:
+def with_drives(leg: ElasticLeg, units: Units, drives: Any, damping: Any) -> ElasticLeg:
     """Add what rotors and friction do to the coordinates of a leg.
 
     Args:
@@ -62,13 +62,13 @@ def _turns(spring: Spring, drives: Any) -> Scalar:
     return reciprocal(given) * (2.0 * math.pi) if slides else given
 
 
-def _friction(leg: Chain, coordinate: int, units: Units, damping: Any) -> Array:
+def _friction(leg: ElasticLeg, coordinate: int, units: Units, damping: Any) -> Array:
     """Friction of a passive coordinate; the bars of a parallelogram turn about both of their ends."""
     result = units.nothing
-    for motion, follows in enumerate(leg.coordinate):
+    for motion, follows in enumerate(leg.chain.coordinate):
         if follows != coordinate:
             continue
-        turning = leg.twists[:, motion, :3]
+        turning = leg.chain.twists[:, motion, :3]
         if all(is_zero(part) for part in turning.flat):
             result = result + units.inertia(damping.slides, turns=False)
         else:

@@ -16,7 +16,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, is_zero, total
 from kinetostat.algebra.vector import Displacement
 from kinetostat.arrays import Array, Integers
-from kinetostat.equilibrium.chains import Chain, Given, Masses, Units, Weight, chain_of
+from kinetostat.equilibrium.chains import ElasticLeg, Given, Masses, Units, Weight, elastic_leg
 from kinetostat.equilibrium.drives import with_drives
 from kinetostat.kinematics.closure import Joints
 from kinetostat.machine.leg import Spring, Turn
@@ -44,7 +44,7 @@ class Mechanism:
         weighs: whether any mass is known.
     """
 
-    legs: tuple[Chain, ...]
+    legs: tuple[ElasticLeg, ...]
     driven: tuple[Spring, ...]
     growth: Array
     platform: Masses
@@ -61,7 +61,7 @@ class Mechanism:
         """The mechanism at some of its poses [rows]."""
         return replace(
             self,
-            legs=tuple(_leg_at(leg, rows) for leg in self.legs),
+            legs=tuple(leg.at(rows) for leg in self.legs),
             platform=self.platform.at(rows),
             growth=self.growth[rows],
             wrench=self.wrench[rows],
@@ -105,11 +105,6 @@ def _wrench_units(length: Array, force: Array) -> Array:
     return np.stack([force * length] * 3 + [force] * 3, axis=1)
 
 
-def _leg_at(leg: Chain, rows: Integers) -> Chain:
-    parts = {name: getattr(leg, name)[rows] for name in ("twists", "stiffness", "preload", "idle", "rotors", "dampers")}
-    return replace(leg, masses=leg.masses.at(rows), **parts)
-
-
 def mechanism_of(
     machine: Machine, configuration: Configuration, joints: Joints | None, count: int | None = 1
 ) -> Mechanism:
@@ -135,7 +130,7 @@ def mechanism_of(
     legs = []
     for leg in configuration.legs:
         here = [m for m in members if m.leg == leg.name or (not m.leg and leg.number is None)]
-        chain = chain_of(leg, units, amounts, here, travels.get(leg.name, ()))
+        chain = elastic_leg(leg, units, amounts, here, travels.get(leg.name, ()))
         legs.append(with_drives(chain, units, machine.tables["drives"], machine.tables["damping"]))
     platform = configuration.platform
     weights = platform_weights(machine, platform)

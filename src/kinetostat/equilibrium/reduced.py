@@ -18,7 +18,7 @@ from kinetostat.algebra.solve import Eliminated, Row, eliminated
 from kinetostat.algebra.symmetric import POSITIONS, greatest_eigenvalue
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.balance import LegTerms, leg_terms, placed_leg, platform_load
+from kinetostat.equilibrium.balance import LegTerms, leg_terms, platform_load
 from kinetostat.equilibrium.cut import Cut, Rod, cut
 from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.numbers import borne, greatest_loads
@@ -144,9 +144,9 @@ def place_of(machine: Cut, coordinates: Row) -> Place:
     mechanism, carrier = machine.mechanism, machine.carrier
     moved = of_scalars(coordinates)
     amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
-    placed = placed_leg(carrier, moved, amounts)
-    platform = placed.motions[-1]
-    grows = any(number >= len(mechanism.actuators) for number in carrier.given)
+    placed = carrier.chain.placed(moved, amounts)
+    platform = placed.end
+    grows = any(number >= len(mechanism.actuators) for number in carrier.chain.given)
     free = not grows and all(is_zero(coordinate) for coordinate in coordinates)
     pulls = [_pull(rod, None if free else platform) for rod in machine.rods]
     (load, change), (hold, fall) = platform_load(mechanism, platform), _pulled(pulls)

@@ -10,7 +10,7 @@ import numpy as np
 
 from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.vector import Vector
-from kinetostat.equilibrium.balance import Balance, placed_leg
+from kinetostat.equilibrium.balance import Balance
 from kinetostat.kinetostatics.deflected import DeflectedLink, leg_links
 from kinetostat.machine.leg import Leg
 from kinetostat.numerics.motions import Motions
@@ -28,9 +28,9 @@ def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> t
     length = float(mechanism.length[0])
     links: list[DeflectedLink] = []
     given = np.concatenate([state.amounts, mechanism.growth], axis=1)
-    for leg, chain, coordinates in zip(legs, mechanism.legs, state.coordinates, strict=True):
-        placed = placed_leg(chain, coordinates, given).motions
-        bodies = [placed[number] for number in chain.ends]
+    for leg, elastic, coordinates in zip(legs, mechanism.legs, state.coordinates, strict=True):
+        placed = elastic.chain.placed(coordinates, given).before
+        bodies = [placed[number] for number in elastic.ends]
         links += leg_links(leg, partial(_moved, bodies, origin, length))
     return tuple(links)
 

@@ -97,6 +97,13 @@ def largest(numbers: Array) -> Array:
     return np.where(np.isfinite(result), result, np.inf)
 
 
+def with_rows(values: Array, rows: Integers, part: Array) -> Array:
+    """Return an array with other values in some of its rows."""
+    result = values.copy()
+    result[rows] = part
+    return result
+
+
 def newton(
     equations: Callable[[Value, Integers], tuple[Array, Steps]],
     start: Value,
@@ -180,8 +187,7 @@ def _with_part(value: Value, rows: Integers, part: Any, chosen: Mask) -> Value:
         return value
     if not isinstance(value, np.ndarray):
         return value.with_part(rows[places], part.at(places))
-    changed = value.copy()
-    changed[rows[places]] = part[places]
+    changed: Any = with_rows(value, rows[places], part[places])
     return changed
 
 

@@ -14,8 +14,9 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, cos, is_zero, sin
 from kinetostat.algebra.vector import Vector, rotation_along
-from kinetostat.arrays import Array
+from kinetostat.arrays import Array, Integers
 from kinetostat.machine.column import stacked
+from kinetostat.numerics.iteration import with_rows
 
 NEXT, AFTER = [1, 2, 0], [2, 0, 1]
 """The axes that come next in turn, and after these."""
@@ -53,6 +54,16 @@ class Motions:
         """Rotation vectors and translations [n x 6]: how far bodies are turned, and where their origins are."""
         turned = logarithm(Motions(self.rotation, np.zeros_like(self.translation)))
         return np.concatenate([turned[:, :3], self.translation], axis=1)
+
+    def at(self, rows: Integers) -> "Motions":
+        """The displacements of some of the bodies, by number."""
+        return Motions(self.rotation[rows], self.translation[rows])
+
+    def with_part(self, rows: Integers, part: "Motions") -> "Motions":
+        """The displacements with those of some of the bodies, by number, in their places."""
+        return Motions(
+            with_rows(self.rotation, rows, part.rotation), with_rows(self.translation, rows, part.translation)
+        )
 
     def inverse(self) -> "Motions":
         """The displacements that undo these."""

@@ -15,8 +15,8 @@ import numpy as np
 
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.balance import Placed
-from kinetostat.equilibrium.chains import Chain, Masses
+from kinetostat.equilibrium.chains import ElasticLeg, Masses
+from kinetostat.kinematics.chain import PlacedChain
 from kinetostat.numerics.motions import Motions, cross, skew_of
 
 TENSOR_ROWS = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
@@ -47,12 +47,12 @@ def tensor_of(masses: Masses, number: int, motion: Motions) -> Array | None:
     return np.asarray(motion.rotation @ rows @ np.swapaxes(motion.rotation, 1, 2))
 
 
-def leg_rates(leg: Chain, placed: Placed) -> list[PartRates]:
+def leg_rates(leg: ElasticLeg, placed: PlacedChain) -> list[PartRates]:
     """Motion of each mass of a leg by the rates of the leg's coordinates."""
-    follows = leg.follows(leg.coordinate, leg.size)
+    follows = leg.chain.follows
     rates = []
     for number, carried in enumerate(leg.masses.carried):
-        motion, screws = placed.motions[carried], placed.screws[:, :carried]
+        motion, screws = placed.before[carried], placed.screws[:, :carried]
         at = motion.point(leg.masses.point[:, number])
         moving = cross(screws[..., :3], at[:, None]) + screws[..., 3:]
         moved, turned = (np.swapaxes(part, 1, 2) @ follows[:carried] for part in (moving, screws[..., :3]))

@@ -17,7 +17,7 @@ import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.admissible import starts_of, tangent_matrices, within
-from kinetostat.equilibrium.balance import Balance, placed_leg
+from kinetostat.equilibrium.balance import Balance
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.numerics.motions import skew_of
 from kinetostat.tolerances import CLOSING_ROUND_OFF, EQUAL_STIFFNESSES, UNRESISTED
@@ -81,7 +81,7 @@ def mass_matrix(equations: Balance) -> Array:
     for number, (leg, (first, last)) in enumerate(zip(mechanism.legs, pairwise(starts), strict=True)):
         moving = slice(first, last)
         if leg.masses.carried:
-            placed = placed_leg(leg, equations.state.coordinates[number], given)
+            placed = leg.chain.placed(equations.state.coordinates[number], given)
             for _, matrix in energies(leg.masses, leg_rates(leg, placed), length):
                 result[:, moving, moving] += matrix
         result[:, moving, moving] += _diagonal(leg.rotors * length[:, None])

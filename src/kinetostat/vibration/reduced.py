@@ -17,7 +17,6 @@ from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.algebra.solve import Row, eliminated
 from kinetostat.algebra.symmetric import eigenvalues
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.balance import placed_leg
 from kinetostat.equilibrium.cut import Cut, Rod, cut
 from kinetostat.equilibrium.mechanism import mechanism_of, platform_weights
 from kinetostat.equilibrium.reduced import place_of, relative
@@ -162,7 +161,7 @@ def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list
     """
     place, mechanism = place_of(machine, coordinates), machine.mechanism
     amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
-    placed = placed_leg(machine.carrier, of_scalars(coordinates), amounts)
+    placed = machine.carrier.chain.placed(of_scalars(coordinates), amounts)
     length, twists = mechanism.length, place.terms.rates[0]
     inertia = platform_inertia(mechanism.platform, place.platform, length)[0]
     for rod in machine.rods:

@@ -16,7 +16,7 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, total
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.admissible import starts_of, tangent_matrices
-from kinetostat.equilibrium.balance import Balance, placed_leg
+from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.chains import Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.solving import with_share
@@ -116,11 +116,11 @@ class Vibrating:
         strain, open_by = 0.0, 0.0
         amounts = np.zeros((1, len(mechanism.actuators) + mechanism.growth.shape[1]))
         for leg, motion, force in zip(mechanism.legs, moved, forces, strict=True):
-            placed = placed_leg(leg, np.zeros((1, leg.size)).astype(object), amounts.astype(object))
+            placed = leg.chain.placed(np.zeros((1, leg.size)).astype(object), amounts.astype(object))
             kinetic = kinetic + _energy(leg.masses, leg_rates(leg, placed), motion, mechanism.length)
             kinetic = kinetic + mechanism.length[0] * total(list(leg.rotors[0] * motion * motion))
             strain = strain + total(list(leg.stiffness[0] * motion * motion))
-            ends = placed.screws[0].T @ (leg.follows(leg.coordinate, leg.size) @ motion)
+            ends = placed.screws[0].T @ (leg.chain.follows @ motion)
             open_by = open_by + total(list(force * (ends - platform)))
         return square + ratio * (kinetic - square * strain) + 2.0 * open_by
 

@@ -1,0 +1,116 @@
+"""A leg as a row of screw motions from base to platform, and the gap by which it misses the platform.
+
+A motion belongs to a coordinate of the leg, as joints and springs have them, or to an amount that is given, as that of
+an actuator. Errors are motions of size zero in the drawn leg: small displacements that stand between the others. Loads,
+masses and names belong to those who read a chain (`equilibrium`, `accuracy`). Nothing is solved here.
+
+Source: theory (35), (38) and (45). Screws are at one origin, in axes of the base.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from kinetostat.arrays import Array, Integers
+from kinetostat.numerics.motions import Motions, each_about, each_along, each_twist, exponential, logarithm, still
+
+
+@dataclass(frozen=True)
+class PlacedChain:
+    """A chain somewhere, at n poses.
+
+    Attributes:
+        before: displacement of what each number of motions carries, before the errors there [motions + 1].
+        end: displacement of the platform's end.
+        screws: of each motion in its place [n x motions x 6].
+    """
+
+    before: tuple[Motions, ...]
+    end: Motions
+    screws: Array
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A leg as a row of screw motions.
+
+    Attributes:
+        twists: unit twist of each motion where the leg is drawn [n x motions x 6]; n is 1 where it is the same at all
+            poses.
+        coordinate: number of the coordinate that each motion follows [motions]; -1 where its amount is given.
+        given: number of the given amount that each motion follows [motions]; -1 where a coordinate moves it.
+        size: number of coordinates.
+    """
+
+    twists: Array
+    coordinate: tuple[int, ...]
+    given: tuple[int, ...]
+    size: int
+
+    @cached_property
+    def follows(self) -> Array:
+        """1 where a motion follows a coordinate, else 0 [motions x coordinates]."""
+        return _matches(self.coordinate, self.size)
+
+    def driven(self, count: int) -> Array:
+        """Return 1 where a motion follows one of so many given amounts, else 0 [motions x count]."""
+        return _matches(self.given, count)
+
+    def at(self, rows: Integers) -> "Chain":
+        """Return the chain at some of its poses."""
+        return replace(self, twists=self.twists[rows])
+
+    def placed(
+        self, coordinates: Array, amounts: Array | None = None, errors: Mapping[int, Array] | None = None
+    ) -> PlacedChain:
+        """Move the chain, theory (35) and (45).
+
+        Args:
+            coordinates: of its joints and springs [n x coordinates].
+            amounts: all given amounts of the machine [n x amounts].
+            errors: small screw motions [n x 6] or [1 x 6], by the number of motions behind which they stand.
+        """
+        count, errors = len(coordinates), errors or {}
+        motion, before, carried = still(count), [], []
+        for number, step in enumerate(self._steps(coordinates, amounts)):
+            before.append(motion)
+            motion = _beside(motion, errors.get(number))
+            carried.append(motion)
+            motion = motion @ step
+        before.append(motion)
+        screws = each_twist(carried, self.twists) if carried else np.zeros((count, 0, 6))
+        return PlacedChain(tuple(before), _beside(motion, errors.get(len(carried))), screws)
+
+    def _steps(self, coordinates: Array, amounts: Array | None) -> list[Motions]:
+        """The displacement by each motion alone."""
+        if not self.coordinate:
+            return []
+        if amounts is None:
+            return each_about(self.twists[0], coordinates[:, self.coordinate])
+        pairs = zip(self.coordinate, self.given, strict=True)
+        moved = [amounts[:, driven] if by < 0 else coordinates[:, by] for by, driven in pairs]
+        return each_along(self.twists, np.stack(moved, axis=1))
+
+    def rates(self, placed: PlacedChain) -> Array:
+        """Return the twist of the end per unit of each coordinate [n x 6 x coordinates]."""
+        return np.asarray(np.swapaxes(placed.screws, 1, 2) @ self.follows)
+
+
+def _matches(numbers: tuple[int, ...], count: int) -> Array:
+    return (np.array(numbers, dtype=int)[:, None] == np.arange(count)).astype(float)
+
+
+def _beside(motion: Motions, error: Array | None) -> Motions:
+    return motion if error is None else motion @ exponential(error)
+
+
+def closing_gap(platform: Motions, end: Motions) -> Array:
+    """Return the screw motion from the end of a leg to the platform [n x 6]: 0 where the leg closes.
+
+    A twist of the platform adds to it, and the rates of the end (`Chain.rates`) reduce it, both exactly where it is 0.
+
+    Source: theory (38) and (48).
+    """
+    return logarithm(platform @ end.inverse())
