@@ -6,6 +6,7 @@ from typing import Any
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Complex
 from kinetostat.display import Display, number
+from kinetostat.machine.loads import loads_platform
 from kinetostat.studies.attribution import ranked
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.vibration import Mode, Vibration, frequency_range, modes
@@ -27,6 +28,14 @@ def masses_of(answer: Vibration) -> str:
     if not answer.uncounted:
         return text
     return f"{text} Nothing says the mass of {', '.join(answer.uncounted)}: they count as massless."
+
+
+def loads_of(answer: Vibration) -> str:
+    """Say that the loads of the file do not count where the machine vibrates about its free state; empty if they do."""
+    loaded = loads_platform(answer.machine) or answer.state.left_out
+    if answer.loaded or not loaded:
+        return ""
+    return "These are vibrations about the free state: loads of the file do not count, but in modes --loaded."
 
 
 def damping_of(answer: Vibration) -> str:
@@ -123,8 +132,8 @@ def _lines(answer: Vibration) -> Lines:
         ("Masses", masses_of(answer)),
         ("Damping", damping_of(answer)),
     ]
-    cut = cut_of(answer)
-    return [*lines, ("Cutting", cut)] if cut else lines
+    more = [("Loads", loads_of(answer)), ("Cutting", cut_of(answer))]
+    return [*lines, *((word, sentence) for word, sentence in more if sentence)]
 
 
 def _tables(answer: Vibration, _full: bool) -> Iterator[FittedTable]:
