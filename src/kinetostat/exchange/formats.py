@@ -20,8 +20,8 @@ class Format:
     """A file format of another program.
 
     Attributes:
-        name: as in `kinetostat export --to`.
-        suffix: of its files.
+        name: the name as in `kinetostat export --to`.
+        suffix: the suffix of its files.
         writer: "module.function" in this package; the function takes an analysis and a path, writes, and returns the
             paths of the files it made.
         summary: what is in it, for lists.
@@ -40,8 +40,8 @@ class Format:
         """Write the machine, or its results at the pose, whole or not at all, and return the paths of the files.
 
         Args:
-            analysis: of the machine, at a pose where its status is OK.
-            path: of the file; one that is there is replaced.
+            analysis: the analysis of the machine, at a pose where its status is OK.
+            path: the path of the file; one that is there is replaced.
             channels: names of `inputs` and of `outputs`; None for all that the format has by itself.
 
         Raises:
@@ -133,11 +133,11 @@ def export(
     """Write a machine, or its results at its pose, in the format of another program, whole or not at all.
 
     Args:
-        machine: at a pose where it can be analysed.
-        path: of the file; one that is there is replaced.
+        machine: the machine at a pose where it can be analysed.
+        path: the path of the file; one that is there is replaced.
         to: name of the format, as in `kinetostat export --to`; None to go by the suffix of the path.
-        inputs, outputs: of a state space: names of forces fx fy fz mx my mz at the tool point, of motions x y z rx ry
-            rz there, and of actuators in both; forces and motions of the tool point if None.
+        inputs, outputs: the inputs and outputs of a state space: names of forces fx fy fz mx my mz at the tool point,
+            of motions x y z rx ry rz there, and of actuators in both; forces and motions of the tool point if None.
 
     Returns:
         The paths of the files: some formats need several.

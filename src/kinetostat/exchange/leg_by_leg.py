@@ -36,7 +36,7 @@ def legs_of(name: str) -> str:
     """The text of a machine file leg by leg that is the same machine as a bundled one or one from a file.
 
     Args:
-        name: of a bundled machine, or path of a machine file.
+        name: the name of a bundled machine, or path of a machine file.
 
     Raises:
         InputError: no such machine, or it cannot be placed at its pose.
@@ -56,7 +56,7 @@ def built_text(machine: Machine, built: Configuration, notes: Sequence[str]) -> 
     """The text of a machine file leg by leg of a machine as built.
 
     Args:
-        machine: as drawn.
+        machine: the machine as drawn.
         built: where its legs are as built, at the home pose of the file.
         notes: lines of comment at its head.
     """
@@ -71,7 +71,7 @@ def document_of(machine: Machine, built: Configuration | None = None) -> Documen
     """A machine as what its file leg by leg would say.
 
     Args:
-        machine: whose tables the file takes over.
+        machine: the machine whose tables the file takes over.
         built: where its legs are; at the machine's pose if None.
 
     Raises:
@@ -105,8 +105,8 @@ def _limits_as_built(limits: dict[str, float], machine: Machine, built: Configur
     """Limits of a machine whose axes of joints no longer meet: a length of such a leg becomes a travel of its ram.
 
     Args:
-        limits: of the machine as drawn, SI.
-        machine: as drawn.
+        limits: the limits of the machine as drawn, SI.
+        machine: the machine as drawn.
         built: where its legs are as built, at the home pose.
     """
     parted = [leg.name for leg in built.legs if _is_parted(leg)]

@@ -55,7 +55,7 @@ def text_of(analysis: Analysis, vibrating: bool = False) -> str:
     """Return the model: unstressed and at rest at the pose; a wrench on the platform acts at the tool point.
 
     Args:
-        analysis: of the machine.
+        analysis: the analysis of the machine.
         vibrating: whether it has the machine's own masses and no damping, so that it vibrates as the machine does;
             otherwise masses and damping let it come to rest soon.
 

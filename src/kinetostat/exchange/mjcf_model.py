@@ -29,7 +29,7 @@ class Freedom:
     Attributes:
         name: unique within the model.
         axis: unit vector.
-        point: on the axis of a hinge, base frame, m; None for a slide.
+        point: a point on the axis of a hinge, base frame, m; None for a slide.
         stiffness: N·m/rad or N/m; 0 where it moves freely.
         actuated: whether the spring is that of an actuator.
     """
@@ -48,7 +48,7 @@ class Body:
     Attributes:
         name: unique within the model.
         at: its frame's origin, base frame, m.
-        freedoms: between it and its parent, the nearest to the parent first.
+        freedoms: the freedoms between it and its parent, the nearest to the parent first.
         children: bodies that hang on it.
         reach: points to which a drawing connects its origin, base frame, m.
         leg: name of the leg that it belongs to.

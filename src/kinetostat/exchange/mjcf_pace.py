@@ -147,8 +147,8 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
     """Return the machine's masses on its bodies, and a time step that follows all of its springs.
 
     Args:
-        analysis: of the machine.
-        model: of its bodies.
+        analysis: the analysis of the machine.
+        model: the model of its bodies.
 
     Raises:
         InputError: if nothing has a mass.

@@ -198,9 +198,9 @@ def write_lines(path: Path, dataset: xr.Dataset, unit: Unit) -> None:
     """Write a dataset as CSV, one number a line: its names, all its digits and its unit; NaN is left empty.
 
     Args:
-        path: of the file.
-        dataset: with the attributes of `ABOUT`.
-        unit: of a number by its variable, row and column.
+        path: the path of the file.
+        dataset: the dataset with the attributes of `ABOUT`.
+        unit: the unit of a number by its variable, row and column.
 
     Raises:
         InputError: the file cannot be written.

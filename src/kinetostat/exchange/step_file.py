@@ -139,7 +139,7 @@ def step_bytes(scene: Scene, name: str) -> bytes:
 
     Args:
         scene: the solids.
-        name: of the assembly.
+        name: the name of the assembly.
 
     Returns:
         The file; the same bytes from the same scene and name.

@@ -100,8 +100,8 @@ class _Tree:
         """Add what weighs something to the links, as far as a link carries it whole.
 
         Args:
-            machine: with its masses.
-            response, joints: of it; joints of a machine written leg by leg.
+            machine: the machine with its masses.
+            response, joints: its response, and its joints where it is written leg by leg.
         """
         parts: dict[str, list[Heavy]] = {
             PLATFORM: [part for part in on_platform(machine, response.configuration.platform) if part.mass]

@@ -33,9 +33,9 @@ class FileJoint:
     """A joint of the file, placed at zero joint coordinates.
 
     Attributes:
-        name, kind: as written.
+        name, kind: the name and kind as written.
         parent, child: names of its links.
-        frame: of itself and of its child, in the root link's frame, m [4 x 4].
+        frame: the frame of itself and of its child, in the root link's frame, m [4 x 4].
         axis: unit vector in the root link's frame; without meaning for a fixed joint.
         actuated: by a <transmission>, `independent`, or as its extension says.
         mimics: name and multiplier of the joint that it follows, None if it follows none.
@@ -70,13 +70,13 @@ class UrdfFile:
 
     Attributes:
         origin: name of the file, for messages.
-        name: of the robot.
+        name: the name of the robot.
         about: attributes of the element <kinetostat> of the robot.
         root: name of the link that hangs on no joint.
-        joints: by name of their child link.
-        frames: of every link in the root link's frame, m [4 x 4].
-        loops: in the order of the file.
-        masses: of the links that have one, in the root link's frame, by name.
+        joints: the joints by name of their child link.
+        frames: the frames of every link in the root link's frame, m [4 x 4].
+        loops: the loops in the order of the file.
+        masses: the masses of the links that have one, in the root link's frame, by name.
     """
 
     origin: str

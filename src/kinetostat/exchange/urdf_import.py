@@ -103,8 +103,8 @@ def document_of(file: UrdfFile, bodies: Bodies | None = None) -> Document:
     """Return the machine as a document with all coordinates of its pose.
 
     Args:
-        file: that was read.
-        bodies: of it, from which what the machine weighs is taken.
+        file: the file that was read.
+        bodies: its bodies, from which what the machine weighs is taken.
 
     Raises:
         InputError: if the file is not legs between the root link and a platform.
@@ -223,7 +223,7 @@ def _leg(leg: str, path: Sequence[FileJoint], loop: FileLoop | None, bodies: Bod
         leg: its name, which is taken off the names of joints.
         path: the joints from the root to the platform, or to the tip of the leg.
         loop: the joint between the tip and the platform, if it closes a loop.
-        bodies: of the file.
+        bodies: the bodies of the file.
         origin: name of the file, for messages.
 
     Raises:

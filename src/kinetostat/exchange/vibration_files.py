@@ -103,8 +103,8 @@ def write_state_space(
     """Write A, B, C and D, as NetCDF if the suffix says so, otherwise as a MATLAB file (level 5).
 
     Args:
-        analysis: of the machine.
-        path: of the file.
+        analysis: the analysis of the machine.
+        path: the path of the file.
         inputs, outputs: see `state_space`.
 
     Raises:

@@ -29,7 +29,7 @@ class Actuator:
     """An actuator and where it stands.
 
     Attributes:
-        name: of the joint that it drives, e.g. "leg 1 actuator".
+        name: the name of the joint that it drives, e.g. "leg 1 actuator".
         leg: name of its leg.
         meaning: what its coordinate counts.
         coordinate: m, or rad.
@@ -60,7 +60,7 @@ def actuators_of(configuration: Configuration) -> list[Actuator]:
     from the z axis (towards +x or +y where none does); about a vertical axis, the angle from x, counter-clockwise.
 
     Args:
-        configuration: of a machine in closed form.
+        configuration: the configuration of a machine in closed form.
     """
     lengths = {rod.leg: rod.length for rod in rods(configuration.legs) if rod.telescopic}
     result, end = [], configuration.platform.translation
@@ -83,7 +83,7 @@ def senses_of(configuration: Configuration) -> list[Scalar]:
     """Tell for each of `actuators_of` whether its coordinate grows (1) or falls (-1) as its joint moves forward.
 
     Args:
-        configuration: of a machine in closed form, over floats or columns.
+        configuration: the configuration of a machine in closed form, over floats or columns.
     """
     senses: list[Scalar] = []
     for number, leg in enumerate(configuration.legs):
@@ -136,7 +136,7 @@ class JointActuator:
 
     Attributes:
         name, leg, meaning, slides: see `Actuator`.
-        place: of its coordinate among the joint coordinates.
+        place: the place of its coordinate among the joint coordinates.
         offset, sign: its coordinate is offset + sign times the joint coordinate; m or rad.
     """
 
@@ -164,7 +164,7 @@ def joint_actuators(chains: Chains, names: Sequence[str]) -> list[JointActuator]
 
     Args:
         chains: its legs at the home pose; floats.
-        names: of the legs.
+        names: the names of the legs.
     """
     result, place = [], 0
     for name, steps in zip(names, chains.legs, strict=True):

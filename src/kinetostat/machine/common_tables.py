@@ -133,7 +133,7 @@ def check_inertia(tables: Mapping[str, Any], origin: str) -> None:
     """Refuse an inertia tensor that no body has, and that of a link without a mass.
 
     Args:
-        tables: of a machine, by dotted name.
+        tables: the tables of a machine, by dotted name.
         origin: names the machine in messages.
 
     Raises:

@@ -29,11 +29,11 @@ class Material:
     """An isotropic elastic material.
 
     Attributes:
-        name: as written in files.
+        name: the name as written in files.
         youngs_modulus, shear_modulus: E and G, Pa.
         density: kg/m³.
         expansion: relative growth per kelvin, 1/K.
-        source: where the values come from.
+        source: the origin of the values.
     """
 
     name: str
@@ -84,7 +84,7 @@ class CrossSection:
 
     Attributes:
         area: m².
-        second_moment_y, second_moment_z: of area about y and z, m⁴.
+        second_moment_y, second_moment_z: the second moments of area about y and z, m⁴.
         torsion_constant: J, m⁴.
         shear_factor: kappa, the share of the area that shear sees; infinite where shear is not considered.
     """

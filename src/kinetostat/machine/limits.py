@@ -28,7 +28,7 @@ class Parts:
     """The parts of a machine that limits are about, at one pose.
 
     Attributes:
-        legs: of the machine.
+        legs: the legs of the machine.
         normal: the platform's z axis, base frame.
         planar: whether the machine moves in a plane; angles to z are then fixed.
         slides: actuated slides that count from a home pose, each with its travel, m.
@@ -103,15 +103,15 @@ class Limit:
     """A limit that files may set.
 
     Attributes:
-        name: in the table [limits].
+        name: the name in the table [limits].
         about: what it is about.
         quantity: what may be written, and what it means.
         at_most: whether it is a greatest value, otherwise a least one.
-        measure: from the parts of a machine to what the limit is compared with.
+        measure: gives what the limit is compared with, from the parts of a machine.
         needs: what a machine must have for the limit to mean something.
-        sentence: about a part that passes the limit, with its value in braces.
-        phrase: in a few words, that it is passed.
-        title: of the measure, where its range over many poses is shown; limits with one measure share it.
+        sentence: the sentence about a part that passes the limit, with its value in braces.
+        phrase: says in a few words that it is passed.
+        title: the title of the measure, where its range over many poses is shown; limits with one measure share it.
         compared: from the limit as written (SI) to the number that the measure is compared with.
         shown: from the measure to the value as written, SI.
         falling: whether the measure falls where the value rises, as a cosine does.
@@ -319,7 +319,7 @@ def check_limits(limits: object, parts: Parts, origin: str) -> None:
 
     Args:
         limits: the table [limits] of the machine.
-        parts: of the machine, at any pose.
+        parts: the parts of the machine, at any pose.
         origin: name of the file.
 
     Raises:

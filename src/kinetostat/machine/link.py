@@ -86,10 +86,10 @@ class Beam:
     exact (theory section 5).
 
     Attributes:
-        name: of the link.
+        name: the name of the link.
         start, end: of its axis, base frame, m.
         up: not along the link; the cross-section's z axis lies in the plane of both.
-        rigidity: of its cross-section.
+        rigidity: the rigidity of its cross-section.
         placed: its axes and its length, m: known without the ends once it has been displaced.
     """
 
@@ -175,10 +175,10 @@ class Parallelogram:
     """Two equal bars between two equal short sides: one freedom, a translation that turns nothing.
 
     Attributes:
-        name: of the joint.
+        name: the name of the joint.
         near, far: middles of the short sides nearer to the base and to the platform, base frame, m.
         side: unit vector along the short sides.
-        width: of the short sides, m.
+        width: the width of the short sides, m.
         bar: axial stiffness of each bar, N/m.
         kept: unit normal of its plane once it has moved. If it were computed from the sides, its sign and the direction
             of the motion would change where the bars pass the short sides.
@@ -255,8 +255,8 @@ def seat_springs(name: str, axis: Vector, point: Vector, stiffness: Mapping[str,
     """Springs of a joint's bearings in the joint's own frame, as data sheets give their stiffness.
 
     Args:
-        name: of the part that the springs stand for.
-        axis: of the joint, of any length, base frame.
+        name: the name of the part that the springs stand for.
+        axis: the axis of the joint, of any length, base frame.
         point: centre of the bearings, base frame, m.
         stiffness: "radial" in any direction across the axis and "axial" along it, N/m; "tilt" about any axis across it
             and "torsion" about it, N·m/rad. What is not given is rigid.
@@ -282,7 +282,7 @@ def matrix_springs(name: str, compliance: npt.ArrayLike, point: Vector) -> tuple
     block, up to three slides. Their dyads add up to the matrix.
 
     Args:
-        name: of the link or joint.
+        name: the name of the link or joint.
         compliance: symmetric, >= 0, rows rx ry rz x y z, of one end against the other at `point`, SI [6 x 6].
         point: base frame, m.
     """

@@ -32,7 +32,7 @@ class LinkKind:
     Attributes:
         name: their field in the tables about links.
         rigidities: fields of [stiffness] in which their cross-section may be written.
-        lengths: of each of them, and where it is.
+        lengths: gives the length and the place of each of them.
         count: how many entries those fields have; None where one is for all links.
     """
 
@@ -120,7 +120,7 @@ def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> Lengths:
 
     Args:
         what: they are called.
-        field: with their length.
+        field: the field with their length.
         segment: which piece of the leg's path from the base they are, counted from 0.
         bars: side by side.
     """

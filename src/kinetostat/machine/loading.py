@@ -258,7 +258,7 @@ def as_toml(machine: Machine, readable: bool = False) -> str:
     """A machine file that `load` reads back as the same machine; it never depends on how the machine was written.
 
     Args:
-        machine: of any family.
+        machine: a machine of any family.
         readable: numbers in the units of people where that needs fewer digits; otherwise all are in SI, for programs.
     """
     lines = [
@@ -307,8 +307,8 @@ def changed(machine: Machine, values: Mapping[str, Given]) -> Machine:
 
     Args:
         machine: which stays as it is.
-        values: by name of the field, in SI or as text with a unit; for a field with several entries one for all, or a
-            list or array of one for each; infinity is "rigid".
+        values: the values by name of the field, in SI or as text with a unit; for a field with several entries one for
+            all, or a list or array of one for each; infinity is "rigid".
 
     Raises:
         InputError: an unknown field, no quantity, a value out of bounds, a list of the wrong length, or numbers that

@@ -31,9 +31,9 @@ class Mass:
     """The mass of one part at a pose.
 
     Attributes:
-        name: of the link, or `PLATFORM`.
+        name: the name of the link, or `PLATFORM`.
         mass: kg; None where nothing says it.
-        leg: that it belongs to; empty for the platform and for a link that is not counted to a leg.
+        leg: the leg that it belongs to; empty for the platform and for a link that is not counted to a leg.
     """
 
     name: str
@@ -48,7 +48,7 @@ def moving_masses(machine: Machine, configuration: Configuration) -> list[Mass]:
 
     Args:
         machine: says which links there are, their densities, and the mass of the platform.
-        configuration: of it, at its pose.
+        configuration: its configuration, at its pose.
     """
     platform = machine.tables["tool"].mass
     links = [Mass(link.name, _known_mass(link), link.leg) for link in _members(machine, configuration)]
@@ -148,9 +148,9 @@ class PlatformMass:
 
     Attributes:
         name: `PLATFORM` or `PAYLOAD`.
-        centre: of it at the pose, base frame, m.
+        centre: its centre of mass at the pose, base frame, m.
         mass: kg.
-        inertia: about the centre, in the axes of the platform: xx, yy, zz, xy, xz, yz, kg·m².
+        inertia: the inertia about the centre, in the axes of the platform: xx, yy, zz, xy, xz, yz, kg·m².
     """
 
     name: str
@@ -163,8 +163,8 @@ def platform_masses(machine: Machine, platform: Displacement) -> list[PlatformMa
     """Return the masses of the platform with its tool and of the payload; those that are zero are left out.
 
     Args:
-        machine: with its table [tool].
-        platform: where it is, base frame.
+        machine: the machine with its table [tool].
+        platform: its placement, base frame.
     """
     tool = machine.tables["tool"]
     payload = machine.tool_point(platform) + platform.rotation.apply(Vector(*tool.payload_centre))
@@ -189,8 +189,8 @@ def load_on_platform(machine: Machine, platform: Displacement) -> Wrench:
     """Add up all loads on the platform, its weight and that of the payload among them.
 
     Args:
-        machine: with its loads.
-        platform: where it is.
+        machine: the machine with its loads.
+        platform: its placement.
 
     Returns:
         The wrench at the tool point, base axes (N·m, N).
@@ -211,8 +211,8 @@ def loads_left_out(machine: Machine, configuration: Configuration) -> str:
     """Say which loads of a file an answer to first order does not count; empty if it counts all.
 
     Args:
-        machine: with its loads.
-        configuration: of it.
+        machine: the machine with its loads.
+        configuration: its configuration.
     """
     weights = [part.mass for part in moving_masses(machine, configuration) if part.name != PLATFORM and part.mass]
     parts = []

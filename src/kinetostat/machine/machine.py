@@ -89,7 +89,7 @@ class Configuration:
         legs: every leg, placed.
         closures: the conditions under which this placement exists.
         length: a characteristic length of the machine, m; scales rows in solves, no result depends on it.
-        plane: of a planar machine; None for a spatial one.
+        plane: the plane of a planar machine; None for a spatial one.
     """
 
     platform: Displacement
@@ -104,12 +104,12 @@ class Member:
     """A link that can move.
 
     Attributes:
-        leg: that it belongs to, or empty.
+        leg: the leg that it belongs to, or empty.
         name: unique within the machine.
-        length: from joint to joint, m.
+        length: the length from joint to joint, m.
         mass: kg; 0 where nothing says it.
         bending: least E I, N·m²; 0 where nothing says it.
-        growth: by which it makes its leg longer because it is warmer than when the machine was built, m.
+        growth: the growth by which it makes its leg longer because it is warmer than when the machine was built, m.
         ends: gives both ends of its axis at the pose; None where they are not known.
         centre: gives its centre of mass at the pose; None for a uniform link.
         inertia: gives its inertia about that centre at the pose, base axes: xx, yy, zz, xy, xz, yz, kg·m²; None where
@@ -171,19 +171,19 @@ class Family:
     """A kind of machine: what people must write about one, and its kinematics.
 
     Attributes:
-        name: as written in machine files.
+        name: the name as written in machine files.
         summary: one line for lists.
         tables: the tables of a machine file by name (dots for tables in tables): dataclasses of annotated fields.
-        configure: from one instance per table, by keyword, to the machine at its pose.
+        configure: makes the machine at its pose from one instance per table, by keyword.
         planar: whether its platform moves in the x-y plane only.
         chains: where a pose has to be solved for, from the tables to the legs at the home pose, so that joint
             coordinates can be found that close them (`kinematics.closure`); `configure` then takes these as `joints`.
         literals: what its machine files say beside numbers, by table.
         links: those with a mass, of a family in closed form.
-        members: of a machine written leg by leg, from the tables to all links that can move.
+        members: gives all links that can move of a machine written leg by leg, from its tables.
         loads: names of the loads at other points of the platform that its files have, see `named_loads`.
-        recipe: of a family that is made while the program runs, a function and its arguments that make it again
-            elsewhere; other families are pickled by name.
+        recipe: the recipe of a family that is made while the program runs, a function and its arguments that make it
+            again elsewhere; other families are pickled by name.
     """
 
     name: str
@@ -224,7 +224,7 @@ class Written:
     """The file that a machine was read from, so that saving it keeps comments, units and order.
 
     Attributes:
-        text: of its file.
+        text: the text of its file.
         settings: overrides "path=value" with which it was read.
     """
 
@@ -237,13 +237,15 @@ class Machine(Immutable):
     """A machine of some family with its reference pose; never modified, only replaced.
 
     Attributes:
-        name: for people.
+        name: the name for people.
         family: its kind.
         tables: one instance per table of the family and per common one, SI.
         display: units and digits in which people read its results, from the table [display].
         written: the file it was read from; None where it was made of data. Comparisons leave it out.
-        requirements: of its file's table [requirements], by name; they change no number (`studies.requirements`).
-        tolerances: of its file's table [tolerances], by what they are about; only an error budget reads them.
+        requirements: the requirements of its file's table [requirements], by name; they change no number
+            (`studies.requirements`).
+        tolerances: the tolerances of its file's table [tolerances], by what they are about; only an error budget reads
+            them.
         loaded: whether its file says `state = "loaded"` in [load]: what is shown where no quantity is named is then the
             machine at rest under its loads.
     """
@@ -285,8 +287,9 @@ class Machine(Immutable):
         """The machine with other numbers, each checked by itself: machine.with_values(x="5 mm", base_radius=0.26).
 
         Args:
-            values: by name of the field: SI, text with a unit, or for a field with several entries an array or list of
-                one for each. `quaternion`, `rotation` and `tilt` stand for roll, pitch and yaw, as in a file's [pose].
+            values: the values by name of the field: SI, text with a unit, or for a field with several entries an array
+                or list of one for each. `quaternion`, `rotation` and `tilt` stand for roll, pitch and yaw, as in a
+                file's [pose].
             fields: the same as keywords; dots in names are written as underscores.
 
         Raises:

@@ -212,8 +212,8 @@ def with_angles(document: Document, coordinates: Sequence[str], origin: str) -> 
     """The document with roll, pitch and yaw, rad, in the place of a quaternion, a rotation matrix, or tilt and torsion.
 
     Args:
-        document: of a machine, with its table [pose].
-        coordinates: that its [pose] may have.
+        document: the document of a machine, with its table [pose].
+        coordinates: the coordinates that its [pose] may have.
         origin: names it in messages.
 
     Raises:
@@ -250,9 +250,9 @@ def make_room(document: Any, settings: Iterable[str], coordinates: Sequence[str]
     An override of one angle of a pose by quaternion leaves the other two angles as the quaternion has them.
 
     Args:
-        document: of a machine.
+        document: the document of a machine.
         settings: overrides "path=value", with whole paths.
-        coordinates: that its [pose] may have.
+        coordinates: the coordinates that its [pose] may have.
         origin: names it in messages.
 
     Raises:
@@ -276,7 +276,7 @@ def numbers_for(
     """The values of a Python program with roll, pitch and yaw in the place of another form; see `with_values`.
 
     Args:
-        coordinates: of the machine's pose.
+        coordinates: the coordinates of the machine's pose.
         given: values by name of the field.
         read: `single_angles`, or `angles_of` where there may be several poses.
 

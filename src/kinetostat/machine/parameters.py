@@ -62,7 +62,7 @@ class Parameter:
     """A field of a machine file, or one entry of a field that holds several.
 
     Attributes:
-        path: as people write it.
+        path: the path as people write it.
         quantity: kind, meaning and bounds of its values.
         leaves: paths of the scalars it stands for: one, or every entry of the field together.
     """
@@ -145,7 +145,7 @@ def find(family: HasFields, text: str) -> Parameter:
     """The parameter people mean: its path, its name in tables or datasets, or the end of its path if no other ends so.
 
     Args:
-        family: of the machine.
+        family: the family of the machine.
         text: "x", "pose.x", "geometry.base_angles.1", "geometry_base_angles_1" or "base_angles.1".
 
     Raises:
@@ -215,7 +215,7 @@ def read_numbers(family: HasFields, given: Mapping[str, Given]) -> dict[str, flo
     """Read values of fields, each checked by itself: SI by leaf path.
 
     Args:
-        family: whose fields they are.
+        family: the family whose fields they are.
         given: by name of the field, as `find` takes it.
 
     Raises:
@@ -272,7 +272,7 @@ def check_contrast(machine: HasNumbers, origin: str) -> None:
     """Refuse stiffnesses so far apart that double precision cannot tell the stiffest one from a rigid one.
 
     Args:
-        machine: with numbers; those that are free or rigid are exact beside any others.
+        machine: the machine with numbers; those that are free or rigid are exact beside any others.
         origin: names it in messages.
 
     Raises:

@@ -63,10 +63,10 @@ def built_in_bar(
     Its other end bends by 3 EI / length and twists by GJ / length; each is in series with the stiffness of the seat.
 
     Args:
-        name: of the bar.
+        name: the name of the bar.
         axes: x and y across the bar, and z along it, base frame.
-        point: of that end, base frame, m.
-        stiffness: of its seat about these axes, N·m/rad.
+        point: the point of that end, base frame, m.
+        stiffness: the stiffness of its seat about these axes, N·m/rad.
         link: E I and G J (N·m²) and the length (m) of the bar.
     """
     bending, torsion, length = link
@@ -88,7 +88,7 @@ class Arm:
 
     Attributes:
         start, end: ends of its axis, base frame, m.
-        name: of the link.
+        name: the name of the link.
         up: unit vector that fixes the y and z axes of the cross-section; not along the link.
         bending, torsion: E I, the same about both axes of the cross-section, and G J, N·m².
     """
@@ -141,10 +141,10 @@ class BarPair:
     """Two parallel bars with spherical joints between a link of a leg and the platform, as in a Delta (theory (16)).
 
     Attributes:
-        name: of the leg it belongs to.
+        name: the name of the leg it belongs to.
         near, far: midpoints between the two bars at the leg and at the platform, base frame, m.
         side: unit vector from one bar to the other; not along the bars.
-        length, spacing: of the bars and between them, m.
+        length, spacing: the length of the bars and the distance between them, m.
         axial: E A of each bar, N.
     """
 

@@ -69,7 +69,7 @@ def outward(base: Sequence[Vector], radius: Scalar, turns: Sequence[Scalar]) -> 
 
     Args:
         base: base joints, on a ring about z, m.
-        radius: of the ring, m.
+        radius: the radius of the ring, m.
         turns: rad.
     """
     shrink = reciprocal(radius)
@@ -97,10 +97,10 @@ def crank_leg(
     springs of the paper's Table II those that a force through the elbow loads.
 
     Args:
-        name: of the leg.
+        name: the name of the leg.
         base, tip: centres of the actuated revolute and of the spherical joint, base frame, m.
-        axis: of the revolute, unit vector; see `place` for its sign.
-        stiffness: of the actuator, N·m/rad.
+        axis: the axis of the revolute, unit vector; see `place` for its sign.
+        stiffness: the stiffness of the actuator, N·m/rad.
         links: crank and rod.
     """
     elbow, limits = place(name, base, tip, axis, links)
@@ -133,7 +133,7 @@ def crank_legs(
     Args:
         ends: base joints and platform joints in order, base frame, m.
         sides: horizontal unit vectors in the planes of the cranks, see `outward`.
-        stiffness: of the actuators, N·m/rad.
+        stiffness: the stiffness of the actuators, N·m/rad.
         links: crank and rod, alike in all legs.
     """
     placed = [
@@ -184,7 +184,7 @@ def ends(
 
     Args:
         rings: the radii.
-        base_angles, platform_angles: of the joints from x, rad.
+        base_angles, platform_angles: the angles of the joints of both rings from x, rad.
         platform: its placement.
         heights: z of the base ring in the base frame, and of the platform ring in the platform frame, m.
     """
@@ -232,11 +232,11 @@ def with_struts_or_cranks(
     above the base; a machine is NaN where a rod does not reach.
 
     Args:
-        name: of the family with struts.
+        name: the name of the family with struts.
         summaries: one line about each of them, for lists.
         tables: geometry (`Rings`), stiffness (with `actuator` and `leg_axial`) and pose of the family with struts.
         place: the platform and what guides it.
-        links: of what guides it, those with a mass.
+        links: those links with a mass that guide it.
     """
 
     def with_struts(geometry: Any, stiffness: Any, pose: Any) -> Configuration:

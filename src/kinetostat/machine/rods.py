@@ -55,7 +55,7 @@ def rods(legs: Sequence[Leg], planar: bool = False) -> list[Rod]:
     a Hooke joint that a file describes axis by axis, and its centres then coincide.
 
     Args:
-        legs: at a pose.
+        legs: the legs at a pose.
         planar: whether the machine moves in a plane.
     """
     return [rod for leg in legs if (rod := _rod(leg, planar)) is not None]

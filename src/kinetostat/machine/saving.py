@@ -35,7 +35,7 @@ def as_file(machine: Machine) -> str:
     """Return the text of a machine file that `load` reads back as exactly the same machine.
 
     Args:
-        machine: whose file, where it was read from one, keeps its comments, units and order.
+        machine: the machine whose file, where it was read from one, keeps its comments, units and order.
     """
     written = machine.written
     kept = _edited_text(written, machine) if written and len(written.text) <= LONGEST_EDITED_TEXT else None

@@ -65,7 +65,7 @@ def springs_in_a_row(spring: Spring, named: Sequence[tuple[str, Scalar]], joint:
     """Springs on one freedom in the place of a spring on it; the first of them is the one that its servo drives.
 
     Args:
-        spring: whose place they take; its `of` knows the leg.
+        spring: the spring whose place they take; its `of` knows the leg.
         named: key and stiffness of each part, N/m or N·m/rad.
         joint: name of the joint, which comes before that of the part; empty to leave it out.
     """

@@ -182,7 +182,7 @@ def positive(value: object, kind: str, name: str) -> float:
     Args:
         value: a number (SI), or text with a unit.
         kind: a key of `KINDS`.
-        name: of the argument, for the message.
+        name: the name of the argument, for the message.
 
     Raises:
         InputError: it is not such a quantity.

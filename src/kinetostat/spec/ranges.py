@@ -20,7 +20,7 @@ class Range:
     """A field and the values it runs through, still as text.
 
     Attributes:
-        field: as written.
+        field: the field as written.
         start, end: the ends, each a value of the field.
         count: how many values, the ends included.
         logarithmic: whether they are spaced by a constant factor.

@@ -87,7 +87,7 @@ def with_former_keys(data: dict[str, Any], table: Mapping[str, str]) -> dict[str
     under "deprecated_keys", so that a program that reads them can tell.
 
     Args:
-        data: with the present keys; it is not changed.
+        data: the data with the present keys; it is not changed.
         table: the present key for each old one, e.g. `RENAMED["JSON key"]`.
     """
     used: dict[str, str] = {}

@@ -43,12 +43,12 @@ class Deviation:
     """How far a number may be from its nominal value.
 
     Attributes:
-        text: as it was written.
+        text: the text as it was written.
         kind: "length", "angle" or "ratio"; empty of a class of a standard.
         limit: plus and minus, SI: three standard deviations of a normal distribution; 0 of a class.
         spread: "uniform" or "normal", between or about the limits.
-        grade: of ISO 286-1; 0 if it is not written so.
-        standard_class: of ISO 2768-1: f, m, c or v; empty if it is not written so.
+        grade: the grade of ISO 286-1; 0 if it is not written so.
+        standard_class: the standard class of ISO 2768-1: f, m, c or v; empty if it is not written so.
         size: nominal size that was written with a class, m; 0 if none was.
     """
 
@@ -70,7 +70,7 @@ class Deviation:
         """The plus and minus of a number, SI.
 
         Args:
-            kind: of the number, "length", "angle" or "ratio".
+            kind: the kind of the number, "length", "angle" or "ratio".
             size: its nominal size, m; 0 if it has none.
 
         Raises:
@@ -93,7 +93,7 @@ class Tolerance:
     Attributes:
         about: a group, or a path in which * stands for anything.
         deviations: one for each kind of number.
-        cost: of making each of its numbers as written, compared with those of other lines.
+        cost: the cost of making each of its numbers as written, compared with those of other lines.
     """
 
     about: str
@@ -152,7 +152,7 @@ def read_tolerances(written: object, origin: str = "") -> Tolerances:
 
     Args:
         written: values by what they are about; tables in it are parts of a path.
-        origin: before the message: the name of the file.
+        origin: what stands before the message: the name of the file.
 
     Raises:
         InputError: names the line, its value, what is allowed, and how to write it.

@@ -105,7 +105,7 @@ def validate(document: Document, origin: str, model: type[BaseModel], tables: Ma
     Args:
         document: what was written.
         origin: name of the file, for messages.
-        model, tables: from `file_model` and the family.
+        model, tables: the model and tables from `file_model` and the family.
 
     Raises:
         InputError: one sentence for each mistake, at most five.

@@ -65,7 +65,7 @@ def register(family: Family) -> Family:
     name that was registered before is replaced, as when a notebook's cell runs again.
 
     Args:
-        family: with its tables and its kinematics in closed form (see docs/extending.md).
+        family: the family with its tables and its kinematics in closed form (see docs/extending.md).
 
     Returns:
         The family.

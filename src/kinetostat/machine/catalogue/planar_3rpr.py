@@ -65,9 +65,9 @@ def planar_leg(name: str, base: Vector, tip: Vector, stiffness: Scalar, axial: S
     """Return a leg R-P-R with an actuated slide: it carries a force along the line of its joints.
 
     Args:
-        name: of the leg.
+        name: the name of the leg.
         base, tip: its joints on the base and on the platform, base frame, m.
-        stiffness: of the actuator, N/m.
+        stiffness: the stiffness of the actuator, N/m.
         axial: axial rigidity EA, N.
     """
     span = tip - base

@@ -156,7 +156,7 @@ def check_chain(leg: str, joints: tuple[JointPlan, ...], legs: Mapping[str, Any]
 
     Args:
         leg: name of the leg.
-        joints: of it.
+        joints: the joints of the leg.
         legs: all legs as written, by name, with everything in them by name.
         where: names file and leg in messages.
 

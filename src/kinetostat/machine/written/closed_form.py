@@ -25,7 +25,7 @@ class ParallelAxes:
         leg: its name.
         revolutes: which of its movable elements turn, from base to platform.
         slide: which of them slides, or None.
-        signs: of the axes against the first revolute's.
+        signs: the signs of the axes against the first revolute's.
         bend: side of the line from the first to the last revolute on which the middle one lies at the home pose.
     """
 
@@ -40,7 +40,7 @@ class ParallelAxes:
 
         Args:
             steps: the leg at the home pose.
-            motion: of the platform from its home pose, base frame.
+            motion: the motion of the platform from its home pose, base frame.
 
         Returns:
             One coordinate per movable element: m of a slide, the cosine and sine of a revolute; NaN where the links

@@ -33,7 +33,7 @@ class Placing:
     """Placement of a copy: mirrored in the x-z plane of the base if it is, then turned about its z axis.
 
     Attributes:
-        cosine, sine: of the angle of the turn.
+        cosine, sine: the cosine and sine of the angle of the turn.
         mirrored: whether it is a mirror image.
     """
 

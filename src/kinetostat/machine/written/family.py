@@ -161,9 +161,9 @@ def members(plan: Plan, joints: Sequence[Scalar | Turn] | None = None, **tables:
     """The links between two joints that can move: those after the first joint of their leg that is not fixed.
 
     Args:
-        plan: of the machine.
+        plan: the plan of the machine.
         joints: coordinates at the pose, which place the ends of the links; without them no ends are given.
-        tables: of the machine, by keyword.
+        tables: the tables of the machine, by keyword.
     """
     links, left = [], None if joints is None else iter(joints)
     for leg in plan.legs:
@@ -202,7 +202,7 @@ def _member(
 
     Args:
         plan, leg, body: the machine, its leg, and the name of the link's body.
-        ends: of its axis at the home pose, base frame, m.
+        ends: the ends of its axis at the home pose, base frame, m.
         carrier: where it is, if that is known.
         tables: numbers of the machine.
     """

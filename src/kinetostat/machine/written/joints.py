@@ -27,10 +27,10 @@ class Motor:
     """A freedom of a joint that may have an actuator, while the joint's others stay passive.
 
     Attributes:
-        place: of its element among those of the joint.
+        place: the place of its element among those of the joint.
         stiffness: kind of quantity of its stiffness.
-        elements: of the joint with this actuator, where they differ from those without it.
-        fields: that it needs besides those of the joint.
+        elements: the elements of the joint with this actuator, where they differ from those without it.
+        fields: the fields that it needs besides those of the joint.
     """
 
     place: int
@@ -46,10 +46,10 @@ class JointType:
     Attributes:
         meaning: what its numbers mean.
         fields: what is written about it, by name.
-        elements: from the name of a joint and its numbers to what the chain of a leg has for it, base to platform.
+        elements: makes what the chain of a leg has for a joint, base to platform, from its name and its numbers.
         stiffness: kind of quantity of its stiffness, for a type of one freedom, which may have an actuator or a spring
             of its own; None for all others.
-        motors: of a type of several freedoms, those that may have an actuator each, by what `actuated` says.
+        motors: the motors of a type of several freedoms, those that may have an actuator each, by what `actuated` says.
         seat: directions in which its bearings may have a stiffness: those of `SEAT` in which it does not move.
         bearings_travel: whether bearings given by `seat` go with the body that it moves, as those of a carriage do;
             those of other joints stay on the base side, and so does the matrix of any joint.
@@ -259,7 +259,7 @@ def write_directions(joints: Mapping[str, dict[str, Any]], where: str) -> None:
     """Put numbers in the place of names of joints, and both axes in the place of a universal joint's shaft.
 
     Args:
-        joints: of a leg by name, as written; they are changed.
+        joints: the joints of a leg by name, as written; they are changed.
         where: names the leg in messages.
 
     Raises:

@@ -51,7 +51,8 @@ class JointPlan:
         motor: the freedom that is actuated, of a joint with several: a key of its type's `motors`; empty otherwise.
         preloaded: whether the file gives a preload of its spring.
         acts: "pulls" or "pushes" if its spring carries loads of one sign only; empty otherwise.
-        compliance: of its own, rows rx ry rz x y z at its point, base axes at the home pose, SI; empty if it is stiff.
+        compliance: its own compliance, rows rx ry rz x y z at its point, base axes at the home pose, SI; empty
+            if it is stiff.
         rod: whether it is a strut whose rod stretches (`struts`).
         cross_section: name of the rod's cross-section; empty if its axial rigidity is given, or if there is no rod.
     """
@@ -76,11 +77,11 @@ class LinkPlan:
     """A link between two consecutive joints of a leg.
 
     Attributes:
-        name: of the body.
+        name: the name of the body.
         model: a key of `LINK_MODELS`.
         cross_section: name of its cross-section, or empty.
         up: direction in which the cross-section's z axis points, base axes at the home pose; None to leave the choice.
-        compliance: of model "matrix", as for a joint, at the link's end.
+        compliance: the compliance of model "matrix", as for a joint, at the link's end.
         weight: what the file gives of its mass, its centre and its inertia: keys of `tables.WEIGHT`.
     """
 
@@ -98,7 +99,7 @@ class Copies(Immutable):
 
     Attributes:
         count: how many legs there are.
-        angles: by which they are turned about the z axis of the base, as written; empty for equal steps.
+        angles: the angles by which they are turned about the z axis of the base, as written; empty for equal steps.
         mirrored: whether every other one is the mirror image of the one before.
     """
 
@@ -113,7 +114,7 @@ class LegPlan(Immutable):
 
     Attributes:
         name: unique within the machine.
-        joints, links: of it.
+        joints, links: its joints and links.
         idle, centred: see `leg.Leg`.
         inverse: closed form of its joint coordinates, if it has one.
         written: name of the leg of the file that it is a copy of; empty if it is not a copy.
@@ -141,9 +142,10 @@ class Plan(Immutable):
     """A machine written leg by leg.
 
     Attributes:
-        legs: in the order of the file.
-        shapes: of the cross-sections, by name: keys of `cross_section.SHAPES`.
-        materials: of the cross-sections, by name: keys of `cross_section.MATERIALS`, or empty where E and G are given.
+        legs: the legs in the order of the file.
+        shapes: the shapes of the cross-sections, by name: keys of `cross_section.SHAPES`.
+        materials: the materials of the cross-sections, by name: keys of `cross_section.MATERIALS`, or empty where E and
+            G are given.
         pose: coordinates that the pose gives; the others follow from the legs.
         planar: whether the platform moves in the x-y plane only.
     """

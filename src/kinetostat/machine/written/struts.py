@@ -30,7 +30,7 @@ class StrutRod:
 
     Attributes:
         part: what it is called.
-        actuator: in whose slide it stretches, and whose load it carries.
+        actuator: the actuator in whose slide it stretches, and whose load it carries.
         start: where it begins if no joint with a centre comes before it, base frame, m.
         axial: E A, N.
     """
@@ -69,11 +69,11 @@ def rod_of(name: str, slide: JointPlan, actuator: Spring, data: Any, plan: Plan,
     """The rod of a strut.
 
     Args:
-        name: of the leg.
+        name: the name of the leg.
         slide: what the file says about the strut.
-        actuator: of it.
+        actuator: the actuator of the strut.
         data: its numbers.
-        plan, tables: of the machine, for the cross-section.
+        plan, tables: the plan and tables of the machine, for the cross-section.
     """
     section = slide.cross_section
     shape, sizes = (plan.shapes[section], tables[f"sections.{section}"]) if section else ("", None)
@@ -85,7 +85,7 @@ def with_rods(steps: Sequence[Step], placed: Sequence[Element | StrutRod]) -> tu
     """A placed chain with springs in the place of its rods.
 
     Args:
-        steps: of the leg at the home pose.
+        steps: the steps of the leg at the home pose.
         placed: the same elements where they are at a pose, base frame.
     """
     centres = [
@@ -106,8 +106,8 @@ def check_strut(joints: Sequence[JointPlan], place: int, where: str) -> None:
     """Refuse a rod on a joint that is not an actuated slide, and one without joints at which it begins and ends.
 
     Args:
-        joints: of the leg, in order.
-        place: of the joint with the rod among them.
+        joints: the joints of the leg, in order.
+        place: the place of the joint with the rod among them.
         where: names the joint in messages.
 
     Raises:
