@@ -16,9 +16,9 @@ from kinetostat.studies.analysis import analyze as analyze
 from kinetostat.studies.assembly import forward as forward
 from kinetostat.studies.budget.budget import budget as budget
 from kinetostat.studies.carrying import carrying_legs as carrying_legs
-from kinetostat.studies.command import command as command
+from kinetostat.studies.commanding import command as command
 from kinetostat.studies.comparison import compare as compare
-from kinetostat.studies.correction.table import correction_table as correction_table
+from kinetostat.studies.corrections import correction_table as correction_table
 from kinetostat.studies.datasets import evaluate as evaluate
 from kinetostat.studies.grid import evaluate_grid as evaluate_grid
 from kinetostat.studies.guidelines import guidelines as guidelines

@@ -14,7 +14,7 @@ from kinetostat.machine.parameters import values
 from kinetostat.numerics.motions import exponential
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.assembly import forward
-from kinetostat.studies.command import command
+from kinetostat.studies.commanding import command
 from synthetic_measurements import truth_of
 
 

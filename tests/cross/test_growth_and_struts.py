@@ -10,7 +10,7 @@ from kinetostat.machine.loading import build, load
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.assembly import forward
-from kinetostat.studies.command import command
+from kinetostat.studies.commanding import command
 from kinetostat.studies.under_load import Rest, under_load
 from kinetostat.views.loaded_tables import stability_of
 from machines import load_without_limits, written

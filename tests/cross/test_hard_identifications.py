@@ -13,7 +13,7 @@ from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.kinematics.forward import assembly_modes, poses_at, stand, system_of
 from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import with_values
-from kinetostat.studies.identification.identification import PREFERENCE, identified
+from kinetostat.studies.identification.identification import PREFERENCE, identification_of
 from machines import load_without_limits
 from synthetic_measurements import measured, posed, truth_of, written
 
@@ -77,14 +77,14 @@ def test_no_fit_ends_above_a_trust_region_solver_that_starts_from_the_drawing(se
         data = measured(model, poses, scale * rng.normal(size=len(scale)), ("z",), rng)
         if seed % 2:
             data.values["z"][UNMOVED] = poses["pose.z"][UNMOVED] + 5e-6 * rng.normal(size=len(UNMOVED))
-        answer = identified(model, data, HEIGHTS)
+        answer = identification_of(model, data, HEIGHTS)
         kept, seen, weak = answer.fit.kept, answer.observed, PREFERENCE * np.eye(len(answer.sizes))
 
         def residuals(units, answer=answer, seen=seen, kept=kept, weak=weak):
             return np.concatenate([seen.residuals(units * answer.sizes)[kept], weak @ units])
 
         def slopes(units, answer=answer, seen=seen, kept=kept, weak=weak):
-            return np.concatenate([-(seen.linearised(units * answer.sizes)[1] * answer.sizes)[kept], weak])
+            return np.concatenate([-(seen.linearisation(units * answer.sizes)[1] * answer.sizes)[kept], weak])
 
         other = least_squares(residuals, np.zeros(len(weak)), slopes, ftol=1e-12, xtol=1e-12, gtol=1e-12)
         objective = 0.5 * (residuals(answer.fit.values / answer.sizes) ** 2).sum()

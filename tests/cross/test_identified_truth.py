@@ -9,7 +9,7 @@ from kinetostat.cli import main
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.machine.loading import build
 from kinetostat.numerics.motions import exponential
-from kinetostat.studies.identification.identification import identified
+from kinetostat.studies.identification.identification import identification_of
 from kinetostat.studies.identification.measurements import POSITION, Measurements
 from kinetostat.studies.identification.next_poses import as_csv
 from kinetostat.studies.poses import given_poses
@@ -21,7 +21,7 @@ from synthetic_measurements import SIGMA, found, measured, posed, truth_of, writ
 def test_a_hexapod_gives_back_its_42_errors():
     model, poses = posed(load_without_limits("hexapod"), 40)
     truth = truth_of(model)
-    answer = identified(model, measured(model, poses, truth))
+    answer = identification_of(model, measured(model, poses, truth))
     assert answer.fit.rank == len(answer.unknowns) == 42
     assert not answer.unseen
     assert np.mean(np.abs(found(answer, truth)) < 1.0) > 0.85
@@ -34,7 +34,7 @@ def test_an_unknown_frame_and_target_hide_twelve_combinations_of_a_hexapod_and_n
     model, poses = posed(load_without_limits("hexapod"), 30)
     truth = truth_of(model)
     frame = exponential(np.array([[0.3, -0.2, 2.0, 0.4, -0.1, 0.7]]))
-    answer = identified(model, measured(model, poses, truth, frame=frame), frame=True, target=True)
+    answer = identification_of(model, measured(model, poses, truth, frame=frame), frame=True, target=True)
     assert answer.fit.rank == 42
     assert len(answer.unseen) == 12
     words = [each.words for each in answer.unseen]
@@ -54,7 +54,7 @@ def test_what_is_not_seen_is_the_null_space_of_the_measurements(name):
     machine = build(document_of(machine)) if name == "written" else machine
     model, poses = posed(machine, 25)
     groups = ("geometry", "zeros") if name != "delta" else ("zeros", "legs.*.actuator.?", "legs.*length")
-    answer = identified(model, measured(model, poses, 0.0 * truth_of(model)), groups, frame=True)
+    answer = identification_of(model, measured(model, poses, 0.0 * truth_of(model)), groups, frame=True)
     columns = []
     for unknown, size in zip(answer.unknowns, answer.sizes, strict=True):
         way = np.zeros(len(answer.unknowns))
@@ -77,8 +77,8 @@ def test_tilt_of_a_delta_is_seen_only_by_what_turns():
     truth = truth_of(model, ())
     for path in ("legs.leg 1.parallelogram.difference", "legs.leg 3.elbow.length"):
         truth[[error.path for error in model.errors].index(path)] = 2e-4
-    whole = identified(model, measured(model, poses, truth), fit)
-    position = identified(model, measured(model, poses, truth, POSITION), fit, target=True)
+    whole = identification_of(model, measured(model, poses, truth), fit)
+    position = identification_of(model, measured(model, poses, truth, POSITION), fit, target=True)
     assert whole.fit.rank == len(whole.unknowns)
     assert np.mean(np.abs(found(whole, truth)) < 1.0) > 0.7
     tilt = [n for n, unknown in enumerate(position.unknowns) if unknown.path.endswith("difference")]
@@ -95,8 +95,8 @@ def test_gross_outliers_hardly_move_the_result_and_are_named():
     wrong = {(name, row) for name in spoilt for row in rng.choice(60, 6, replace=False)}
     for name, row in wrong:
         spoilt[name][row] += rng.choice([-1.0, 1.0]) * SIGMA[name] * rng.uniform(20.0, 500.0)
-    plain = identified(model, clean)
-    robust = identified(model, Measurements(**{**vars(clean), "values": spoilt}))
+    plain = identification_of(model, clean)
+    robust = identification_of(model, Measurements(**{**vars(clean), "values": spoilt}))
     sigma = np.sqrt(np.diag(plain.fit.covariance))
     assert {(name, line - 2) for line, name, _ in robust.outliers} >= wrong
     assert len(robust.outliers) <= len(wrong) + 2
@@ -110,7 +110,7 @@ def test_gross_outliers_hardly_move_the_result_and_are_named():
 def test_poses_to_measure_next_are_a_file_that_other_commands_read(tmp_path):
     machine = load_without_limits("hexapod")
     model, poses = posed(machine, 30)
-    answer = identified(model, measured(model, poses, 0.0 * truth_of(model)), more=3)
+    answer = identification_of(model, measured(model, poses, 0.0 * truth_of(model)), more=3)
     (tmp_path / "next.csv").write_text(as_csv(answer.next))
     read = given_poses(machine, tmp_path / "next.csv")
     for field, values in zip(read.fields, read.values, strict=True):
@@ -146,7 +146,7 @@ def test_over_200_repetitions_the_truth_lies_in_its_95_percent_intervals():
     model, poses = posed(load_without_limits("planar-3rpr"), 25, 0.4, 0.3)
     truth, inside = truth_of(model), []
     for seed in range(200):
-        answer = identified(model, measured(model, poses, truth, ("x", "y", "rz"), np.random.default_rng(seed)))
+        answer = identification_of(model, measured(model, poses, truth, ("x", "y", "rz"), np.random.default_rng(seed)))
         inside.append(np.abs(found(answer, truth)) < 1.0)
     each = np.array(inside)
     assert each.shape[1] > 5

@@ -8,11 +8,11 @@ from kinetostat.accuracy.model import error_model
 from kinetostat.machine.machine import springs
 from kinetostat.numerics.motions import Motions
 from kinetostat.spec.errors import InputError
-from kinetostat.studies.identification.fit import Wishes, fitted
-from kinetostat.studies.identification.identification import identified, identify
+from kinetostat.studies.identification.fit import Wishes, best_fit
+from kinetostat.studies.identification.identification import identification_of, identify
 from kinetostat.studies.identification.measurements import POSITION, TURNED, Measurements
 from kinetostat.studies.identification.next_poses import chosen_poses, first_poses
-from kinetostat.studies.identification.observed import FRAME, TARGET, observed, place_unknown
+from kinetostat.studies.identification.observation import FRAME_UNKNOWNS, TARGET_UNKNOWNS, observation, place_unknown
 from kinetostat.studies.identification.unseen import sparse
 from machines import load_without_limits
 from synthetic_measurements import posed
@@ -32,10 +32,10 @@ def test_rates_of_every_sort_of_measurement_are_exact():
         rng.normal(size=(count, 3)),
     )
     chosen = [error for error in model.errors if error.group in ("geometry", "gains", "compliances")]
-    unknowns = [*chosen, *(place_unknown(path) for path in (*FRAME, *TARGET))]
-    seen = observed(model, data, unknowns, Motions(np.eye(3)[None], np.zeros((1, 3))))
+    unknowns = [*chosen, *(place_unknown(path) for path in (*FRAME_UNKNOWNS, *TARGET_UNKNOWNS))]
+    seen = observation(model, data, unknowns, Motions(np.eye(3)[None], np.zeros((1, 3))))
     at, way = (size * rng.normal(size=len(unknowns)) for size in (1e-3, 1e-6))
-    _, rates = seen.linearised(at)
+    _, rates = seen.linearisation(at)
     difference = 0.5 * (seen.residuals(at - way) - seen.residuals(at + way))
     for name in names:
         rows = np.array(seen.names) == name
@@ -56,7 +56,7 @@ def test_compliances_follow_from_deflections_under_known_loads():
     sigma = {name: np.full(count, 1e-3 * np.abs(entries).max()) for name, entries in names.items()}
     noisy = {name: entries + sigma[name] * rng.normal(size=count) for name, entries in names.items()}
     data = Measurements("data.csv", tuple(range(count)), poses, noisy, sigma, wrenches, np.full((count, 3), np.nan))
-    answer = identified(model, data, ["compliances"])
+    answer = identification_of(model, data, ["compliances"])
     assert answer.fit.rank == 6
     assert (np.abs(answer.fit.values - truth[soft]) < 1.6 * answer.fit.sure).all()
     built = as_built(machine, answer.errors)
@@ -75,21 +75,21 @@ class Line:
     def residuals(self, at):
         return self.value - self.rates @ at
 
-    def linearised(self, at):
+    def linearisation(self, at):
         return self.residuals(at), self.rates
 
 
 def test_what_is_not_seen_is_said_and_a_prior_or_a_bound_settles_it():
     line, groups, none = Line(np.zeros(4)), np.arange(4), np.full(2, np.inf)
     small = np.full(2, 1e-5)
-    open_end = fitted(line, groups, Wishes(np.ones(2), none, none, small))
+    open_end = best_fit(line, groups, Wishes(np.ones(2), none, none, small))
     assert open_end.rank == 1
     assert np.isinf(open_end.sure).all()
     assert open_end.values == pytest.approx([0.2, 0.2], abs=1e-6)
-    known = fitted(line, groups, Wishes(np.ones(2), np.array([np.inf, 0.01]), none, small))
+    known = best_fit(line, groups, Wishes(np.ones(2), np.array([np.inf, 0.01]), none, small))
     assert known.rank == 2
     assert known.values == pytest.approx([0.4, 0.0], abs=1e-3)
-    bounded = fitted(line, groups, Wishes(np.ones(2), none, np.array([0.05, 10.0]), small))
+    bounded = best_fit(line, groups, Wishes(np.ones(2), none, np.array([0.05, 10.0]), small))
     assert bounded.values[0] <= 0.05 + 1e-9
     assert bounded.values.sum() == pytest.approx(0.4, abs=1e-6)
 
@@ -162,8 +162,8 @@ def test_poses_to_add_first_show_what_many_poses_show(tmp_path):
         data = Measurements(
             "d", tuple(range(count)), poses, values, sigma, np.zeros((count, 6)), np.full((count, 3), np.nan)
         )
-        seen = observed(model, data, unknowns, Motions(np.eye(3)[None], np.zeros((1, 3))))
-        return seen, seen.linearised(np.zeros(len(unknowns)))[1]
+        seen = observation(model, data, unknowns, Motions(np.eye(3)[None], np.zeros((1, 3))))
+        return seen, seen.linearisation(np.zeros(len(unknowns)))[1]
 
     seen, known = rates(few, home)
     added = first_poses(machine, seen, sizes, 12)
@@ -210,7 +210,7 @@ def test_poses_chosen_beat_poses_at_random_by_the_factor_that_is_foretold():
     data = Measurements("data.csv", tuple(range(count)), poses, zeros, sigma, np.zeros((count, 6)), nothing)
     unknowns = [error for error in model.errors if error.group in ("geometry", "zeros")]
     frame = Motions(np.eye(3)[None], np.zeros((1, 3)))
-    _, rates = observed(model, data, unknowns, frame).linearised(np.zeros(len(unknowns)))
+    _, rates = observation(model, data, unknowns, frame).linearisation(np.zeros(len(unknowns)))
     _, sizes, ways = np.linalg.svd(rates * 1e-3)
     blocks = (rates * 1e-3 @ ways[sizes > 1e-6 * sizes[0]].T).reshape(count, 3, -1)
     unknown, rng = blocks.shape[2], np.random.default_rng(0)

@@ -7,8 +7,8 @@ from kinetostat import load
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.parameters import values, with_values
-from kinetostat.studies.identification.admissible import FARTHEST, STEPS, within_limits
-from kinetostat.studies.identification.identification import identified
+from kinetostat.studies.identification.identification import identification_of
+from kinetostat.studies.identification.next_poses import FARTHEST, RAY_STEPS, within_limits
 from machines import load_without_limits
 from synthetic_measurements import measured, posed, truth_of
 
@@ -19,7 +19,7 @@ def answers():
     model, poses = posed(load("hexapod"), 24)
     data = measured(model, poses, truth_of(model))
     free, _ = posed(load_without_limits("hexapod"), 24)
-    return [identified(each, data, more=5).next for each in (model, free)], poses
+    return [identification_of(each, data, more=5).next for each in (model, free)], poses
 
 
 def test_next_poses_keep_the_limits_one_by_one(answers):
@@ -57,7 +57,7 @@ def test_rays_end_at_the_strokes_of_slides():
     for path in paths:
         off = poses[path] - given[path]
         for farthest in (off.max(), -off.min()):
-            assert 0.35 - FARTHEST * length / STEPS < farthest <= 0.4
+            assert 0.35 - FARTHEST * length / RAY_STEPS < farthest <= 0.4
 
 
 def test_nothing_is_drawn_where_nothing_is_limited_or_no_measured_pose_keeps_the_limits():

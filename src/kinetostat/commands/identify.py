@@ -55,14 +55,14 @@ def add_identify_command(commands: "Commands") -> None:
 
 
 def _identify(options: argparse.Namespace) -> int:
-    from kinetostat.studies.identification.identification import USUAL, as_json, identify
+    from kinetostat.studies.identification.identification import USUALLY_FITTED, as_json, identify
     from kinetostat.views.identification_tables import print_identification
 
     with search_bar("fitting") as update:
         answer = identify(
             load_machine(options),
             options.data,
-            options.fit or USUAL,
+            options.fit or USUALLY_FITTED,
             frame=options.frame,
             target=options.target,
             sigma=options.sigma,

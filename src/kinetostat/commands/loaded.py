@@ -95,7 +95,7 @@ def add_command_command(commands: "Commands") -> None:
 
 def _command(options: argparse.Namespace) -> int:
     from kinetostat.spec.errors import InputError, choice
-    from kinetostat.studies.command import as_csv, as_json, command
+    from kinetostat.studies.commanding import as_csv, as_json, command
     from kinetostat.studies.storage import write_text
     from kinetostat.views.loaded_tables import print_command
 
@@ -118,8 +118,8 @@ def _command(options: argparse.Namespace) -> int:
 
 def _corrections(options: argparse.Namespace, written: list[Path]) -> int:
     from kinetostat.spec.errors import InputError
-    from kinetostat.studies.command import as_csv
-    from kinetostat.studies.correction.table import as_json, correction_table
+    from kinetostat.studies.commanding import as_csv
+    from kinetostat.studies.corrections import as_json, correction_table
     from kinetostat.studies.storage import write_text
     from kinetostat.views.correction_tables import print_corrections
 

@@ -98,11 +98,11 @@ KINDS = (
         "studies.under_load.as_json",
     ),
     Kind("studies.vibration.Vibration", description="views.vibration.VIBRATION"),
-    Kind("studies.command.Command", "views.loaded_tables.print_command", plain="studies.command.as_json"),
+    Kind("studies.commanding.Command", "views.loaded_tables.print_command", plain="studies.commanding.as_json"),
     Kind(
-        "studies.correction.table.CorrectionTable",
+        "studies.corrections.CorrectionTable",
         "views.correction_tables.print_corrections",
-        plain="studies.correction.table.as_json",
+        plain="studies.corrections.as_json",
     ),
     Kind(
         "studies.carrying.Carrying",

@@ -7,8 +7,7 @@ from rich.console import Console
 
 from kinetostat.display import Display, number
 from kinetostat.machine.parameters import Parameter
-from kinetostat.studies.correction.law import Term
-from kinetostat.studies.correction.table import CorrectionTable
+from kinetostat.studies.corrections import CorrectionTable, Term
 from kinetostat.views.tables import numeric_table
 
 MOST_TERMS = 40

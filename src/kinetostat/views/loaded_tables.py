@@ -10,7 +10,7 @@ from rich.text import Text
 
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.display import DASH, Display, number
-from kinetostat.studies.command import Command
+from kinetostat.studies.commanding import Command
 from kinetostat.studies.requirements import Verdict
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.under_load import LoadedState, SpringState

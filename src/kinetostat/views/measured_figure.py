@@ -9,7 +9,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from kinetostat.studies.measured.comparison import COVER, MeasuredComparison
+from kinetostat.studies.measured.comparison import COVERAGE_FACTOR, MeasuredComparison
 from kinetostat.studies.setting import setting_of
 from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, note_setting, set_title
 from kinetostat.views.measured_tables import WORDS
@@ -27,12 +27,12 @@ def measured_figure(answer: MeasuredComparison) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(6.4, 1.9 + 0.2 * len(rows)), layout="constrained")
         left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
-        left.axvspan(-COVER, COVER, color="#e8e8e8", zorder=0)
+        left.axvspan(-COVERAGE_FACTOR, COVERAGE_FACTOR, color="#e8e8e8", zorder=0)
         left.axvline(0.0, color="black", linewidth=0.6)
         colours = [COLOURS[0] if row.explained else COLOURS[1] for row in rows]
         left.barh(places, size[order], 0.6, color=colours)
         left.set(xlabel="computed less measured (standard uncertainties)")
-        reach = 1.1 * max(np.abs(size).max(), 1.5 * COVER)
+        reach = 1.1 * max(np.abs(size).max(), 1.5 * COVERAGE_FACTOR)
         left.set_xlim(-reach, reach)
         names = [f"{row.entry.name} (line {row.entry.line})" for row in rows]
         left.set_yticks(places, names)

@@ -3,7 +3,7 @@
 from rich.console import Console
 
 from kinetostat.display import Display, Scale, number, number_and_uncertainty
-from kinetostat.studies.measured.comparison import COVER, MeasuredComparison, MeasuredRow
+from kinetostat.studies.measured.comparison import COVERAGE_FACTOR, MeasuredComparison, MeasuredRow
 from kinetostat.views.fitted_table import FittedTable
 from kinetostat.views.tables import text_table
 
@@ -62,7 +62,7 @@ def verdict_of(row: MeasuredRow, display: Display) -> str:
         return "explained"
     low, high = row.bounds
     size = abs(row.entry.value)
-    if size <= COVER * row.u_data:
+    if size <= COVERAGE_FACTOR * row.u_data:
         scale = _scale(row, display)
         ends = f"{number(low * scale.factor, digits=2)} to {number(high * scale.factor, digits=2)} {scale.unit}"
         return f"off by {ends}"

@@ -1,1 +1,1 @@
-"""Which numbers of a machine as built explain what has been measured of it, and how surely."""
+"""Identification: the numbers of a machine as built that explain what was measured, with their uncertainty."""

@@ -1,7 +1,7 @@
 """The most likely values of unknowns, how sure they are, and which measured values do not belong: theory (64) to (66).
 
 Unknowns are counted in plausible sizes, so that metres and radians compare. A preference for zero decides what no
-measurement sees. Derivatives are exact (`observed`); nothing here knows machines.
+measurement sees. Derivatives are exact (`observation`); nothing here knows machines.
 
 Source: theory (64)-(66). Least squares by trust regions: `scipy.optimize.least_squares` (M. Branch, T. Coleman and
 Y. Li, 1999); deviation by the median: F. Hampel, 1974; a loss whose scale shrinks: A. Blake and A. Zisserman, *Visual
@@ -23,7 +23,7 @@ OUTLYING = 4.0
 """Standard deviations from which a value counts as an outlier: one of 16 000 good ones does."""
 MEDIAN = 1.4826
 """Standard deviation of normal values over the median of their sizes."""
-ROUNDS = 20
+MOST_ROUNDS = 20
 """Number of fits at most in which the scale of residuals, outliers and unseen combinations settle: few need half."""
 SAME_SPREAD = 0.1
 """Relative change of the spread of residuals below which it has settled."""
@@ -33,10 +33,10 @@ seen less than it is preferred to be zero counts as unseen too."""
 SURELY = 1.959963984540054
 """Half of the 95 % interval of a normal value over its standard deviation."""
 FOLDS = 5
-FULL = 50.0
+FULL_PREFERENCE = 50.0
 """The preference for zero in full over the weak one, for combinations that are not seen: with the weak one alone they
 would go where the curvature of the equations explains some of the noise."""
-MOST_EVALUATIONS = 500
+MOST_FIT_STEPS = 500
 """Steps of a fit at most: along a curved valley they are short."""
 
 
@@ -46,13 +46,13 @@ class Question(Protocol):
     def residuals(self, values: Array) -> Array:
         """At values of the unknowns [rows]."""
 
-    def linearised(self, values: Array) -> tuple[Array, Array]:
+    def linearisation(self, values: Array) -> tuple[Array, Array]:
         """The same, and how each falls per unit of each unknown [rows x unknowns]."""
 
 
 @dataclass(frozen=True)
 class Wishes:
-    """How a fit is to be made.
+    """Options of a fit.
 
     Attributes:
         sizes: plausible size of each unknown, SI [unknowns].
@@ -122,7 +122,7 @@ class Fit:
         return self.ways[:, self.rank :]
 
 
-def fitted(question: Question, groups: Integers, wishes: Wishes, tell: Tell = lambda *_: None) -> Fit:
+def best_fit(question: Question, groups: Integers, wishes: Wishes, tell: Tell = lambda *_: None) -> Fit:
     """Find the most likely values of unknowns, theory (64).
 
     Each fit is one of least squares by trust regions: a step is taken only where the residuals fall by about as much as
@@ -140,24 +140,24 @@ def fitted(question: Question, groups: Integers, wishes: Wishes, tell: Tell = la
     kept, after, spread = np.ones(len(before), dtype=bool), before, _spread(before, rates, wishes)
     for squares in (False, True) if wishes.robust else (True,):
         settled, rank = False, 0
-        for turn in range(ROUNDS):
+        for turn in range(MOST_ROUNDS):
             if squares and wishes.robust:
                 inside = np.abs(after) < OUTLYING * spread
                 settled, kept = settled and bool((inside == kept).all()), inside
             seen = _combinations(rates[kept], wishes, spread)
             if settled and seen.rank == rank:
                 break
-            tell(turn, ROUNDS, f"{int((~kept).sum())} outliers")
-            values = _solved(question, wishes, kept, values, seen, np.inf if squares else spread)
+            tell(turn, MOST_ROUNDS, f"{int((~kept).sum())} outliers")
+            values = _least_squares(question, wishes, kept, values, seen, np.inf if squares else spread)
             after, rates = _rates_at(question, values, wishes)
             last, spread, rank = spread, _spread(after, rates, wishes), seen.rank
             settled = abs(spread - last) <= SAME_SPREAD * last
-    return _judged(before, after, rates, kept, values, groups, wishes)
+    return _fit_result(before, after, rates, kept, values, groups, wishes)
 
 
 def _rates_at(question: Question, values: Array, wishes: Wishes) -> tuple[Array, Array]:
     """The residuals [rows], and how they fall per plausible size of each unknown [rows x unknowns]."""
-    after, rates = question.linearised(values)
+    after, rates = question.linearisation(values)
     return after, rates * wishes.sizes
 
 
@@ -179,7 +179,7 @@ def _spread(residuals: Array, rates: Array, wishes: Wishes) -> float:
 
 @dataclass(frozen=True)
 class _Combinations:
-    """What the rates of measured values say about combinations of unknowns, in plausible sizes.
+    """Combinations of unknowns, in plausible sizes, ordered by how well measured values see them.
 
     Attributes:
         strengths: of each, standard deviations per plausible size; those that are seen come first [unknowns].
@@ -217,11 +217,13 @@ def _combinations(rates: Array, wishes: Wishes, spread: float) -> _Combinations:
     order = np.argsort(sizes <= least, kind="stable")
     rank = int((sizes > least).sum())
     hidden = np.linalg.qr(preferred @ ways[order[rank:]].T)[0]
-    preference = np.concatenate([preferred, FULL * hidden.T @ preferred])
+    preference = np.concatenate([preferred, FULL_PREFERENCE * hidden.T @ preferred])
     return _Combinations(sizes[order], ways[order].T, rank, unit, prior, preference)
 
 
-def _solved(question: Question, wishes: Wishes, kept: Mask, start: Array, seen: _Combinations, scale: float) -> Array:
+def _least_squares(
+    question: Question, wishes: Wishes, kept: Mask, start: Array, seen: _Combinations, scale: float
+) -> Array:
     """Fit values by least squares from a start; `scale` is that of Cauchy's loss, infinite for squares."""
     from scipy.optimize import least_squares  # half a second to import
 
@@ -244,12 +246,12 @@ def _solved(question: Question, wishes: Wishes, kept: Mask, start: Array, seen: 
     form, precision = (loss, FIT_BEGUN) if np.isfinite(scale) else ("linear", FIT_SETTLED)
     answer = least_squares(
         residuals, start / wishes.sizes, slopes, (-most, most), loss=form, f_scale=min(scale, 1e300), ftol=precision,
-        xtol=precision, gtol=None, max_nfev=MOST_EVALUATIONS,
+        xtol=precision, gtol=None, max_nfev=MOST_FIT_STEPS,
     )  # fmt: skip
     return np.asarray(answer.x * wishes.sizes)
 
 
-def _judged(
+def _fit_result(
     before: Array,
     after: Array,
     rates: Array,
@@ -258,7 +260,7 @@ def _judged(
     groups: Integers,
     wishes: Wishes,
 ) -> Fit:
-    """Judge what has been found: covariance and intervals, theory (65), rank, and poses that took no part."""
+    """Describe the fit at its values: covariance and intervals, theory (65), rank, and poses that took no part."""
     seen = _combinations(rates[kept], wishes, _spread(after, rates, wishes))
     rank, ways = seen.rank, seen.ways
     freedom = max(int(kept.sum()) - rank, 1)
@@ -268,7 +270,7 @@ def _judged(
     covariance = spread**2 * basis @ basis.T * np.outer(wishes.sizes, wishes.sizes)
     factor = SURELY if wishes.known else _quantile(freedom)
     hidden = ways[:, rank:]
-    likely = np.linalg.inv(hidden.T @ np.diag((FULL * wishes.preferred) ** 2) @ hidden)
+    likely = np.linalg.inv(hidden.T @ np.diag((FULL_PREFERENCE * wishes.preferred) ** 2) @ hidden)
     unseen = np.sqrt(np.einsum("ui,ij,uj->u", hidden, likely, hidden)) * wishes.sizes
     sure = np.hypot(factor * np.sqrt(np.diag(covariance)), SURELY * unseen)
     sure[np.linalg.norm(hidden, axis=1) > np.sqrt(UNSEEN)] = np.inf

@@ -16,7 +16,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several, shorten
 from kinetostat.spec.fields import Quantity, positive
-from kinetostat.studies.identification.fit import Fit, Tell, Wishes, fitted
+from kinetostat.studies.identification.fit import Fit, Tell, Wishes, best_fit
 from kinetostat.studies.identification.measurements import EULER, TURNED, Measurements, Sigmas, read_measurements
 from kinetostat.studies.identification.next_poses import (
     MOST_PROPOSED,
@@ -25,24 +25,30 @@ from kinetostat.studies.identification.next_poses import (
     next_poses,
     unit_of,
 )
-from kinetostat.studies.identification.observed import FRAME, TARGET, Observed, observed, place_unknown
+from kinetostat.studies.identification.observation import (
+    FRAME_UNKNOWNS,
+    TARGET_UNKNOWNS,
+    Observation,
+    observation,
+    place_unknown,
+)
 from kinetostat.studies.identification.unseen import Unseen, unseen_of
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.tolerances import ROUND_OFF_OF_MEASUREMENT
 from kinetostat.units import KINDS, UnitError, parse
 
-USUAL = ("geometry", "zeros")
-"""What is fitted unless somebody says otherwise."""
-SIZES = {"length": 1e-3, "angle": 1e-3, "ratio": 1e-3}
+USUALLY_FITTED = ("geometry", "zeros")
+"""Groups of errors that are fitted by default."""
+PLAUSIBLE_SIZES = {"length": 1e-3, "angle": 1e-3, "ratio": 1e-3}
 """Plausible sizes of unknowns: a millimetre, a milliradian, a thousandth."""
-SOFT = 0.1
+PLAUSIBLE_COMPLIANCE_ERROR = 0.1
 """Plausible size of the relative error of a compliance."""
 PREFERENCE = 0.02
 """Weight of zero for errors of a machine, in standard deviations per plausible size: half a metre in ten standard
 deviations hides nothing that is measured, but what is hardly seen does not run away."""
 PLACED_ANYWHERE = 1e-5
 """The same for the measuring frame and the target, which may be metres away."""
-MOST_NAMED = 12
+MOST_NAMED_POSES = 12
 """Poses to add that a refusal names."""
 USUAL_SIGMA = 1e-5
 """Standard deviation of measured lengths, m, where nobody says it; only ratios count then."""
@@ -50,7 +56,7 @@ USUAL_SIGMA = 1e-5
 
 @dataclass(frozen=True)
 class Identification:
-    """What measurements say about a machine as built.
+    """Errors of a machine as built that follow from measurements.
 
     Attributes:
         machine: as drawn.
@@ -62,7 +68,7 @@ class Identification:
     """
 
     machine: Machine
-    observed: Observed
+    observed: Observation
     fit: Fit
     sizes: Array
     unseen: tuple[Unseen, ...]
@@ -76,7 +82,7 @@ class Identification:
 
     @property
     def unknowns(self) -> tuple[MachineError, ...]:
-        """What was to be found."""
+        """The unknowns of the fit, in order."""
         return self.observed.unknowns
 
     @property
@@ -109,7 +115,7 @@ class Identification:
 def identify(
     machine: Machine,
     data: str | Path,
-    fit: Sequence[str] = USUAL,
+    fit: Sequence[str] = USUALLY_FITTED,
     *,
     frame: bool = False,
     target: bool = False,
@@ -151,13 +157,13 @@ def identify(
         sigmas = Sigmas(sigmas.length, sigmas.length / length, sigmas.known)
     measured = read_measurements(machine, Path(data), sigmas)
     model = error_model(machine, measured.pose, len(measured), np.zeros(6))
-    return identified(model, measured, fit, frame, target, priors or {}, bounds or {}, robust, more, tell)
+    return identification_of(model, measured, fit, frame, target, priors or {}, bounds or {}, robust, more, tell)
 
 
-def identified(
+def identification_of(
     model: ErrorModel,
     data: Measurements,
-    fit: Sequence[str] = USUAL,
+    fit: Sequence[str] = USUALLY_FITTED,
     frame: bool = False,
     target: bool = False,
     priors: Mapping[str, str] | None = None,
@@ -176,36 +182,41 @@ def identified(
     Raises:
         InputError: as for `identify`.
     """
-    unknowns = _chosen(model, fit)
+    unknowns = _unknowns_named(model, fit)
     turned = any(name in (*TURNED, *EULER) for name in data.values)
-    places = [*(FRAME if frame else ()), *(TARGET if target and turned else TARGET[3:] if target else ())]
+    places = [
+        *(FRAME_UNKNOWNS if frame else ()),
+        *(TARGET_UNKNOWNS if target and turned else TARGET_UNKNOWNS[3:] if target else ()),
+    ]
     unknowns += [place_unknown(path) for path in places]
-    seen = observed(model, data, unknowns)
-    sizes = np.array([SOFT if u.group == "compliances" else SIZES[u.kind] for u in unknowns])
+    seen = observation(model, data, unknowns)
+    sizes = np.array(
+        [PLAUSIBLE_COMPLIANCE_ERROR if u.group == "compliances" else PLAUSIBLE_SIZES[u.kind] for u in unknowns]
+    )
     _enough(model.machine, seen, sizes)
     wishes = Wishes(
         sizes,
-        _given(unknowns, priors or {}, "prior"),
-        _given(unknowns, bounds or {}, "bound"),
+        _sizes_by_name(unknowns, priors or {}, "prior"),
+        _sizes_by_name(unknowns, bounds or {}, "bound"),
         np.array([PLACED_ANYWHERE if u.group in ("frame", "target") else PREFERENCE for u in unknowns]),
         robust,
         data.known,
         float((ROUND_OFF_OF_MEASUREMENT * np.where(seen.turns, 1.0, model.length) / seen.sigma).min(initial=np.inf)),
     )
-    answer = fitted(seen, seen.pose, wishes, tell)
+    answer = best_fit(seen, seen.pose, wishes, tell)
     hidden = tuple(unseen_of(seen, answer, sizes))
     proposed = next_poses(model.machine, seen, answer, sizes, more) if more else None
     return Identification(model.machine, seen, answer, sizes, hidden, proposed)
 
 
-def _chosen(model: ErrorModel, patterns: Sequence[str]) -> list[MachineError]:
+def _unknowns_named(model: ErrorModel, patterns: Sequence[str]) -> list[MachineError]:
     """The errors that groups and patterns name, in the order of the model.
 
     Raises:
         InputError: one names nothing.
     """
     if not several(patterns):
-        raise InputError(f'fit is empty; name groups or paths of what is to be found, e.g. "{USUAL[0]}".')
+        raise InputError(f'fit is empty; name groups or paths of what is to be found, e.g. "{USUALLY_FITTED[0]}".')
     paths: set[str] = set()
     for pattern in several(patterns):
         named = [e.path for e in model.errors if e.group == pattern or _matches(e, pattern)]
@@ -219,19 +230,23 @@ def _chosen(model: ErrorModel, patterns: Sequence[str]) -> list[MachineError]:
     return [error for error in model.errors if error.path in paths]
 
 
+def _plausible_size(unknown: MachineError) -> float:
+    return PLAUSIBLE_COMPLIANCE_ERROR if unknown.group == "compliances" else PLAUSIBLE_SIZES[unknown.kind]
+
+
 def _matches(error: MachineError, pattern: str) -> bool:
     """Whether a pattern names an error; clearances, which stand where geometry does, are meant by their word only."""
     return fnmatchcase(error.path, pattern) and (error.group != "clearances" or "clearance" in pattern)
 
 
-def _enough(machine: Machine, seen: Observed, sizes: Array) -> None:
+def _enough(machine: Machine, seen: Observation, sizes: Array) -> None:
     """Refuse fewer values than unknowns, and say how many poses are needed, and which."""
     data, unknowns = seen.data, len(seen.unknowns)
     if data.count >= unknowns:
         return
     each = max(data.count / max(len(data), 1), 1.0)
     needed = int(np.ceil(unknowns / each))
-    poses = first_poses(machine, seen, sizes, min(needed - len(data), MOST_NAMED))
+    poses = first_poses(machine, seen, sizes, min(needed - len(data), MOST_NAMED_POSES))
     scales = [machine.display.scale(unit_of(path)) for path in poses]
     heads = ", ".join(scale.label(path.removeprefix("pose.")) for scale, path in zip(scales, poses, strict=True))
     rows = np.column_stack([scale.factor * values for scale, values in zip(scales, poses.values(), strict=True)])
@@ -243,12 +258,12 @@ def _enough(machine: Machine, seen: Observed, sizes: Array) -> None:
     )
 
 
-def _given(unknowns: Sequence[MachineError], given: Mapping[str, str], what: str) -> Array:
+def _sizes_by_name(unknowns: Sequence[MachineError], given: Mapping[str, str], what: str) -> Array:
     """Sizes by group or path for all unknowns, SI; infinity where none is given."""
     result = np.full(len(unknowns), np.inf)
     for pattern, text in given.items():
         named = [n for n, u in enumerate(unknowns) if u.group == pattern or fnmatchcase(u.path, pattern)]
-        kinds = {kind for kind in SIZES for n in named if unknowns[n].kind == kind}
+        kinds = {kind for kind in PLAUSIBLE_SIZES for n in named if unknowns[n].kind == kind}
         if not named:
             raise InputError(
                 f'the {what} "{pattern}" belongs to nothing that is fitted; name a group or a path with *.'

@@ -24,12 +24,12 @@ MEASURED = {
     **dict.fromkeys((*POSITION, "distance"), "length"),
     **dict.fromkeys((*TURNED, *EULER), "angle"),
 }
-"""What can be measured of a pose, and the kinds of these quantities: position of the target, its rotation vector or its
+"""Quantities that can be measured of a pose, with their kinds: position of the target, its rotation vector or its
 roll, pitch and yaw, and its distance from a fixed point."""
 MOVED = {**dict.fromkeys(POSITION, "length"), **dict.fromkeys(TURNED, "angle")}
-"""What can be measured of a deflection."""
-WRENCH = {f"moment.{name}": "moment" for name in POSITION} | {f"force.{name}": "force" for name in POSITION}
-GROUPS: dict[str, Mapping[str, str]] = {
+"""Quantities that can be measured of a deflection, with their kinds."""
+WRENCH_COLUMNS = {f"moment.{name}": "moment" for name in POSITION} | {f"force.{name}": "force" for name in POSITION}
+COLUMN_GROUPS: dict[str, Mapping[str, str]] = {
     "measured": MEASURED,
     "deflection": MOVED,
     "from": dict.fromkeys(POSITION, "length"),
@@ -37,9 +37,9 @@ GROUPS: dict[str, Mapping[str, str]] = {
 }
 """Columns by the word before their first dot, with the kinds of their quantities."""
 HALF_TURN = np.pi * (1.0 + 1e-9)
-MOST_POSES = 10_000
+MOST_MEASURED_POSES = 10_000
 """Poses that are fitted at once."""
-FAR = 0.5
+FARTHEST_POSITION = 0.5
 """Share of the machine's length by which a measured position may differ from the commanded one in a known frame."""
 
 
@@ -60,7 +60,7 @@ class Sigmas:
 
 @dataclass(frozen=True)
 class Measurements:
-    """What was commanded and measured at n poses; NaN where a cell is empty.
+    """Commanded poses and measured values, n of them; NaN where a cell is empty.
 
     Attributes:
         path: of the file.
@@ -87,7 +87,7 @@ class Measurements:
 
     @property
     def count(self) -> int:
-        """How many values have been measured."""
+        """Number of measured values."""
         return int(sum(np.isfinite(values).sum() for values in self.values.values()))
 
     @property
@@ -95,8 +95,8 @@ class Measurements:
         """Whether any wrench acts."""
         return bool(self.wrenches.any())
 
-    def refused(self, row: int, what: str) -> InputError:
-        """What is wrong with a pose, with file and line."""
+    def refusal(self, row: int, what: str) -> InputError:
+        """The message about a mistake at a pose, with file and line."""
         return InputError(f'"{self.path}", line {self.lines[row]}: {what}')
 
 
@@ -112,13 +112,13 @@ def read_measurements(machine: Machine, path: Path, sigmas: Sigmas) -> Measureme
         InputError: the file cannot be read, a column is unknown or missing, or a value is of the wrong kind or beyond
             what it can be; the message names file, line and column.
     """
-    columns, lines = columns_of(path, MOST_POSES)
+    columns, lines = columns_of(path, MOST_MEASURED_POSES)
 
     def where(name: str, row: int) -> str:
         return f"line {lines[row]}, column {name}"
 
     try:
-        sorted_columns = _sorted(columns)
+        sorted_columns = _by_group(columns)
         commanded = sorted_columns.pop("", [])
         driven = sorted_columns.pop("actuator", [])
         pose = dict(read_columns(machine, commanded, where).leaves) if commanded else {}
@@ -135,12 +135,13 @@ def read_measurements(machine: Machine, path: Path, sigmas: Sigmas) -> Measureme
             names = ", ".join(name.removeprefix(POSE) for name in _pose_names(machine))
             raise InputError(f"no column says what was commanded; add columns of the pose ({names}) or actuator.NAME.")
         numbers = {
-            group: {_inner(column): _numbers(column, GROUPS[group], where) for column in entries}
+            group: {_inner(column): _numbers(column, COLUMN_GROUPS[group], where) for column in entries}
             for group, entries in sorted_columns.items()
-            if group in GROUPS
+            if group in COLUMN_GROUPS
         }
         wrench = {
-            column.name: _numbers(column, WRENCH, where, column.name) for column in sorted_columns.get("wrench", [])
+            column.name: _numbers(column, WRENCH_COLUMNS, where, column.name)
+            for column in sorted_columns.get("wrench", [])
         }
         return _measurements(str(path), lines, pose, numbers, wrench, sigmas)
     except InputError as error:
@@ -148,14 +149,16 @@ def read_measurements(machine: Machine, path: Path, sigmas: Sigmas) -> Measureme
         raise InputError(text if text.startswith('"') else f'"{path}": {text}') from None
 
 
-def _sorted(columns: Sequence[GivenColumn]) -> dict[str, list[GivenColumn]]:
+def _by_group(columns: Sequence[GivenColumn]) -> dict[str, list[GivenColumn]]:
     """The columns by what they are about."""
     result: dict[str, list[GivenColumn]] = {}
     for column in columns:
         head, _, rest = column.name.partition(".")
-        group = head if rest and head in (*GROUPS, "actuator") else "wrench" if column.name in WRENCH else ""
-        if group in GROUPS and rest not in GROUPS[group]:
-            allowed = ", ".join(f"{group}.{name}" for name in GROUPS[group])
+        group = (
+            head if rest and head in (*COLUMN_GROUPS, "actuator") else "wrench" if column.name in WRENCH_COLUMNS else ""
+        )
+        if group in COLUMN_GROUPS and rest not in COLUMN_GROUPS[group]:
+            allowed = ", ".join(f"{group}.{name}" for name in COLUMN_GROUPS[group])
             raise InputError(f"there is no column {column.name}; choose from {allowed}.")
         result.setdefault(group, []).append(column)
     return result
@@ -211,7 +214,7 @@ def _measurements(
             "orientations are given both as rx, ry, rz and as roll, pitch, yaw; keep the ones or the others."
         )
     origins = np.stack([numbers.get("from", {}).get(name, np.full(count, np.nan)) for name in POSITION], axis=1)
-    wrenches = np.stack([np.nan_to_num(wrench.get(name, np.zeros(count))) for name in WRENCH], axis=1)
+    wrenches = np.stack([np.nan_to_num(wrench.get(name, np.zeros(count))) for name in WRENCH_COLUMNS], axis=1)
     result = Measurements(
         path,
         tuple(lines),
@@ -226,10 +229,10 @@ def _measurements(
         rows = np.flatnonzero(np.isfinite(entries))
         if name == "distance" and not np.isfinite(origins[rows]).all():
             row = int(rows[~np.isfinite(origins[rows]).all(axis=1)][0])
-            raise result.refused(row, "a distance is measured, but not from where; add from.x, from.y and from.z [mm].")
+            raise result.refusal(row, "a distance is measured, but not from where; add from.x, from.y and from.z [mm].")
         if name.startswith("deflection") and not wrenches[rows].any(axis=1).all():
             row = int(rows[~wrenches[rows].any(axis=1)][0])
-            raise result.refused(row, "a deflection is measured without a load; add columns such as force.z [N].")
+            raise result.refusal(row, "a deflection is measured without a load; add columns such as force.z [N].")
     return result
 
 
@@ -242,7 +245,7 @@ def _sigma(values: Mapping[str, Array], given: Mapping[str, Array], sigmas: Sigm
     """Standard deviations of all measured values, from the file or from the defaults."""
     result = {}
     for name, entries in values.items():
-        kind = GROUPS["sigma"][name]
+        kind = COLUMN_GROUPS["sigma"][name]
         usual = np.full(len(entries), sigmas.length if kind == "length" else sigmas.angle)
         stated = given.get(name, usual)
         result[name] = np.where(np.isnan(stated), usual, stated)

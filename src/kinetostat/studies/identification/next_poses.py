@@ -1,8 +1,10 @@
-"""Which poses to measure next: those that make the uncertain combinations of unknowns surest (D-optimal designs).
+"""Poses to measure next: those that make the uncertain combinations of unknowns surest (D-optimal designs).
 
 The determinant of the information grows by poses that are chosen one after the other, and then exchanged as long as
-that helps (V. Fedorov, 1972). Candidates lie at random within the limits of the machine's file (`admissible`), or where
-it sets none, in the range of what was measured.
+that helps (V. Fedorov, 1972). Candidates lie at random within the limits of the machine's file and are joined to poses
+at which it has been: rays go out from a measured pose until a limit or a singularity ends them, first along each
+coordinate, which says how far each one goes, then in random directions. Where the file sets no limits, candidates lie
+in the range of what was measured.
 
 Source: theory (67) and (68).
 """
@@ -13,21 +15,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinetostat.accuracy.model import PLACED, error_model
-from kinetostat.arrays import Array
+from kinetostat.arrays import Array, Mask
+from kinetostat.engine.batch import evaluate
+from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine
-from kinetostat.studies.identification.admissible import within_limits
 from kinetostat.studies.identification.fit import Fit
 from kinetostat.studies.identification.measurements import Measurements
-from kinetostat.studies.identification.observed import Observed, observed
+from kinetostat.studies.identification.observation import Observation, observation
 
 CANDIDATES = 400
 MOST_PROPOSED = 100
 EXCHANGES = 5
 """Rounds of exchanges at most."""
-NEARBY = 0.1
-"""How far on either side of what was measured first poses go at least: a tenth of the machine's length, or 0.1 rad."""
+LEAST_SPAN = 0.1
+"""Least span of first poses on either side of the measured ones: a tenth of the machine's length, or 0.1 rad."""
 
 WITHIN_LIMITS = "They were chosen within the [limits] of the machine's file."
 WITHOUT_LIMITS = (
@@ -37,6 +40,14 @@ WITHOUT_LIMITS = (
 BEYOND_LIMITS = (
     "No measured pose keeps the [limits] of the machine's file: they were chosen in the range of the measured poses."
 )
+FARTHEST, RAY_STEPS = 1.5, 48
+"""End of a ray, in lengths of the machine or rad, then in reaches of all coordinates; and how many places of a ray are
+looked at."""
+SINGULAR_SHARE = 0.1
+"""Share of the singularity margin at the start that must be left all along a ray, so that no step passes over a
+singularity."""
+
+Poses = Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -58,7 +69,7 @@ class NextPoses:
     within: str
 
 
-def next_poses(machine: Machine, seen: Observed, fit: Fit, sizes: Array, count: int) -> NextPoses | None:
+def next_poses(machine: Machine, seen: Observation, fit: Fit, sizes: Array, count: int) -> NextPoses | None:
     """Choose poses among candidates; None where too few of these can be placed.
 
     Args:
@@ -74,7 +85,7 @@ def next_poses(machine: Machine, seen: Observed, fit: Fit, sizes: Array, count: 
     rows = len(there.data)
     if rows < count:
         return None
-    _, rates = there.linearised(fit.values)
+    _, rates = there.linearisation(fit.values)
     basis = fit.ways[:, : fit.rank]
     blocks = (rates * sizes @ basis).reshape(rows, -1, fit.rank)
     start = np.diag(fit.seen[: fit.rank] ** 2)
@@ -85,7 +96,7 @@ def next_poses(machine: Machine, seen: Observed, fit: Fit, sizes: Array, count: 
     return NextPoses(poses, gain, usual, ranges, within)
 
 
-def first_poses(machine: Machine, seen: Observed, sizes: Array, count: int) -> Mapping[str, Array]:
+def first_poses(machine: Machine, seen: Observation, sizes: Array, count: int) -> Mapping[str, Array]:
     """Choose poses to add where there are too few for a fit: within limits, or about those that are there.
 
     Args:
@@ -99,12 +110,12 @@ def first_poses(machine: Machine, seen: Observed, sizes: Array, count: int) -> M
     """
     spans = {}
     for path, values in seen.data.pose.items():
-        least = NEARBY * (seen.model.length if unit_of(path) == "m" else 1.0)
+        least = LEAST_SPAN * (seen.model.length if unit_of(path) == "m" else 1.0)
         middle, half = 0.5 * (values.max() + values.min()), 0.5 * (values.max() - values.min())
         spans[path] = (middle - max(half, least), middle + max(half, least))
     there, _ = _candidates(machine, seen, spans, np.random.default_rng(0))
-    _, known = seen.linearised(np.zeros(len(sizes)))
-    _, rates = there.linearised(np.zeros(len(sizes)))
+    _, known = seen.linearisation(np.zeros(len(sizes)))
+    _, rates = there.linearisation(np.zeros(len(sizes)))
     blocks = (rates * sizes).reshape(len(there.data), -1, len(sizes))
     start = (known * sizes).T @ (known * sizes)
     chosen = chosen_poses(blocks, start, min(count, len(blocks)))
@@ -125,8 +136,8 @@ def unit_of(path: str) -> str:
 
 
 def _candidates(
-    machine: Machine, seen: Observed, spans: Mapping[str, tuple[float, float]], rng: np.random.Generator
-) -> tuple[Observed, str]:
+    machine: Machine, seen: Observation, spans: Mapping[str, tuple[float, float]], rng: np.random.Generator
+) -> tuple[Observation, str]:
     """Poses at random that the machine reaches, as if the same had been measured there, and a sentence about them.
 
     They keep the limits of its file; without any they lie within spans.
@@ -140,7 +151,7 @@ def _candidates(
     whole = error_model(machine, poses, CANDIDATES, np.zeros(6))
     rows = np.flatnonzero(np.isin(whole.drawn.status, PLACED if within != WITHIN_LIMITS else Status.OK))
     poses = {path: values[rows] for path, values in poses.items()}
-    return observed(whole.at_poses(rows), _like(seen.data, poses, len(rows)), seen.unknowns, seen.frame), within
+    return observation(whole.at_poses(rows), _like(seen.data, poses, len(rows)), seen.unknowns, seen.frame), within
 
 
 def _like(data: Measurements, pose: Mapping[str, Array], count: int) -> Measurements:
@@ -194,3 +205,53 @@ def _gain(blocks: Array, start: Array) -> float:
     flat = blocks.reshape(-1, blocks.shape[2])
     before, after = (float(np.linalg.slogdet(information)[1]) for information in (start, start + flat.T @ flat))
     return float(np.exp((after - before) / (2.0 * len(start))))
+
+
+def within_limits(
+    machine: Machine, measured: Poses, units: Mapping[str, float], count: int, rng: np.random.Generator
+) -> Poses | None:
+    """Draw poses within the limits of a machine's file, those coordinates alone that measurements vary.
+
+    Args:
+        machine: with its limits.
+        measured: poses at which it has been, by leaf path, SI.
+        units: of each of their coordinates: the machine's length, m, or 1 rad.
+        count: how many poses are wanted.
+        rng: draws them.
+
+    Returns:
+        Coordinates by leaf path, SI [count]; None if the file sets no limits or no measured pose keeps them.
+    """
+    if not limits_set(machine.tables["limits"]):
+        return None
+    paths, scale = list(measured), np.array([units[path] for path in measured])
+    places = np.stack([measured[path] for path in paths], axis=1)
+    margins = _margins(machine, paths, places)
+    if not (margins > 0.0).any():
+        return None
+    off = np.abs((places - places.mean(axis=0)) / scale).max(axis=1)
+    middle = int(np.argmin(np.where(margins > 0.0, off, np.inf)))
+    start, least = places[middle], SINGULAR_SHARE * float(margins[middle])
+    axes = np.concatenate([np.diag(scale), -np.diag(scale)])
+    reach = _reach(machine, paths, start, axes, least).reshape(2, -1).max(axis=0) * scale
+    ways = rng.normal(size=(count, len(paths)))
+    ways = ways / np.linalg.norm(ways, axis=1)[:, None] * reach
+    share = _reach(machine, paths, start, ways, least) * rng.random(count) ** (1.0 / len(paths))
+    return dict(zip(paths, (start + share[:, None] * ways).T, strict=True))
+
+
+def _reach(machine: Machine, paths: list[str], start: Array, ways: Array, least: float) -> Array:
+    """Reach of rays [rays x coordinates] from a pose before they end: factors of their length [rays]."""
+    steps = np.linspace(0.0, FARTHEST, RAY_STEPS + 1)[1:]
+    places = start + steps[:, None, None] * ways
+    kept = _margins(machine, paths, places.reshape(-1, len(paths))).reshape(RAY_STEPS, -1) > least
+    ended = np.where(kept.all(axis=0), RAY_STEPS, np.argmin(kept, axis=0))
+    return np.asarray(np.concatenate([[0.0], steps])[ended])
+
+
+def _margins(machine: Machine, paths: list[str], places: Array) -> Array:
+    """The singularity margin at poses [poses x coordinates]; 0 where one is out of reach or passes a limit."""
+    columns = {path: np.ascontiguousarray(column) for path, column in zip(paths, places.T, strict=True)}
+    answer = evaluate(machine, PointTable(columns), ["singularity_margin"])
+    inside: Mask = np.asarray(answer.status == Status.OK)
+    return np.where(inside, answer.values["singularity_margin"], 0.0)

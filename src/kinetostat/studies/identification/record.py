@@ -16,11 +16,11 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 
 RECORD = "fit.json"
-PICTURES = ("residuals", "correlations", "poses")
+FIT_PICTURES = ("residuals", "correlations", "poses")
 PNG = b"\x89PNG\r\n\x1a\n"
-LARGEST = 1 << 28
+LARGEST_FILE = 1 << 28
 """Bytes of a record or a picture."""
-GIVE = "give the folder, or the fit.json in it, that `kinetostat identify -o FOLDER` has written."
+FIT_ADVICE = "give the folder, or the fit.json in it, that `kinetostat identify -o FOLDER` has written."
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class FittedNumber:
 
 @dataclass(frozen=True)
 class FitRecord:
-    """What a fit has left on the disk.
+    """The record of a fit, read from its file.
 
     Attributes:
         path: of the record.
@@ -76,7 +76,7 @@ class FitRecord:
     home: Mapping[str, float]
     senses: Mapping[str, float]
 
-    def counted(self, actuators: Sequence[str], coordinates: Array, home: Mapping[str, float]) -> Array:
+    def controller_counts(self, actuators: Sequence[str], coordinates: Array, home: Mapping[str, float]) -> Array:
         """Coordinates of actuators as their controller counts them, with the zeros and gains that were found.
 
         An actuator that is commanded to c stands at c + zero + gain c, theory (45) and what follows it.
@@ -139,20 +139,20 @@ def read_fit(path: str | Path) -> FitRecord:
     try:
         place = place / RECORD if place.is_dir() else place
         record = json.loads(_bytes(place))
-        pictures = {name: place.with_name(f"{name}.png") for name in PICTURES}
-        return _checked(str(place), record, {n: _bytes(p) for n, p in pictures.items() if p.is_file()})
+        pictures = {name: place.with_name(f"{name}.png") for name in FIT_PICTURES}
+        return _record_of(str(place), record, {n: _bytes(p) for n, p in pictures.items() if p.is_file()})
     except OSError as error:
-        raise InputError(f'"{place}" cannot be read: {error.strerror}; {GIVE}') from None
+        raise InputError(f'"{place}" cannot be read: {error.strerror}; {FIT_ADVICE}') from None
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
-        raise InputError(f'"{place}" is not the record of a fit; {GIVE}') from None
+        raise InputError(f'"{place}" is not the record of a fit; {FIT_ADVICE}') from None
 
 
 def _bytes(path: Path) -> bytes:
     with path.open("rb") as stream:
-        return stream.read(LARGEST)
+        return stream.read(LARGEST_FILE)
 
 
-def _checked(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecord:
+def _record_of(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecord:
     unknowns = tuple(
         FittedNumber(
             str(u["path"]), str(u["group"]), str(u.get("words", "")), str(u.get("unit", "1")), float(u["value"]),

@@ -1,4 +1,4 @@
-"""What no measured pose can see: combinations of unknowns in plain words, and whether they matter to the tool.
+"""Combinations of unknowns that no measured pose sees, in plain words, and how far they move the tool.
 
 Common motions of all base joints, of all platform joints, of the measuring frame and of the target are looked for
 first, because they are what cannot be told apart as a rule. What remains is named by its largest parts.
@@ -17,22 +17,22 @@ from kinetostat.accuracy.rows import places_of
 from kinetostat.arrays import Array
 from kinetostat.numerics.motions import cross
 from kinetostat.studies.identification.fit import Fit
-from kinetostat.studies.identification.observed import FRAME, TARGET, Observed
+from kinetostat.studies.identification.observation import FRAME_UNKNOWNS, TARGET_UNKNOWNS, Observation
 from kinetostat.tolerances import SEEN_BY_LEG
 
-ALIKE = 0.02
+SEEN_SHARE = 0.02
 """Share of a combination that may be seen although it counts as unseen: it is named at the drawn machine, and the fit
 is some thousandths away from there."""
-FEW = 5
+MOST_NAMED_PARTS = 5
 """Parts of a combination that are named."""
 SAME_EFFECT = 1e-5
 """Share of the effect of a motion that errors of the leg may leave out and yet stand for it."""
 NO_ERROR = MachineError("", "", "", "", "")
-ROUND_OFF = 1e-7
+ROUND_OFF_OF_MOTION = 1e-7
 """Share of a motion of the tool below which what is left of it is round-off."""
 SAME_SHARE = 1e-6
 """Relative difference below which two unknowns take part in combinations alike."""
-SMALL = 0.05
+LEAST_NAMED_SHARE = 0.05
 """Share of the largest part of a combination below which a part is not named."""
 WAYS = [("turn", "about", axis) for axis in "xyz"] + [("shift", "along", axis) for axis in "xyz"]
 
@@ -54,7 +54,7 @@ class Unseen:
     inside: float
 
 
-def unseen_of(observed: Observed, fit: Fit, sizes: Array) -> list[Unseen]:
+def unseen_of(observed: Observation, fit: Fit, sizes: Array) -> list[Unseen]:
     """Name the combinations that a fit does not see.
 
     Args:
@@ -69,21 +69,21 @@ def unseen_of(observed: Observed, fit: Fit, sizes: Array) -> list[Unseen]:
     named: list[Array] = []
     for words, candidate in _common(observed, sizes, basis):
         inside = basis @ (basis.T @ candidate)
-        if np.linalg.norm(candidate - inside) < ALIKE * np.linalg.norm(candidate) and _new(inside, named):
+        if np.linalg.norm(candidate - inside) < SEEN_SHARE * np.linalg.norm(candidate) and _new(inside, named):
             named.append(inside)
-            result.append(_judged(words, candidate, observed, twists, sizes))
-    rest = basis - _projected(basis, named)
+            result.append(_combination(words, candidate, observed, twists, sizes))
+    rest = basis - _projection(basis, named)
     left, strength, _ = np.linalg.svd(rest, full_matrices=False)
     ways = sparse(left[:, strength > 0.5]).T
-    return result + [_judged(_sentence(way, observed), way, observed, twists, sizes) for way in ways]
+    return result + [_combination(_sentence(way, observed), way, observed, twists, sizes) for way in ways]
 
 
 def _new(way: Array, named: list[Array]) -> bool:
-    rest = way - _projected(way[:, None], named)[:, 0]
+    rest = way - _projection(way[:, None], named)[:, 0]
     return bool(np.linalg.norm(rest) > 0.1 * np.linalg.norm(way))
 
 
-def _projected(ways: Array, named: list[Array]) -> Array:
+def _projection(ways: Array, named: list[Array]) -> Array:
     """The parts of combinations, as columns, that lie in the span of named ones."""
     if not named:
         return np.zeros_like(ways)
@@ -105,10 +105,10 @@ def sparse(ways: Array) -> Array:
     return np.asarray(ways @ np.linalg.inv(ways[places]))
 
 
-def _common(observed: Observed, sizes: Array, basis: Array) -> Iterator[tuple[str, Array]]:
+def _common(observed: Observation, sizes: Array, basis: Array) -> Iterator[tuple[str, Array]]:
     """Common motions that may hide each other, with what they are in unknowns, in plausible sizes."""
-    base, platform = (_moved(observed, sizes, at_end) for at_end in (False, True))
-    frame, target = _placed(observed, sizes, FRAME), _placed(observed, sizes, TARGET)
+    base, platform = (_common_motions(observed, sizes, at_end) for at_end in (False, True))
+    frame, target = _place_motions(observed, sizes, FRAME_UNKNOWNS), _place_motions(observed, sizes, TARGET_UNKNOWNS)
     for number, (what, preposition, axis) in enumerate(WAYS):
         on_base = f"a common {what} of all base joints {preposition} {axis}"
         on_platform = f"a common {what} of all platform joints {preposition} {axis}"
@@ -145,7 +145,7 @@ def _with_best(candidate: Array, others: dict[int, Array], basis: Array) -> Arra
     return np.asarray(candidate - block @ share)
 
 
-def _moved(observed: Observed, sizes: Array, at_end: bool) -> dict[int, Array]:
+def _common_motions(observed: Observation, sizes: Array, at_end: bool) -> dict[int, Array]:
     """The unknowns that move all legs together on the base, or on the platform, by the number of the motion."""
     result = {}
     for number, unit in enumerate(np.eye(6)):
@@ -160,7 +160,7 @@ def _moved(observed: Observed, sizes: Array, at_end: bool) -> dict[int, Array]:
     return result
 
 
-def _of_leg(observed: Observed, leg: int, twist: Array, at_end: bool) -> Array | None:
+def _of_leg(observed: Observation, leg: int, twist: Array, at_end: bool) -> Array | None:
     """The unknowns of a leg that do what a motion of its whole beginning or end does; None if they cannot, SI."""
     rows, sources = observed.model.rows, observed.model.sources
     row, result = rows.legs[leg], np.zeros(len(observed.chosen))
@@ -182,7 +182,7 @@ def _of_leg(observed: Observed, leg: int, twist: Array, at_end: bool) -> Array |
     return result
 
 
-def _placed(observed: Observed, sizes: Array, paths: tuple[str, ...]) -> dict[int, Array]:
+def _place_motions(observed: Observation, sizes: Array, paths: tuple[str, ...]) -> dict[int, Array]:
     """The unknowns of the measuring frame or the target, by the number of the motion."""
     known = [unknown.path for unknown in observed.unknowns]
     result = {}
@@ -194,29 +194,29 @@ def _placed(observed: Observed, sizes: Array, paths: tuple[str, ...]) -> dict[in
     return result
 
 
-def _sentence(way: Array, observed: Observed) -> str:
+def _sentence(way: Array, observed: Observation) -> str:
     """Name the largest parts of a combination."""
-    order = [int(i) for i in np.argsort(-np.abs(way)) if abs(way[i]) > SMALL * np.abs(way).max()]
-    parts = [f"{way[i] / np.abs(way).max():+.2g} × {observed.unknowns[i].words}" for i in order[:FEW]]
-    more = f" and {len(order) - FEW} more" if len(order) > FEW else ""
+    order = [int(i) for i in np.argsort(-np.abs(way)) if abs(way[i]) > LEAST_NAMED_SHARE * np.abs(way).max()]
+    parts = [f"{way[i] / np.abs(way).max():+.2g} × {observed.unknowns[i].words}" for i in order[:MOST_NAMED_PARTS]]
+    more = f" and {len(order) - MOST_NAMED_PARTS} more" if len(order) > MOST_NAMED_PARTS else ""
     if len(order) == 1:
         return f"The {observed.unknowns[order[0]].words} changes nothing that was measured."
     return f"Only other combinations than this one are seen: {', '.join(parts)}{more}."
 
 
-def _judged(words: str, way: Array, observed: Observed, twists: Array, sizes: Array) -> Unseen:
+def _combination(words: str, way: Array, observed: Observation, twists: Array, sizes: Array) -> Unseen:
     values = way / np.abs(way).max() * sizes
     moved = twists @ values
     parts = {
         u.path: float(v) for u, v in zip(observed.unknowns, values, strict=True) if abs(v) > 1e-9 * np.abs(values).max()
     }
-    left = moved - _replaced(moved, observed)
+    left = moved - _undone_by_frames(moved, observed)
     tool, inside = (float(np.linalg.norm(each[:, 3:], axis=1).max()) for each in (moved, left))
-    return Unseen(words, parts, tool, inside if inside > ROUND_OFF * tool else 0.0)
+    return Unseen(words, parts, tool, inside if inside > ROUND_OFF_OF_MOTION * tool else 0.0)
 
 
-def _replaced(moved: Array, observed: Observed) -> Array:
-    """What motions of the base and of the target make of motions of the tool [n x 6]."""
+def _undone_by_frames(moved: Array, observed: Observation) -> Array:
+    """The part of motions of the tool that motions of the base and of the target can make [n x 6]."""
     count, tool = len(moved), observed.model.drawn.tool
     ways = []
     for turning, moving in product((0.0, 1.0), np.eye(3)):

@@ -1,10 +1,13 @@
 """A measured stiffness beside the computed one: what lies between them, and whether their uncertainties explain it.
 
+Uncertain numbers of the machine come from the lines of [tolerances], or from the record of a fit, whose values then
+count as well. Compliances of springs act exactly, errors of geometry by differences of machines placed as built.
+
 Source: theory (69) to (72); ASME V&V 20-2009, *Standard for Verification and Validation in Computational Fluid Dynamics
 and Heat Transfer*, sections 1 and 6.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,9 +15,10 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc
 
+from kinetostat.accuracy.built import compliances_as_built
 from kinetostat.accuracy.model import PLACED, ErrorModel, error_model
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.arrays import Array
+from kinetostat.arrays import Array, Integers
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.column import stacked
@@ -22,18 +26,137 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
+from kinetostat.spec.tolerance_table import SIGMAS
+from kinetostat.studies.budget.tolerances import toleranced_parts
+from kinetostat.studies.identification.record import read_fit
 from kinetostat.studies.measured.stiffness_file import MeasuredEntry, MeasuredStiffness, read_stiffness
-from kinetostat.studies.measured.uncertain import Uncertain, compliance_changes, dyads_of, uncertain_of
 from kinetostat.studies.plain_data import as_answer
 
-COVER = 2.0
+GROUPS_WITHOUT_COMPLIANCE = ("zeros", "gains", "clearances")
+"""Groups of errors that leave the compliance of a machine at its pose as it is: they only move it."""
+GEOMETRY_STEP = 1e-5
+"""Of differences by errors of geometry, rad or in units of the machine's length: what they leave out is its square."""
+SAME_COMPLIANCE = 1e-9
+"""Share by which a machine that is placed as built may differ from the drawn one, without any error."""
+COVERAGE_FACTOR = 2.0
 """Standard uncertainties that an interval reaches: about 95 % of normal values lie within."""
-LIKELY = 0.05
+LEAST_LIKELY = 0.05
 """Probability below which so much disagreement is not put down to chance."""
-LEAST = 1e-4
+LEAST_PROBABILITY = 1e-4
 """Probability below which no number is given."""
-RIGID = 1e-12
+RIGID_SHARE = 1e-12
 """Share of the largest compliance, with lengths in units of the machine's, below which a direction counts as rigid."""
+
+
+@dataclass(frozen=True)
+class UncertainNumbers:
+    """Numbers of a machine that are not exact.
+
+    Attributes:
+        places: in the errors of the model [p].
+        values: by which they differ from the drawing, SI [p].
+        covariance: SI [p x p].
+        source: where that is from, for people; empty where nothing is uncertain.
+    """
+
+    places: Integers
+    values: Array
+    covariance: Array
+    source: str
+
+
+def uncertain_numbers(machine: Machine, model: ErrorModel, fit: Path | None) -> UncertainNumbers:
+    """Gather what is known of a machine's numbers: from a fit, and from [tolerances] for those that were not fitted.
+
+    Args:
+        machine: as drawn.
+        model: its errors.
+        fit: record of `kinetostat identify`; None without one.
+
+    Raises:
+        InputError: the record cannot be read or is about another machine, or a line of [tolerances] is about nothing.
+    """
+    paths = {error.path: place for place, error in enumerate(model.errors)}
+    fitted, values, covariance = _of_fit(machine, paths, fit) if fit else ([], np.zeros(0), np.zeros((0, 0)))
+    parts = toleranced_parts(machine, model.errors, machine.tolerances) if machine.tolerances else ()
+    chosen = [part for part in parts if part.group not in GROUPS_WITHOUT_COMPLIANCE and part.errors[0] not in fitted]
+    variances = [part.limit**2 * (SIGMAS**-2 if part.normal else 1.0 / 3.0) for part in chosen]
+    places = [*fitted, *(part.errors[0] for part in chosen)]
+    whole = np.zeros((len(places), len(places)))
+    whole[: len(fitted), : len(fitted)] = covariance
+    whole[np.arange(len(fitted), len(places)), np.arange(len(fitted), len(places))] = variances
+    counted = [place for place, size in enumerate(np.diag(whole)) if size > 0.0 or place < len(fitted)]
+    sources = [f'the fit "{fit}"' if fit else "", "[tolerances]" if chosen else ""]
+    return UncertainNumbers(
+        np.array(places, dtype=np.int64)[counted],
+        np.concatenate([values, np.zeros(len(chosen))])[counted],
+        whole[np.ix_(counted, counted)],
+        " and ".join(filter(None, sources)),
+    )
+
+
+def _of_fit(machine: Machine, paths: Mapping[str, int], path: Path) -> tuple[list[int], Array, Array]:
+    """Places, values and covariance of what a fit says of the machine's compliance."""
+    record = read_fit(path)
+    record.check(machine)
+    rows = [n for n, u in enumerate(record.unknowns) if u.group not in (*GROUPS_WITHOUT_COMPLIANCE, "frame", "target")]
+    missing = [record.unknowns[n].path for n in rows if record.unknowns[n].path not in paths]
+    if missing:
+        raise InputError(
+            f'"{path}" is the fit of a machine with {missing[0]}, which {machine.name} does not have; give the machine '
+            "as drawn, not the file that the fit has written."
+        )
+    values = np.array([record.unknowns[n].value for n in rows])
+    return [paths[record.unknowns[n].path] for n in rows], values, record.covariance[np.ix_(rows, rows)]
+
+
+def spring_dyads(model: ErrorModel) -> Array:
+    """Contribution of each spring to C at the tool point [n x 6 x 6 x springs], base axes, SI: theory (8)."""
+    loads = [np.broadcast_to(unit, (len(model), 6)) for unit in np.eye(6)]
+    return np.stack([model.deflections(load) for load in loads], axis=2)
+
+
+def compliance_changes(model: ErrorModel, uncertain: UncertainNumbers, dyads: Array) -> tuple[Array, tuple[str, ...]]:
+    """Changes of the compliance per unit of each uncertain number [n x 6 x 6 x p], and numbers that do not count.
+
+    Errors of geometry are left out of an overconstrained machine, whose legs would be bent by them, and of one whose
+    springs change with the pose, away from its home place.
+
+    Args:
+        model: of the machine at n poses.
+        uncertain: numbers.
+        dyads: of its springs [n x 6 x 6 x springs].
+    """
+    first = len(model.errors) - dyads.shape[3]
+    changes = np.zeros((len(model), 6, 6, len(uncertain.places)))
+    geometry = [n for n, place in enumerate(uncertain.places) if place < first]
+    for n, place in enumerate(uncertain.places):
+        if place >= first:
+            changes[..., n] = dyads[..., place - first]
+    if not geometry:
+        return changes, ()
+    if model.overconstrained or not _agrees(model, dyads):
+        return changes, tuple(model.errors[uncertain.places[n]].path for n in geometry)
+    for n in geometry:
+        changes[..., n] = _change(model, int(uncertain.places[n]))
+    return changes, ()
+
+
+def _agrees(model: ErrorModel, dyads: Array) -> bool:
+    """Whether the machine placed without errors has the compliance of the drawn one at all poses.
+
+    It has not where springs change with the pose, as a strut does that is longer elsewhere.
+    """
+    drawn = dyads.sum(axis=3)
+    off = np.abs(compliances_as_built(np.zeros(len(model.errors)), model) - drawn)
+    return bool((off.max(axis=(1, 2)) <= SAME_COMPLIANCE * np.abs(drawn).max(axis=(1, 2))).all())
+
+
+def _change(model: ErrorModel, place: int) -> Array:
+    """Of the compliance per unit of an error, by central differences [n x 6 x 6]."""
+    size = GEOMETRY_STEP * (model.length if model.errors[place].kind == "length" else 1.0)
+    way = size * np.eye(len(model.errors))[place]
+    return (compliances_as_built(way, model) - compliances_as_built(-way, model)) / (2.0 * size)
 
 
 @dataclass(frozen=True)
@@ -55,7 +178,7 @@ class MeasuredRow:
 
     @property
     def error(self) -> float:
-        """What the computed number is more than the measured one."""
+        """Excess of the computed number over the measured one."""
         return self.predicted - self.entry.value
 
     @property
@@ -66,13 +189,13 @@ class MeasuredRow:
     @property
     def explained(self) -> bool:
         """Whether the uncertainties explain the difference: it is at most twice theirs."""
-        return abs(self.error) <= COVER * self.u_val
+        return abs(self.error) <= COVERAGE_FACTOR * self.u_val
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Between what sizes the error of the model lies, SI; the lower one is 0 where uncertainties explain it."""
-        least = max(abs(self.error) - COVER * self.u_val, 0.0)
-        return least, abs(self.error) + COVER * self.u_val
+        least = max(abs(self.error) - COVERAGE_FACTOR * self.u_val, 0.0)
+        return least, abs(self.error) + COVERAGE_FACTOR * self.u_val
 
 
 @dataclass(frozen=True)
@@ -103,11 +226,11 @@ class MeasuredComparison:
     @property
     def agrees(self) -> bool:
         """Whether the uncertainties explain all differences together."""
-        return self.probability >= LIKELY
+        return self.probability >= LEAST_LIKELY
 
     @property
     def shares(self) -> dict[str, float]:
-        """What the variances of the differences are made of on average: shares that add up to 1."""
+        """Shares of the sources in the variances of the differences, on average; they add up to 1."""
         parts = np.array([[row.u_num, row.u_input, row.u_data] for row in self.rows]) ** 2
         means = (parts / parts.sum(axis=1, keepdims=True)).mean(axis=0)
         return dict(zip(("numerics", "inputs", "measurement"), means.tolist(), strict=True))
@@ -116,7 +239,7 @@ class MeasuredComparison:
     def message(self) -> str:
         """The verdict in words."""
         inside, count = sum(row.explained for row in self.rows), len(self.rows)
-        likely = f"{100.0 * self.probability:.2g} %" if self.probability > LEAST else "below 0.01 %"
+        likely = f"{100.0 * self.probability:.2g} %" if self.probability > LEAST_PROBABILITY else "below 0.01 %"
         text = (
             f"{self.machine.name}: {inside} of {count} measured numbers lie within twice the uncertainty of the "
             f"comparison. Together they are {'as' if self.agrees else 'not as'} near to the computed ones as "
@@ -162,14 +285,14 @@ def validate_measured(
         raise InputError(f'"{data}", {line}the drawn machine is not at the measured pose. {sentence}')
     response = respond(with_values(machine, pose) if pose else machine)
     computed = stacked([entry for row in response.compliance.rows() for entry in row], count).reshape(-1, 6, 6)
-    uncertain = uncertain_of(machine, model, Path(fit) if fit else None)
-    return _compared(machine, model, measured, computed, uncertain)
+    uncertain = uncertain_numbers(machine, model, Path(fit) if fit else None)
+    return _comparison(machine, model, measured, computed, uncertain)
 
 
-def _compared(
-    machine: Machine, model: ErrorModel, measured: MeasuredStiffness, computed: Array, uncertain: Uncertain
+def _comparison(
+    machine: Machine, model: ErrorModel, measured: MeasuredStiffness, computed: Array, uncertain: UncertainNumbers
 ) -> MeasuredComparison:
-    dyads = dyads_of(model)
+    dyads = spring_dyads(model)
     changes, left_out = compliance_changes(model, uncertain, dyads)
     compliance = computed + changes @ uncertain.values
     loads = measured.deflections.wrenches if measured.deflections else np.zeros((1, 6))
@@ -206,7 +329,7 @@ class _Entry:
             places = np.ix_(list(components), list(components))
             units = np.array([length if c < 3 else 1.0 for c in components])
             scaled = compliance[places] * np.outer(units, units)
-            if np.linalg.svd(scaled)[1][-1] <= RIGID * np.abs(scaled).max():
+            if np.linalg.svd(scaled)[1][-1] <= RIGID_SHARE * np.abs(scaled).max():
                 raise InputError(
                     f"{entry.name} is measured in line {entry.line}, but the model is rigid in some direction, so that "
                     "K has no end; give its springs stiffnesses, or compare entries of C (compliance_z)."
@@ -248,7 +371,7 @@ def as_json(answer: MeasuredComparison) -> dict[str, Any]:
             "agrees": answer.agrees,
             "chi_square": answer.chi_square,
             "probability": answer.probability,
-            "coverage_factor": COVER,
+            "coverage_factor": COVERAGE_FACTOR,
             "uncertainty_from": answer.source,
             "left_out": list(answer.left_out),
             "shares": answer.shares,

@@ -17,11 +17,11 @@ from kinetostat.studies.identification.measurements import Measurements, Sigmas,
 from kinetostat.studies.poses import GivenColumn, columns_of
 from kinetostat.units import KINDS, UnitError, parse
 
-MATRICES = ("stiffness", "compliance", "free_stiffness")
-"""What an entry may belong to: K, C, or 1 / C of its diagonal, which a load along one component measures."""
+MEASURED_MATRICES = ("stiffness", "compliance", "free_stiffness")
+"""Matrices to which an entry may belong: K, C, or 1 / C of its diagonal, which a load along one component measures."""
 COLUMNS = ("entry", "value", "sigma")
 KIND_OF = {kind.unit: kind.name for kind in KINDS.values() if kind.name.endswith((" stiffness", " compliance"))}
-SURE = 'write a column sigma, such as 2 N/um or 3 %, or give --sigma "3 %"'
+SIGMA_ADVICE = 'write a column sigma, such as 2 N/um or 3 %, or give --sigma "3 %"'
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class MeasuredEntry:
     @property
     def parts(self) -> tuple[str, int, int]:
         """The matrix that it belongs to, and its row and column in COMPONENTS."""
-        matrix = next(m for m in (*MATRICES, "deflection") if self.name.startswith(f"{m}_"))
+        matrix = next(m for m in (*MEASURED_MATRICES, "deflection") if self.name.startswith(f"{m}_"))
         names = self.name.removeprefix(f"{matrix}_").split("_")
         return matrix, COMPONENTS.index(names[0]), COMPONENTS.index(names[-1])
 
@@ -120,7 +120,7 @@ def _entry(machine: Machine, name: str, value: str, sure: str, line: int) -> Mea
     unit = QUANTITIES[name].unit
     size = _number(value, KIND_OF[unit], lambda text: refused(f"the value of {name} is {text}"))
     if not sure:
-        raise refused(f"nothing says how sure {name} is; {SURE}.")
+        raise refused(f"nothing says how sure {name} is; {SIGMA_ADVICE}.")
     share = sure.endswith("%")
     sigma = _number(sure, "ratio" if share else KIND_OF[unit], lambda text: refused(f"the sigma of {name} is {text}"))
     sigma = sigma * abs(size) if share else sigma
@@ -134,7 +134,7 @@ def _entry(machine: Machine, name: str, value: str, sure: str, line: int) -> Mea
 def _known(machine: Machine) -> list[str]:
     """The names of all entries, in either order of their components."""
     names, components = [], machine.family.component_names
-    for matrix in MATRICES:
+    for matrix in MEASURED_MATRICES:
         pairs = [(a, b) for a in components for b in components if a == b or matrix != "free_stiffness"]
         names += [f"{matrix}_{a}" if a == b else f"{matrix}_{a}_{b}" for a, b in pairs]
     return names
@@ -174,7 +174,7 @@ def _deflections(machine: Machine, path: Path, sigma: str, sigma_angle: str) -> 
             if not np.isfinite(value):
                 continue
             if not np.isfinite(sure):
-                raise data.refused(row, f"nothing says how sure {name} is; add a column sigma.{name} [um] or --sigma.")
+                raise data.refusal(row, f"nothing says how sure {name} is; add a column sigma.{name} [um] or --sigma.")
             component = name.removeprefix("deflection.")
             unit = "rad" if component.startswith("r") else "m"
             entries.append(MeasuredEntry(f"deflection_{component}", unit, value, sure, data.lines[row], row))

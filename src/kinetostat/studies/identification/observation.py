@@ -1,4 +1,4 @@
-"""What a machine with errors would be measured as, and how that changes with every unknown: theory (64).
+"""Measured values that a machine with errors would give, and their rates by every unknown: theory (64).
 
 Unknowns are errors of the machine, and where wanted the place of the measuring frame in the base frame and that of the
 target on the platform. Residuals are in standard deviations.
@@ -16,12 +16,12 @@ from kinetostat.accuracy.model import PLACED, ErrorModel
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.kinematics.status import Status
 from kinetostat.numerics.motions import Motions, cross, exponential, logarithm
-from kinetostat.studies.identification.measurements import EULER, FAR, POSITION, TURNED, Measurements
+from kinetostat.studies.identification.measurements import EULER, FARTHEST_POSITION, POSITION, TURNED, Measurements
 
-STEP = 1e-5
+ANGLE_STEP = 1e-5
 """Of central differences of angles by small rotations, rad: what they leave out is its square."""
-FRAME = tuple(f"frame.{name}" for name in (*TURNED, *POSITION))
-TARGET = tuple(f"target.{name}" for name in (*TURNED, *POSITION))
+FRAME_UNKNOWNS = tuple(f"frame.{name}" for name in (*TURNED, *POSITION))
+TARGET_UNKNOWNS = tuple(f"target.{name}" for name in (*TURNED, *POSITION))
 """Unknown places of the measuring frame in the base frame, and of the target from the tool point in platform axes."""
 PLACES = {"frame": "place of the measuring frame in the base frame", "target": "place of the target on the platform"}
 
@@ -35,7 +35,7 @@ def place_unknown(path: str) -> MachineError:
 
 
 @dataclass(frozen=True, eq=False)
-class Observed:
+class Observation:
     """Measurements beside the model that is to explain them.
 
     Attributes:
@@ -62,18 +62,18 @@ class Observed:
 
     @property
     def turns(self) -> Mask:
-        """Which rows are angles [rows]."""
+        """Flags of the rows that are angles [rows]."""
         return np.isin([name.removeprefix("deflection.") for name in self.names], (*TURNED, *EULER))
 
     def residuals(self, values: Array) -> Array:
-        """What was measured less what the unknowns predict, over the standard deviations [rows].
+        """Measured values less those that the unknowns predict, over the standard deviations [rows].
 
         NaN where the legs do not close.
         """
         predicted, _ = self._predict(values, False)
         return self._over_sigma(predicted)
 
-    def linearised(self, values: Array) -> tuple[Array, Array]:
+    def linearisation(self, values: Array) -> tuple[Array, Array]:
         """The residuals, and how each falls per unit of each unknown [rows x unknowns]."""
         predicted, rates = self._predict(values, True)
         return self._over_sigma(predicted), rates / self.sigma[:, None]
@@ -95,7 +95,7 @@ class Observed:
         return result
 
     def twists(self, whole: Array) -> Array:
-        """How the tool moves per unit of each unknown, base axes, from the rates of all errors; 0 by frame and target.
+        """Twists of the tool per unit of each unknown, base axes, from the rates of all errors; 0 by frame and target.
 
         Args:
             whole: rates of all errors of the model [n x 6 x errors].
@@ -115,7 +115,7 @@ class Observed:
         moved = moved + deflected
         turned = exponential(np.concatenate([moved[:, :3], 0.0 * moved[:, :3]], axis=1)).rotation @ model.drawn.axes
         tool = model.drawn.tool + moved[:, 3:]
-        frame, target = self._of(values, FRAME), self._of(values, TARGET)
+        frame, target = self._of(values, FRAME_UNKNOWNS), self._of(values, TARGET_UNKNOWNS)
         arm = np.einsum("nij,j->ni", turned, target[3:])
         shift = exponential(frame[None] * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
         axes, origin = (shift.rotation @ self.frame.rotation)[0], self.frame.translation[0] + frame[3:]
@@ -130,7 +130,7 @@ class Observed:
     def _place_rates(
         self, twists: Array, turned: Array, at: Array, arm: Array, axes: Array, target: Array, frame: Array
     ) -> Array:
-        """How the target turns and moves in the measuring frame per unit of each unknown [n x 6 x unknowns]."""
+        """Twists of the target in the measuring frame per unit of each unknown [n x 6 x unknowns]."""
         soft = self.model.deflections(self.data.wrenches)
         first = len(self.model.errors) - soft.shape[2]
         for number, place in enumerate(self.chosen):
@@ -140,7 +140,7 @@ class Observed:
         moving = moving + np.swapaxes(cross(np.swapaxes(turning, 1, 2), arm[:, None]), 1, 2)
         unit = np.eye(3)
         paths = [unknown.path for unknown in self.unknowns]
-        for name, path in zip((*TURNED, *POSITION), FRAME, strict=True):
+        for name, path in zip((*TURNED, *POSITION), FRAME_UNKNOWNS, strict=True):
             if path in paths:
                 axis = unit["xyz".index(name[-1])]
                 if name in TURNED:
@@ -149,7 +149,7 @@ class Observed:
                     moving[:, :, paths.index(path)] = -np.cross(way, at)
                 else:
                     moving[:, :, paths.index(path)] = -axis
-        for name, path in zip((*TURNED, *POSITION), TARGET, strict=True):
+        for name, path in zip((*TURNED, *POSITION), TARGET_UNKNOWNS, strict=True):
             if path in paths:
                 axis = unit["xyz".index(name[-1])]
                 if name in TURNED:
@@ -200,21 +200,21 @@ def _angles(rotation: Array) -> Array:
 
 
 def _angle_rates(rotation: Array) -> Array:
-    """How these angles change by small rotations about the axes of the frame [n x 6 x 3]."""
+    """Rates of these angles by small rotations about the axes of the frame [n x 6 x 3]."""
     columns = []
     for axis in np.eye(3):
         ends = [
-            _angles(exponential(np.array([[*(sign * STEP * axis), 0.0, 0.0, 0.0]])).rotation @ rotation)
+            _angles(exponential(np.array([[*(sign * ANGLE_STEP * axis), 0.0, 0.0, 0.0]])).rotation @ rotation)
             for sign in (1.0, -1.0)
         ]
         off = ends[0] - ends[1]
-        columns.append(np.arctan2(np.sin(off), np.cos(off)) / (2.0 * STEP))
+        columns.append(np.arctan2(np.sin(off), np.cos(off)) / (2.0 * ANGLE_STEP))
     return np.stack(columns, axis=2)
 
 
-def observed(
+def observation(
     model: ErrorModel, data: Measurements, unknowns: Sequence[MachineError], frame: Motions | None = None
-) -> Observed:
+) -> Observation:
     """Put measurements beside the model.
 
     Args:
@@ -231,7 +231,7 @@ def observed(
     if elsewhere.size:
         row = int(elsewhere[0])
         sentence = Status(int(model.drawn.status[row])).sentence
-        raise data.refused(row, f"the drawn machine is not at the commanded pose. {sentence} Check units and angles.")
+        raise data.refusal(row, f"the drawn machine is not at the commanded pose. {sentence} Check units and angles.")
     paths = [error.path for error in model.errors]
     chosen = np.array([paths.index(u.path) if u.path in paths else -1 for u in unknowns], dtype=np.int64)
     pairs = [(n, row) for n, values in data.values.items() for row in np.flatnonzero(np.isfinite(values)).tolist()]
@@ -241,7 +241,7 @@ def observed(
         frame = _frame(model, data) if free else still_frame()
         if not free:
             _check_far(model, data)
-    return Observed(
+    return Observation(
         model,
         data,
         tuple(unknowns),
@@ -279,9 +279,9 @@ def _check_far(model: ErrorModel, data: Measurements) -> None:
     length = model.length
     for i, name in enumerate(POSITION):
         off = np.abs(data.values.get(name, model.drawn.tool[:, i]) - model.drawn.tool[:, i])
-        if np.isfinite(off).any() and np.nanmedian(off) > FAR * length:
+        if np.isfinite(off).any() and np.nanmedian(off) > FARTHEST_POSITION * length:
             row = int(np.nanargmax(off))
-            raise data.refused(
+            raise data.refusal(
                 row,
                 f"measured.{name} is {1e3 * data.values[name][row]:.6g} mm where the drawn machine has its tool at "
                 f"{1e3 * model.drawn.tool[row, i]:.6g} mm, and most others are as far away; check the unit in the head "

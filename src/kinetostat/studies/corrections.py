@@ -1,11 +1,17 @@
-"""Corrections of actuators over a grid, for a controller that interpolates between its points; with their error.
+"""Corrections of actuators over a grid, for a controller that interpolates between its points, and their shortest law.
 
 The grid may run over the pose, the angle of gravity, or any other parameter. Between its points the table is compared
 with what is solved at the middle of each cell.
+
+A law is made of harmonics of the angle of gravity, and of powers of all else. A machine that is linear and fixed has
+corrections a + b cos + c sin of the angle by which gravity is turned, exactly: its weight is such a law, and what the
+weight moves is proportional to it. Corrections that gravity does to second order have the double angle. Over a pose no
+law is exact, and polynomials of ever higher degree are fitted until one is good enough.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -19,18 +25,136 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.command import Command, answer_of, refuse_tensions
-from kinetostat.studies.correction.law import Law, shortest_law
-from kinetostat.studies.driven import Driven, driven
+from kinetostat.studies.commanding import ActuatorTargets, Command, actuator_targets, command_of, refuse_tensions
 from kinetostat.studies.grid import chosen_axes, grid_of
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.poses import PoseColumns
 from kinetostat.tolerances import EXACT_LAW
 
-MOST_POINTS = 200_000
+GRAVITY_ANGLE = "load.gravity_angle"
+"""Path of the field over which laws are harmonic."""
+MOST_HARMONICS, MOST_DEGREE, MOST_TERMS = 3, 8, 500
+
+Term = tuple[tuple[str, int], ...]
+"""For each axis which function of it: ("power", k), ("cos", k) or ("sin", k)."""
+MOST_TABLE_POINTS = 200_000
 """Points of a table: an hour or less."""
 GOOD_ENOUGH = 1e-3
 """Share of the error without corrections that a law may leave, if no tolerance is given."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """Corrections as sums of terms.
+
+    Attributes:
+        paths: of the fields.
+        middles, halves: of the range of each; powers are those of (value - middle) / half, from -1 to 1.
+        terms: each a product over the axes.
+        coefficients: of each term in each correction, m or rad [terms x actuators].
+    """
+
+    paths: tuple[str, ...]
+    middles: tuple[float, ...]
+    halves: tuple[float, ...]
+    terms: tuple[Term, ...]
+    coefficients: Array
+
+    def at(self, values: Sequence[Array]) -> Array:
+        """The corrections at points, given by the values of each axis [n]: m or rad [n x actuators]."""
+        return _functions(self.terms, values, self.middles, self.halves) @ self.coefficients
+
+
+def _functions(
+    terms: Sequence[Term], values: Sequence[Array], middles: Sequence[float], halves: Sequence[float]
+) -> Array:
+    """Value of each term at each point [n x terms]."""
+    columns = []
+    for term in terms:
+        column = np.ones(len(values[0]))
+        for (kind, k), axis, middle, half in zip(term, values, middles, halves, strict=True):
+            if kind == "power":
+                column = column * ((axis - middle) / half) ** k
+            else:
+                column = column * (np.cos(k * axis) if kind == "cos" else np.sin(k * axis))
+        columns.append(column)
+    return np.stack(columns, axis=1)
+
+
+def shortest_law(
+    paths: Sequence[str], axes: Sequence[Array], corrections: Array, error: Callable[[Law], float], tolerance: float
+) -> tuple[Law, float]:
+    """Fit laws of ever more terms until the error of one is within the tolerance; else return the best of them.
+
+    Args:
+        paths: of the fields.
+        axes: values along each.
+        corrections: at all points of the grid, the last axis fastest, NaN where there are none [n x actuators].
+        error: of a law.
+        tolerance: of it, in the same unit.
+
+    Returns:
+        The law and its error.
+    """
+    middles = tuple(float(0.5 * (axis.min() + axis.max())) for axis in axes)
+    halves = tuple(float(0.5 * (axis.max() - axis.min())) or 1.0 for axis in axes)
+    points = [grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")]
+    known = np.isfinite(corrections).all(axis=1)
+    best: tuple[Law, float] | None = None
+    for terms in _candidates(paths, [len(axis) for axis in axes], int(known.sum())):
+        functions = _functions(terms, [axis[known] for axis in points], middles, halves)
+        coefficients: Array = np.linalg.lstsq(functions, corrections[known], rcond=None)[0].astype(float)
+        law = _without_round_off(Law(tuple(paths), middles, halves, terms, coefficients))
+        here = error(law)
+        if best is None or here < best[1]:
+            best = law, here
+        if best[1] <= tolerance:
+            break
+    if best is None:
+        raise ValueError("no point of the grid has a correction")
+    return best
+
+
+def _without_round_off(law: Law) -> Law:
+    """The law without terms that only round-off has; all functions are 1 at most."""
+    sizes = np.abs(law.coefficients)
+    coefficients = np.where(sizes > EXACT_LAW * sizes.max(axis=0), law.coefficients, 0.0)
+    counted = np.asarray(coefficients.any(axis=1))
+    counted[0] |= not counted.any()
+    terms = tuple(term for term, kept in zip(law.terms, counted, strict=True) if kept)
+    return replace(law, terms=terms, coefficients=coefficients[counted])
+
+
+def _candidates(paths: Sequence[str], counts: Sequence[int], known: int) -> Iterator[tuple[Term, ...]]:
+    """Rows of terms, the shortest first and harmonics before powers; each with fewer terms than points."""
+    rows: list[tuple[bool, tuple[Term, ...]]] = []
+    turning = paths.index(GRAVITY_ANGLE) if GRAVITY_ANGLE in paths else None
+    others = [i for i in range(len(paths)) if i != turning]
+    for degree in range(MOST_DEGREE + 1):
+        rows.append((False, _powers(counts, range(len(paths)), degree)))
+        if turning is not None:
+            plain = _powers(counts, others, degree)
+            most = min(MOST_HARMONICS, (counts[turning] - 1) // 2)
+            rows += [(True, _with_harmonics(plain, turning, harmonics)) for harmonics in range(1, most + 1)]
+    rows = [row for row in rows if len(row[1]) <= min(known, MOST_TERMS)]
+    yield from dict.fromkeys(terms for _, terms in sorted(rows, key=lambda row: (len(row[1]), not row[0])))
+
+
+def _powers(counts: Sequence[int], axes: Sequence[int], degree: int) -> tuple[Term, ...]:
+    """All products of powers of some axes up to a degree; of each axis no more than its points determine."""
+    terms = []
+    for size in range(degree + 1):
+        for chosen in combinations_with_replacement(axes, size):
+            powers = [chosen.count(axis) for axis in range(len(counts))]
+            if all(power < count for power, count in zip(powers, counts, strict=True)):
+                terms.append(tuple(("power", power) for power in powers))
+    return tuple(terms)
+
+
+def _with_harmonics(terms: Sequence[Term], axis: int, harmonics: int) -> tuple[Term, ...]:
+    """The terms, each also times cosine and sine of multiples of the angle."""
+    waves = [("power", 0), *((kind, k) for k in range(1, harmonics + 1) for kind in ("cos", "sin"))]
+    return tuple((*term[:axis], wave, *term[axis + 1 :]) for term in terms for wave in waves)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +194,7 @@ class CorrectionTable(Immutable):
 
     @property
     def corrections(self) -> Array:
-        """What is added to the coordinates of the actuators without loads, m or rad [points along axes x actuators]."""
+        """Corrections, m or rad [points along axes x actuators]: they are added to coordinates without loads."""
         return self.command.corrections.reshape(*map(len, self.axes), -1)
 
 
@@ -105,24 +229,26 @@ def correction_table(
     if not pairs:
         raise InputError('over is empty; give an axis of the table, e.g. "gravity_angle=0 deg:90 deg:7".')
     grid = grid_of(pairs)
-    if grid.size > MOST_POINTS:
-        raise InputError(f"the table has {grid.size:,} points; at most {MOST_POINTS:,} are computed: lower the counts.")
+    if grid.size > MOST_TABLE_POINTS:
+        raise InputError(
+            f"the table has {grid.size:,} points; at most {MOST_TABLE_POINTS:,} are computed: lower the counts."
+        )
     wanted = None if tolerance is None else positive(tolerance, "length", "tolerance")
     middles = Grid([Axis(axis.paths, 0.5 * (axis.values[1:] + axis.values[:-1])) for axis in grid.axes])
     # Together, so that a table whose cells have no place is still a table.
     every = middles.columns(0, middles.size)
     columns = {path: np.concatenate([values, every[path]]) for path, values in grid.columns(0, grid.size).items()}
-    answers = driven(machine, columns, grid.size + middles.size, progress)
+    answers = actuator_targets(machine, columns, grid.size + middles.size, progress)
     fields = tuple(parameter for _, parameter in pairs)
-    return _judged(machine, fields, grid, middles, answers.parted(grid.size), wanted)
+    return _table_of(machine, fields, grid, middles, answers.split(grid.size), wanted)
 
 
-def _judged(
+def _table_of(
     machine: Machine,
     fields: tuple[Parameter, ...],
     grid: Grid,
     middles: Grid,
-    answers: Sequence[Driven],
+    answers: Sequence[ActuatorTargets],
     wanted: float | None,
 ) -> CorrectionTable:
     """The table with its errors and its law, of what is solved at points and at middles of cells."""
@@ -132,7 +258,7 @@ def _judged(
         raise InputError(
             f"{machine.name} comes to rest at no point of this table; reduce the load, or preload what only pulls."
         )
-    errors = _errors(cells, _between(nodes.corrections, grid.shape))
+    errors = _errors(cells, _at_middles(nodes.corrections, grid.shape))
     before, left = (
         float(np.nanmax(np.concatenate([getattr(nodes, name), getattr(cells, name)]))) for name in ("before", "left")
     )
@@ -145,7 +271,7 @@ def _judged(
     law, law_error = shortest_law([field.path for field in fields], axes, nodes.corrections, error, tolerance)
     largest = float(np.nanmax(errors)) if np.isfinite(errors).any() else float("nan")
     unknown = int((~np.isfinite(errors)).sum())
-    command = answer_of(machine, PoseColumns(fields, points, {}), nodes)
+    command = command_of(machine, PoseColumns(fields, points, {}), nodes)
     message = _message(machine, before, left, largest, unknown, len(errors))
     return CorrectionTable(
         command,
@@ -169,7 +295,7 @@ def _points(grid: Grid) -> tuple[Array, ...]:
     return tuple(np.array(columns[axis.paths[0]]) for axis in grid.axes)
 
 
-def _between(values: Array, shape: Sequence[int]) -> Array:
+def _at_middles(values: Array, shape: Sequence[int]) -> Array:
     """Values at the points of a grid, interpolated linearly at the middles of its cells [n x k] -> [cells x k]."""
     table = values.reshape(*shape, -1)
     for axis in range(len(shape)):
@@ -178,8 +304,8 @@ def _between(values: Array, shape: Sequence[int]) -> Array:
     return table.reshape(-1, values.shape[1])
 
 
-def _errors(solved: Driven, corrections: Array) -> Array:
-    """How far corrections leave the tool point from where exact ones bring it, m [n]; to first order in the error."""
+def _errors(solved: ActuatorTargets, corrections: Array) -> Array:
+    """Distance of the corrected tool point from where exact corrections bring it, to first order, m [n]."""
     off = np.einsum("nca,na->nc", solved.rates, corrections - solved.corrections)
     return np.asarray(np.linalg.norm(off, axis=1))
 
