@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from kinetostat.commands.asking import add_question
-from kinetostat.commands.budget import add_budget_command
 from kinetostat.commands.common import (
     BAD_INPUT,
     DONE,
@@ -38,7 +37,6 @@ from kinetostat.commands.compare import add_compare_commands
 from kinetostat.commands.doctor import add_doctor_command
 from kinetostat.commands.forward import add_forward_command
 from kinetostat.commands.grid import add_grid_commands
-from kinetostat.commands.identify import add_identify_command
 from kinetostat.commands.influence import add_influence_commands
 from kinetostat.commands.loaded import add_command_command, analyze_loaded
 from kinetostat.commands.optimize import add_optimize_commands
@@ -204,13 +202,13 @@ def _parser() -> Parser:
     takes_figures(analyze, "figures of the loaded machine: its shape, and the curve while the load grows")
     takes_json(analyze)
     add_forward_command(commands)
-    add_identify_command(commands)
+    add_question(commands, "identify")
     add_command_command(commands)
     add_path_command(commands)
     add_grid_commands(commands)
     add_influence_commands(commands)
     add_question(commands, "modes")
-    add_budget_command(commands)
+    add_question(commands, "budget")
     add_compare_commands(commands)
     add_optimize_commands(commands)
     add_report_commands(commands)

@@ -16,8 +16,8 @@ from kinetostat.commands.common import (
     direction,
     give,
     load_machine,
-    progress_bar,
     said_when_slow,
+    search_bar,
     takes_figures,
     takes_json,
     takes_loaded,
@@ -29,6 +29,8 @@ from kinetostat.views.question import Option, Question, late
 from kinetostat.views.questions import QUESTIONS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from kinetostat.commands.common import Commands
     from kinetostat.views.question import Description
 
@@ -120,13 +122,14 @@ def ask(question: Question, options: argparse.Namespace) -> int:
     from kinetostat.views.data_forms import json_of
     from kinetostat.views.terminal import tell
 
-    machine = load_machine(options)
-    values = {option.name: getattr(options, option.name) for option in question.options}
+    given = {option.name: getattr(options, option.name) for option in question.options}
+    settings = {option.name: given.pop(option.name) for option in question.options if option.kind == "setting"}
+    machine = load_machine(options, [f"{table}.{text}" for table, texts in settings.items() for text in texts])
     waiting = nullcontext() if question.reports_progress else said_when_slow(question.slow)
     try:
-        with waiting, progress_bar(question.slow) as progress:
-            reports = {"progress": progress} if question.reports_progress else {}
-            answer = question.answer(machine, **values, **reports)
+        with waiting, search_bar(question.slow) as update:
+            reports = {"progress": partial(_advance, update)} if question.reports_progress else {}
+            answer = question.answer(machine, **given, **reports)
     except InputError as error:
         raise InputError(_in_words(question, str(error))) from None
     description = description_of(answer)
@@ -140,6 +143,11 @@ def ask(question: Question, options: argparse.Namespace) -> int:
         written,
         message=getattr(answer, "message", ""),
     )
+
+
+def _advance(update: "Callable[[int, int, str], None]", done: int, total: int, words: str = "") -> None:
+    """Show how far the work is, and a few words on its state where there are any."""
+    update(done, total, words)
 
 
 def _in_words(question: Question, message: str) -> str:
@@ -164,4 +172,5 @@ def write_folder(options: argparse.Namespace, description: "Description", answer
                 continue
             write_content(content, path)
         written.append(path)
-    return written + write_figures(options, description.drawings(answer))
+    drawings = description.drawings(answer).items()
+    return written + write_figures(options, {f"{description.figure_prefix}{name}": draw for name, draw in drawings})

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from kinetostat.accuracy.built import as_built
 from kinetostat.algebra.vector import Rotation, Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import state_of
@@ -29,6 +30,7 @@ from kinetostat.spec.document import Document, toml_key, toml_pairs, toml_value
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import LARGEST_OTHER, quantities
 from kinetostat.spec.validation import SCHEMA_VERSION
+from kinetostat.studies.identification.identification import Identification
 from kinetostat.studies.rounding import clean_screw
 
 
@@ -65,6 +67,26 @@ def built_text(machine: Machine, built: Configuration, notes: Sequence[str]) -> 
     if lost:
         notes = [*notes, f"Left out, since axes of joints do not meet: {lost}; travels stand for lengths of legs."]
     return "".join(f"# {note}\n" for note in notes) + _text(document, machine)
+
+
+def fitted_text(answer: Identification) -> str | None:
+    """The text of a machine file leg by leg of a machine as measurements say it is built.
+
+    Args:
+        answer: of `identify`.
+
+    Returns:
+        The text; None where legs with these errors close only by being bent.
+    """
+    try:
+        built = as_built(answer.machine, answer.errors)
+    except InputError:
+        return None
+    notes = [
+        f"{answer.machine.name} as built, from {answer.observed.data.path}.",
+        "Zeros and gains of actuators are in the record of the fit; coordinates here are the real ones.",
+    ]
+    return built_text(answer.machine, built.configuration, notes)
 
 
 def document_of(machine: Machine, built: Configuration | None = None) -> Document:

@@ -3,8 +3,10 @@
 Each study lists what belongs to its answer (`as_json`); how a value is written is decided here alone.
 """
 
+import csv
+import io
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from typing import Any
@@ -66,3 +68,24 @@ def stiffness_of_spring(stiffness: float | None) -> float | str | None:
 def no_formula(text: str) -> str:
     """Return a name with an apostrophe before it where a spreadsheet would take it for a formula and compute it."""
     return f"'{text}" if text.lstrip()[:1] in ("=", "+", "-", "@") else text
+
+
+def columns_csv(columns: Mapping[str, Iterable[Any]]) -> str:
+    """Write columns of equal length as CSV, heads first; a cell is empty where a number is not known (NaN).
+
+    Texts that a spreadsheet would take for a formula have an apostrophe before them.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([no_formula(head) for head in columns])
+    for row in zip(*columns.values(), strict=True):
+        writer.writerow([_cell(value) for value in row])
+    return text.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, str):
+        return no_formula(value)
+    if isinstance(value, float | np.floating):
+        return "" if math.isnan(value) else float(value)
+    return value

@@ -131,12 +131,7 @@ KINDS = (
         "views.influence_figures.sensitivity_figures",
         "studies.sensitivity.as_json",
     ),
-    Kind(
-        "studies.identification.identification.Identification",
-        "views.identification_tables.print_identification",
-        "views.identification_figures.identification_figures",
-        "studies.identification.identification.as_json",
-    ),
+    Kind("studies.identification.identification.Identification", description="views.identification.IDENTIFICATION"),
     Kind(
         "studies.guidelines.Guidelines",
         "views.influence_tables.print_guidelines",
@@ -145,11 +140,10 @@ KINDS = (
     ),
     Kind(
         "studies.budget.budget.Budget",
-        "views.budget_tables.print_budget",
-        "views.budget_figures.budget_figures",
-        "studies.budget.data.as_json",
-        {".csv": "studies.budget.data.contributions_csv", ".nc": "studies.budget.data.as_dataset"},
+        files={".csv": "studies.budget.data.contributions_csv", ".nc": "studies.budget.data.budget_dataset"},
+        description="views.budget.BUDGET",
     ),
+    Kind("studies.budget.budget.PossibleErrors", description="views.budget.POSSIBLE_ERRORS"),
     Kind(
         "studies.comparison.Comparison",
         "views.comparison_tables.print_comparison",
@@ -276,6 +270,10 @@ def write_form(description: Description, answer: object, form: str, path: Path) 
 
 
 def write_content(content: Any, path: Path) -> None:
-    """Write a text, bytes or a dataset."""
-    write = write_text if isinstance(content, str) else write_bytes if isinstance(content, bytes) else write_dataset
-    write(path, content)
+    """Write a text, bytes, plain data or a dataset."""
+    kinds: tuple[tuple[type, Callable[[Path, Any], None]], ...] = (
+        (str, write_text),
+        (bytes, write_bytes),
+        (dict, write_json),
+    )
+    next((write for kind, write in kinds if isinstance(content, kind)), write_dataset)(path, content)

@@ -8,11 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kinetostat.studies.budget.budget import Budget
-from kinetostat.studies.budget.data import as_dataset
+from kinetostat.studies.budget.data import budget_dataset
 from kinetostat.studies.setting import setting_of
-from kinetostat.views.budget_tables import ranked_by
-from kinetostat.views.figures import COLOURS, STYLE, Drawings, contour_maps, curves, fix_layout, note_setting, set_title
+from kinetostat.views.budget import ranked_by
+from kinetostat.views.figures import COLOURS, STYLE, contour_maps, curves, fix_layout, note_setting, set_title
 from kinetostat.views.lettering import width_of
+from kinetostat.views.question import Drawing
 
 MOST_BARS = 15
 """Single tolerances that have bars."""
@@ -22,17 +23,21 @@ BAR = 0.8
 """Height of all bars of a row together."""
 
 
-def budget_figures(budget: Budget) -> Drawings:
-    """Give the functions that draw a budget: contributions, and the error over the poses if there are many."""
-    drawings: Drawings = {"contributions": partial(contributions_figure, budget)} if budget.shares.any() else {}
+def budget_figures(budget: Budget) -> dict[str, Drawing]:
+    """Drawings of a budget by name: contributions, and the error over the poses if there are many."""
+    drawings = {}
+    if budget.shares.any():
+        caption = "What the variance of the error is made of."
+        drawings["contributions"] = Drawing(caption, partial(contributions_figure, budget))
     dims = 1 if budget.question is None else len(budget.question.dims)
     if len(budget.status) > 1 and dims <= 2:
-        drawings["map" if dims == 2 else "curves"] = partial(_over_poses, budget)
+        over = Drawing("The error of the tool over the poses.", partial(_over_poses, budget))
+        drawings["map" if dims == 2 else "curves"] = over
     return drawings
 
 
-def _over_poses(budget: Budget) -> Figure:
-    dataset, measures, title = as_dataset(budget), ranked_by(budget), f"{budget.machine.name}: error of the tool"
+def _over_poses(budget: Budget, title: str = "{}: error of the tool") -> Figure:
+    dataset, measures, title = budget_dataset(budget), ranked_by(budget), title.format(budget.machine.name)
     if len(dataset["status"].dims) == 2:
         # Percentiles of drawn machines have noise, of which a map would draw contours.
         return contour_maps(dataset, [f"rms_{name}" for name in measures], title)

@@ -8,8 +8,9 @@ from matplotlib.figure import Figure
 
 from kinetostat.studies.identification.identification import Identification
 from kinetostat.studies.identification.measurements import EULER, TURNED
-from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, note_setting, set_title, slim_bar
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title, slim_bar
 from kinetostat.views.lettering import width_of
+from kinetostat.views.question import Drawing
 
 FEW_NAMES = 60
 """Unknowns whose paths still fit beside a matrix."""
@@ -19,16 +20,20 @@ NAMES = 1.4
 """Inches for them, at least."""
 
 
-def identification_figures(answer: Identification) -> Drawings:
-    """Functions that draw its figures, by name."""
-    return {
-        "residuals": partial(residual_figure, answer),
-        "correlations": partial(correlation_figure, answer),
-        "poses": partial(pose_figure, answer),
-    }
+CAPTIONS = {
+    "residuals": "What is left of every measured value, as drawn and as identified.",
+    "correlations": "Correlations of the numbers: which ones were found together.",
+    "poses": "The tool points at which was measured, from above and from the front.",
+}
 
 
-def residual_figure(answer: Identification) -> Figure:
+def identification_figures(answer: Identification) -> dict[str, Drawing]:
+    """Drawings of an identification, by name."""
+    draw = {"residuals": residual_figure, "correlations": correlation_figure, "poses": pose_figure}
+    return {name: Drawing(caption, partial(draw[name], answer)) for name, caption in CAPTIONS.items()}
+
+
+def residual_figure(answer: Identification, title: str = "{}: what is left of the measurements") -> Figure:
     """Residuals of every measured value over the line of the file, as drawn and as identified.
 
     Each component has a colour. Panels are as high as what was kept asks for; outliers beyond stand at the edge.
@@ -43,9 +48,7 @@ def residual_figure(answer: Identification) -> Figure:
         panels = figure.subplots(len(parts), 2, squeeze=False, sharex=True)
         for row, (rows, unit) in zip(panels, parts, strict=True):
             scale = answer.machine.display.deflection(unit)
-            for panel, residuals, title in zip(
-                row, (fit.before, fit.after), ("as drawn", "as identified"), strict=True
-            ):
+            for panel, residuals, head in zip(row, (fit.before, fit.after), ("as drawn", "as identified"), strict=True):
                 off = residuals * seen.sigma * scale.factor
                 for colour, name in zip(COLOURS, dict.fromkeys(names[rows]), strict=False):
                     of_name = rows & fit.kept & (names == name)
@@ -55,19 +58,19 @@ def residual_figure(answer: Identification) -> Figure:
                 if aside.any():
                     shown = np.clip(off[aside], -0.94 * edge, 0.94 * edge)
                     panel.plot(lines[aside], shown, "x", color="black", ms=4, mew=0.9, label="outlier")
-                panel.set(title=title, ylim=(-edge, edge))
+                panel.set(title=head, ylim=(-edge, edge))
             row[0].set_ylabel(scale.label("residual"))
             row[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), handletextpad=0.2)
         for panel in panels[-1]:
             panel.set_xlabel("line of the file")
-        set_title(figure, f"{answer.machine.name}: what is left of the measurements")
+        set_title(figure, title.format(answer.machine.name))
         beyond = "outliers stand at the edge of a panel where they lie beyond it" if answer.outliers else ""
         note_setting(figure, "measured less computed", beyond)
         fix_layout(figure)
     return figure
 
 
-def correlation_figure(answer: Identification) -> Figure:
+def correlation_figure(answer: Identification, title: str = "{}: numbers that were found together") -> Figure:
     """The correlations of the unknowns; those that are not seen at all are left white."""
     matrix = answer.fit.correlations.copy()
     hidden = ~np.isfinite(answer.fit.sure)
@@ -85,25 +88,25 @@ def correlation_figure(answer: Identification) -> Figure:
             panel.set_yticks(range(len(names)), names, fontsize=NAME_SIZE)
             panel.set_xticks(range(len(names)), names, fontsize=NAME_SIZE, rotation=90)
         slim_bar(figure.colorbar(image, ax=panel, shrink=0.5, pad=0.02, label="correlation"))
-        set_title(figure, f"{answer.machine.name}: numbers that were found together")
+        set_title(figure, title.format(answer.machine.name))
         fix_layout(figure)
     return figure
 
 
-def pose_figure(answer: Identification) -> Figure:
+def pose_figure(answer: Identification, title: str = "{}: commanded places of the tool") -> Figure:
     """The commanded tool points, from above and from the front, and the poses to be measured next."""
     scale = answer.machine.display.scale("m")
     tool = answer.observed.model.drawn.tool * scale.factor
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(6.4, 3.6), layout="constrained")
-        for panel, (title, across, up) in zip(figure.subplots(1, 2), (("plan", 0, 1), ("front", 0, 2)), strict=True):
+        for panel, (view, across, up) in zip(figure.subplots(1, 2), (("plan", 0, 1), ("front", 0, 2)), strict=True):
             panel.plot(tool[:, across], tool[:, up], ".", color=COLOURS[0], label="measured")
             if answer.next is not None and {"pose.x", "pose.y", "pose.z"} <= answer.next.poses.keys():
                 places = [answer.next.poses[f"pose.{'xyz'[axis]}"] * scale.factor for axis in (across, up)]
                 panel.plot(*places, "o", mfc="none", color=COLOURS[1], label="to be measured next (platform point)")
-            panel.set(title=title, xlabel=scale.label("xyz"[across]), ylabel=scale.label("xyz"[up]), aspect="equal")
+            panel.set(title=view, xlabel=scale.label("xyz"[across]), ylabel=scale.label("xyz"[up]), aspect="equal")
         handles, labels = panel.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
-        set_title(figure, f"{answer.machine.name}: commanded places of the tool")
+        set_title(figure, title.format(answer.machine.name))
         fix_layout(figure)
     return figure

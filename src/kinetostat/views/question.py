@@ -139,7 +139,8 @@ class Description:
         state: what stands behind the name of the machine in the first line.
         answered: whether there is an answer; where there is none, `message` of the answer says why.
         files: name of each file that a folder of results gets, with its form "json", "csv" or "nc", or a function
-            that writes its text or dataset.
+            that writes its text, dataset or plain data; where this gives None, there is no such file.
+        figure_prefix: stands before the names of the figures in a folder.
     """
 
     type: str
@@ -152,6 +153,7 @@ class Description:
     state: Callable[[Any], str] = lambda answer: answer.status.word
     answered: Callable[[Any], bool] = lambda _answer: True
     files: Mapping[str, Late] = field(default_factory=dict)
+    figure_prefix: str = ""
 
     @property
     def forms(self) -> tuple[str, ...]:
@@ -166,8 +168,9 @@ class Description:
         return dict(late(self.figures)(answer)) if self.figures else {}
 
 
-Kind = Literal["flag", "direction", "count", "number", "choice", "quantity", "text", "file"]
-"""Kinds of what an option takes: `quantity` is a text with a unit, `file` a path."""
+Kind = Literal["flag", "direction", "count", "number", "choice", "quantity", "text", "file", "setting"]
+"""Kinds of what an option takes: `quantity` is a text with a unit, `file` a path, `setting` a line in the table of the
+machine file that is named as the option is: it changes the machine and is not handed on."""
 
 
 @dataclass(frozen=True)

@@ -4,5 +4,13 @@ from collections.abc import Mapping
 
 QUESTIONS: Mapping[str, tuple[str, str]] = {
     "modes": ("compute natural frequencies and modes, and the receptance of the tool", "views.vibration.MODES"),
+    "budget": (
+        "compute the error of the tool that tolerances allow, and what it is made of",
+        "views.budget.QUESTION",
+    ),
+    "identify": (
+        "find the errors of a machine as built that explain what was measured of it",
+        "views.identification.QUESTION",
+    ),
 }
 """Word, which is the command and the Python function; phrase; and the place of the `Question` in kinetostat."""

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from kinetostat.accuracy.errors import MachineError
 from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.display import number, with_unit
@@ -164,6 +165,26 @@ class Budget(Immutable):
         """Places of the parts, the most important for the leading measure first."""
         row = self.shares[self.measures.index(self.leading)]
         return [place for place, _ in ranked(dict(enumerate(row.tolist())))]
+
+
+@dataclass(frozen=True)
+class PossibleErrors:
+    """Every number of a machine that may be off, with the machine and its tolerances."""
+
+    machine: Machine
+    errors: tuple[MachineError, ...]
+
+
+def possible_errors(machine: Machine) -> PossibleErrors:
+    """List every number of a machine that may be off.
+
+    Args:
+        machine: as drawn, with or without tolerances.
+
+    Raises:
+        InputError: it has no place at its pose.
+    """
+    return PossibleErrors(machine, error_model(machine, {}, 1).errors)
 
 
 @checked

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kinetostat.accuracy.built import as_built
 from kinetostat.accuracy.errors import MachineError
 from kinetostat.accuracy.model import ErrorModel, error_model
 from kinetostat.arrays import Array
@@ -33,7 +34,6 @@ from kinetostat.studies.identification.observation import (
     place_unknown,
 )
 from kinetostat.studies.identification.unseen import Unseen, unseen_of
-from kinetostat.studies.plain_data import as_answer
 from kinetostat.tolerances import ROUND_OFF_OF_MEASUREMENT
 from kinetostat.units import KINDS, UnitError, parse
 
@@ -190,9 +190,7 @@ def identification_of(
     ]
     unknowns += [place_unknown(path) for path in places]
     seen = observation(model, data, unknowns)
-    sizes = np.array(
-        [PLAUSIBLE_COMPLIANCE_ERROR if u.group == "compliances" else PLAUSIBLE_SIZES[u.kind] for u in unknowns]
-    )
+    sizes = np.array([_plausible_size(unknown) for unknown in unknowns])
     _enough(model.machine, seen, sizes)
     wishes = Wishes(
         sizes,
@@ -286,42 +284,16 @@ def _sizes_by_name(unknowns: Sequence[MachineError], given: Mapping[str, str], w
     return result
 
 
-def as_json(answer: Identification) -> dict[str, Any]:
-    """The record of a fit as plain data, SI."""
-    fit, seen = answer.fit, answer.observed
-    return as_answer(
-        {
-            "machine": answer.machine.name,
-            "family": answer.machine.family.name,
-            "data": seen.data.path,
-            "poses": len(seen.data),
-            "values": len(seen.value),
-            "unknowns": [
-                {
-                    "path": unknown.path,
-                    "words": unknown.words,
-                    "group": unknown.group,
-                    "unit": KINDS[unknown.kind].unit if unknown.kind != "ratio" else "1",
-                    "value": float(value),
-                    "half_interval_95": float(sure),
-                    "seen": bool(np.isfinite(sure)),
-                }
-                for unknown, value, sure in zip(answer.unknowns, fit.values, fit.sure, strict=True)
-            ],
-            "covariance": fit.covariance,
-            "rank": fit.rank,
-            "scatter": fit.scatter,
-            "sigma_known": seen.data.known,
-            "before": answer.scatter(fit.before),
-            "after": answer.scatter(fit.after),
-            "left_out": answer.scatter(fit.predicted),
-            "outliers": [{"line": line, "value": name, "sigmas": off} for line, name, off in answer.outliers],
-            "unseen": [
-                {"words": each.words, "parts": each.parts, "tool": each.tool, "inside": each.inside}
-                for each in answer.unseen
-            ],
-            "next_poses": None if answer.next is None else {"poses": answer.next.poses, "sharper": answer.next.sharper,
-                                                            "random": answer.next.random,
-                                                            "ranges": answer.next.ranges, "within": answer.next.within},
-        }
-    )  # fmt: skip
+def with_home(answer: Identification, record: dict[str, Any]) -> dict[str, Any]:
+    """Add to the record of a fit where actuators stand at the home pose of the machine as built.
+
+    Args:
+        answer: of the fit.
+        record: plain data; where the machine cannot be placed as built, it gets the reason under "machine_file".
+    """
+    try:
+        built = as_built(answer.machine, answer.errors)
+    except InputError as error:
+        return {**record, "machine_file": str(error)}
+    home = {"commands": built.commands, "actuators": built.coordinates, "senses": built.senses}
+    return {**record, "home": home}

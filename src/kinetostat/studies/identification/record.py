@@ -126,6 +126,14 @@ class FitRecord:
             )
 
 
+@dataclass(frozen=True)
+class RecordedFit:
+    """The record of a fit beside the machine that was fitted, as drawn."""
+
+    machine: Machine
+    record: FitRecord
+
+
 def read_fit(path: str | Path) -> FitRecord:
     """Read the record of a fit and the pictures beside it.
 
@@ -140,7 +148,7 @@ def read_fit(path: str | Path) -> FitRecord:
         place = place / RECORD if place.is_dir() else place
         record = json.loads(_bytes(place))
         pictures = {name: place.with_name(f"{name}.png") for name in FIT_PICTURES}
-        return _record_of(str(place), record, {n: _bytes(p) for n, p in pictures.items() if p.is_file()})
+        return record_of(str(place), record, {n: _bytes(p) for n, p in pictures.items() if p.is_file()})
     except OSError as error:
         raise InputError(f'"{place}" cannot be read: {error.strerror}; {FIT_ADVICE}') from None
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
@@ -152,7 +160,17 @@ def _bytes(path: Path) -> bytes:
         return stream.read(LARGEST_FILE)
 
 
-def _record_of(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecord:
+def record_of(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecord:
+    """Read the record of a fit from plain data.
+
+    Args:
+        path: where it is from.
+        record: plain data of an identification.
+        pictures: contents of files by name; those that are no PNG are left out.
+
+    Raises:
+        ValueError, KeyError, TypeError, AttributeError: it is not such a record.
+    """
     unknowns = tuple(
         FittedNumber(
             str(u["path"]), str(u["group"]), str(u.get("words", "")), str(u.get("unit", "1")), float(u["value"]),

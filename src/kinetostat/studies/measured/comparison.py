@@ -117,7 +117,7 @@ def spring_dyads(model: ErrorModel) -> Array:
 
 
 def compliance_changes(model: ErrorModel, uncertain: UncertainNumbers, dyads: Array) -> tuple[Array, tuple[str, ...]]:
-    """Changes of the compliance per unit of each uncertain number [n x 6 x 6 x p], and numbers that do not count.
+    """Changes of C per unit of each uncertain number [n x 6 x 6 x p], theory (71), and numbers that do not count.
 
     Errors of geometry are left out of an overconstrained machine, whose legs would be bent by them, and of one whose
     springs change with the pose, away from its home place.

@@ -7,21 +7,24 @@ from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 
 from kinetostat.kinematics.status import Status
+from kinetostat.machine.machine import Machine
+from kinetostat.studies.identification.record import FitRecord, RecordedFit
 from kinetostat.studies.report.answers import Answers
 from kinetostat.studies.setting import pose_of
 from kinetostat.validation.comparison import Validation
+from kinetostat.views.budget import BUDGET
 from kinetostat.views.figures import contour_maps, curves
-from kinetostat.views.report.content import Block, Report
+from kinetostat.views.identification import RECORDED_FIT
+from kinetostat.views.identification_figures import CAPTIONS
+from kinetostat.views.report.content import Block, Figure, Report, Section
 from kinetostat.views.report.described import described_section
 from kinetostat.views.report.design import guideline_section, sensitivity_section
-from kinetostat.views.report.identification import identification_section
 from kinetostat.views.report.machine import data_section, machine_section, portrait
 from kinetostat.views.report.pictures import drawn, shown
 from kinetostat.views.report.provenance import Origin, method_section, record_section, validation_section
 from kinetostat.views.report.stiffness import load_section, stiffness_section, workspace_section
 from kinetostat.views.report.study import study_section
 from kinetostat.views.report.summary import summary_section
-from kinetostat.views.report.tolerances import tolerances_section
 from kinetostat.views.report.typesetting import typeset
 from kinetostat.views.report.under_load import loaded_section
 from kinetostat.views.vibration import VIBRATION
@@ -56,8 +59,8 @@ def report_of(
         load_section(analysis, pictures),
         *([loaded_section(answers.loaded, analysis)] if answers.loaded else []),
         *([described_section(VIBRATION, answers.vibration, _frequencies(answers))] if answers.vibration else []),
-        *([tolerances_section(answers.budget)] if answers.budget else []),
-        *([identification_section(answers.fit, answers.machine)] if answers.fit else []),
+        *([described_section(BUDGET, answers.budget)] if answers.budget else []),
+        *([_fit_section(answers.machine, answers.fit)] if answers.fit else []),
         workspace_section(answers),
         guideline_section(answers),
         sensitivity_section(answers.sensitivity),
@@ -81,6 +84,14 @@ def _frequencies(answers: Answers) -> Iterator[Block]:
         draw = contour_maps if over["status"].ndim == 2 else curves
         names = [str(name) for name in over.data_vars if "frequency" in str(name)]
         yield drawn(draw(over, names, ""), "The first natural frequency over the poses.")
+
+
+def _fit_section(machine: Machine, record: FitRecord) -> Section:
+    """The machine as built, by the record of a fit and the pictures beside it."""
+    pictures = (
+        Figure(caption, record.pictures[name], 0.85) for name, caption in CAPTIONS.items() if name in record.pictures
+    )
+    return described_section(RECORDED_FIT, RecordedFit(machine, record), pictures)
 
 
 def _title_block(answers: Answers) -> list[tuple[str, str]]:

@@ -17,13 +17,13 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.studies import under_load
 from kinetostat.studies.analysis import as_json
-from kinetostat.studies.budget import data as budget_data
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.result_data import message
 from kinetostat.studies.report.answers import STEPS, Answers, gather
 from kinetostat.studies.report.subject import Texts, texts_of
 from kinetostat.studies.storage import place_of, write_bytes
 from kinetostat.validation.comparison import Validation, choose, validate
+from kinetostat.views.budget import BUDGET
 from kinetostat.views.data_forms import json_of
 from kinetostat.views.report.assembly import report_of
 from kinetostat.views.report.html_page import html_page
@@ -143,7 +143,7 @@ def write_report(
     """
     command = shlex.join(["kinetostat", "report", *subject, *wanted.options(), "-o", path.name])
     loaded = {} if answers.loaded is None else {"under_load": under_load.as_json(answers.loaded)}
-    built = {} if answers.budget is None else {"budget": budget_data.as_json(answers.budget)}
+    built = {} if answers.budget is None else {"budget": json_of(BUDGET, answers.budget)}
     rings = {} if answers.vibration is None else {"vibration": json_of(VIBRATION, answers.vibration)}
     results = json.dumps(
         as_json(answers.analysis) | loaded | built | rings, ensure_ascii=False, allow_nan=False, indent=1

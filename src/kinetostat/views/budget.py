@@ -1,0 +1,400 @@
+"""The error of the tool that tolerances allow: the question, and the description of its answer.
+
+Nothing is computed here.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from kinetostat.display import Display, number
+from kinetostat.engine.batch import Progress
+from kinetostat.kinematics.status import Status
+from kinetostat.machine.machine import Machine
+from kinetostat.studies.budget.budget import (
+    ALLOCATION_RULES,
+    DRAWN_DIGITS,
+    ROUND_OFF_SHARE,
+    Budget,
+    PossibleErrors,
+    budget,
+    possible_errors,
+)
+from kinetostat.studies.budget.data import STATISTICS, budget_dataset, contributions_csv, poses_csv, varied_fields
+from kinetostat.studies.budget.tolerances import is_about
+from kinetostat.units import KINDS
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.question import Description, Field, Lines, Option, Question, Records
+from kinetostat.views.tables import numeric_table, text_table
+
+MOST_LISTED_PARTS = 12
+"""Single tolerances that are listed; all of them with --full, and in JSON."""
+PER_METRE = 1e-6
+"""Ratios are read in µm/m."""
+
+
+def _lines(answer: Budget) -> Lines:
+    yield "As built", answer.message
+    for code in sorted({*answer.status.tolist()} - {int(Status.OK)}):
+        count, status = int((answer.status == code).sum()), Status(code)
+        text = f"{count:,} of {len(answer.status):,} poses: no result ({status.word.replace('_', ' ')})."
+        yield "Poses", f"{text} {status.sentence}"
+    drawn = f"{answer.samples:,} machines drawn, to first order; the worst case is at the limits of all tolerances."
+    yield "Percentiles", drawn
+    if answer.exact is not None:
+        yield "Exact", _exact_sentence(answer)
+    if answer.allocation is not None:
+        yield "Allocation", _allocation_sentence(answer)
+
+
+def _exact_sentence(answer: Budget) -> str:
+    exact, show, place = answer.exact, answer.machine.display.show_deflection, answer.measures.index(answer.leading)
+    if exact is None:
+        return ""
+    lost = f" {exact.failed:,} of them cannot be assembled." if exact.failed else ""
+    return (
+        f"{exact.machines:,} machines solved exactly: 95 % keep within {show(float(exact.usual[place]), 'm')}; the "
+        f"first order is off by at most {show(float(exact.difference[place]), 'm')}.{lost} Single contributions "
+        f"explain all of the variance but {number(100.0 * float(exact.unexplained[place]), digits=2)} %."
+    )
+
+
+def _allocation_sentence(answer: Budget) -> str:
+    allocation = answer.allocation
+    if allocation is None:
+        return ""
+    times, evenly = (number(c / allocation.before, digits=3) for c in (allocation.cost, allocation.evenly))
+    return (
+        f"The present tolerances give {answer.machine.display.show_deflection(allocation.present, 'm')}. The new ones "
+        f"cost {times} times as much; if all were changed by one factor, {evenly} times as much. Half of a tolerance "
+        "counts as twice the cost."
+    )
+
+
+def _tables(answer: Budget, full: bool) -> Iterator[FittedTable]:
+    yield sizes_table(answer, full)
+    if answer.shares.any():
+        texts = {line.about: line.text for line in answer.tolerances}
+        counts = {line: str(sum(part.line == line for part in answer.parts)) for line in texts}
+        yield _sums_table(answer, "line", "lines of [tolerances]", {"tolerance": texts, "numbers": counts})
+        yield _sums_table(answer, "leg", "legs", {})
+        yield _parts_table(answer, full)
+    if answer.allocation is not None:
+        yield _allocation_table(answer)
+
+
+def shown_measures(answer: Budget, full: bool = False) -> list[str]:
+    """Names of the measures that are worth a row: parasitic parts where they are not simply a component.
+
+    Args:
+        answer: with its measures.
+        full: whether parasitic components are shown one by one.
+    """
+    shown = []
+    for name, unit in zip(answer.measures, answer.units, strict=True):
+        of_unit = [m for m, u in zip(answer.measures, answer.units, strict=True) if u == unit]
+        most = max(float(np.nanmax(answer.size("worst", m))) for m in of_unit)
+        parasitic = name.startswith("parasitic ")
+        single = parasitic and f"parasitic {'rotation' if unit == 'rad' else 'position'}" != name
+        nothing = float(np.nanmax(answer.size("worst", name))) <= ROUND_OFF_SHARE * most
+        if not parasitic or not (nothing or (single and not full)):
+            shown.append(name)
+    return shown
+
+
+def sizes_table(answer: Budget, full: bool = False) -> FittedTable:
+    """A row for each measure: at the pose, or the largest over all poses with the number of its pose.
+
+    Args:
+        answer: with its sizes.
+        full: whether parasitic components are shown one by one.
+    """
+    display, many = answer.machine.display, len(answer.status) > 1
+    statistics = [s for s in STATISTICS if s != "mean" or answer.pressed]
+    title = f"Error of the tool at the {answer.machine.reference}, base axes"
+    heads = ["unit", *(STATISTICS[s].replace(" ", "\n", 1) for s in statistics)]
+    heads += ["95 %:\nat pose", "95 %\neverywhere"] if many else []
+    table = numeric_table(title + (": largest over all poses" if many else ""), "error", heads)
+    for name in shown_measures(answer, full):
+        place = answer.measures.index(name)
+        scale = display.deflection(answer.units[place])
+        sizes = [float(np.nanmax(answer.size(s, name))) for s in statistics]
+        clean = [size if size > ROUND_OFF_SHARE * sizes[-1] else 0.0 for size in sizes]
+        cells = [number(size * scale.factor, digits=DRAWN_DIGITS) for size in clean]
+        if many:
+            everywhere = float(answer.spread.everywhere[place]) * scale.factor
+            cells += [str(int(np.nanargmax(answer.size("usual", name))) + 1), number(everywhere, digits=DRAWN_DIGITS)]
+        table.add_row(f"{name} (parasitic)" if name in answer.parasitic else name, scale.unit, *cells)
+    return table
+
+
+def ranked_by(answer: Budget) -> list[str]:
+    """The measures whose shares are listed, the leading one first."""
+    turned = "rotation" if "rotation" in answer.measures else "rz"
+    return [name for name in ("along", "position", turned) if name in answer.measures]
+
+
+def _shares_table(answer: Budget, what: str, *heads: str) -> FittedTable:
+    """A table of contributions without rows yet."""
+    table = text_table(f"Contributions to the variance: {what}", *heads)
+    for name in ranked_by(answer):
+        table.add_column(f"{name}\n%", justify="right", no_wrap=True)
+    return table
+
+
+def _sums_table(answer: Budget, key: str, what: str, notes: dict[str, dict[str, str]]) -> FittedTable:
+    """The shares of lines or legs, the largest first; notes by name stand in columns between."""
+    table = _shares_table(answer, what, key, *notes)
+    by_measure = [answer.shares_by(key, name) for name in ranked_by(answer)]
+    for name in answer.shares_by(key):
+        table.add_row(name, *(note[name] for note in notes.values()), *(_percent(each[name]) for each in by_measure))
+    return table
+
+
+def _parts_table(answer: Budget, full: bool) -> FittedTable:
+    """The shares of single tolerances, the largest first."""
+    rows = answer.shares[[answer.measures.index(name) for name in ranked_by(answer)]]
+    order = answer.ranking
+    shown = order if full else order[:MOST_LISTED_PARTS]
+    table = _shares_table(answer, "the largest single tolerances", "number of the machine", "±")
+    for place in shown:
+        part = answer.parts[place]
+        table.add_row(
+            part.words, limit_of(part.kind, part.limit, answer.machine.display), *map(_percent, rows[:, place])
+        )
+    if len(shown) < len(order):
+        left = rows[:, order[len(shown) :]].sum(axis=1)
+        table.add_row(f"{len(order) - len(shown)} further ones (--full)", "", *map(_percent, left))
+    return table
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f}"
+
+
+def limit_of(kind: str, limit: float, display: Display) -> str:
+    """A tolerance with its unit, "0.05 mm"."""
+    if kind == "ratio":
+        return f"{number(limit / PER_METRE, digits=display.digits)} µm/m"
+    return display.show(limit, "m" if kind == "length" else "rad")
+
+
+def _allocation_table(answer: Budget) -> FittedTable:
+    allocation = answer.allocation
+    if allocation is None:
+        raise ValueError("no allocation was asked for")
+    how = "root of the sum of squares" if allocation.by == "rss" else "worst case"
+    where = "along the direction" if allocation.measure == "along" else "at the tool point"
+    wanted = answer.machine.display.show_deflection(allocation.wanted, "m")
+    table = text_table(f"Tolerances of least cost for {wanted} {where} ({how})", "line", "now", "least cost", "so")
+    table.add_column("factor", justify="right", no_wrap=True)
+    table.add_column("cost\n%", justify="right", no_wrap=True)
+    texts = {line.about: line.text for line in answer.tolerances}
+    for place in np.argsort(allocation.factors, kind="stable"):
+        line, factor = allocation.lines[place], float(allocation.factors[place])
+        cost = 100.0 * float(allocation.costs[place]) / factor / max(allocation.cost, 1e-300)
+        new = _new_tolerance(answer, line, factor)
+        table.add_row(line, texts[line], new, _advice(factor), number(factor, digits=3), f"{cost:.1f}")
+    return table
+
+
+def _advice(factor: float) -> str:
+    if math.isinf(factor):
+        return "no effect"
+    return "tighten" if factor < 0.99 else "loosen" if factor > 1.01 else "keep"
+
+
+def _new_tolerance(answer: Budget, line: str, factor: float) -> str:
+    """The new tolerances of a line by kind, from the least to the largest where sizes differ."""
+    if math.isinf(factor):
+        return "any"
+    texts = []
+    for kind in ("length", "angle", "ratio"):
+        limits = sorted(part.limit for part in answer.parts if part.line == line and part.kind == kind)
+        ends = dict.fromkeys(limit_of(kind, limit * factor, answer.machine.display) for limit in limits)
+        if ends:
+            texts.append("±" + " to ".join([*ends][:: max(1, len(ends) - 1)]))
+    return ", ".join(texts)
+
+
+def _by_measure(answer: Budget, table: Any) -> dict[str, Any]:
+    """A statistic [poses x measures] by measure: a number at a single pose, else a list."""
+    columns = dict(zip(answer.measures, table.T, strict=True))
+    return {name: float(column[0]) if len(column) == 1 else column for name, column in columns.items()}
+
+
+def _exact_of(answer: Budget) -> dict[str, Any] | None:
+    exact = answer.exact
+    if exact is None:
+        return None
+    tables = {name: getattr(exact, name) for name in ("rms", "usual", "difference", "unexplained")}
+    by_measure = {name: dict(zip(answer.measures, table.tolist(), strict=True)) for name, table in tables.items()}
+    return {"machines": exact.machines, "failed": exact.failed, **by_measure}
+
+
+def _budget_file(answer: Budget) -> xr.Dataset | None:
+    return budget_dataset(answer) if len(answer.status) > 1 else None
+
+
+PART = (
+    Field("path"),
+    Field("meaning", "words"),
+    Field("leg"),
+    Field("group"),
+    Field("line"),
+    Field("tolerance", "limit"),
+    Field("unit", lambda part: KINDS[part["kind"]].unit),
+    Field("distribution", lambda part: "normal" if part["normal"] else "uniform"),
+    Field("shares"),
+)
+
+
+def _contributions(answer: Budget) -> list[dict[str, Any]]:
+    """The parts with their shares by measure."""
+    rows = zip(answer.parts, answer.shares.T.tolist(), strict=True)
+    return [vars(part) | {"shares": dict(zip(answer.measures, row, strict=True))} for part, row in rows]
+
+
+BUDGET = Description(
+    type="studies.budget.budget.Budget",
+    title="Error by tolerances",
+    fields=(
+        Field("name", "machine.name"),
+        Field("message"),
+        Field("tolerances", lambda answer: {line.about: line.text for line in answer.tolerances}),
+        Field("measures", lambda answer: dict(zip(answer.measures, answer.units, strict=True))),
+        Field("leading_measure", "leading"),
+        Field("status", lambda answer: [Status(code).word for code in answer.status.tolist()]),
+        Field("poses", lambda answer: {path: values for path, (values, _) in varied_fields(answer).items()}),
+        Field("errors", lambda answer: {s: _by_measure(answer, getattr(answer.spread, s)) for s in STATISTICS}),
+        Field("usual_everywhere", lambda a: dict(zip(a.measures, a.spread.everywhere.tolist(), strict=True))),
+        Field("machines", "samples"),
+        Records("contributions", "tolerance", PART, _contributions, forms=("json",)),
+        Field("shares_by_line", lambda answer: answer.shares_by("line")),
+        Field("shares_by_leg", lambda answer: answer.shares_by("leg")),
+        Field("pressed_joints", "pressed"),
+        Field("sometimes_pressed_joints", "sometimes"),
+        Field("freedoms"),
+        Field("parasitic"),
+        Field("exact", _exact_of),
+        Field("allocation"),
+    ),
+    lines=_lines,
+    tables=_tables,
+    figures="views.budget_figures.budget_figures",
+    state=lambda answer: f"error of the tool by {len(answer.parts)} tolerances",
+    files={
+        "budget.json": "json",
+        "contributions.csv": contributions_csv,
+        "poses.csv": poses_csv,
+        "budget.nc": _budget_file,
+    },
+    figure_prefix="budget-",
+)
+
+
+def _errors_table(answer: PossibleErrors, _full: bool) -> Iterator[FittedTable]:
+    """Every number of a machine that may be off, with the line of [tolerances] that is about it."""
+    table = text_table("Numbers that may be off", "path", "meaning", "kind", "line of [tolerances]")
+    for error in answer.errors:
+        table.add_row(error.path, error.words, error.kind, _line_about(answer, error) or "exact")
+    yield table
+
+
+def _line_about(answer: PossibleErrors, error: Any) -> str | None:
+    lines = [line for line in answer.machine.tolerances.values() if is_about(line.about, error) and line.of(error.kind)]
+    return f"{lines[-1].about}: {lines[-1].text}" if lines else None
+
+
+POSSIBLE_ERRORS = Description(
+    type="studies.budget.budget.PossibleErrors",
+    title="Numbers that may be off",
+    fields=(
+        Field("name", "machine.name"),
+        Field(
+            "errors",
+            lambda answer: [
+                {"path": e.path, "meaning": e.words, "kind": e.kind, "line": _line_about(answer, e)}
+                for e in answer.errors
+            ],
+        ),
+    ),
+    tables=_errors_table,
+    state=lambda answer: f"{len(answer.errors)} numbers may be off",
+)
+
+
+def _ask(
+    machine: Machine, poses: Any, ranges: list[str], list_errors: bool, progress: Progress, **options: Any
+) -> Budget | PossibleErrors:
+    """Answer the command, whose tolerances are in the machine."""
+    if list_errors:
+        return possible_errors(machine)
+    return budget(machine, poses, ranges, None, progress=progress, **options)
+
+
+QUESTION = Question(
+    example='kinetostat budget hexapod --tolerance "joints=0.05 mm" --tolerance "zeros=0.02 mm" -o out',
+    answer=_ask,
+    options=(
+        Option(
+            "poses",
+            "file",
+            "a CSV file of poses, as `path` takes it (default: the pose of the machine)",
+            metavar="POSES",
+            first=True,
+        ),
+        Option(
+            "tolerances",
+            "setting",
+            "a line as in the table [tolerances] of the machine file, after those of the file: joints, zeros, gains, "
+            "clearances, compliances, or a path in which * stands for anything; VALUE is plus and minus (0.05 mm), a "
+            "standard deviation (sigma 0.02 mm), or a class (IT7 at 300 mm, ISO 2768-m at 300 mm); repeatable",
+            metavar="WHAT=VALUE",
+            many=True,
+            word="--tolerance",
+        ),
+        Option(
+            "ranges",
+            "text",
+            "a coordinate of the pose and its range: the error over a sweep or a map; repeatable",
+            metavar="FIELD=from:to:count",
+            many=True,
+            word="--over",
+        ),
+        Option(
+            "along",
+            "direction",
+            "also the error of the tool point along this direction, by which contributions are then ranked",
+            default=(),
+        ),
+        Option(
+            "samples",
+            "count",
+            "machines that are drawn to first order (default: 131072, or 4096 if there are several poses)",
+            default=0,
+        ),
+        Option("exact", "count", "machines that are solved exactly, to compare with", default=0),
+        Option(
+            "allocate",
+            "quantity",
+            'also the tolerances of least cost for this error, e.g. "0.05 mm"',
+            metavar="LENGTH",
+        ),
+        Option(
+            "by",
+            "choice",
+            "what must keep it: the root of the sum of squares (default), or the worst case",
+            default="rss",
+            choices=ALLOCATION_RULES,
+        ),
+        Option("seed", "count", "seed of the random machines (default: 0)", metavar="SEED", default=0),
+        Option("list_errors", "flag", "only list every number that may be off, with its path", word="--list"),
+    ),
+    output="the figures, JSON, CSV and NetCDF",
+    reports_progress=True,
+    full="list all contributions and parasitic components",
+)

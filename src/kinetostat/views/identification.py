@@ -1,0 +1,308 @@
+"""The machine as built by measurements: the question, and the descriptions of its answer and of the record of a fit.
+
+Sentences and tables show the record of a fit, so that an answer and a file that is read again look alike. Nothing is
+computed here.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from kinetostat.display import DASH, Display, Scale, number, number_and_uncertainty
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.studies.identification.fit import Tell
+from kinetostat.studies.identification.identification import (
+    USUALLY_FITTED,
+    Identification,
+    identify,
+    with_home,
+)
+from kinetostat.studies.identification.next_poses import NextPoses, as_csv, unit_of
+from kinetostat.studies.identification.record import FitRecord, record_of
+from kinetostat.units import KINDS
+from kinetostat.views.data_forms import json_of
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.question import Description, Field, Lines, Option, Question
+from kinetostat.views.tables import numeric_table, text_table
+
+RATIO, SHARE = Scale(1e6, "ppm"), Scale(1e2, "%")
+MOST_LISTED_OUTLIERS = 40
+MOST_LISTED_POSES = 40
+NOT_EXPLAINED = 1.5
+"""Residuals over their standard deviations from which something else must be said to move the tool."""
+NOT_SEEN = "not seen"
+SI_UNITS = {"length": "m", "angle": "rad"}
+MEASURED_KINDS = {"length": "positions and distances", "angle": "angles"}
+
+
+def _record(answer: Identification) -> FitRecord:
+    return record_of(answer.observed.data.path, json_of(IDENTIFICATION, answer), {})
+
+
+def _fit_lines(record: FitRecord) -> Lines:
+    hidden, aside = len(record.unknowns) - record.rank, len(record.outliers)
+    text = (
+        f"{len(record.unknowns)} unknowns from {record.values} values at {record.poses} poses; {record.rank} "
+        f"combinations are seen{f', {hidden} are not' if hidden else ''}"
+    )
+    text += f"; {aside} values are set aside as outliers." if aside else "."
+    if record.known and record.scatter > NOT_EXPLAINED:
+        text += (
+            f" The residuals are {number(record.scatter, digits=2)} times as large as the standard deviations say: the "
+            "measurements are less sure, or something that moves the tool is not fitted (gains, compliances)."
+        )
+    yield "As measured", text
+    if not record.known:
+        yield "Intervals", "No standard deviations were given: intervals follow from the residuals themselves."
+    if record.unseen:
+        yield (
+            "Not seen",
+            "Combinations that no pose sees are left as near to zero as they can be. They move the tool in the base "
+            "frame; what lies inside the machine is what another place of the base and of the target cannot undo.",
+        )
+
+
+def _lines(answer: Identification) -> Lines:
+    yield from _fit_lines(_record(answer))
+    if answer.next is not None:
+        sharper, random = (number(factor, digits=3) for factor in (answer.next.sharper, answer.next.random))
+        yield (
+            "Next poses",
+            f"They make the intervals shorter by a factor of {sharper} on average; as many poses at random by "
+            f"{random}. {answer.next.within} Candidates: {_ranges(answer.next, answer.machine.display)}.",
+        )
+
+
+def _ranges(proposed: NextPoses, display: Display) -> str:
+    """The range of each coordinate among the candidates."""
+    parts = []
+    for path, ends in proposed.ranges.items():
+        scale = display.scale(unit_of(path))
+        low, high = (number(end * scale.factor, digits=3) for end in ends)
+        parts.append(f"{path.removeprefix('pose.')} {low} to {high} {scale.unit}")
+    return ", ".join(parts)
+
+
+def _fit_tables(record: FitRecord, display: Display) -> Iterator[FittedTable]:
+    yield _residual_table(record, display)
+    yield _number_table(record, display)
+    if record.unseen:
+        table = text_table("What no pose sees", "combination", "moves the tool by", "of that, inside the machine")
+        for words, *motions in record.unseen:
+            table.add_row(words, *(display.show_deflection(motion, "m") for motion in motions))
+        yield table
+    if record.outliers:
+        yield _outlier_table(record)
+
+
+def _tables(answer: Identification, _full: bool) -> Iterator[FittedTable]:
+    yield from _fit_tables(_record(answer), answer.machine.display)
+    if answer.next is not None:
+        yield _pose_table(answer.next, answer.machine.display)
+
+
+def _residual_table(record: FitRecord, display: Display) -> FittedTable:
+    table = numeric_table("Residuals, root mean square", "", ["as drawn", "as identified", "of poses left out"])
+    for kind, name in MEASURED_KINDS.items():
+        sizes = [residuals.get(kind) for residuals in record.residuals]
+        if any(size is not None for size in sizes):
+            unit = SI_UNITS[kind]
+            table.add_row(name, *(DASH if size is None else display.show_deflection(size, unit) for size in sizes))
+    return table
+
+
+def _number_table(record: FitRecord, display: Display) -> FittedTable:
+    table = text_table("Identified numbers (± half of the 95 % interval)", "error", "value", "±", "unit", "meaning")
+    for column in table.columns[1:3]:
+        column.justify = "right"
+    for unknown in record.unknowns:
+        scale = scale_of(display, unknown.unit, unknown.group)
+        table.add_row(unknown.path, *value_and_half(unknown.value, unknown.half, scale), scale.unit, unknown.words)
+    return table
+
+
+def value_and_half(value: float, half: float, scale: Scale) -> tuple[str, str]:
+    """An identified number and half of its 95 % interval in a unit, to the digits that are known."""
+    if not np.isfinite(half):
+        return number(value * scale.factor), NOT_SEEN
+    return number_and_uncertainty(value * scale.factor, half * scale.factor)
+
+
+def scale_of(display: Display, unit: str, group: str) -> Scale:
+    """The unit in which an error is read: that of small motions, ppm for gains, percent for compliances."""
+    if unit in SI_UNITS.values():
+        return display.deflection(unit)
+    return SHARE if group == "compliances" else RATIO
+
+
+def _outlier_table(record: FitRecord) -> FittedTable:
+    table = numeric_table("Outliers, set aside", "line", ["value", "standard deviations"])
+    ordered = sorted(record.outliers, key=lambda outlier: -abs(outlier[2]))
+    for line, name, off in ordered[:MOST_LISTED_OUTLIERS]:
+        table.add_row(str(line), name, number(off, digits=3))
+    if len(ordered) > MOST_LISTED_OUTLIERS:
+        table.add_row("...", f"{len(ordered) - MOST_LISTED_OUTLIERS} more", "")
+    return table
+
+
+def _pose_table(proposed: NextPoses, display: Display) -> FittedTable:
+    scales = [display.scale(unit_of(path)) for path in proposed.poses]
+    names = (path.removeprefix("pose.") for path in proposed.poses)
+    heads = [scale.label(name) for scale, name in zip(scales, names, strict=True)]
+    table = numeric_table("Poses to measure next", "pose", heads)
+    for row, values in enumerate(np.column_stack(list(proposed.poses.values()))[:MOST_LISTED_POSES], 1):
+        table.add_row(str(row), *(number(float(v) * s.factor) for v, s in zip(values, scales, strict=True)))
+    return table
+
+
+def _unknowns(answer: Identification) -> list[dict[str, Any]]:
+    return [
+        {
+            "path": unknown.path,
+            "words": unknown.words,
+            "group": unknown.group,
+            "unit": KINDS[unknown.kind].unit if unknown.kind != "ratio" else "1",
+            "value": float(value),
+            "half_interval_95": float(half),
+            "seen": bool(np.isfinite(half)),
+        }
+        for unknown, value, half in zip(answer.unknowns, answer.fit.values, answer.fit.sure, strict=True)
+    ]
+
+
+def _fit_file(answer: Identification) -> dict[str, Any]:
+    """The record of the fit, with what commands of the machine as built need."""
+    return with_home(answer, json_of(IDENTIFICATION, answer))
+
+
+def _next_file(answer: Identification) -> str | None:
+    return None if answer.next is None else as_csv(answer.next)
+
+
+IDENTIFICATION = Description(
+    type="studies.identification.identification.Identification",
+    title="Identification",
+    fields=(
+        Field("machine", "machine.name"),
+        Field("family", "machine.family.name"),
+        Field("data", "observed.data.path"),
+        Field("poses", lambda answer: len(answer.observed.data)),
+        Field("values", lambda answer: len(answer.observed.value)),
+        Field("unknowns", _unknowns),
+        Field("covariance", "fit.covariance"),
+        Field("rank", "fit.rank"),
+        Field("scatter", "fit.scatter"),
+        Field("sigma_known", "observed.data.known"),
+        Field("before", lambda answer: answer.scatter(answer.fit.before)),
+        Field("after", lambda answer: answer.scatter(answer.fit.after)),
+        Field("left_out", lambda answer: answer.scatter(answer.fit.predicted)),
+        Field(
+            "outliers",
+            lambda answer: [{"line": line, "value": name, "sigmas": off} for line, name, off in answer.outliers],
+        ),
+        Field("unseen", lambda answer: list(answer.unseen)),
+        Field("next_poses", "next"),
+    ),
+    lines=_lines,
+    tables=_tables,
+    figures="views.identification_figures.identification_figures",
+    state=lambda answer: f"as built, by {answer.observed.data.path}",
+    files={
+        "machine.toml": "exchange.leg_by_leg.fitted_text",
+        "fit.json": _fit_file,
+        "next-poses.csv": _next_file,
+    },
+)
+
+RECORDED_FIT = Description(
+    type="studies.identification.record.RecordedFit",
+    title="Identification",
+    fields=(),
+    lines=lambda fit: _fit_lines(fit.record),
+    tables=lambda fit, _full: _fit_tables(fit.record, fit.machine.display),
+)
+
+
+def _ask(
+    machine: Machine,
+    data: str,
+    fit: Sequence[str],
+    priors: Sequence[str],
+    bounds: Sequence[str],
+    no_outliers: bool,
+    progress: Tell,
+    **options: Any,
+) -> Identification:
+    return identify(
+        machine,
+        data,
+        fit or USUALLY_FITTED,
+        priors=_sizes(priors, "--prior"),
+        bounds=_sizes(bounds, "--bound"),
+        robust=not no_outliers,
+        tell=progress,
+        **options,
+    )
+
+
+def _sizes(texts: Sequence[str], option: str) -> Mapping[str, str]:
+    """Sizes by group or path, from texts "what=size"."""
+    sizes = {}
+    for text in texts:
+        name, equals, size = (part.strip() for part in text.partition("="))
+        if not (name and equals and size):
+            raise InputError(f'{option} {shorten(text)} must be what=size, e.g. {option} "zeros=0.1 mm".')
+        sizes[name] = size
+    return sizes
+
+
+QUESTION = Question(
+    example="kinetostat identify hexapod measured.csv --fit geometry --fit zeros --frame -o identified",
+    answer=_ask,
+    options=(
+        Option(
+            "data",
+            "file",
+            "a CSV file: columns of the commanded pose (x [mm], roll [deg]) or actuators (actuator.leg 1 [mm]) and of "
+            "what was measured (measured.x [mm], measured.rx [deg], measured.distance [mm], deflection.z [um]), with "
+            "sigma.x [um], force.z [N] and from.x [mm] where they belong",
+            metavar="DATA",
+            first=True,
+            required=True,
+        ),
+        Option(
+            "fit",
+            "text",
+            "geometry, zeros, gains, compliances, shared, or paths with * (default: geometry and zeros); repeatable",
+            metavar="WHAT",
+            many=True,
+        ),
+        Option("frame", "flag", "the place of the measuring frame is unknown"),
+        Option("target", "flag", "the place of the target on the platform is unknown"),
+        Option("sigma", "quantity", 'of measured lengths, e.g. --sigma "5 um"', metavar="LENGTH", default=""),
+        Option("sigma_angle", "quantity", 'of angles, e.g. --sigma-angle "20 urad"', metavar="ANGLE", default=""),
+        Option(
+            "priors",
+            "text",
+            'standard deviation about zero before measuring by group or path, e.g. --prior "zeros=0.1 mm"; repeatable',
+            metavar="WHAT=SIZE",
+            many=True,
+            word="--prior",
+        ),
+        Option(
+            "bounds",
+            "text",
+            'largest size by group or path, e.g. --bound "zeros=0.1 mm"; repeatable',
+            metavar="WHAT=SIZE",
+            many=True,
+            word="--bound",
+        ),
+        Option("no_outliers", "flag", "keep all values: outliers are not set aside"),
+        Option("more", "count", "propose N poses to measure next", default=0, word="--next"),
+    ),
+    output="the machine as built (TOML), the record of the fit (JSON), poses to measure next (CSV) and figures",
+    slow="fitting",
+    reports_progress=True,
+)
