@@ -38,7 +38,7 @@ from kinetostat.commands.doctor import add_doctor_command
 from kinetostat.commands.forward import add_forward_command
 from kinetostat.commands.grid import add_grid_commands
 from kinetostat.commands.influence import add_influence_commands
-from kinetostat.commands.loaded import add_command_command, analyze_loaded
+from kinetostat.commands.loaded import analyze_loaded
 from kinetostat.commands.optimize import add_optimize_commands
 from kinetostat.commands.path import add_path_command
 from kinetostat.commands.report import add_report_commands
@@ -203,7 +203,7 @@ def _parser() -> Parser:
     takes_json(analyze)
     add_forward_command(commands)
     add_question(commands, "identify")
-    add_command_command(commands)
+    add_question(commands, "command")
     add_path_command(commands)
     add_grid_commands(commands)
     add_influence_commands(commands)

@@ -24,7 +24,7 @@ from kinetostat.commands.common import (
     takes_machine,
     write_figures,
 )
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, choice
 from kinetostat.views.question import Option, Question, late
 from kinetostat.views.questions import QUESTIONS
 
@@ -57,7 +57,9 @@ def _fill(command: Parser, summary: str, where: str) -> None:
         takes_loaded(command, question.loaded)
     if question.full:
         command.add_argument("--full", action="store_true", help=question.full)
-    if question.output:
+    if question.suffixes:
+        command.add_argument("-o", "--output", metavar="FILE", type=Path, help=question.output)
+    elif question.output:
         takes_figures(command, question.output)
     takes_json(command)
 
@@ -118,10 +120,13 @@ def ask(question: Question, options: argparse.Namespace) -> int:
     Raises:
         InputError: what the question refuses, in the words of the command line.
     """
-    from kinetostat.views.answers import description_of
+    from kinetostat.views.answers import description_of, save
     from kinetostat.views.data_forms import json_of
     from kinetostat.views.terminal import tell
 
+    output = getattr(options, "output", None)
+    if output is not None and question.suffixes:
+        choice(output.suffix.lower(), question.suffixes, f'the suffix of "{output}"')
     given = {option.name: getattr(options, option.name) for option in question.options}
     settings = {option.name: given.pop(option.name) for option in question.options if option.kind == "setting"}
     machine = load_machine(options, [f"{table}.{text}" for table, texts in settings.items() for text in texts])
@@ -134,7 +139,10 @@ def ask(question: Question, options: argparse.Namespace) -> int:
         raise InputError(_in_words(question, str(error))) from None
     description = description_of(answer)
     answered, full = description.answered(answer), getattr(options, "full", False)
-    written = write_folder(options, description, answer) if answered and getattr(options, "output", None) else []
+    if output is None or not answered:
+        written = []
+    else:
+        written = [save(answer, output)] if question.suffixes else write_folder(options, description, answer)
     return give(
         options,
         answered,

@@ -3,8 +3,6 @@
 Poses are solved in slabs, each as one array. The equations are in `equilibrium.commanding`; the command is `command`.
 """
 
-import csv
-import io
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
@@ -33,7 +31,6 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.identification.record import FitRecord, read_fit
-from kinetostat.studies.plain_data import as_answer, no_formula
 from kinetostat.studies.poses import PoseColumns, given_poses
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 
@@ -331,44 +328,4 @@ def _message(machine: Machine, settled: Mask, before: Array, left: Array) -> str
     return (
         f"Commanded so, the tool point is off by at most {show(float(np.nanmax(left)), 'm')}; without a correction by "
         f"{show(float(np.nanmax(before)), 'm')}.{without}"
-    )
-
-
-def as_csv(answer: Command, corrections: bool = False) -> str:
-    """Write the commands as CSV in SI: a row with the number of each pose (from 1), its fields, and its commands.
-
-    Args:
-        answer: the commands.
-        corrections: whether to add by how much they differ from the coordinates without loads.
-    """
-    columns: dict[str, Any] = {"pose": range(1, len(answer.coordinates) + 1)}
-    if answer.poses is not None:
-        for field, values in zip(answer.poses.fields, answer.poses.values, strict=True):
-            columns[f"{field.shown} [{field.unit}]"] = values.tolist()
-    tables = {"": answer.coordinates, " correction": answer.corrections if corrections else answer.coordinates[:, :0]}
-    for what, table in tables.items():
-        for name, unit, values in zip(answer.actuators, answer.units, table.T, strict=False):
-            pairs = zip(values.tolist(), answer.settled, strict=True)
-            columns[no_formula(f"{name}{what} [{unit}]")] = [value if known else "" for value, known in pairs]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
-    return text.getvalue()
-
-
-def as_json(answer: Command) -> dict[str, Any]:
-    """Return the commands as plain data, SI; null at poses without a state of rest."""
-    return as_answer(
-        {
-            "name": answer.machine.name,
-            "message": answer.message,
-            "actuators": answer.actuators,
-            "units": answer.units,
-            "coordinates": answer.coordinates,
-            "unloaded": answer.unloaded,
-            "error_before": answer.before,
-            "error_left": answer.left,
-            "rotation_left": answer.turned,
-        }
     )

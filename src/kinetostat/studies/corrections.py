@@ -12,7 +12,6 @@ law is exact, and polynomials of ever higher degree are fitted until one is good
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
-from typing import Any
 
 import numpy as np
 
@@ -27,7 +26,6 @@ from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.commanding import ActuatorTargets, Command, actuator_targets, command_of, refuse_tensions
 from kinetostat.studies.grid import chosen_axes, grid_of
-from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.poses import PoseColumns
 from kinetostat.tolerances import EXACT_LAW
 
@@ -193,6 +191,11 @@ class CorrectionTable(Immutable):
         return f"<CorrectionTable of {self.command.machine.name!r}: {' x '.join(map(str, map(len, self.axes)))} points>"
 
     @property
+    def machine(self) -> Machine:
+        """The machine with its loads."""
+        return self.command.machine
+
+    @property
     def corrections(self) -> Array:
         """Corrections, m or rad [points along axes x actuators]: they are added to coordinates without loads."""
         return self.command.corrections.reshape(*map(len, self.axes), -1)
@@ -325,35 +328,3 @@ def _message(machine: Machine, before: float, left: float, error: float, unknown
     if unknown:
         sentences.append(f"{unknown} of {cells} cells have a corner or a middle without a state of rest.")
     return " ".join(sentences)
-
-
-def as_json(table: CorrectionTable) -> dict[str, Any]:
-    """Return the table as plain data, SI; null at points without a state of rest."""
-    law = table.law
-    return as_answer(
-        {
-            "name": table.command.machine.name,
-            "message": table.message,
-            "axes": {field.path: values for field, values in zip(table.fields, table.axes, strict=True)},
-            "actuators": table.command.actuators,
-            "units": table.command.units,
-            "corrections": table.corrections,
-            "coordinates": table.command.coordinates.reshape(table.corrections.shape),
-            "error_before": table.before,
-            "error_left": table.left,
-            "error_of_table": table.error,
-            "cells_unknown": table.unknown,
-            "law": {
-                "terms": [
-                    {path: list(part) for path, part in zip(law.paths, term, strict=True) if part != ("power", 0)}
-                    for term in law.terms
-                ],
-                "middles": dict(zip(law.paths, law.middles, strict=True)),
-                "halves": dict(zip(law.paths, law.halves, strict=True)),
-                "coefficients": law.coefficients,
-                "error": table.law_error,
-                "tolerance": table.tolerance,
-                "exact": table.exact,
-            },
-        }
-    )

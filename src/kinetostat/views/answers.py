@@ -98,11 +98,15 @@ KINDS = (
         "studies.under_load.as_json",
     ),
     Kind("studies.vibration.Vibration", description="views.vibration.VIBRATION"),
-    Kind("studies.commanding.Command", "views.loaded_tables.print_command", plain="studies.commanding.as_json"),
+    Kind(
+        "studies.commanding.Command",
+        files={".csv": "views.command.command_csv"},
+        description="views.command.COMMAND",
+    ),
     Kind(
         "studies.corrections.CorrectionTable",
-        "views.correction_tables.print_corrections",
-        plain="studies.corrections.as_json",
+        files={".csv": "views.command.corrections_csv"},
+        description="views.command.CORRECTIONS",
     ),
     Kind(
         "studies.carrying.Carrying",

@@ -10,12 +10,10 @@ from rich.text import Text
 
 from kinetostat.algebra.scalar import reciprocal
 from kinetostat.display import DASH, Display, number
-from kinetostat.studies.commanding import Command
 from kinetostat.studies.requirements import Verdict
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.under_load import LoadedState, SpringState
 from kinetostat.views.analysis_tables import entry_unit, matrix_table
-from kinetostat.views.assembly_tables import precise
 from kinetostat.views.requirement_lines import print_requirements
 from kinetostat.views.tables import numeric_table, print_doubts
 
@@ -131,31 +129,3 @@ def strut_table(state: LoadedState, display: Display) -> Table:
         reserve = DASH if math.isinf(strut.factor) else f"{number(strut.factor)} x"
         table.add_row(strut.name, display.show(strut.compression, "N"), display.show(strut.euler_load, "N"), reserve)
     return table
-
-
-def _single_command(answer: Command, display: Display) -> Table:
-    """A row for each actuator, for one pose."""
-    table = numeric_table("Where each actuator must stand", "actuator", ["commanded", "without loads", "difference"])
-    rows = zip(answer.actuators, answer.units, answer.coordinates[0], answer.unloaded[0], strict=True)
-    for name, unit, commanded, unloaded in rows:
-        shown = (f"{precise(float(v), unit, display)} {display.scale(unit).unit}" for v in (commanded, unloaded))
-        table.add_row(name, *shown, display.show_deflection(float(commanded - unloaded), unit))
-    return table
-
-
-def print_command(console: Console, answer: Command) -> None:
-    """Print where the actuators must stand, a row for each pose, and what that leaves."""
-    display = answer.machine.display
-    console.print(answer.message, highlight=False)
-    if len(answer.coordinates) == 1:
-        console.print(_single_command(answer, display))
-        return
-    scales = [display.scale(unit) for unit in answer.units]
-    heads = [scale.label(name) for name, scale in zip(answer.actuators, scales, strict=True)]
-    table = numeric_table("Commands: where each actuator must stand", "pose", [*heads, "error before", "error left"])
-    for i, row in enumerate(answer.coordinates):
-        known = bool(answer.settled[i])
-        cells = [precise(float(v), unit, display) if known else DASH for v, unit in zip(row, answer.units, strict=True)]
-        errors = [display.show_deflection(float(e[i]), "m") if known else DASH for e in (answer.before, answer.left)]
-        table.add_row(str(i + 1), *cells, *errors)
-    console.print(table)

@@ -219,6 +219,7 @@ class Question:
         options: what it takes besides the machine.
         loaded: help on `--loaded`, where the state of the machine matters.
         output: words on what a folder of results gets; empty if nothing is written.
+        suffixes: of the file that `--output` names, where an answer is written to a single file instead of a folder.
         slow: words on what is being done, where the function takes `progress` or people would wonder.
         reports_progress: whether the function takes `progress`.
         full: help on `--full`; empty if there is nothing more to show.
@@ -229,6 +230,7 @@ class Question:
     options: tuple[Option, ...] = ()
     loaded: str = ""
     output: str = ""
+    suffixes: tuple[str, ...] = ()
     slow: str = "computing"
     reports_progress: bool = False
     full: str = ""

@@ -8,6 +8,10 @@ QUESTIONS: Mapping[str, tuple[str, str]] = {
         "compute the error of the tool that tolerances allow, and what it is made of",
         "views.budget.QUESTION",
     ),
+    "command": (
+        "compute where actuators must stand to bring a loaded tool to its pose",
+        "views.command.QUESTION",
+    ),
     "identify": (
         "find the errors of a machine as built that explain what was measured of it",
         "views.identification.QUESTION",

@@ -1,0 +1,263 @@
+"""Where the actuators of a loaded machine must stand: the question, and the descriptions of both of its answers.
+
+At poses the answer is a command, over a grid a table of corrections with its law. Nothing is computed here.
+"""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinetostat.display import DASH, number
+from kinetostat.engine.batch import Progress
+from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import Parameter
+from kinetostat.spec.errors import InputError
+from kinetostat.studies.commanding import Command, command
+from kinetostat.studies.corrections import CorrectionTable, Term, correction_table
+from kinetostat.studies.plain_data import columns_csv
+from kinetostat.views.assembly_tables import precise
+from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.question import Description, Field, Lines, Option, Question
+from kinetostat.views.tables import numeric_table
+
+MOST_LISTED_TERMS = 40
+"""Terms of a law that are printed; a longer one is in JSON."""
+COEFFICIENT_DIGITS = 7
+"""Significant digits of coefficients, which are typed into a controller."""
+UNNAMED_TABLES = ("pose.", "load.")
+"""Tables whose names are left out."""
+RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def _command_tables(answer: Command, _full: bool) -> Iterator[FittedTable]:
+    """A row for each actuator at a single pose, else a row for each pose."""
+    display = answer.machine.display
+    if len(answer.coordinates) == 1:
+        heads = ["commanded", "without loads", "difference"]
+        table = numeric_table("Where each actuator must stand", "actuator", heads)
+        rows = zip(answer.actuators, answer.units, answer.coordinates[0], answer.unloaded[0], strict=True)
+        for name, unit, commanded, unloaded in rows:
+            shown = (f"{precise(float(v), unit, display)} {display.scale(unit).unit}" for v in (commanded, unloaded))
+            table.add_row(name, *shown, display.show_deflection(float(commanded - unloaded), unit))
+        yield table
+        return
+    pairs = zip(answer.actuators, answer.units, strict=True)
+    heads = [*(display.scale(unit).label(name) for name, unit in pairs), "error before", "error left"]
+    table = numeric_table("Commands: where each actuator must stand", "pose", heads)
+    for i, row in enumerate(answer.coordinates):
+        known = bool(answer.settled[i])
+        cells = [precise(float(v), unit, display) if known else DASH for v, unit in zip(row, answer.units, strict=True)]
+        errors = [display.show_deflection(float(e[i]), "m") if known else DASH for e in (answer.before, answer.left)]
+        table.add_row(str(i + 1), *cells, *errors)
+    yield table
+
+
+def command_csv(answer: Command, corrections: bool = False) -> str:
+    """Write the commands as CSV in SI: a row with the number of each pose (from 1), its fields, and its commands.
+
+    Args:
+        answer: the commands.
+        corrections: whether to add by how much they differ from the coordinates without loads.
+    """
+    columns: dict[str, Any] = {"pose": range(1, len(answer.coordinates) + 1)}
+    if answer.poses is not None:
+        for field, values in zip(answer.poses.fields, answer.poses.values, strict=True):
+            columns[f"{field.shown} [{field.unit}]"] = values
+    tables = {"": answer.coordinates} | ({" correction": answer.corrections} if corrections else {})
+    for what, table in tables.items():
+        for name, unit, values in zip(answer.actuators, answer.units, table.T, strict=True):
+            columns[f"{name}{what} [{unit}]"] = np.where(answer.settled, values, np.nan)
+    return columns_csv(columns)
+
+
+COMMAND = Description(
+    type="studies.commanding.Command",
+    title="Commands",
+    fields=(
+        Field("name", "machine.name"),
+        Field("message"),
+        Field("actuators"),
+        Field("units"),
+        Field("coordinates"),
+        Field("unloaded"),
+        Field("error_before", "before"),
+        Field("error_left", "left"),
+        Field("rotation_left", "turned"),
+    ),
+    lines=lambda answer: [("Commands", answer.message)],
+    tables=_command_tables,
+    state=lambda _answer: "commanded under load",
+    answered=lambda answer: bool(answer.settled.any()),
+)
+
+
+def _correction_lines(answer: CorrectionTable) -> Lines:
+    yield "Corrections", answer.message
+    if not answer.before:
+        return
+    law, display = answer.law, answer.machine.display
+    error, wanted = (display.show_deflection(value, "m") for value in (answer.law_error, answer.tolerance))
+    if answer.law_error > answer.tolerance:
+        yield (
+            "Law",
+            f"No law reaches the tolerance of {wanted}; the best one has {len(law.terms)} terms and leaves {error}. "
+            "Give more points, or use the table.",
+        )
+        return
+    leaves = f"; at the tool it leaves at most {error} (tolerance: {wanted})."
+    terms = "one term" if len(law.terms) == 1 else f"{len(law.terms)} terms"
+    yield "Law", f"Each correction is a sum of {terms}" + (", exact to round-off." if answer.exact else leaves)
+    for axis in sorted({i for term in law.terms for i, (kind, k) in enumerate(term) if kind == "power" and k}):
+        field, unit = answer.fields[axis], answer.fields[axis].unit
+        middle, half = (display.show(value, unit) for value in (law.middles[axis], law.halves[axis]))
+        yield "", f"[{_name(field)}] is ({_name(field)} - {middle}) / {half}."
+    if len(law.terms) > MOST_LISTED_TERMS:
+        yield "", "Its coefficients are printed with --json."
+
+
+def _correction_tables(answer: CorrectionTable, _full: bool) -> Iterator[FittedTable]:
+    if not answer.before:
+        return
+    commands, display = answer.command, answer.machine.display
+    ranges = numeric_table("Corrections: what is added to each actuator", "actuator", ["least", "largest"])
+    for name, unit, values in zip(commands.actuators, commands.units, commands.corrections.T, strict=True):
+        ends = (float(np.nanmin(values)), float(np.nanmax(values)))
+        ranges.add_row(name, *(display.show_deflection(end, unit) for end in ends))
+    yield ranges
+    if answer.law_error <= answer.tolerance and len(answer.law.terms) <= MOST_LISTED_TERMS:
+        scales = [display.deflection(unit) for unit in commands.units]
+        heads = [f"{name}\n{scale.unit}" for scale, name in zip(scales, commands.actuators, strict=True)]
+        rows = numeric_table("Law: coefficients of its terms", "term", heads)
+        for term, coefficients in zip(answer.law.terms, answer.law.coefficients, strict=True):
+            pairs = zip(coefficients.tolist(), scales, strict=True)
+            cells = (number(c * scale.factor, digits=COEFFICIENT_DIGITS) for c, scale in pairs)
+            rows.add_row(_term_text(term, answer.fields), *cells)
+        yield rows
+
+
+def _name(field: Parameter) -> str:
+    """The field by its path, without a table that says nothing."""
+    return field.path.split(".", 1)[1] if field.path.startswith(UNNAMED_TABLES) else field.shown
+
+
+def _term_text(term: Term, fields: Sequence[Parameter]) -> str:
+    """A term as people write it: 1, [x]², [y] cos(2 gravity_angle); [x] goes from -1 to 1 over the range of x."""
+    parts = []
+    for (kind, k), field in zip(term, fields, strict=True):
+        if kind != "power":
+            parts.append(f"{kind}({f'{k} ' if k > 1 else ''}{_name(field)})")
+        elif k:
+            parts.append(f"[{_name(field)}]" + (str(k).translate(RAISED) if k > 1 else ""))
+    return " ".join(parts) or "1"
+
+
+def _law(answer: CorrectionTable) -> dict[str, Any]:
+    law = answer.law
+    return {
+        "terms": [
+            {path: list(part) for path, part in zip(law.paths, term, strict=True) if part != ("power", 0)}
+            for term in law.terms
+        ],
+        "middles": dict(zip(law.paths, law.middles, strict=True)),
+        "halves": dict(zip(law.paths, law.halves, strict=True)),
+        "coefficients": law.coefficients,
+        "error": answer.law_error,
+        "tolerance": answer.tolerance,
+        "exact": answer.exact,
+    }
+
+
+def corrections_csv(answer: CorrectionTable) -> str:
+    """Write the commands of a table and its corrections as CSV in SI, a row for each point."""
+    return command_csv(answer.command, corrections=True)
+
+
+def _grid_text(answer: CorrectionTable) -> str:
+    sizes = (f"{_name(field)} ({len(axis)})" for field, axis in zip(answer.fields, answer.axes, strict=True))
+    return f"corrections over {' × '.join(sizes)}"
+
+
+CORRECTIONS = Description(
+    type="studies.corrections.CorrectionTable",
+    title="Corrections",
+    fields=(
+        Field("name", "machine.name"),
+        Field("message"),
+        Field("axes", lambda answer: {f.path: values for f, values in zip(answer.fields, answer.axes, strict=True)}),
+        Field("actuators", "command.actuators"),
+        Field("units", "command.units"),
+        Field("corrections"),
+        Field("coordinates", lambda answer: answer.command.coordinates.reshape(answer.corrections.shape)),
+        Field("error_before", "before"),
+        Field("error_left", "left"),
+        Field("error_of_table", "error"),
+        Field("cells_unknown", "unknown"),
+        Field("law", _law),
+    ),
+    lines=_correction_lines,
+    tables=_correction_tables,
+    state=_grid_text,
+)
+
+
+def _ask(
+    machine: Machine,
+    poses: Path | None,
+    ranges: Sequence[str],
+    tolerance: str | None,
+    fit: Path | None,
+    progress: Progress,
+) -> Command | CorrectionTable:
+    if not ranges:
+        if tolerance is not None:
+            raise InputError("--tolerance is about the law of a table of corrections; give its axes with --over.")
+        return command(machine, poses, fit)
+    if fit is not None:
+        raise InputError("--fit is about commands at poses; leave out --over, and give a file of poses.")
+    if poses is not None:
+        raise InputError("the poses come from a file or from --over, not from both; leave one of them out.")
+    return correction_table(machine, ranges, tolerance, progress)
+
+
+QUESTION = Question(
+    example='kinetostat command hexapod --set \'load.gravity=[0, 0, "-9.81 m/s**2"]\' --set tool.mass="20 kg" '
+    '--over "gravity_angle=0 deg:90 deg:7" -o corrections.csv',
+    answer=_ask,
+    options=(
+        Option(
+            "poses",
+            "file",
+            "a CSV file of wanted poses, as `path` takes it (default: the pose of the machine)",
+            metavar="POSES",
+            first=True,
+        ),
+        Option(
+            "ranges",
+            "text",
+            "an axis of a table of corrections: a coordinate of the pose, gravity_angle, or any other field, as `map` "
+            "takes it; repeatable",
+            metavar="FIELD=from:to:count",
+            many=True,
+            word="--over",
+        ),
+        Option(
+            "tolerance",
+            "quantity",
+            'error at the tool that the law of the corrections may have, e.g. "0.1 um" (default: a thousandth of the '
+            "error without corrections)",
+            metavar="LENGTH",
+        ),
+        Option(
+            "fit",
+            "file",
+            "folder of `identify -o` in which MACHINE lies: coordinates are then those that the controller counts, "
+            "with the zeros and gains that were found",
+            metavar="FOLDER",
+        ),
+    ),
+    output="write the commands, and the corrections of a table, as CSV",
+    suffixes=(".csv",),
+    reports_progress=True,
+)
