@@ -46,7 +46,7 @@ from kinetostat import (
 )
 from kinetostat.cli import main
 from kinetostat.commands.common import DONE
-from kinetostat.studies.report.answers import PARTS
+from kinetostat.studies.report import PARTS
 from refusals import refused
 
 LEAST = [word for part in PARTS for word in ("--without", part)]

@@ -11,19 +11,19 @@ from report_pages import MACHINE, QUICK, Page, no_pictures, number, reported, sm
 
 from kinetostat import report
 from kinetostat.cli import main
+from kinetostat.commands import report as report_command
 from kinetostat.commands.common import STOPPED
-from kinetostat.commands.report import WITHOUT
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.installation import adding
+from kinetostat.studies import report as report_study
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.report import answers
-from kinetostat.studies.report.answers import usual_ranges
+from kinetostat.studies.report import PARTS, usual_ranges
 from kinetostat.views.report import pdf, pictures
-from kinetostat.views.report.assembly import report_of
 from kinetostat.views.report.html_page import html_page
 from kinetostat.views.report.provenance import Origin
+from kinetostat.views.report.writing import report_of
 from pages import ROOT
 from studies import SMALL
 
@@ -66,7 +66,7 @@ def told(*words):
 
 def quick(machine):
     """The page about a machine, without what takes time."""
-    found = answers.gather(machine, without=answers.PARTS)
+    found = report_study.gather(machine, without=PARTS)
     return html_page(report_of(found, "Validation was left out.", ORIGIN, {}, True))
 
 
@@ -208,7 +208,7 @@ def test_every_bundled_machine_has_a_page(name):
 
 
 def test_the_command_leaves_out_what_can_be_left_out():
-    assert WITHOUT == answers.PARTS
+    assert report_command.PARTS == PARTS
 
 
 @pytest.mark.parametrize("setting", ["pose.z=3 m", "limits.longest_leg=10 cm"])
@@ -254,7 +254,7 @@ def test_a_report_that_is_stopped_leaves_the_old_file(tmp_path, capsys, monkeypa
 
     kept = tmp_path / "r.html"
     kept.write_text("old")
-    monkeypatch.setattr(answers, "sensitivity", stop)
+    monkeypatch.setattr(report_study, "sensitivity", stop)
     assert main(["report", MACHINE, "-o", str(kept)]) == STOPPED
     assert [path.name for path in tmp_path.iterdir()] == ["r.html"]
     assert kept.read_text() == "old"

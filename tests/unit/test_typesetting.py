@@ -3,7 +3,7 @@
 import pytest
 from rich.text import Text
 
-from kinetostat.views.report.typesetting import printed, typeset
+from kinetostat.views.report.typesetting import as_table, typeset
 from kinetostat.views.tables import numeric_table, text_table
 
 
@@ -30,7 +30,7 @@ def test_a_number_looks_as_in_print_and_keeps_its_value(terminal, print_):
 def test_a_terminal_table_loses_its_colours_and_keeps_its_cells():
     table = numeric_table("title", "part", ["x", "n"])
     table.add_row("leg-1", Text("▼2e-3", "red"), "-1")
-    found = printed(table, "caption", 3)
+    found = as_table(table, "caption", 3)
     assert found.heads == ("part", "x", "n")
     assert found.rows == (("leg-1", "▼2×10⁻³", "−1"),)
     assert found.numeric == (False, True, True)
@@ -41,4 +41,4 @@ def test_what_is_no_markup_is_kept_as_it_is():
     table = text_table("", "field")
     table.add_row("[/no] markup")
     table.add_row("[bold] neither :smile:")
-    assert printed(table, "").rows == (("[/no] markup",), ("[bold] neither :smile:",))
+    assert as_table(table, "").rows == (("[/no] markup",), ("[bold] neither :smile:",))

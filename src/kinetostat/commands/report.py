@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from kinetostat.studies.optimisation.result import Result
 
 FORMATS = "mjcf, mjcf-vibration, urdf, glb, step, csv, netcdf, mat, modes, state-space, nastran, abaqus or ansys"
-WITHOUT = ("maps", "guidelines", "sensitivity", "validation")
+PARTS = ("maps", "guidelines", "sensitivity", "validation")
 
 
 def add_report_commands(commands: "Commands") -> None:
@@ -82,8 +82,8 @@ def _add_report_command(commands: "Commands") -> None:
     takes_units(command)
     takes_ranges(command, "an axis of the maps (one or two); default: two coordinates of the pose, over their reach")
     command.add_argument(
-        "--without", metavar="PART", action="append", default=[], choices=WITHOUT,
-        help=f"omit a part that takes time: {', '.join(WITHOUT)}; repeatable",
+        "--without", metavar="PART", action="append", default=[], choices=PARTS,
+        help=f"omit a part that takes time: {', '.join(PARTS)}; repeatable",
     )  # fmt: skip
     takes_loaded(command, "also show the machine at rest under its loads")
     command.add_argument(
@@ -110,13 +110,12 @@ def _add_report_command(commands: "Commands") -> None:
 def _report(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
     from kinetostat.studies.optimisation.result_data import message
-    from kinetostat.studies.report.answers import gather
-    from kinetostat.studies.report.subject import subject_of
-    from kinetostat.views.report.writing import Wanted, report_path, write_report
+    from kinetostat.studies.report import gather, subject_of
+    from kinetostat.views.report.writing import ReportOptions, report_path, write_report
     from kinetostat.views.tables import print_written, terminal
 
     path = report_path(options.output)
-    wanted = Wanted(
+    wanted = ReportOptions(
         options.ranges, options.without, options.engine, options.author, options.date, options.loaded, options.fit
     )
     subject = subject_of(options.subject, options.settings)
@@ -134,7 +133,7 @@ def _report(options: argparse.Namespace) -> int:
         return no_answer(answers.analysis.message)
     list_written(None, [path])
     print_written(terminal(), [path])
-    return DONE if all(verdict.met for verdict in answers.requirements) else NO_ANSWER
+    return DONE if all(verdict.met for verdict in answers.of("requirements") or ()) else NO_ANSWER
 
 
 def _search(problem: "Problem", folder: Path | None) -> "Result":

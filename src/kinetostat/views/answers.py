@@ -197,6 +197,14 @@ def kind_of(answer: object) -> Kind:
     return kind_of_answer
 
 
+def plain_of(answer: object) -> Any:
+    """Return an answer as plain data, as JSON has it."""
+    kind = kind_of(answer)
+    if kind.description:
+        return late("views.data_forms.json_of")(described(kind.description), answer)
+    return late(kind.plain)(answer)
+
+
 @checked
 def plot(answer: object, which: str | None = None) -> "Figure":
     """Draw a figure of a result; a notebook displays it, `save` writes it.

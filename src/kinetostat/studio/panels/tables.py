@@ -17,7 +17,7 @@ from kinetostat.studio.session import Session
 from kinetostat.studio.wording import bars, engineering, entry, heading, paragraph, table
 from kinetostat.views.analysis_tables import entry_unit, matrix_units
 from kinetostat.views.loaded_tables import leg_loads, spring_table, stability_of, tangent_table
-from kinetostat.views.report.typesetting import printed
+from kinetostat.views.report.typesetting import as_table
 
 KINDS = {"C": "compliance", "K": "stiffness"}
 PRINCIPAL_UNITS = {"translation": "N/m", "rotation": "N·m/rad"}
@@ -200,7 +200,7 @@ def loaded_text(state: LoadedState) -> str:
         [name, display.show_deflection(now, unit), display.show_deflection(first, unit)]
         for name, unit, now, first in zip(state.components, units, state.displacement, linear, strict=True)
     ]
-    springs = printed(spring_table(state, display), "")
+    springs = as_table(spring_table(state, display), "")
     return (
         paragraph(f"{state.message} {stability_of(state)}", "lead")
         + heading("Which legs carry")
@@ -230,7 +230,7 @@ def _tangents(state: LoadedState) -> str:
     stiffness = tangent_table(state)
     if stiffness is None:
         return ""
-    rows = printed(stiffness, "")
+    rows = as_table(stiffness, "")
     return heading("Stiffness to further loads") + table("stiffness", rows.heads, rows.rows)
 
 

@@ -5,7 +5,7 @@ Nothing is computed here.
 
 from kinetostat.studies.guideline_sentences import statements
 from kinetostat.studies.guidelines import Guidelines, Roles
-from kinetostat.studies.report.answers import Answers
+from kinetostat.studies.report import Answers
 from kinetostat.studies.sensitivity import Sensitivity, notes
 from kinetostat.views.influence_figures import limit_figure
 from kinetostat.views.influence_tables import (
@@ -22,8 +22,8 @@ from kinetostat.views.influence_tables import (
     over_poses,
 )
 from kinetostat.views.report.content import Block, Listing, Paragraph, Points, Section
-from kinetostat.views.report.pictures import drawn
-from kinetostat.views.report.typesetting import printed, typeset
+from kinetostat.views.report.pictures import figure_of
+from kinetostat.views.report.typesetting import as_table, typeset
 
 MOST_INFLUENCES = 24
 """Number of parameters in the ranking."""
@@ -31,7 +31,7 @@ MOST_INFLUENCES = 24
 
 def guideline_section(answers: Answers) -> Section:
     """Write the section on what the stiffness depends on and what to change."""
-    advice, title = answers.guidelines, "Guidelines"
+    advice, title = answers.of("guidelines"), "Guidelines"
     if advice is None or advice.here is None:
         return Section(title, (Paragraph("Guidelines were left out." if advice is None else advice.message),))
     parts = []
@@ -52,23 +52,23 @@ def _about(advice: Guidelines) -> str:
 
 def _tables(advice: Guidelines, here: Roles) -> tuple[Block, ...]:
     count = min(MOST_ROWS, len(advice.parameters))
-    blocks: list[Block] = [printed(element_table(advice, here), "Shares of the elements in the diagonal of C.")]
+    blocks: list[Block] = [as_table(element_table(advice, here), "Shares of the elements in the diagonal of C.")]
     sums = equations(advice)
     if sums:
         caption = "Diagonal of K as a sum over the elements, k being the stiffness of one part of each (SI)."
         blocks.append(Listing(caption, "\n".join(sums)))
-    blocks.append(printed(limit_table(advice, here), f"Stiffness from which an element counts as rigid. {LEGEND}"))
+    blocks.append(as_table(limit_table(advice, here), f"Stiffness from which an element counts as rigid. {LEGEND}"))
     if count:
         poses = f" {ALIKE[0].upper()}{ALIKE[1:]}" if advice.poses[0] else ""
         arrows = "Effect of 1 % more of a parameter, or of 0.01 rad more of an angle: percent stiffer ▲ or softer ▼."
-        blocks.append(printed(move_table(advice, count), arrows + poses))
+        blocks.append(as_table(move_table(advice, count), arrows + poses))
     blocks += [Paragraph(typeset(line)) for line in (advice.meaning, *left_out(advice, count))]
     limits = limit_figure(advice)
     if limits is not None:
         caption = (
             "Stiffness in each direction over the stiffness of each element, relative to that with the element rigid."
         )
-        blocks.append(drawn(limits, caption))
+        blocks.append(figure_of(limits, caption))
     return tuple(blocks)
 
 
@@ -90,7 +90,7 @@ def sensitivity_section(ranking: Sensitivity | None) -> Section:
         title,
         (
             Paragraph("Exact derivatives at the pose, largest influence first."),
-            printed(influence_table(ranking, count), caption),
+            as_table(influence_table(ranking, count), caption),
             *(Paragraph(typeset(note)) for note in notes(ranking)),
         ),
     )

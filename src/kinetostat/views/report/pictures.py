@@ -26,23 +26,23 @@ from kinetostat.views.scene.machine_scene import machine_scene
 from kinetostat.views.scene.proportions import proportions_of
 from kinetostat.views.scene.solids import Scene, Solid, as_data, looks_data, solid_data
 
-SIZE = (1000, 700)
+PICTURE_SIZE = (1000, 700)
 """Pixels of a picture of the machine: 190 to an inch on A4."""
-SHARE = 0.6
+PICTURE_WIDTH = 0.6
 """Width of that picture as a share of the width of the text."""
-FULL = 7.4
+FULL_WIDTH = 7.4
 """Width of a drawing that takes the whole width of the text, inches: its letters then have the size of captions."""
-LOADED = ("load", "deflection")
+LOADED_LAYERS = ("load", "deflection")
 """Layers of a loaded machine."""
 SCRIPT = Path(__file__).with_name("live.js")
-SWINGS = 6
+SWINGING_MODES = 6
 """Modes whose shapes swing on a page."""
-WITHOUT = " To get a machine that you can turn with the mouse, run this before you make the report: {}."
+NO_RENDERER = " To get a machine that you can turn with the mouse, run this before you make the report: {}."
 """Sentence of a page that cannot show the scene, because the renderer's libraries are not installed."""
 
 
 @dataclass(frozen=True)
-class Shown:
+class MachinePictures:
     """A machine at its pose as solids.
 
     Attributes:
@@ -68,15 +68,15 @@ class Shown:
 
     def portrait(self) -> bytes:
         """A PNG of the machine."""
-        return picture(self.scene, SIZE)
+        return picture(self.scene, PICTURE_SIZE)
 
-    def deflected(self) -> bytes:
+    def deflected_picture(self) -> bytes:
         """A PNG of the loaded machine with its deflected shape."""
-        loaded = (solid for solid in self.overlays if solid.layer in LOADED)
-        return picture(replace(self.scene, solids=(*self.scene.solids, *loaded)), SIZE)
+        loaded = (solid for solid in self.overlays if solid.layer in LOADED_LAYERS)
+        return picture(replace(self.scene, solids=(*self.scene.solids, *loaded)), PICTURE_SIZE)
 
 
-def shown(analysis: Analysis, vibration: Vibration | None = None) -> Shown:
+def machine_pictures(analysis: Analysis, vibration: Vibration | None = None) -> MachinePictures:
     """Build the solids of an analysed machine with its overlays, and the swings of its modes where these are known."""
     machine = analysis.machine
     configuration = analysis.state.configuration
@@ -84,15 +84,15 @@ def shown(analysis: Analysis, vibration: Vibration | None = None) -> Shown:
     overlays, factor = overlays_of(analysis, sizes)
     swings = [
         (f"mode {number}, {machine.display.show(mode.frequency, 'Hz')}", solids)
-        for number, mode in enumerate(vibration.modes[:SWINGS] if vibration else (), 1)
+        for number, mode in enumerate(vibration.modes[:SWINGING_MODES] if vibration else (), 1)
         if mode.shape is not None and (solids := swing_data(machine, configuration, sizes, mode.shape))
     ]
-    return Shown(machine_scene(machine, configuration, sizes), tuple(overlays), factor, tuple(swings))
+    return MachinePictures(machine_scene(machine, configuration, sizes), tuple(overlays), factor, tuple(swings))
 
 
-def drawn(drawing: Drawing, caption: str) -> Figure:
+def figure_of(drawing: Drawing, caption: str) -> Figure:
     """Make a figure of a drawing, in the same scale as all others."""
-    return Figure(caption, as_svg(drawing), min(1.0, drawing.get_figwidth() / FULL))
+    return Figure(caption, as_svg(drawing), min(1.0, drawing.get_figwidth() / FULL_WIDTH))
 
 
 @cache

@@ -13,7 +13,7 @@ from kinetostat.tolerances import AGREED
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.comparison_tables import diagonal_table, difference_table, frequency_table, trial_table
 from kinetostat.views.report.content import Block, Formula, Listing, Paragraph, Section, Table
-from kinetostat.views.report.typesetting import printed, typeset
+from kinetostat.views.report.typesetting import as_table, typeset
 
 LIBRARIES = ("kinetostat", "numpy", "scipy", "llvmlite", "pymoo", "matplotlib")
 THEORY = (
@@ -99,13 +99,13 @@ def validation_section(validation: Validation | str) -> Section:
     )
     blocks: list[Block] = [
         Paragraph(typeset(about)),
-        printed(diagonal_table(validation), "The diagonal of the compliance, side by side."),
-        printed(difference_table(validation), "Relative difference by block, and how exact the engine itself is."),
+        as_table(diagonal_table(validation), "The diagonal of the compliance, side by side."),
+        as_table(difference_table(validation), "Relative difference by block, and how exact the engine itself is."),
     ]
     if validation.frequencies:
-        blocks.append(printed(frequency_table(validation), "Natural frequencies without loads, side by side."))
+        blocks.append(as_table(frequency_table(validation), "Natural frequencies without loads, side by side."))
     if len(validation.trials) > 1:
-        blocks.append(printed(trial_table(validation), "How the engine converges to its result."))
+        blocks.append(as_table(trial_table(validation), "How the engine converges to its result."))
     return Section(title, tuple(blocks))
 
 

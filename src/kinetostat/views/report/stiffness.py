@@ -9,7 +9,7 @@ from kinetostat.display import number
 from kinetostat.kinematics.status import Status
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.grid import failures
-from kinetostat.studies.report.answers import Answers
+from kinetostat.studies.report import NOTHING_TO_MAP, Answers
 from kinetostat.views.analysis_tables import (
     actuator_table,
     compliance_table,
@@ -25,11 +25,11 @@ from kinetostat.views.analysis_tables import (
 from kinetostat.views.figures import axis_values, contour_maps, curves
 from kinetostat.views.grid_tables import display_of
 from kinetostat.views.report.content import Block, Figure, Paragraph, Section, Table
-from kinetostat.views.report.pictures import SHARE, Shown, drawn
+from kinetostat.views.report.pictures import PICTURE_WIDTH, MachinePictures, figure_of
 from kinetostat.views.report.provenance import MOTION
-from kinetostat.views.report.typesetting import printed, typeset
+from kinetostat.views.report.typesetting import as_table, typeset
 
-BLOCKS = "Blocks: {}, {} and {} (rotation, coupling, translation)."
+BLOCK_UNITS = "Blocks: {}, {} and {} (rotation, coupling, translation)."
 NO_LOAD = (
     "The machine file has no load. Add a table [load] with a force (N) and a moment (N·m) at the {} to see "
     "deflections, actuator loads and joint reactions here."
@@ -47,8 +47,8 @@ def stiffness_section(analysis: Analysis) -> Section:
     matrices: list[Block] = [
         Paragraph(about),
         MOTION,
-        printed(stiffness_table(analysis), f"Stiffness K. {_blocks('stiffness', analysis)}", split),
-        printed(compliance_table(analysis), f"Compliance C. {_blocks('compliance', analysis)}", split),
+        as_table(stiffness_table(analysis), f"Stiffness K. {_blocks('stiffness', analysis)}", split),
+        as_table(compliance_table(analysis), f"Compliance C. {_blocks('compliance', analysis)}", split),
     ]
     if analysis.stiffness is None or analysis.compliance is None:
         endless = "rigid: K is infinite there" if analysis.stiffness is None else "free: C is infinite there"
@@ -69,7 +69,7 @@ def stiffness_section(analysis: Analysis) -> Section:
 
 def _blocks(kind: str, analysis: Analysis) -> str:
     """Name the units of the blocks of K or C."""
-    return BLOCKS.format(*matrix_units(kind, analysis.machine.display).split(", "))
+    return BLOCK_UNITS.format(*matrix_units(kind, analysis.machine.display).split(", "))
 
 
 def _attribution(analysis: Analysis) -> tuple[Block, ...]:
@@ -79,7 +79,7 @@ def _attribution(analysis: Analysis) -> tuple[Block, ...]:
         Paragraph(
             "C is a sum over the springs of the machine: each share is exact. A dash stands where nothing deflects."
         ),
-        printed(shares_table(analysis), caption),
+        as_table(shares_table(analysis), caption),
         *(Paragraph(f"{', '.join(names)}.", f"{word}:") for names, word in states),
     )
 
@@ -90,15 +90,15 @@ def _indices(analysis: Analysis) -> tuple[Block, ...]:
     if principal.row_count:
         units = display.names(["N/m", "N·m/rad"])
         caption = f"Principal stiffnesses ({units}) and their directions x y z, the other motions free or held."
-        blocks.append(printed(principal, caption))
+        blocks.append(as_table(principal, caption))
     known = analysis.indices.eigenscrews if analysis.indices else ()
     screws = eigenscrew_table(known, analysis.machine.reference, display)
     if screws.row_count:
-        blocks.append(printed(screws, f"Eigenscrews of the stiffness; points from the {analysis.machine.reference}."))
+        blocks.append(as_table(screws, f"Eigenscrews of the stiffness; points from the {analysis.machine.reference}."))
     return tuple(blocks)
 
 
-def load_section(analysis: Analysis, pictures: Shown) -> Section:
+def load_section(analysis: Analysis, pictures: MachinePictures) -> Section:
     """Write the section on the load of the file, or say how to add one."""
     point, display = analysis.machine.reference, analysis.machine.display
     if analysis.load is None:
@@ -116,22 +116,23 @@ def load_section(analysis: Analysis, pictures: Shown) -> Section:
             f"({display.names(['N·m', 'N'])}; {analysis.axes} axes).",
         ),
     ]
-    blocks: list[Block] = [printed(table, caption) for table, caption in tables if table.row_count]
+    blocks: list[Block] = [as_table(table, caption) for table, caption in tables if table.row_count]
     if pictures.factor is not None:
         caption = f"The load, and the deflected shape (red), {pictures.factor:,.6g} times as large as it is."
-        blocks.append(Figure(caption, pictures.deflected(), SHARE))
+        blocks.append(Figure(caption, pictures.deflected_picture(), PICTURE_WIDTH))
     return Section("Load case, to first order" if analysis.machine.loaded else "Load case", tuple(blocks))
 
 
 def workspace_section(answers: Answers) -> Section:
     """Write the section with maps of the diagonal of C, and its extremes."""
     title = "Over the poses"
-    if answers.maps is None:
-        return Section(title, (Paragraph(answers.refused.get("maps", "Maps were left out.")),))
-    return Section(title, tuple(_mapped(answers.maps)))
+    maps = answers.of("maps")
+    if maps is None:
+        return Section(title, (Paragraph("Maps were left out." if answers.ranges else NOTHING_TO_MAP),))
+    return Section(title, tuple(_blocks_of_maps(maps)))
 
 
-def _mapped(maps: xr.Dataset) -> list[Block]:
+def _blocks_of_maps(maps: xr.Dataset) -> list[Block]:
     names = [str(name) for name in maps.data_vars if name != "status"]
     dims = [str(dim) for dim in maps["status"].dims]
     spans = [
@@ -148,7 +149,7 @@ def _mapped(maps: xr.Dataset) -> list[Block]:
     draw = contour_maps if len(dims) == 2 else curves
     return [
         Paragraph(about),
-        drawn(draw(maps, names, ""), "Compliance in each direction over the poses."),
+        figure_of(draw(maps, names, ""), "Compliance in each direction over the poses."),
         _extremes(maps, names),
     ]
 

@@ -1,30 +1,36 @@
-"""The first section: the results in sentences, and each direction in a line.
+"""The first sections: the results in sentences, each direction in a line, the machine, and every number of its file.
 
 Nothing is computed here but sums of shares.
 """
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 from kinetostat.display import Display
+from kinetostat.kinematics.mobility import Kind, Mobility
 from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.spec.fields import NO_LIMIT
+from kinetostat.spec.installation import adding
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.attribution import by_part, ranked
 from kinetostat.studies.guideline_sentences import statements
 from kinetostat.studies.optimisation.result_data import message
-from kinetostat.studies.report.answers import Answers
+from kinetostat.studies.report import Answers
 from kinetostat.validation.comparison import Validation
-from kinetostat.views.first_lines import first_lines
+from kinetostat.views.drawing import three_views
+from kinetostat.views.first_lines import first_lines, margins
+from kinetostat.views.report.answers import gains, verdict_of
 from kinetostat.views.report.content import Block, Figure, Paragraph, Points, Section, Table
+from kinetostat.views.report.pictures import NO_RENDERER, PICTURE_WIDTH, MachinePictures, can_be_live, figure_of
 from kinetostat.views.report.provenance import verdict
-from kinetostat.views.report.study import gains
-from kinetostat.views.report.typesetting import typeset
-from kinetostat.views.report.under_load import verdict_of
+from kinetostat.views.report.typesetting import as_table, typeset
 from kinetostat.views.requirement_lines import headline, requirement_lines
+from kinetostat.views.tables import machine_table
 
-MOST_NAMED = 2
+MOST_PARTS_NAMED = 2
 """Number of parts that are named in each direction, at most."""
-NAMED = 0.05
+LEAST_NAMED_SHARE = 0.05
 """Share of a direction's compliance from which a part is named."""
 
 
@@ -32,15 +38,17 @@ def summary_section(answers: Answers, validation: Validation | str, portrait: Fi
     """Write the summary, with the requirements and a picture of the machine."""
     points = tuple((typeset(text), "") for text in _findings(answers, validation))
     answer = [Paragraph(typeset(text), f"{label}:") for label, text in first_lines(answers.analysis)]
-    answer += [verdict_of(answers.loaded)] if answers.loaded else []
-    for label, known in (("Vibration", answers.vibration), ("As built", answers.budget)):
+    state = answers.of("under_load")
+    answer += [verdict_of(state)] if state else []
+    for label, name in (("Vibration", "vibration"), ("As built", "budget")):
+        known = answers.of(name)
         answer += [Paragraph(typeset(known.message), f"{label}:")] if known else []
     return Section("Summary", (*answer, *_requirements(answers), portrait, Points(points), _directions(answers)))
 
 
 def _requirements(answers: Answers) -> tuple[Block, ...]:
-    """What the file demands: how much of it is met, and each requirement with its margin and worst pose."""
-    judged, display = answers.requirements, answers.machine.display
+    """The requirements of the file: how many are met, and each with its margin and worst pose."""
+    judged, display = answers.of("requirements"), answers.machine.display
     if not judged:
         return ()
     lines = tuple((typeset(sentence), word) for _, word, sentence in requirement_lines(judged, display))
@@ -50,8 +58,9 @@ def _requirements(answers: Answers) -> tuple[Block, ...]:
 def _findings(answers: Answers, validation: Validation | str) -> Iterator[str]:
     if answers.result is not None:
         yield " ".join([message(answers.result), *gains(answers.result)])
-    if answers.guidelines is not None:
-        yield from (statement.text for statement in statements(answers.guidelines) if statement.topic == "weakest")
+    advice = answers.of("guidelines")
+    if advice is not None:
+        yield from (statement.text for statement in statements(advice) if statement.topic == "weakest")
     yield verdict(validation)
 
 
@@ -64,8 +73,8 @@ def _directions(answers: Answers) -> Table:
     for i, name in enumerate(analysis.components):
         soft, stiff = analysis.compliance_diagonal[i], analysis.stiffness_diagonal[i]
         free = math.inf if soft == 0.0 else 1.0 / soft
-        values = [_scaled(soft, f"compliance_{name}", "free", display)]
-        values += [_scaled(k, f"stiffness_{name}", "rigid", display) for k in (free, stiff)]
+        values = [_shown_value(soft, f"compliance_{name}", "free", display)]
+        values += [_shown_value(k, f"stiffness_{name}", "rigid", display) for k in (free, stiff)]
         rows.append((name, *values, _contributors(analysis, i)))
     caption = (
         f"Each direction at the {analysis.machine.reference}: C is the motion by a unit load in the same direction, "
@@ -74,14 +83,79 @@ def _directions(answers: Answers) -> Table:
     return Table(caption, heads, tuple(rows), (False, True, True, True, False))
 
 
-def _scaled(value: float, quantity: str, infinite: str, display: Display) -> str:
+def _shown_value(value: float, quantity: str, infinite: str, display: Display) -> str:
     return typeset(display.show(value, QUANTITIES[quantity].unit, infinite))
 
 
 def _contributors(analysis: Analysis, i: int) -> str:
     parts = by_part(analysis.attribution).items()
     shares = {name: sum(spring.compliance_share[i] or 0.0 for spring in springs) for name, springs in parts}
-    largest = [pair for pair in ranked(shares) if pair[1] >= NAMED]
-    named = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in largest[:MOST_NAMED])
-    more = len(largest) - MOST_NAMED
+    largest = [pair for pair in ranked(shares) if pair[1] >= LEAST_NAMED_SHARE]
+    named = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in largest[:MOST_PARTS_NAMED])
+    more = len(largest) - MOST_PARTS_NAMED
     return f"{named} and {more} more" if more > 0 else named or "nothing"
+
+
+def portrait(analysis: Analysis, pictures: MachinePictures, live: bool) -> Figure:
+    """The picture of the machine on the first page.
+
+    Args:
+        analysis: at the pose.
+        pictures: of the machine.
+        live: whether the report will be a page, which shows the machine in three dimensions if it can.
+    """
+    machine, turning = analysis.machine, live and can_be_live()
+    caption = f"{machine.name} at its pose: actuated legs blue, passive ones orange."
+    if live and not turning:
+        caption += NO_RENDERER.format(adding("report"))
+    if turning and pictures.factor is not None:
+        caption += f" Deflections are drawn {pictures.factor:,.6g} times as large as they are."
+    if turning and pictures.swings:
+        caption += " Modes of vibration swing as far as can be seen; their sizes say nothing."
+    return Figure(caption, pictures.portrait(), PICTURE_WIDTH, pictures.data if turning else None)
+
+
+def machine_section(analysis: Analysis) -> Section:
+    """Write the section with drawings and mobility."""
+    summary = Paragraph(_first_upper(analysis.machine.family.summary))
+    return Section("The machine", (summary, *_mobility(analysis), _drawing(analysis)))
+
+
+def _drawing(analysis: Analysis) -> Figure:
+    """Front, side and plan of the machine; of a planar machine the plan alone."""
+    views = "Plan" if analysis.machine.family.planar else "Front, side and plan"
+    return figure_of(
+        three_views(analysis.machine, ""),
+        f"{views}, to scale; K, C and the load refer to {analysis.machine.reference[-1]}.",
+    )
+
+
+def _pose_kind(analysis: Analysis, mobility: Mobility) -> str:
+    """Say in a sentence or two what kind of pose it is, and how far it is from a singularity."""
+    kind = f"{mobility.kind} pose" if mobility.kind is Kind.REGULAR else mobility.kind
+    return f"{_first_upper(kind)} {margins(analysis)}"
+
+
+def _mobility(analysis: Analysis) -> tuple[Block, ...]:
+    mobility = analysis.mobility
+    if mobility is None:
+        return ()
+    redundant = f", {mobility.here.redundant} constraints redundant" if mobility.here.redundant else ""
+    text = (
+        f"{mobility.full_cycle} freedoms, {mobility.actuators} actuators{redundant}. {_pose_kind(analysis, mobility)} "
+        "At a margin of 0 a leg locks up, or the platform moves although the actuators are locked."
+    )
+    return (Paragraph(typeset(text), "Mobility and singularity:"),)
+
+
+def data_section(analysis: Analysis) -> Section:
+    """Write the section with every number of the machine file."""
+    table = as_table(machine_table(analysis.machine), "All values of the machine with their units; angles in degrees.")
+    unset = [row[0].removeprefix("limits.") for row in table.rows if row[1] == NO_LIMIT]
+    rest = replace(table, rows=tuple(row for row in table.rows if row[1] != NO_LIMIT))
+    remarks = (Paragraph(f"{', '.join(unset)}.", "Limits that are not set:"),) if unset else ()
+    return Section("Data sheet", (rest, *remarks))
+
+
+def _first_upper(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}{'' if text.endswith('.') else '.'}"

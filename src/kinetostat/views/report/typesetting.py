@@ -35,7 +35,7 @@ def _scientific(digits: str, zeros: int) -> str:
     return f"{digits[0]}{rest}e{zeros + len(digits) - 1}"
 
 
-def printed(table: TerminalTable, caption: str, split: int = 0) -> Table:
+def as_table(table: TerminalTable, caption: str, split: int = 0) -> Table:
     """Convert a table of the terminal for a report.
 
     Args:

@@ -1,13 +1,15 @@
-"""A report as a file: the answers are gathered, assembled, and written as a page or as a PDF.
+"""A report as a file: the answers are gathered, its sections put in order, and written as a page or as a PDF.
 
 Sections are written in the modules beside this one; only the order of the work and the file are decided here.
 """
 
 import json
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.kinematics.status import Status
@@ -15,32 +17,35 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
-from kinetostat.studies import under_load
 from kinetostat.studies.analysis import as_json
 from kinetostat.studies.optimisation.result import Result
 from kinetostat.studies.optimisation.result_data import message
-from kinetostat.studies.report.answers import STEPS, Answers, gather
-from kinetostat.studies.report.subject import Texts, texts_of
+from kinetostat.studies.report import STEPS, Answers, Texts, gather, texts_of
+from kinetostat.studies.setting import pose_of
 from kinetostat.studies.storage import place_of, write_bytes
 from kinetostat.validation.comparison import Validation, choose, validate
-from kinetostat.views.budget import BUDGET
-from kinetostat.views.data_forms import json_of
-from kinetostat.views.report.assembly import report_of
+from kinetostat.views.answers import plain_of
+from kinetostat.views.report.answers import ANSWERS_WITH_SECTIONS, answer_sections, study_section
+from kinetostat.views.report.content import Report
+from kinetostat.views.report.design import guideline_section, sensitivity_section
 from kinetostat.views.report.html_page import html_page
 from kinetostat.views.report.pdf import check_typst, pdf_bytes
-from kinetostat.views.report.provenance import Origin
-from kinetostat.views.vibration import VIBRATION
+from kinetostat.views.report.pictures import machine_pictures
+from kinetostat.views.report.provenance import Origin, method_section, record_section, validation_section
+from kinetostat.views.report.stiffness import load_section, stiffness_section, workspace_section
+from kinetostat.views.report.summary import data_section, machine_section, portrait, summary_section
+from kinetostat.views.report.typesetting import typeset
 
 SUFFIXES = (".html", ".pdf")
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """Options of a report.
+class ReportOptions:
+    """Options of a report, by the names of the command line.
 
     Attributes:
         ranges: of the maps, "FIELD=from:to:count[:log]", one or two; empty to choose them automatically.
-        without: parts to leave out because they take time, of `studies.report.answers.PARTS`.
+        without: parts to leave out because they take time, of `studies.report.PARTS`.
         engine: for the validation; None for the first that is installed.
         author, date: for the title block; None for none.
         loaded: whether the machine is to be shown under its loads, whatever its file says.
@@ -55,7 +60,7 @@ class Wanted:
     loaded: bool = False
     fit: str | Path | None = None
 
-    def options(self) -> list[str]:
+    def words(self) -> list[str]:
         """Words of the command line that give the same options."""
         single = (("--engine", self.engine), ("--author", self.author), ("--date", self.date), ("--fit", self.fit))
         pairs = [("--over", self.ranges), ("--without", self.without)]
@@ -96,7 +101,7 @@ def report(
         InputError: the pose has no answer, no design meets the constraints, a range or part is not valid, the file is
             neither .html nor .pdf or cannot be written, or a library is missing.
     """
-    place, wanted = report_path(path), Wanted(ranges, without, engine, author, date, fit=fit)
+    place, options = report_path(path), ReportOptions(ranges, without, engine, author, date, fit=fit)
     result = about if isinstance(about, Result) else None
     if result is not None and not result.solved:
         raise InputError(message(result))
@@ -105,7 +110,7 @@ def report(
     if answers.analysis.status is not Status.OK:
         raise InputError(answers.analysis.message)
     inputs = texts_of(result.problem) if result else (("machine.toml", as_file(machine)),)
-    write_report(answers, wanted, [inputs[0][0]], inputs, place, progress)
+    write_report(answers, options, [inputs[0][0]], inputs, place, progress)
     return place
 
 
@@ -126,13 +131,18 @@ def report_path(path: str | Path) -> Path:
 
 
 def write_report(
-    answers: Answers, wanted: Wanted, subject: Sequence[str], inputs: Texts, path: Path, progress: Progress = silent
+    answers: Answers,
+    options: ReportOptions,
+    subject: Sequence[str],
+    inputs: Texts,
+    path: Path,
+    progress: Progress = silent,
 ) -> None:
     """Write a report from its answers; the file appears whole or not at all.
 
     Args:
         answers: for a pose whose status is OK.
-        wanted: options of the report.
+        options: of the report.
         subject: words of the command line that name the machine or study, with its overrides.
         inputs: name and text of each file that it was read from.
         path: from `report_path`.
@@ -141,17 +151,12 @@ def write_report(
     Raises:
         InputError: an unknown engine, or a path that cannot be written.
     """
-    command = shlex.join(["kinetostat", "report", *subject, *wanted.options(), "-o", path.name])
-    loaded = {} if answers.loaded is None else {"under_load": under_load.as_json(answers.loaded)}
-    built = {} if answers.budget is None else {"budget": json_of(BUDGET, answers.budget)}
-    rings = {} if answers.vibration is None else {"vibration": json_of(VIBRATION, answers.vibration)}
-    results = json.dumps(
-        as_json(answers.analysis) | loaded | built | rings, ensure_ascii=False, allow_nan=False, indent=1
-    )
+    command = shlex.join(["kinetostat", "report", *subject, *options.words(), "-o", path.name])
+    results = json.dumps(results_of(answers), ensure_ascii=False, allow_nan=False, indent=1)
     origin = Origin(command, inputs, as_file(answers.machine), results)
-    about = {name: text for name, text in (("Author", wanted.author), ("Date", wanted.date)) if text}
+    about = {name: text for name, text in (("Author", options.author), ("Date", options.date)) if text}
     page = path.suffix == ".html"
-    validation = _validation(answers.machine, wanted)
+    validation = _validation(answers.machine, options)
     progress(STEPS - 1, STEPS)
     whole = report_of(answers, validation, origin, about, page)
     data = html_page(whole).encode() if page else pdf_bytes(whole)
@@ -159,13 +164,74 @@ def write_report(
     progress(STEPS, STEPS)
 
 
-def _validation(machine: Machine, wanted: Wanted) -> Validation | str:
+def _validation(machine: Machine, options: ReportOptions) -> Validation | str:
     """Validate with an independent engine, or say why that was not possible."""
-    if "validation" in wanted.without:
+    if "validation" in options.without:
         return "Validation was left out."
-    if wanted.engine:
-        choose(wanted.engine)
+    if options.engine:
+        choose(options.engine)
     try:
-        return validate(machine, wanted.engine)
+        return validate(machine, options.engine)
     except InputError as reason:
         return str(reason)
+
+
+def results_of(answers: Answers) -> dict[str, Any]:
+    """The analysis as plain data, with the other answers that have a section of their own under their names."""
+    others = {name: answers.of(name) for name in ANSWERS_WITH_SECTIONS}
+    return as_json(answers.analysis) | {name: plain_of(answer) for name, answer in others.items() if answer}
+
+
+def report_of(
+    answers: Answers, validation: Validation | str, origin: Origin, about: Mapping[str, str], live: bool
+) -> Report:
+    """Assemble the report on a machine, or on a study and its best design.
+
+    Args:
+        answers: for a pose whose status is OK.
+        validation: by an independent engine, or why there is none.
+        origin: what the report is made from.
+        about: further lines of the title block, by name.
+        live: whether the report will be a page, which may show the machine in three dimensions.
+
+    Raises:
+        ValueError: the status of the pose is not OK.
+    """
+    analysis, result = answers.analysis, answers.result
+    if analysis.status is not Status.OK:
+        raise ValueError("a report needs a pose whose status is OK")
+    pictures = machine_pictures(analysis, answers.of("vibration") if live else None)
+    engine = () if isinstance(validation, str) else (validation.engine, validation.version)
+    sections = [
+        summary_section(answers, validation, portrait(analysis, pictures, live)),
+        *([study_section(result)] if result else []),
+        machine_section(analysis),
+        data_section(analysis),
+        stiffness_section(analysis),
+        load_section(analysis, pictures),
+        *answer_sections(answers),
+        workspace_section(answers),
+        guideline_section(answers),
+        sensitivity_section(answers.of("sensitivity")),
+        validation_section(validation),
+        method_section(),
+        record_section(origin, engine),
+    ]
+    return Report(
+        "Stiffness report" if result is None else "Design study report",
+        analysis.machine.name if result is None else result.problem.study.name,
+        (*_title_block(answers), *about.items()),
+        tuple(sections),
+        {"machine.toml": origin.machine_file, "results.json": origin.results},
+    )
+
+
+def _title_block(answers: Answers) -> list[tuple[str, str]]:
+    machine = answers.machine
+    return [
+        ("Machine", machine.name),
+        ("Family", machine.family.name),
+        ("Pose", typeset(pose_of(machine))),
+        ("Reference", f"{machine.reference}, {answers.analysis.axes} axes"),
+        ("Program", f"kinetostat {version('kinetostat')}"),
+    ]

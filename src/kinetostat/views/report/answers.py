@@ -1,0 +1,226 @@
+"""Sections on the answers to further questions: each is made of the description of its answer, or written here.
+
+Nothing is computed here.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from kinetostat.algebra.scalar import reciprocal
+from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import spoken
+from kinetostat.machine.machine import Machine
+from kinetostat.studies.analysis import Analysis
+from kinetostat.studies.identification.record import FitRecord, RecordedFit
+from kinetostat.studies.optimisation.problem import Problem
+from kinetostat.studies.optimisation.result import Result
+from kinetostat.studies.optimisation.result_data import message
+from kinetostat.studies.report import Answers
+from kinetostat.studies.under_load import LoadedState
+from kinetostat.views.answers import described, kind_of
+from kinetostat.views.figures import contour_maps, curves
+from kinetostat.views.identification import RECORDED_FIT
+from kinetostat.views.identification_figures import CAPTIONS
+from kinetostat.views.loaded_figures import bars_figure, load_figure, shape_figure
+from kinetostat.views.loaded_tables import displacement_table, spring_table, stability_of, strut_table, tangent_table
+from kinetostat.views.optimisation_figures import pictures
+from kinetostat.views.optimisation_tables import (
+    aims,
+    bounds_table,
+    direction_table,
+    failing,
+    front_table,
+    not_searched,
+    remarks,
+    scatter_table,
+    variable_table,
+    worth_table,
+)
+from kinetostat.views.question import Description
+from kinetostat.views.report.content import Block, Figure, Paragraph, Points, Section
+from kinetostat.views.report.pictures import figure_of
+from kinetostat.views.report.typesetting import as_table, typeset
+
+ANSWERS_WITH_SECTIONS = ("under_load", "vibration", "budget")
+"""Answers of `studies.report.QUESTIONS` with a section, in the order of a report."""
+SAID_BEFORE = "Pose"
+"""Line that a report has on its first page."""
+
+
+def answer_sections(answers: Answers) -> Iterator[Section]:
+    """Write a section on each answer that was asked for, and on the record of a fit if there is one."""
+    for name in ANSWERS_WITH_SECTIONS:
+        answer = answers.of(name)
+        if not answer:
+            continue
+        description = kind_of(answer).description
+        if description:
+            more = _frequencies(answers) if name == "vibration" else ()
+            yield described_section(described(description), answer, more)
+        else:
+            yield WRITTEN_SECTIONS[name](answer, answers)
+    if answers.fit:
+        yield _fit_section(answers.machine, answers.fit)
+
+
+def described_section(description: Description, answer: Any, more: Iterable[Block] = ()) -> Section:
+    """Write the section on an answer.
+
+    Args:
+        description: of answers of this kind.
+        answer: at the pose of the report.
+        more: blocks that stand behind it.
+    """
+    return Section(description.title, (*_described(description, answer), *more))
+
+
+def _described(description: Description, answer: Any) -> Iterator[Block]:
+    if not description.answered(answer):
+        yield Paragraph(typeset(answer.message))
+        return
+    for head, sentence in description.lines(answer):
+        if head != SAID_BEFORE:
+            yield Paragraph(typeset(sentence), f"{head}:")
+    for table in description.tables(answer, False):
+        yield as_table(table, f"{table.title}.")
+    for drawing in description.drawings(answer).values():
+        if not drawing.minor:
+            yield figure_of(drawing(title=""), drawing.caption)
+
+
+def _frequencies(answers: Answers) -> Iterator[Block]:
+    """The first natural frequency over the poses of the maps, where there are any."""
+    over = answers.of("frequencies")
+    if over is not None and (over["status"] == int(Status.OK)).any():
+        draw = contour_maps if over["status"].ndim == 2 else curves
+        names = [str(name) for name in over.data_vars if "frequency" in str(name)]
+        yield figure_of(draw(over, names, ""), "The first natural frequency over the poses.")
+
+
+def loaded_section(state: LoadedState, answers: Answers) -> Section:
+    """Write the section: verdict, shape, displacement, what each leg carries, stiffness, and the curve.
+
+    Args:
+        state: of the machine under its loads.
+        answers: of the report; its analysis is that of the machine without loads.
+    """
+    return Section("Under load", tuple(_loaded(state, answers.analysis)))
+
+
+def verdict_of(state: LoadedState) -> Paragraph:
+    """Say whether the machine is at rest, what is special, and how far the load may grow."""
+    stability = f" {stability_of(state)}" if state.displacement else ""
+    return Paragraph(typeset(f"{state.message}{stability}"), f"Under load, {state.rest.word}:")
+
+
+def _loaded(state: LoadedState, analysis: Analysis) -> Iterator[Block]:
+    yield verdict_of(state)
+    if not state.displacement:
+        return
+    display = state.machine.display
+    moved = displacement_table(state, display)
+    yield figure_of(shape_figure(state, ""), "The machine at rest under its loads over the machine without them.")
+    yield as_table(moved, f"{moved.title}, with exact geometry and by linear equations; base axes.")
+    yield figure_of(bars_figure(state), "What each leg carries.")
+    yield as_table(spring_table(state, display), "Load and deformation of every spring, and whether it carries.")
+    if state.struts:
+        yield as_table(strut_table(state, display), "Struts, which bend away under Euler's load.")
+    free = [reciprocal(compliance) for compliance in analysis.compliance_diagonal]
+    tangent = tangent_table(state, free, analysis.stiffness_diagonal)
+    if tangent is not None:
+        caption = (
+            "Stiffness that further loads meet, beside that of the free state: 1/C with all other motions free, K with "
+            "all others held. The part of K under load that is not of springs is what loads and weights do by turning."
+        )
+        yield as_table(tangent, caption)
+    yield figure_of(load_figure(state, ""), "Displacement and loads while the loads grow, beside the linear answer.")
+
+
+WRITTEN_SECTIONS: dict[str, Callable[[Any, Answers], Section]] = {"under_load": loaded_section}
+"""Sections on answers that have no description."""
+
+
+def _fit_section(machine: Machine, record: FitRecord) -> Section:
+    """The machine as built, by the record of a fit and the pictures beside it."""
+    pictures = (
+        Figure(caption, record.pictures[name], 0.85) for name, caption in CAPTIONS.items() if name in record.pictures
+    )
+    return described_section(RECORDED_FIT, RecordedFit(machine, record), pictures)
+
+
+METHOD_WORDS = {
+    "genetic": "a genetic algorithm",
+    "gradient": "descents with exact derivatives from several starts",
+    "hybrid": "a genetic algorithm, then descents with exact derivatives",
+    "nsga2": "NSGA-II, a genetic algorithm for several objectives",
+}
+STUDY_CAPTIONS = {
+    "comparison": "Left: how many times stiffer each direction is. Right: each variable between its bounds.",
+    "convergence": "Best and mean of the designs that each step kept, and their distance from the final best.",
+    "front": "Designs over the objectives; on the front no design is better than another in all objectives.",
+    "tolerances": "Scatter of the objectives over machines made to the tolerances from the best design.",
+}
+
+
+def study_section(result: Result) -> Section:
+    """Write the section on a study."""
+    return Section(
+        "Design study",
+        (
+            Section("The question", _study_question(result.problem)),
+            Section("The search", _study_search(result)),
+            Section("The answer", _study_answer(result)),
+        ),
+    )
+
+
+def gains(result: Result) -> Iterator[str]:
+    """Generate a sentence on each objective, with its value before and after."""
+    for k, objective in enumerate(result.problem.objectives):
+        before, after = result.initial.objectives[0, k], result.outcome.objectives[0, k]
+        unit, show = objective.term.unit, result.problem.machine.display.show
+        before, after = (show(value, "1" if unit == "SI" else unit) for value in (before, after))
+        label = spoken(objective.term.label)
+        yield f"{label[0].upper()}{label[1:]} ({objective.goal}): {before} before, {after} now."
+
+
+def _study_question(problem: Problem) -> tuple[Block, ...]:
+    fixed = not_searched(problem)
+    return (
+        Paragraph(typeset(f"{problem.machine.name}, judged at {problem.poses.description}.")),
+        Points(tuple((typeset(text), "") for text in aims(problem))),
+        as_table(bounds_table(problem), "Variables and their bounds."),
+        *([Paragraph(f"{fixed}.", "Not searched:")] if fixed else []),
+    )
+
+
+def _study_search(result: Result) -> tuple[Block, ...]:
+    problem, figures = result.problem, pictures(result)
+    settings = problem.study.optimizer
+    about = f"Method {problem.method}: {METHOD_WORDS[problem.method]}; seed {settings.seed}. {message(result)}"
+    shown = (name for name in ("convergence", "front") if name in figures)
+    return (Paragraph(typeset(about)), *(figure_of(figures[name](), STUDY_CAPTIONS[name]) for name in shown))
+
+
+def _study_answer(result: Result) -> tuple[Block, ...]:
+    figures, several = pictures(result), len(result.problem.objectives) > 1
+    best = "the knee of the front" if several else "the best design"
+    blocks: list[Block] = [
+        as_table(worth_table(result), f"Objectives: the original machine, and {best}."),
+        as_table(
+            variable_table(result),
+            f"Variables of {best}, and the effect of 1 % of each on the objectives, of an angle of 0.01 rad.",
+        ),
+        as_table(direction_table(result), "Compliance before and after, at the worst of all poses."),
+        figure_of(figures["comparison"](), STUDY_CAPTIONS["comparison"]),
+    ]
+    if several:
+        blocks.append(as_table(front_table(result), "Designs of the front."))
+    if result.robustness:
+        scatter = scatter_table(result.robustness, result.problem.machine.display)
+        blocks.append(as_table(scatter, "Objectives under the tolerances."))
+        blocks.append(figure_of(figures["tolerances"](), STUDY_CAPTIONS["tolerances"]))
+        if result.robustness.failing:
+            blocks.append(Paragraph(failing(result.robustness)))
+    items = tuple((typeset(line), "") for line in remarks(result))
+    return (*blocks, Points(items)) if items else tuple(blocks)
