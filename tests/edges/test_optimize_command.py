@@ -12,7 +12,7 @@ from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
 from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import analyze
-from kinetostat.studies.optimisation.assessment import Assessor, Verdict
+from kinetostat.studies.optimisation.assessment import Assessor, DesignVerdict
 from kinetostat.studies.optimisation.log import front_of
 from kinetostat.studies.optimisation.search import search, search_into
 from kinetostat.studies.study_folder import study_folder
@@ -70,7 +70,7 @@ def test_a_folder_gets_everything_a_designer_needs(tmp_path, capsys):
         assert table.sizes["design"] == 96
         assert table["geometry.base_radius"].attrs["units"] == "m"
         assert float(table["objective_0"].min()) == told["objective"]
-        assert (table["verdict"] == Verdict.FEASIBLE).all()
+        assert (table["verdict"] == DesignVerdict.FEASIBLE).all()
 
 
 def test_two_objectives_give_a_front_with_its_knee(tmp_path, capsys):
@@ -249,7 +249,7 @@ def test_poses_of_the_workspace_alone():
     text = SMALL + '[poses]\nover = ["x=-40 cm:40 cm:9", "z=40 cm:120 cm:9"]\nwithin = "workspace"\n'
     study = written(text, 'set.limits.longest_leg="90 cm"')
     assert 0 < study.poses.count < 81
-    assert (Assessor(study)(study.space.initial[None]).verdict == Verdict.FEASIBLE).all()
+    assert (Assessor(study)(study.space.initial[None]).verdict == DesignVerdict.FEASIBLE).all()
 
 
 def test_robust_objectives_are_worse_than_nominal_ones():

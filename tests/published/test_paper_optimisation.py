@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kinetostat.studies.optimisation.assessment import Assessor
-from kinetostat.studies.optimisation.result_data import variables_of
+from kinetostat.studies.optimisation.result import variables_of
 from kinetostat.studies.optimisation.search import optimize
 from studies import BEST, PAPER, best, problem, solved
 

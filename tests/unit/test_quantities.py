@@ -5,7 +5,7 @@ import pytest
 from kinetostat.machine.loading import load
 from kinetostat.spec.study import ObjectiveTable
 from kinetostat.studies.optimisation import problem
-from kinetostat.studies.optimisation.catalogue import usual_goal
+from kinetostat.studies.optimisation.terms import usual_goal
 from refusals import refused
 
 

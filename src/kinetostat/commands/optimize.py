@@ -54,7 +54,7 @@ def add_optimize_commands(commands: "Commands") -> None:
 def _optimize(options: argparse.Namespace) -> int:
     result = _search(options)
     if options.json:
-        from kinetostat.studies.optimisation.result_data import as_json
+        from kinetostat.studies.optimisation.result import as_json
 
         print_json(as_json(result))
     return _report(options, result)
@@ -63,7 +63,7 @@ def _optimize(options: argparse.Namespace) -> int:
 def _pareto(options: argparse.Namespace) -> int:
     result = _search(options, least=2)
     if options.json:
-        from kinetostat.studies.optimisation.result_data import as_json
+        from kinetostat.studies.optimisation.result import as_json
 
         data = as_json(result)
         print_json({key: data.get(key) for key in ("name", "status", "message", "evaluations", "front")})
@@ -102,7 +102,7 @@ def _search(options: argparse.Namespace, least: int = 1) -> "Result":
 
 def _report(options: argparse.Namespace, result: "Result") -> int:
     """Write the files of a result, and print it unless JSON was printed."""
-    from kinetostat.studies.optimisation.result_data import message, write_result
+    from kinetostat.studies.optimisation.result import message, write_result
 
     result = result.in_units(options.units) if options.units else result
     if options.output:

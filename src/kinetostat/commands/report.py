@@ -109,7 +109,7 @@ def _add_report_command(commands: "Commands") -> None:
 
 def _report(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
-    from kinetostat.studies.optimisation.result_data import message
+    from kinetostat.studies.optimisation.result import message
     from kinetostat.studies.report import gather, subject_of
     from kinetostat.views.report.writing import ReportOptions, report_path, write_report
     from kinetostat.views.tables import print_written, terminal

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
-from kinetostat.studies.optimisation.search import ROWS
+from kinetostat.studies.optimisation.log import ROWS
 from kinetostat.studies.result_file import RowFile, frame_is_whole
 from kinetostat.studies.storage import LIST, differing, is_damaged, read_list
 from kinetostat.studies.stored_grid import LAYOUT, damaged_chunks

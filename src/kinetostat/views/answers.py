@@ -164,7 +164,7 @@ KINDS = (
         "studies.optimisation.result.Result",
         "views.optimisation_tables.print_result",
         "views.optimisation_figures.pictures",
-        "studies.optimisation.result_data.as_json",
+        "studies.optimisation.result.as_json",
     ),
     Kind(
         "validation.comparison.Validation",

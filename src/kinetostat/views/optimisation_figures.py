@@ -10,10 +10,10 @@ from matplotlib.lines import Line2D
 
 from kinetostat.display import Display, Scale
 from kinetostat.kinetostatics.quantities import spoken
+from kinetostat.studies.optimisation.assessment import Scatter
 from kinetostat.studies.optimisation.log import Log
 from kinetostat.studies.optimisation.problem import Objective
 from kinetostat.studies.optimisation.result import Result
-from kinetostat.studies.optimisation.robustness import Scatter
 from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, set_title
 
 BINS = 40
@@ -105,10 +105,10 @@ def _places(panel: Axes, result: Result) -> None:
                 arrowprops={"arrowstyle": "-", "color": "#888888", "linewidth": 0.8}, zorder=1,
             )  # fmt: skip
         panel.plot(after[place], place, "o", color=COLOURS[0], zorder=3)
-        value = variable.shown(float(space.values(result.genes)[place]), display)
+        value = variable.in_words(float(space.values(result.genes)[place]), display)
         panel.annotate(value, (1.04, place), va="center", fontsize=7)
-        ends = [variable.shown(0.0 if variable.choices is not None else variable.low, display)]
-        ends.append(variable.shown(variable.high, display))
+        ends = [variable.in_words(0.0 if variable.choices is not None else variable.low, display)]
+        ends.append(variable.in_words(variable.high, display))
         for x, text, side in zip((0.0, 1.0), ends, ("left", "right"), strict=True):
             panel.annotate(text, (x, place), (0, 5), textcoords="offset points", ha=side, fontsize=5.5, color="#777777")
     panel.set_yticks(range(space.size), [variable.name for variable in space.searched])

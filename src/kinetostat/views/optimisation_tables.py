@@ -12,11 +12,10 @@ from rich.text import Text
 
 from kinetostat.display import ENGINEERING, Display, number
 from kinetostat.kinetostatics.quantities import spoken
+from kinetostat.studies.optimisation.assessment import Robustness
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.result import Result
-from kinetostat.studies.optimisation.result_data import message
-from kinetostat.studies.optimisation.ridges import ridge_sentences
-from kinetostat.studies.optimisation.robustness import Robustness
+from kinetostat.studies.optimisation.result import Result, message
+from kinetostat.studies.optimisation.slopes import ridge_sentences
 from kinetostat.views.tables import numeric_table
 
 
@@ -38,7 +37,7 @@ def aims(problem: Problem) -> list[str]:
         f"Objective: {term.goal} {spoken(term.term.label)}{_unit(term.term.unit, problem.machine.display)}"
         for term in problem.objectives
     ]
-    return objectives + [f"Constraint: {bound.shown(problem.machine.display)}" for bound in problem.constraints]
+    return objectives + [f"Constraint: {bound.in_words(problem.machine.display)}" for bound in problem.constraints]
 
 
 def bounds_table(problem: Problem) -> Table:
@@ -47,7 +46,7 @@ def bounds_table(problem: Problem) -> Table:
     table.add_column("meaning")
     for variable in problem.space.searched:
         low = 0.0 if variable.choices is not None else variable.low
-        cells = (variable.shown(value, problem.machine.display) for value in (variable.initial, low, variable.high))
+        cells = (variable.in_words(value, problem.machine.display) for value in (variable.initial, low, variable.high))
         table.add_row(variable.name, *cells, variable.quantity.meaning)
     return table
 
@@ -107,7 +106,7 @@ def worth_table(result: Result) -> Table:
         before, after = result.initial.constraints[0, k], result.outcome.constraints[0, k]
         unit = constraint.term.unit
         cells = (display.number(value, unit) for value in (before, after))
-        table.add_row(constraint.shown(display), *cells, "", display.scale(unit).head)
+        table.add_row(constraint.in_words(display), *cells, "", display.scale(unit).head)
     return table
 
 
@@ -126,7 +125,7 @@ def variable_table(result: Result) -> Table:
         influence = influences.get(variable.name)
         percents = [_percent(p) for p in influence.percents] if influence else [""] * len(objectives)
         bound = influence.bound if influence else ""
-        shown = (variable.shown(number, display) for number in (variable.initial, value))
+        shown = (variable.in_words(number, display) for number in (variable.initial, value))
         table.add_row(variable.name, *shown, bound, *percents)
         for field in variable.fields[1:]:
             table.add_row(f"  with {field.path}", "", "", "", *[""] * len(heads))
@@ -184,7 +183,7 @@ def front_table(result: Result) -> Table:
         genes = result.log.genes(result.front[k : k + 1])[0]
         values = zip(problem.space.searched, problem.space.values(genes), strict=True)
         cells = [display.number(value, unit) for value, unit in zip(outcome.objectives[k], units, strict=True)]
-        cells += [variable.shown(value, display) for variable, value in values]
+        cells += [variable.in_words(value, display) for variable, value in values]
         table.add_row("knee" if k == result.knee else "", *cells, style="bold" if k == result.knee else None)
     return table
 

@@ -21,7 +21,7 @@ from rich.text import Text
 
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.spec.installation import command, starting
-from kinetostat.studies.optimisation.result_data import as_dataset
+from kinetostat.studies.optimisation.result import as_dataset
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.printed import EquationCheck, PaperNumber, PrintVerdict
 from kinetostat.studies.paper.reproduction import Claim, Finding, Reproduction

@@ -1,6 +1,7 @@
-"""How good designs are, at all poses and with all manufacturing deviations, in one call of the engine.
+"""Values of designs at all poses and with all manufacturing deviations, in one call of the engine.
 
-Designs that cannot be judged are not errors: their verdict says why, and their violation how far they are from it.
+Designs that cannot be judged are not errors: their verdict says why, and their violation how far they are from it. Many
+machines made within the tolerances from one design tell how its objectives scatter, and their worst case.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,19 +18,21 @@ from kinetostat.kinematics.status import Status
 from kinetostat.spec.immutable import Immutable
 from kinetostat.studies.optimisation.problem import Problem
 
-AT_ONCE = 1 << 20
+POINTS_AT_ONCE = 1 << 20
 """Points that are evaluated before they are summed up: a few quantities of them fit in a hundred megabytes."""
 
-MET = 1e-9
+LARGEST_MET_EXCESS = 1e-9
 """Relative excess up to which a constraint counts as met, so that a design at its bound is not refused by round-off."""
 
 MOST_CORNERS = 12
 """Tolerances of which all combinations of ends are tried: 4096 machines."""
-SIGMAS = 3.0
+SIGMAS_IN_TOLERANCE = 3.0
 """Standard deviations of a normal distribution within the tolerance; what lies beyond is drawn at its end."""
+ROBUSTNESS_STREAM = 1
+"""Of random numbers: not the machines of the search."""
 
 
-class Verdict(IntEnum):
+class DesignVerdict(IntEnum):
     """Why a design is or is not feasible."""
 
     FEASIBLE = 0
@@ -50,7 +53,7 @@ class Verdict(IntEnum):
         )
 
 
-OF_STATUS = np.array([Verdict.FEASIBLE, *(Verdict[status.name] for status in Status if status)])
+OF_STATUS = np.array([DesignVerdict.FEASIBLE, *(DesignVerdict[status.name] for status in Status if status)])
 """The verdict on a design by the status of the poses that it lacks."""
 
 
@@ -63,7 +66,7 @@ class Outcome(Immutable):
         constraints: values of their terms, SI [designs x constraints].
         violation: 0 for a feasible design; below the number of constraints where some are violated, more beyond
             [designs].
-        verdict: `Verdict` codes [designs].
+        verdict: `DesignVerdict` codes [designs].
     """
 
     objectives: Array
@@ -71,7 +74,7 @@ class Outcome(Immutable):
     violation: Array
     verdict: Codes
 
-    def chosen(self, numbers: Integers) -> "Outcome":
+    def selection(self, numbers: Integers) -> "Outcome":
         """Of some designs."""
         return Outcome(*(getattr(self, name)[numbers] for name in vars(self)))
 
@@ -93,39 +96,41 @@ class Assessor:
         """Judge designs just as they are."""
         return self._in_blocks(genes, {})
 
-    def made(self, genes: Array, added: Mapping[str, Array]) -> Outcome:
+    def judge_machines(self, genes: Array, added: Mapping[str, Array]) -> Outcome:
         """Judge every one that manufacture makes of one design [variables]: deviations, SI, by variable."""
         count = len(next(iter(added.values())))
-        step = max(1, AT_ONCE // self.problem.poses.count)
+        step = max(1, POINTS_AT_ONCE // self.problem.poses.count)
         parts = []
         for start in range(0, count, step):
             part = {name: values[start : start + step] for name, values in added.items()}
             repeated = np.repeat(genes[None, :], len(next(iter(part.values()))), axis=0)
-            parts.append(self._judged(self.problem.space.columns(repeated, part), 1))
-        return joined(parts)
+            parts.append(self._judge(self.problem.space.columns(repeated, part), 1))
+        return join_outcomes(parts)
 
     def _in_blocks(self, genes: Array, added: Mapping[str, Array]) -> Outcome:
         each = len(next(iter(added.values()), (0.0,)))
-        step = max(1, AT_ONCE // (each * self.problem.poses.count))
-        return joined([self._block(genes[start : start + step], added, each) for start in range(0, len(genes), step)])
+        step = max(1, POINTS_AT_ONCE // (each * self.problem.poses.count))
+        return join_outcomes(
+            [self._block(genes[start : start + step], added, each) for start in range(0, len(genes), step)]
+        )
 
     def _block(self, genes: Array, added: Mapping[str, Array], each: int) -> Outcome:
         repeated = np.repeat(genes, each, axis=0)
         tiled = {name: np.tile(values, len(genes)) for name, values in added.items()}
-        return self._judged(self.problem.space.columns(repeated, tiled), each)
+        return self._judge(self.problem.space.columns(repeated, tiled), each)
 
-    def _judged(self, columns: Mapping[str, Array], each: int) -> Outcome:
+    def _judge(self, columns: Mapping[str, Array], each: int) -> Outcome:
         """Designs, each of which is `each` machines in a row."""
         problem = self.problem
         answers = self._evaluate(Population(columns, problem.poses.columns))
         there = answers.status == Status.OK
         pairs = [(o.term, o.sign) for o in problem.objectives] + [(c.term, c.sign) for c in problem.constraints]
-        numbers = [self._over_made(term.values(answers.values, there), each, sign > 0) for term, sign in pairs]
+        numbers = [self._over_machines(term.values(answers.values, there), each, sign > 0) for term, sign in pairs]
         status = answers.status.reshape(-1, each * answers.status.shape[1])
         numbers_of_designs, count = np.array(numbers).T.reshape(len(status), len(pairs)), len(problem.objectives)
         return _verdicts(problem, numbers_of_designs[:, :count], numbers_of_designs[:, count:], status)
 
-    def _over_made(self, values: Array, each: int, high_is_bad: bool) -> Array:
+    def _over_machines(self, values: Array, each: int, high_is_bad: bool) -> Array:
         if each == 1 or self.problem.robust is None:
             return values
         made = values.reshape(-1, each)
@@ -138,13 +143,13 @@ def _verdicts(problem: Problem, objectives: Array, constraints: Array, status: C
     excess = np.zeros(constraints.shape)
     for k, constraint in enumerate(problem.constraints):
         over = constraint.sign * (constraints[:, k] - constraint.bound) / constraint.scale
-        over = np.where(over <= MET, 0.0, over)
+        over = np.where(over <= LARGEST_MET_EXCESS, 0.0, over)
         with np.errstate(invalid="ignore"):
             excess[:, k] = np.where(np.isfinite(over), over / (1.0 + over), 1.0)
     violation = excess.sum(axis=1)
-    verdict = np.where(violation > 0.0, Verdict.CONSTRAINT, Verdict.FEASIBLE)
+    verdict = np.where(violation > 0.0, DesignVerdict.CONSTRAINT, DesignVerdict.FEASIBLE)
     endless = ~np.isfinite(objectives).all(axis=1)
-    verdict[endless], violation[endless] = Verdict.NOT_FINITE, most + 1.0
+    verdict[endless], violation[endless] = DesignVerdict.NOT_FINITE, most + 1.0
     counts = np.stack([(status == code).sum(axis=1) for code in Status])
     missing = problem.poses.required - counts[0] / status.shape[1]
     lacking = (missing > 1e-12) | (counts[0] == 0)
@@ -154,7 +159,7 @@ def _verdicts(problem: Problem, objectives: Array, constraints: Array, status: C
     return Outcome(known, constraints, violation, verdict.astype(np.int8))
 
 
-def joined(parts: Sequence[Outcome]) -> Outcome:
+def join_outcomes(parts: Sequence[Outcome]) -> Outcome:
     """Outcomes one after the other."""
     if len(parts) == 1:
         return parts[0]
@@ -172,7 +177,7 @@ def deviations(problem: Problem, samples: int, stream: int) -> dict[str, Array]:
     source = np.random.default_rng([problem.study.optimizer.seed, 0, 1 + stream])
     tolerated = [variable for variable in problem.space.variables if variable.tolerance]
     if problem.study.robustness.distribution == "normal":
-        drawn = np.clip(source.standard_normal((samples, len(tolerated))) / SIGMAS, -1.0, 1.0)
+        drawn = np.clip(source.standard_normal((samples, len(tolerated))) / SIGMAS_IN_TOLERANCE, -1.0, 1.0)
     else:
         drawn = source.uniform(-1.0, 1.0, (samples, len(tolerated)))
     drawn[0] = 0.0
@@ -186,3 +191,75 @@ def corners(problem: Problem) -> dict[str, Array]:
         return {}
     ends = np.array(list(product((-1.0, 1.0), repeat=len(tolerated))))
     return {variable.name: variable.tolerance * row for variable, row in zip(tolerated, ends.T, strict=True)}
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """One objective over many machines of one design, SI.
+
+    Attributes:
+        label, unit: of the objective.
+        nominal: of the design itself.
+        mean, deviation: over all machines that can be judged.
+        usual: what 95 percent of them keep within.
+        worst: of all machines, those with every tolerance at an end included.
+        samples: of the random machines; NaN where one cannot be judged.
+    """
+
+    label: str
+    unit: str
+    nominal: float
+    mean: float
+    deviation: float
+    usual: float
+    worst: float
+    samples: Array
+
+
+@dataclass(frozen=True)
+class Robustness:
+    """The objectives of a design under its tolerances.
+
+    Attributes:
+        scatters: one for each objective.
+        machines: how many random ones.
+        corners: how many combinations of ends of tolerances were tried; 0 if there are too many of them.
+        failing: share of the random machines that are not feasible.
+    """
+
+    scatters: tuple[Scatter, ...]
+    machines: int
+    corners: int
+    failing: float
+
+
+def robustness_of(assess: Assessor, genes: Array) -> Robustness | None:
+    """Return the objectives of a design [variables] under the tolerances of its study; None where there are none."""
+    problem = assess.problem
+    if not any(variable.tolerance for variable in problem.space.variables):
+        return None
+    made = assess.judge_machines(genes, deviations(problem, problem.study.robustness.samples, ROBUSTNESS_STREAM))
+    ends = corners(problem)
+    extreme = assess.judge_machines(genes, ends) if ends else made.selection(np.empty(0, dtype=np.int64))
+    scatters = tuple(_scatter(assess, k, made, extreme) for k in range(len(problem.objectives)))
+    return Robustness(scatters, len(made.violation), len(extreme.violation), float((made.violation > 0.0).mean()))
+
+
+def _scatter(assess: Assessor, number: int, made: Outcome, extreme: Outcome) -> Scatter:
+    objective = assess.problem.objectives[number]
+    samples = made.objectives[:, number]
+    known = objective.sign * samples[np.isfinite(samples)]
+    ends = objective.sign * extreme.objectives[:, number]
+    every = np.concatenate([known, ends[np.isfinite(ends)]])
+    if not known.size:
+        known = every = np.array([np.nan])
+    return Scatter(
+        objective.term.label,
+        objective.term.unit,
+        float(samples[0]),
+        float(objective.sign * known.mean()),
+        float(known.std()),
+        float(objective.sign * np.quantile(known, 0.95)),
+        float(objective.sign * every.max()),
+        samples,
+    )

@@ -18,7 +18,7 @@ from pymoo.operators.survival.rank_and_crowding.metrics import get_crowding_func
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
 from kinetostat.arrays import Array, Integers
-from kinetostat.studies.optimisation.assessment import Assessor, Outcome, joined
+from kinetostat.studies.optimisation.assessment import Assessor, Outcome, join_outcomes
 from kinetostat.studies.optimisation.log import Log, Step
 from kinetostat.studies.optimisation.problem import Problem
 
@@ -48,7 +48,7 @@ class Genetic:
 
     @property
     def problem(self) -> Problem:
-        """What is searched."""
+        """The problem that is searched."""
         return self.assess.problem
 
     @property
@@ -66,7 +66,7 @@ class Genetic:
             genes = self._children(log.genes(parents), self._order(log.outcome(parents))[0], source)
         outcome = self.assess(genes)
         family = np.concatenate([parents, log.count + np.arange(len(genes))])
-        order, _ = self._order(joined([log.outcome(parents), outcome]) if number else outcome)
+        order, _ = self._order(join_outcomes([log.outcome(parents), outcome]) if number else outcome)
         best = np.argsort(order, kind="stable")[: self.problem.study.optimizer.population]
         return Step(genes, outcome, family[best])
 
@@ -103,25 +103,25 @@ class Genetic:
         """As many new designs as there are parents, none of them twice or one of the parents, as far as possible."""
         children = np.empty((0, parents.shape[1]))
         for _ in range(ATTEMPTS):
-            fresh = self._mated(parents, place, source)
+            fresh = self._mate(parents, place, source)
             children = np.concatenate([children, fresh[_new(fresh, np.concatenate([parents, children]))]])
             if len(children) >= len(parents):
                 break
-        return children[: len(parents)] if len(children) else self._mated(parents, place, source)
+        return children[: len(parents)] if len(children) else self._mate(parents, place, source)
 
-    def _mated(self, parents: Array, place: Integers, source: np.random.Generator) -> Array:
+    def _mate(self, parents: Array, place: Integers, source: np.random.Generator) -> Array:
         count, size = parents.shape
         couples = (count + 1) // 2
         rounds = [source.permutation(count) for _ in range(-(-4 * couples // count))]
         pairs = np.concatenate(rounds)[: 4 * couples].reshape(-1, 2)
         winners = np.where(place[pairs[:, 0]] < place[pairs[:, 1]], pairs[:, 0], pairs[:, 1])
         both = parents[winners.reshape(2, couples)]
-        children = self._crossed(both, source)
+        children = self._cross(both, source)
         copied = source.random(couples) >= CROSSED
         children[:, copied] = both[:, copied]
-        return self._mutated(children.reshape(-1, size)[:count], source)
+        return self._mutate(children.reshape(-1, size)[:count], source)
 
-    def _crossed(self, both: Array, source: np.random.Generator) -> Array:
+    def _cross(self, both: Array, source: np.random.Generator) -> Array:
         """Children of couples [2 x couples x variables]."""
         couples, size = both.shape[1:]
         index, swap = np.full((couples, 1), CROSSOVER_INDEX), np.full((couples, 1), 0.5)
@@ -133,7 +133,7 @@ class Genetic:
         children[:, exchanged] = both[::-1, exchanged]
         return children
 
-    def _mutated(self, genes: Array, source: np.random.Generator) -> Array:
+    def _mutate(self, genes: Array, source: np.random.Generator) -> Array:
         count, size = genes.shape
         catalogue = self.problem.space.catalogue
         picked = catalogue > 0
@@ -147,7 +147,7 @@ class Genetic:
 
 
 def _new(fresh: Array, known: Array) -> Integers:
-    """Which designs are neither known nor earlier in the list."""
+    """Flags of the designs that are neither known nor earlier in the list."""
     seen = {row.tobytes() for row in known}
     numbers = []
     for number, row in enumerate(fresh):

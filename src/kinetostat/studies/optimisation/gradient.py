@@ -51,7 +51,7 @@ class Gradient:
 
     @property
     def problem(self) -> Problem:
-        """What is searched."""
+        """The problem that is searched."""
         return self.assess.problem
 
     @property
@@ -121,7 +121,7 @@ class _Descent:
         scale = abs(self._objective(first)[0]) or 1.0
         genes, value = self.start[self.survey.free], np.inf
         for _ in range(ROUNDS if kinked else 1):
-            genes = self._minimised(genes, scale, kinked)
+            genes = self._minimise(genes, scale, kinked)
             here = self._at(genes)
             reached = self._objective(here)[0] / scale if here.sound else np.inf
             if not value - reached > GAIN:
@@ -148,7 +148,7 @@ class _Descent:
         value, slope = here.term(self._term, sign > 0)
         return sign * value, sign * slope
 
-    def _minimised(self, genes: Array, scale: float, kinked: bool) -> Array:
+    def _minimise(self, genes: Array, scale: float, kinked: bool) -> Array:
         """One call of the solver; in the epigraph the last unknown is the bound t."""
         count = len(genes)
         sign = self.problem.objectives[0].sign

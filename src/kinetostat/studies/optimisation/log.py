@@ -12,10 +12,11 @@ import numpy as np
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
 from kinetostat.arrays import Array, Integers
-from kinetostat.studies.optimisation.assessment import Outcome, joined
+from kinetostat.studies.optimisation.assessment import Outcome, join_outcomes
 from kinetostat.studies.optimisation.problem import Problem
 
-"""Numbers of designs in a log."""
+ROWS = "designs.bin"
+"""Name of the file with the rows of a log in the folder of a study."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class Log:
 
     @property
     def kept(self) -> Integers:
-        """What the last step kept."""
+        """Numbers of the designs that the last step kept."""
         return np.array(self.steps[-1]["kept"], dtype=np.int64)
 
     def genes(self, numbers: Integers | Sequence[int] | slice = slice(None)) -> Array:
@@ -85,7 +86,7 @@ class Log:
         return self.rows[numbers, : self._sizes[0]]
 
     def outcome(self, numbers: Integers | Sequence[int] | slice = slice(None)) -> Outcome:
-        """What some designs are worth."""
+        """Objectives, constraints and verdicts of some designs."""
         _, objectives, constraints, violation, verdict = np.split(self.rows[numbers], self._sizes, axis=1)
         return Outcome(objectives, constraints, violation[:, 0], verdict[:, 0].astype(np.int8))
 
@@ -109,11 +110,11 @@ class Log:
 
 
 def record_of(log: Log, step: Step) -> dict[str, Any]:
-    """What is noted about a step: its number, how many designs it judged, what it kept, and how good that is."""
+    """Return the note about a step: its number, how many designs it judged, what it kept, and how good that is."""
     problem, old = log.problem, step.kept < log.count
-    every = joined([log.outcome(step.kept[old]), step.outcome])
+    every = join_outcomes([log.outcome(step.kept[old]), step.outcome])
     place = np.where(old, np.cumsum(old) - 1, old.sum() + step.kept - log.count)
-    kept = every.chosen(place)
+    kept = every.selection(place)
     feasible = kept.violation == 0.0
     notes: dict[str, Any] = {}
     if len(problem.objectives) == 1 and feasible.any():
@@ -142,25 +143,25 @@ def front_of(log: Log) -> Integers:
     feasible = np.flatnonzero(outcome.violation == 0.0)
     if not feasible.size:
         return feasible
-    wanted = _wanted(log)[log.kept[feasible]]
+    wanted = _signed_objectives(log)[log.kept[feasible]]
     _, single = np.unique(wanted, axis=0, return_index=True)
     first = NonDominatedSorting().do(wanted[single], only_non_dominated_front=True)
     return log.kept[feasible][single][first[np.argsort(wanted[single][first, 0], kind="stable")]]
 
 
 def knee_of(log: Log, front: Integers) -> int:
-    """Which design of a front is its knee: the farthest from the plane through its ends, towards the better side.
+    """Return the place of the knee of a front: farthest from the plane through its ends, towards the better side.
 
     With each objective from 0 (its best on the front) to 1 (its worst), that is where their sum is least.
 
     Source: Das, On characterizing the "knee" of the Pareto curve, Structural Optimization 18 (1999).
     """
-    wanted = _wanted(log)[front]
+    wanted = _signed_objectives(log)[front]
     spans = np.ptp(wanted, axis=0)
     shares = (wanted - wanted.min(axis=0)) / np.where(spans > 0.0, spans, 1.0)
     return int(np.argmin(shares.sum(axis=1)))
 
 
-def _wanted(log: Log) -> Array:
+def _signed_objectives(log: Log) -> Array:
     """Objectives of all designs, with signs so that less is better."""
     return np.array([objective.sign for objective in log.problem.objectives]) * log.outcome().objectives

@@ -18,14 +18,12 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import current_name
 from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, read_study
 from kinetostat.studies.bundled import bundled_studies, study_of
-from kinetostat.studies.optimisation.catalogue import known_terms, read_term, usual_goal
-from kinetostat.studies.optimisation.poses import PoseSet, read_poses
-from kinetostat.studies.optimisation.terms import Aggregate, Term, parse_aggregate
-from kinetostat.studies.optimisation.variables import Space, read_space
+from kinetostat.studies.optimisation.space import PoseSet, Space, read_poses, read_space
+from kinetostat.studies.optimisation.terms import Aggregate, Term, known_terms, parse_aggregate, read_term, usual_goal
 from kinetostat.studies.quantities import refuse_loaded, without_derivatives
 from kinetostat.studies.workspace_verdicts import value_of
 
-MACHINE = (
+MACHINE_GIVEN = (
     "is a machine, but this command takes a study, which names the machine and says what may change and what is "
     "better; `kinetostat new study` prints a study to start from."
 )
@@ -67,7 +65,7 @@ class Constraint:
         unit = "" if self.term.unit == "1" else f" {self.term.unit}"
         return f"{self.term.label} {self._relation} {self.bound:.6g}{unit}"
 
-    def shown(self, display: Display) -> str:
+    def in_words(self, display: Display) -> str:
         """As people read it."""
         return f"{spoken(self.term.label)} {self._relation} {display.show(self.bound, self.term.unit)}"
 
@@ -77,13 +75,13 @@ class Constraint:
 
     @property
     def scale(self) -> float:
-        """What an excess is compared with."""
+        """The size with which an excess is compared."""
         return abs(self.bound) or 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Problem(Immutable):
-    """What is optimised.
+    """An optimisation problem.
 
     Attributes:
         study: as written, overrides included.
@@ -151,14 +149,14 @@ def load_problem(study: str | Path, settings: Sequence[str] = ()) -> Problem:
         return build_problem(study_of(name, settings))
     path = Path(study)
     if name in bundled():
-        raise InputError(f'"{name}" {MACHINE}')
+        raise InputError(f'"{name}" {MACHINE_GIVEN}')
     if not documents.exists(path):
         near = difflib.get_close_matches(name, shipped, 1)
         hint = f'did you mean "{near[0]}"?' if near else f"bundled studies: {', '.join(shipped)}."
         raise InputError(f"{shorten(name)} is neither a file nor a bundled study; {hint}")
     document = documents.read(path)
     if "family" in document:
-        raise InputError(f'"{name}" {MACHINE}')
+        raise InputError(f'"{name}" {MACHINE_GIVEN}')
     return build_problem(read_study(document, name, settings), path.parent)
 
 

@@ -18,7 +18,7 @@ from kinetostat.spec.study import read_study
 from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.genetic import Genetic
 from kinetostat.studies.optimisation.gradient import Gradient
-from kinetostat.studies.optimisation.log import Log, Step, record_of
+from kinetostat.studies.optimisation.log import ROWS, Log, Step, record_of
 from kinetostat.studies.optimisation.problem import Problem, problem_of
 from kinetostat.studies.optimisation.result import Result, result_of
 from kinetostat.studies.result_file import ROW_NUMBER, RowFile
@@ -32,7 +32,6 @@ from kinetostat.studies.study_folder import (
     study_folder,
 )
 
-ROWS = "designs.bin"
 STUDY_VERSION = 1
 
 Watch = Callable[[int, int, float | None], None]
@@ -48,7 +47,7 @@ def never() -> bool:
     return False
 
 
-def unwatched(_done: int, _total: int, _best: float | None) -> None:
+def ignore_progress(_done: int, _total: int, _best: float | None) -> None:
     """Ignore the progress of a search."""
 
 
@@ -57,10 +56,10 @@ class Method(Protocol):
 
     @property
     def steps(self) -> int:
-        """How many."""
+        """Number of steps."""
 
     def step(self, number: int, log: Log) -> Step:
-        """The one of that number."""
+        """Make the step of that number."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +102,7 @@ def method_of(assess: Assessor) -> Method:
 def optimize(
     problem: Problem,
     folder: str | Path | None = None,
-    watch: Watch = unwatched,
+    watch: Watch = ignore_progress,
     resume: bool = False,
     stop: Stop = never,
 ) -> Result:
@@ -126,7 +125,7 @@ def optimize(
     return result_of(assess, log)
 
 
-def search(assess: Assessor, watch: Watch = unwatched) -> Log:
+def search(assess: Assessor, watch: Watch = ignore_progress) -> Log:
     """Search in memory and return the log of all designs."""
     log = Log(assess.problem)
     method = method_of(assess)
@@ -137,7 +136,7 @@ def search(assess: Assessor, watch: Watch = unwatched) -> Log:
 
 
 def search_into(
-    assess: Assessor, folder: Path, watch: Watch = unwatched, resume: bool = False, stop: Stop = never
+    assess: Assessor, folder: Path, watch: Watch = ignore_progress, resume: bool = False, stop: Stop = never
 ) -> Log:
     """Search into a folder, continuing a search of the same study that is there; return the log of all designs.
 
@@ -193,14 +192,14 @@ def _take(method: Method, log: Log) -> None:
 def _take_up(problem: Problem, study: StudyFolder, log: Log) -> None:
     """Check that the folder holds this study, or begin it."""
     question = question_of(problem, log.width)
-    stored = study.question(question, _restated)
+    stored = study.question(question, _restate)
     if stored is None:
         (study.path / ROWS).unlink(missing_ok=True)
         study.begin(question | {"machine file": as_file(problem.machine)})
     log.unchecked = stored is not None and not has_checksums(stored)
 
 
-def _restated(stored: Record) -> Record:
+def _restate(stored: Record) -> Record:
     """A stored question as this version writes it."""
     return question_of(_problem_of(stored, "study.json"), stored["numbers in a row"])
 

@@ -1,24 +1,48 @@
-"""What objectives and constraints are about: numbers of a design, from quantities at its poses. One catalogue for both.
+"""Terms, of which objectives and constraints are made: numbers of a design, from quantities at its poses.
 
-A term says which quantities it needs, what they make together, and how that changes with each of them.
+A term says which quantities it needs, what they make together, and how that changes with each of them. The catalogue
+says by name what people may ask for, in which unit, and which way is better.
 """
 
+import difflib
+import math
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 
 from kinetostat.arrays import AnyArray, Array, Mask
-from kinetostat.spec.errors import InputError, shorten
+from kinetostat.kinetostatics.quantities import GROUPS, QUANTITIES
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.errors import InputError, choice, shorten
+from kinetostat.spec.renamed import current_name
+from kinetostat.spec.study import TermTable
+from kinetostat.studies.indices import three_numbers
+from kinetostat.studies.optimisation.space import PoseSet
+from kinetostat.studies.quantities import refuse_absent
 
-_FORM = re.compile(r"percentile\s+(\d{1,2}(?:\.\d+)?|100)")
+_PERCENTILE = re.compile(r"percentile\s+(\d{1,2}(?:\.\d+)?|100)")
 WORST, MEAN = "worst", "mean"
+SUMS = {"compliance_sum": "compliance", "stiffness_sum": "stiffness"}
+"""Weighted sums of the diagonal of C (eq. 40) and of K (eq. 39)."""
+ALONG = {
+    "compliance_along": ("compliance", 3, False, "m/N"),
+    "stiffness_along": ("compliance", 3, True, "N/m"),
+    "compliance_about": ("compliance", 0, False, "rad/(N·m)"),
+    "stiffness_about": ("compliance", 0, True, "N·m/rad"),
+}
+"""Along (force) and about (moment) a direction, all else free to follow: matrix, first row, whether its reciprocal."""
+STROKE, VOLUME = "leg_stroke", "workspace_volume"
+AXES = "xyz"
+
+Goal: TypeAlias = Literal["minimize", "maximize"]
 
 
 @dataclass(frozen=True)
 class Aggregate:
-    """How values become one number.
+    """The way in which many values become one number.
 
     Attributes:
         text: as written.
@@ -53,7 +77,7 @@ class Aggregate:
         if self.share == 1.0:
             return np.where(count > 0, sign * badness.max(axis=-1), np.nan)
         ordered = np.sort(badness, axis=-1)
-        low, high, part = self._between(count, values.shape[-1])
+        low, high, part = self._neighbours(count, values.shape[-1])
         lower, upper = (np.take_along_axis(ordered, place[..., None], -1)[..., 0] for place in (low, high))
         with np.errstate(invalid="ignore"):
             between = np.where(part > 0.0, lower + part * (upper - lower), lower)
@@ -66,12 +90,12 @@ class Aggregate:
             return there / max(int(count), 1)
         weights = np.zeros(len(values))
         order = np.argsort(np.where(there, values if high_is_bad else -values, -np.inf), kind="stable")
-        low, high, part = self._between(count, len(values))
+        low, high, part = self._neighbours(count, len(values))
         weights[order[low]] += 1.0 - float(part)
         weights[order[high]] += float(part)
         return weights
 
-    def _between(self, count: AnyArray, size: int) -> tuple[Any, Any, Any]:
+    def _neighbours(self, count: AnyArray, size: int) -> tuple[Any, Any, Any]:
         """Places of the two neighbours in increasing order, those that do not count first, and the way between."""
         rank = np.minimum((size - count) + (self.share or 0.0) * np.maximum(count - 1, 0), size - 1)
         low = np.floor(rank).astype(int)
@@ -87,7 +111,7 @@ def parse_aggregate(text: str, where: str) -> Aggregate:
     words = text.strip().lower()
     if words in (WORST, MEAN):
         return Aggregate(words, 1.0 if words == WORST else None)
-    match = _FORM.fullmatch(words)
+    match = _PERCENTILE.fullmatch(words)
     if match is None:
         raise InputError(
             f'{where} is {shorten(text)}; write "worst", "mean", or "percentile 95" (that share is better).'
@@ -118,7 +142,7 @@ class Term(Protocol):
         """The numbers of some designs [designs], from their quantities and which poses count [designs x poses]."""
 
     def slopes(self, quantities: dict[str, Array], there: Mask) -> dict[str, Array]:
-        """How the number of one design changes with each quantity at each pose [poses], by name.
+        """Derivatives of the number of one design by each quantity at each pose [poses], by name.
 
         Args:
             quantities, there: of one design [poses].
@@ -175,7 +199,7 @@ class PoseTerm:
 
 @dataclass(frozen=True)
 class StrokeTerm:
-    """How far actuated legs, all made alike, must extend: from the shortest leg of all poses to the longest, m."""
+    """The extension that actuated legs, all made alike, need: from the shortest leg of all poses to the longest, m."""
 
     label: str = "leg_stroke"
     unit: str = "m"
@@ -220,3 +244,111 @@ class VolumeTerm:
     def slopes(self, quantities: dict[str, Array], _there: Mask) -> dict[str, Array]:
         """0: it changes in steps, and between them not at all."""
         return {name: np.zeros_like(quantities[name]) for name in self.names}
+
+
+def known_terms(machine: Machine) -> list[str]:
+    """Names of all terms that a machine of this kind may be asked for."""
+    there = machine.family.component_names
+    of_poses = [
+        name for name, q in QUANTITIES.items() if all(part in there for part in q.components) and name != "aspect"
+    ]
+    return [*SUMS, *ALONG, STROKE, VOLUME, *of_poses]
+
+
+def usual_goal(name: str) -> Goal | None:
+    """Return which way an objective is better unless a study says otherwise; None where neither way is.
+
+    Args:
+        name: of a term of the catalogue.
+    """
+    if name == VOLUME or (name in {*SUMS, *ALONG} and name.startswith("stiffness")):
+        return "maximize"
+    if name not in QUANTITIES:
+        return "minimize"
+    better = QUANTITIES[name].better
+    return None if better is None else "maximize" if better == "more" else "minimize"
+
+
+def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: bool, where: str) -> Term:
+    """The term of an objective or a constraint.
+
+    Args:
+        machine: which has the parts that the quantity is about.
+        table: as written.
+        poses: at which designs are judged.
+        high_is_bad: whether great values are the bad ones.
+        where: the table's name, for messages.
+
+    Raises:
+        InputError: an unknown quantity, weights or a direction that do not belong to it, no aggregate.
+    """
+    name = _known_name(machine, table.quantity, f"{where}.quantity")
+    if table.weights is not None and name not in SUMS:
+        raise InputError(f"{where}: {name} takes no weights; leave them out, or ask for {' or '.join(SUMS)}.")
+    if table.direction is not None and name not in ALONG:
+        raise InputError(f"{where}: {name} takes no direction; leave it out, or ask for {', '.join(ALONG)}.")
+    if name == VOLUME:
+        return _volume(poses, where)
+    if name == STROKE:
+        refuse_absent(machine, StrokeTerm.names)
+        return StrokeTerm()
+    over = parse_aggregate(table.over, f"{where}.over")
+    label = name if poses.count == 1 else f"{name} ({over.text})"
+    if name in SUMS:
+        weights = _sum_weights(machine, name, table.weights, where)
+        return PoseTerm(label, "SI", tuple(weights.items()), False, over, high_is_bad)
+    if name in ALONG:
+        matrix, first, inverse, unit = ALONG[name]
+        weights = _direction_weights(machine, matrix, first, table.direction, where)
+        return PoseTerm(label, unit, tuple(weights.items()), inverse, over, high_is_bad)
+    refuse_absent(machine, [name])
+    return PoseTerm(label, QUANTITIES[name].unit, ((name, 1.0),), False, over, high_is_bad)
+
+
+def _known_name(machine: Machine, name: str, where: str) -> str:
+    """The name, if it is one of the catalogue; otherwise what was meant, or all but the single entries of C and K."""
+    known, name = known_terms(machine), current_name(name, "quantity")
+    entries = [entry for entry in known if entry in QUANTITIES and QUANTITIES[entry].components]
+    if name in known or difflib.get_close_matches(name, known, 1):
+        return choice(name, known, where)
+    return choice(name, [*(term for term in known if term not in entries), entries[0], entries[-1]], where)
+
+
+def _volume(poses: PoseSet, where: str) -> Term:
+    if poses.box is None:
+        raise InputError(
+            f"{where}: {VOLUME} needs a grid of poses; add over = [...] to [poses], ranges of coordinates."
+        )
+    return VolumeTerm(*poses.box)
+
+
+def _sum_weights(machine: Machine, name: str, given: Sequence[float] | None, where: str) -> Mapping[str, float]:
+    there = machine.family.component_names
+    names = [entry for entry in GROUPS[SUMS[name]] if QUANTITIES[entry].components[0] in there]
+    weights = [1.0] * len(names) if given is None else given
+    if len(weights) != len(names) or not any(weights) or min(weights) < 0.0:
+        raise InputError(
+            f"{where}.weights must be {len(names)} numbers of at least 0, not all 0, for {' '.join(there)}."
+        )
+    return {entry: weight for entry, weight in zip(names, weights, strict=True) if weight}
+
+
+def _direction_weights(
+    machine: Machine, matrix: str, first: int, direction: Sequence[float] | None, where: str
+) -> Mapping[str, float]:
+    """n^T C n as a sum of entries of C."""
+    size = math.hypot(*three_numbers(direction)) if direction else 0.0
+    if not direction or size == 0.0:
+        raise InputError(f"{where} needs a direction, e.g. direction = [0, 0, 1].")
+    n = [component / size for component in direction]
+    rotation = "r" if first == 0 else ""
+    weights: dict[str, float] = {}
+    for i in range(3):
+        for j in range(i, 3):
+            weight = n[i] * n[j] * (1.0 if i == j else 2.0)
+            parts = [f"{rotation}{AXES[i]}"] if i == j else [f"{rotation}{AXES[i]}", f"{rotation}{AXES[j]}"]
+            if weight and not all(part in machine.family.component_names for part in parts):
+                raise InputError(f"{where}.direction leaves the plane of {machine.name}, which has no {parts[-1]}.")
+            if weight:
+                weights["_".join([matrix, *parts])] = weight
+    return weights

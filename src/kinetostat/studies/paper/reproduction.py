@@ -28,8 +28,8 @@ from kinetostat.studies.analysis import analyze
 from kinetostat.studies.grid import evaluate_grid
 from kinetostat.studies.optimisation.problem import load_problem
 from kinetostat.studies.optimisation.result import Result
-from kinetostat.studies.optimisation.ridges import ridge_sentences
 from kinetostat.studies.optimisation.search import optimize
+from kinetostat.studies.optimisation.slopes import ridge_sentences
 from kinetostat.studies.paper import printed
 from kinetostat.studies.paper.printed import (
     EquationCheck,

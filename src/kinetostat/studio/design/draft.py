@@ -17,8 +17,8 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.study import OptimizerTable, StudyFile, read_study, study_toml
 from kinetostat.studies.bundled import study_of
-from kinetostat.studies.optimisation.catalogue import ALONG
 from kinetostat.studies.optimisation.problem import Problem, problem_of, settings_of
+from kinetostat.studies.optimisation.terms import ALONG
 from kinetostat.studio.controls import USUAL_STIFFNESS, Control
 from kinetostat.studio.design.state_folder import slug
 from kinetostat.studio.typed_value import typed_value

@@ -14,7 +14,7 @@ from kinetostat.kinetostatics.quantities import spoken
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.optimisation.log import best_feasible, front_of, knee_of
 from kinetostat.studies.optimisation.problem import Objective, Problem
-from kinetostat.studies.optimisation.result import designed
+from kinetostat.studies.optimisation.result import machine_of_design
 from kinetostat.studies.optimisation.search import kept_log, stored_problem
 from kinetostat.studies.study_folder import Record, read_history
 from kinetostat.studio.design.runs import FAILURE, RESULT, Run, Stage
@@ -70,7 +70,7 @@ class Progress:
         """The design at a place of the front as a machine; with one objective, place 0 is the best design."""
         if self.genes is None or not 0 <= place < len(self.genes):
             raise IndexError(place)
-        return designed(self.problem, self.genes[place])
+        return machine_of_design(self.problem, self.genes[place])
 
 
 class Follower:

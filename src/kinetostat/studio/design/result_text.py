@@ -41,7 +41,7 @@ def _so_far(progress: Progress) -> str:
     if progress.genes is not None:
         space = progress.problem.space
         pairs = zip(space.searched, space.values(progress.genes[0]), strict=True)
-        rows += [[variable.name, variable.shown(value, display)] for variable, value in pairs]
+        rows += [[variable.name, variable.in_words(value, display)] for variable, value in pairs]
     return heading("Best so far") + table("Best so far", ["", "best"], rows)
 
 
@@ -53,7 +53,7 @@ def _objectives(progress: Progress, result: dict[str, Any], best: str) -> str:
     for bound in problem.constraints:
         values = (given["constraints"][bound.label] for given in (result["initial"], result))
         texts = (problem.machine.display.show(value, bound.term.unit) for value in values)
-        rows.append([bound.shown(problem.machine.display), *texts, ""])
+        rows.append([bound.in_words(problem.machine.display), *texts, ""])
     title = "Objectives and constraints" if problem.constraints else "Objectives" if len(rows) > 1 else "Objective"
     return heading(title) + table(title, ["", "initial", best, "ratio"], rows)
 
@@ -66,9 +66,9 @@ def _design(problem: Problem, result: dict[str, Any]) -> str:
         variable = first.get(path)
         if variable is None or variable.choices is not None:
             before, after = DASH, f"{value:.6g}"
-            before = variable.shown(variable.initial, problem.machine.display) if variable else before
+            before = variable.in_words(variable.initial, problem.machine.display) if variable else before
         else:
-            before, after = (variable.shown(v, problem.machine.display) for v in (variable.initial, value))
+            before, after = (variable.in_words(v, problem.machine.display) for v in (variable.initial, value))
         percents = slopes.get(path, {}).get("percent_per_percent", [])
         rows.append([path, before, after, bounds.get(path, ""), ", ".join(_percent(p) for p in percents)])
     note = paragraph(

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.result_data import write_result
+from kinetostat.studies.optimisation.result import write_result
 from kinetostat.studies.optimisation.search import begin_search, optimize, stored_problem
 from kinetostat.studies.storage import write_text
 from kinetostat.studies.study_folder import QUESTION, in_use, read_history

@@ -15,7 +15,7 @@ from kinetostat.machine.parameters import find, values
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Quantity
 from kinetostat.studies.bundled import bundled_studies
-from kinetostat.studies.optimisation.catalogue import known_terms, usual_goal
+from kinetostat.studies.optimisation.terms import known_terms, usual_goal
 from kinetostat.studio.controls import Control, controls
 from kinetostat.studio.design.draft import (
     MOST_OBJECTIVES,

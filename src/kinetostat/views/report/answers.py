@@ -13,8 +13,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.identification.record import FitRecord, RecordedFit
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.result import Result
-from kinetostat.studies.optimisation.result_data import message
+from kinetostat.studies.optimisation.result import Result, message
 from kinetostat.studies.report import Answers
 from kinetostat.studies.under_load import LoadedState
 from kinetostat.views.answers import described, kind_of

@@ -15,7 +15,7 @@ from kinetostat.spec.installation import adding
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.attribution import by_part, ranked
 from kinetostat.studies.guideline_sentences import statements
-from kinetostat.studies.optimisation.result_data import message
+from kinetostat.studies.optimisation.result import message
 from kinetostat.studies.report import Answers
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.drawing import three_views

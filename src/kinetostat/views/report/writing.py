@@ -18,8 +18,7 @@ from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import as_json
-from kinetostat.studies.optimisation.result import Result
-from kinetostat.studies.optimisation.result_data import message
+from kinetostat.studies.optimisation.result import Result, message
 from kinetostat.studies.report import STEPS, Answers, Texts, gather, texts_of
 from kinetostat.studies.setting import pose_of
 from kinetostat.studies.storage import place_of, write_bytes
