@@ -35,7 +35,6 @@ from kinetostat.commands.common import (
 )
 from kinetostat.commands.compare import add_compare_commands
 from kinetostat.commands.doctor import add_doctor_command
-from kinetostat.commands.forward import add_forward_command
 from kinetostat.commands.grid import add_grid_commands
 from kinetostat.commands.influence import add_influence_commands
 from kinetostat.commands.loaded import analyze_loaded
@@ -201,7 +200,7 @@ def _parser() -> Parser:
     )
     takes_figures(analyze, "figures of the loaded machine: its shape, and the curve while the load grows")
     takes_json(analyze)
-    add_forward_command(commands)
+    add_question(commands, "forward")
     add_question(commands, "identify")
     add_question(commands, "command")
     add_path_command(commands)

@@ -6,7 +6,6 @@ The equations are solved in `kinematics.forward`; the command is `forward`.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,6 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.plain_data import as_answer
 from kinetostat.units import UnitError
 
 MOST_STARTS = 10_000
@@ -188,17 +186,3 @@ def _message(modes: list[AssemblyMode], machine: Machine, actuators: int) -> str
 def actuators_at(machine: Machine, joints: Joints | None = None) -> tuple[Actuator, ...]:
     """Where the actuators of a machine stand at its pose; see `kinematics.forward.stand`."""
     return tuple(replace(actuator, coordinate=float(actuator.coordinate)) for actuator in stand(machine, joints))
-
-
-def as_json(answer: Forward) -> dict[str, Any]:
-    """Return the answer as plain data, SI."""
-    poses = [{**vars(pose), "status": pose.status.word} for pose in answer.poses]
-    return as_answer(
-        {
-            "name": answer.machine.name,
-            "family": answer.machine.family.name,
-            "message": answer.message,
-            "actuators": answer.actuators,
-            "poses": poses,
-        }
-    )

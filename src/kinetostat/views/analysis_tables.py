@@ -19,8 +19,8 @@ from kinetostat.studies.indices import Along
 from kinetostat.studies.loads import LoadCase
 from kinetostat.studies.requirements import Verdict
 from kinetostat.tolerances import EQUAL_STIFFNESSES, ROUND_OFF_OF_ENTRY
-from kinetostat.views.assembly_tables import actuator_coordinates
 from kinetostat.views.first_lines import first_lines
+from kinetostat.views.forward import actuator_coordinates
 from kinetostat.views.requirement_lines import print_requirements
 from kinetostat.views.tables import numeric_table, print_doubts
 

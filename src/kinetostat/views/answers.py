@@ -90,7 +90,7 @@ KINDS = (
         },
     ),
     Kind("studies.analysis.Analysis", "views.analysis_tables.print_analysis", plain="studies.analysis.as_json"),
-    Kind("studies.assembly.Forward", "views.assembly_tables.print_forward", plain="studies.assembly.as_json"),
+    Kind("studies.assembly.Forward", description="views.forward.MODES"),
     Kind(
         "studies.under_load.LoadedState",
         "views.loaded_tables.print_loaded",

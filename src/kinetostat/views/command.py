@@ -17,8 +17,8 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.commanding import Command, command
 from kinetostat.studies.corrections import CorrectionTable, Term, correction_table
 from kinetostat.studies.plain_data import columns_csv
-from kinetostat.views.assembly_tables import precise
 from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.forward import precise
 from kinetostat.views.question import Description, Field, Lines, Option, Question
 from kinetostat.views.tables import numeric_table
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 QUESTIONS: Mapping[str, tuple[str, str]] = {
+    "forward": ("compute the poses that actuator coordinates give", "views.forward.FORWARD"),
     "modes": ("compute natural frequencies and modes, and the receptance of the tool", "views.vibration.MODES"),
     "budget": (
         "compute the error of the tool that tolerances allow, and what it is made of",
