@@ -19,8 +19,7 @@ from ideal_machines import MECHANISMS, Draw
 from kinetostat import analyze, load
 from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.solving import at_rest, with_share
-from kinetostat.equilibrium.stability import stability
-from kinetostat.equilibrium.tangent import compliance
+from kinetostat.equilibrium.tangent import compliance, stability
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond

@@ -15,7 +15,7 @@ from laws import Case, response_of
 from kinetostat.algebra import solve
 from kinetostat.algebra.vector import Vector
 from kinetostat.kinematics import leg_gaps
-from kinetostat.kinematics.singularity import independent
+from kinetostat.kinematics.mobility import count_independent
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics import leg, response
 from kinetostat.machine.loading import build
@@ -53,7 +53,7 @@ def zeros_are_counted(patch):
 
     def rank(_response, statics, _infinite):
         twists = [twist for twist, s in statics.motions if s > 0.0]
-        return independent(twists, 1.0 / float(statics.length), DEPENDENT_WRENCHES)
+        return count_independent(twists, 1.0 / float(statics.length), DEPENDENT_WRENCHES)
 
     patch.setattr(analysis, "_rank", rank)
 

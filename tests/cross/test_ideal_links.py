@@ -10,8 +10,7 @@ from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, NO_ANSWER
 from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.solving import Rest, at_rest, with_share
-from kinetostat.equilibrium.stability import stability
-from kinetostat.equilibrium.tangent import compliance
+from kinetostat.equilibrium.tangent import compliance, stability
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinetostat.numerics.iteration import Outcome, least_squares, newton
+from kinetostat.numerics.iteration import Ending, least_squares, newton
 
 SQUARES = np.array([2.0, 9.0, 1e-6, -1.0])
 """Numbers whose roots are sought; the last one has none."""
@@ -29,7 +29,7 @@ def test_roots_are_found_and_what_has_none_is_told_apart(criteria):
     answer = newton(roots, start, 4, most_steps=60, **criteria)
     assert (start == 5.1).all()
     assert answer.converged.tolist() == [True, True, True, False]
-    assert answer.outcome[3] == (Outcome.DIVERGED if "contraction" in criteria else Outcome.OUT_OF_STEPS)
+    assert answer.outcome[3] == (Ending.DIVERGED if "contraction" in criteria else Ending.OUT_OF_STEPS)
     assert answer.value[:3, 0] == pytest.approx(np.sqrt(SQUARES[:3]), rel=1e-8)
     assert "round-off" in repr(answer)
 
@@ -53,7 +53,7 @@ def test_numbers_that_are_not_finite_diverge():
         most_steps=5,
         settled=1e-3,
     )
-    assert answer.outcome.tolist() == [Outcome.CONVERGED, Outcome.DIVERGED]
+    assert answer.outcome.tolist() == [Ending.CONVERGED, Ending.DIVERGED]
 
 
 def valley(values, rows):
@@ -71,6 +71,6 @@ def valley(values, rows):
 def test_damped_steps_go_down_a_valley_and_tell_what_has_no_solution():
     answer = least_squares(valley, np.array([[-1.2, 1.0], [3.0, 0.0]]), most_steps=100, settled=1e-12, closed=1e-9)
     assert answer.value[0] == pytest.approx([1.0, 1.0], abs=1e-9)
-    assert answer.outcome.tolist() == [Outcome.CONVERGED, Outcome.DIVERGED]
+    assert answer.outcome.tolist() == [Ending.CONVERGED, Ending.DIVERGED]
     assert answer.residual[1] == pytest.approx(1.0)
     assert answer.value[1, 0] == pytest.approx(0.0, abs=1e-6)

@@ -30,7 +30,7 @@ from kinetostat.numerics.motions import (
 
 @dataclass(frozen=True)
 class State:
-    """Where a mechanism is, and what its legs carry, at n poses.
+    """A place of a mechanism with the loads of its legs, at n poses.
 
     Attributes:
         platform: displacement of the platform from the free state.
@@ -76,7 +76,7 @@ def free_state(mechanism: Mechanism) -> State:
 
 @dataclass(frozen=True)
 class LegTerms:
-    """What a leg adds to the equations, at n poses.
+    """Contribution of a leg to the equations, at n poses.
 
     Attributes:
         end: displacement of its end.

@@ -29,8 +29,8 @@ class Weight:
     """A mass at a point.
 
     Attributes:
-        name: of the part that it belongs to.
-        carried: how many of the leg's screw motions carry it; not used of the platform.
+        name: name of the part that it belongs to.
+        carried: number of the leg's screw motions that carry it; not used of the platform.
         point: where it is in the free state, m.
         mass: kg.
         inertia: about the point, base axes: xx, yy, zz, xy, xz, yz, kg·m²; zero where it is empty.
@@ -53,7 +53,7 @@ class Masses:
     of the bar at each end, and of a sixth that couples both.
 
     Attributes:
-        names: of the parts that they belong to [m].
+        names: names of the parts that they belong to [m].
         carried: how many of the leg's screw motions carry each [m]; not used of the platform.
         pairs: which of them are both halves of a bar.
         point: where they are in the free state [n x m x 3].
@@ -82,8 +82,8 @@ class Masses:
         return Masses(names, carried, (), **parts)
 
 
-def together(masses: Sequence[Masses]) -> Masses:
-    """Several masses as those of a single body; none if there are none, of a single pose."""
+def masses_of_one_body(masses: Sequence[Masses]) -> Masses:
+    """Return several masses as those of a single body; none if there are none, of a single pose."""
     if not masses:
         return Masses((), (), (), np.zeros((1, 0, 3)), *(np.zeros((1, 0)),) * 2, np.zeros((1, 0, 6)))
     names = tuple(name for part in masses for name in part.names)
@@ -96,16 +96,16 @@ class ElasticLeg:
     """A leg as a row of screw motions with its springs, masses and friction.
 
     Attributes:
-        name: its name.
+        name: name of the leg.
         chain: its motions in the free state; given amounts are those of the machine's actuators, then the growths of
             its links.
         springs: the spring of each coordinate [coordinates]; None of a passive one.
         stiffness: of each coordinate, 0 of a passive one [n x coordinates].
-        preload: what each carries where it is zero [n x coordinates].
-        sign: of the loads that it can carry, 0 for both [coordinates].
+        preload: load of each where it is zero [n x coordinates].
+        sign: sign of the loads that each can carry, 0 for both [coordinates].
         idle: a basis of motions of the passive coordinates that move nothing [n x coordinates x coordinates], with
             columns of zeros.
-        masses: that it carries.
+        masses: masses that it carries.
         rotors: inertia that the drives add to each coordinate, in the unit of masses times length, squared for a turn
             [n x coordinates].
         dampers: viscous friction of each coordinate, in units of force per velocity [n x coordinates].
@@ -129,12 +129,12 @@ class ElasticLeg:
 
     @property
     def size(self) -> int:
-        """How many coordinates it has."""
+        """Number of its coordinates."""
         return len(self.springs)
 
     @property
     def hinged(self) -> Mask:
-        """Which coordinates are flexure hinges, which pull back to the home pose [coordinates]."""
+        """Whether each coordinate is a flexure hinge, which pulls back to the home pose [coordinates]."""
         return np.array([spring is not None and not is_zero(spring.returns) for spring in self.springs], dtype=bool)
 
     def at(self, rows: Integers) -> "ElasticLeg":
@@ -145,7 +145,7 @@ class ElasticLeg:
 
 @dataclass(frozen=True)
 class Units:
-    """What lengths and forces are counted in, and where from."""
+    """Units of length and force, and the origin of points."""
 
     origin: Vector
     length: Array
@@ -203,24 +203,24 @@ class Units:
         return of_scalars([number], self.count)[:, 0] * (lighter / (self.length * self.length) if turns else lighter)
 
     def stiffness(self, spring: Spring) -> Array:
-        """Of a spring [n]."""
+        """Stiffness of a spring [n]."""
         unit = self.length / self.force if spring.joint.point is None else 1.0 / (self.force * self.length)
         return of_scalars([spring.stiffness], self.count)[:, 0] * unit
 
     def load(self, spring: Spring, load: Scalar) -> Array:
-        """In a spring [n]."""
+        """Load in a spring [n]."""
         unit = self.force if spring.joint.point is None else self.force * self.length
         return of_scalars([load], self.count)[:, 0] * (1.0 / unit)
 
 
 @dataclass
 class Given:
-    """The motions of given amounts that the legs have so far.
+    """Motions of given amounts that have been counted so far.
 
     Attributes:
-        most: how many actuators there will be.
-        actuators: so far.
-        growth: of links so far, m.
+        most: number of actuators that there will be.
+        actuators: springs of the actuators so far.
+        growth: growth of the links so far, m.
     """
 
     most: int

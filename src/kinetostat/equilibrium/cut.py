@@ -14,7 +14,7 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, total
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.chains import ElasticLeg, together
+from kinetostat.equilibrium.chains import ElasticLeg, masses_of_one_body
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.chain import Chain
@@ -26,7 +26,7 @@ TENSIONS = ("load.min_tension", "load.max_tension")
 
 
 @dataclass(frozen=True)
-class Rod:
+class ElasticRod:
     """A leg as a spring between two points; of its springs in a row, all carry the same.
 
     Attributes:
@@ -59,7 +59,7 @@ class Cut:
 
     mechanism: Mechanism
     carrier: ElasticLeg
-    rods: tuple[Rod, ...]
+    rods: tuple[ElasticRod, ...]
 
 
 def cut(mechanism: Mechanism) -> Cut | None:
@@ -92,8 +92,8 @@ def cut(mechanism: Mechanism) -> Cut | None:
                 return None  # a rotor between two springs has a motion of its own
             driven = tuple(mechanism.driven[i] for i in leg.chain.given if 0 <= i < len(mechanism.driven))
             sign = signs[0] if signs else 0.0
-            rods.append(Rod(*leg.rod, total(soft), total(given), sign, driven, total(rotors)))
-    return Cut(replace(mechanism, platform=together(masses)), carrier, tuple(rods))
+            rods.append(ElasticRod(*leg.rod, total(soft), total(given), sign, driven, total(rotors)))
+    return Cut(replace(mechanism, platform=masses_of_one_body(masses)), carrier, tuple(rods))
 
 
 def _free_motions(mechanism: Mechanism) -> ElasticLeg:
@@ -109,7 +109,7 @@ def _free_motions(mechanism: Mechanism) -> ElasticLeg:
         nothing,
         nothing[0],
         np.zeros((1, size, size)),
-        together([]),
+        masses_of_one_body([]),
         nothing,
         nothing,
     )

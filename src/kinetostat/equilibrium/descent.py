@@ -29,9 +29,9 @@ from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.numerics.iteration import Steps, newton
 from kinetostat.tolerances import CLOSED, NEARLY_AT_REST, ZERO_PIVOT
 
-MOST_STEPS = 200
+MOST_DESCENT_STEPS = 200
 """Of a descent: nine in ten end within 30, and a machine that falls has then fallen by 40 of its lengths."""
-LONGEST_STEP = 0.2
+LARGEST_RADIUS = 0.2
 """Radius of the trust region at most, rad and in units of the machine's length."""
 MOST_CLOSINGS = 6
 """Corrections that close the legs after a step: where they need more, the step is too long."""
@@ -54,9 +54,9 @@ def descent_from(mechanism: Mechanism, start: State) -> State:
         The states that were reached; Newton's method from there tells whether they are at rest.
     """
     state, closed = _closed_state(mechanism, start)
-    radius = np.full(len(mechanism.length), LONGEST_STEP)
+    radius = np.full(len(mechanism.length), LARGEST_RADIUS)
     rows = np.flatnonzero(closed)
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_DESCENT_STEPS):
         if not len(rows):
             break
         part = mechanism.at(rows)
@@ -67,7 +67,7 @@ def descent_from(mechanism: Mechanism, start: State) -> State:
         share = np.where(closed, fall, -1.0) / np.maximum(step.fall, ZERO_PIVOT)
         lower = share > LEAST_SHARE
         wider = np.where(share > GOOD_SHARE, np.maximum(radius[rows], 2.0 * step.size), radius[rows])
-        radius[rows] = np.where(lower, np.minimum(wider, LONGEST_STEP), 0.25 * step.size)
+        radius[rows] = np.where(lower, np.minimum(wider, LARGEST_RADIUS), 0.25 * step.size)
         state = state.with_part(rows, before).with_part(rows[lower], there.at(np.flatnonzero(lower)))
         rows = rows[step.size > NEARLY_AT_REST]
     return state
@@ -102,8 +102,8 @@ class _Step:
     Attributes:
         equations: there, with wrenches that balance all but the admissible motions.
         unknowns: by which it changes them [n x unknowns].
-        size: of the admissible motion; NaN where it is not known [n].
-        fall: of the potential as the model foresees it [n].
+        size: size of the admissible motion; NaN where it is not known [n].
+        fall: fall of the potential as the model foresees it [n].
     """
 
     equations: Balance
@@ -139,7 +139,7 @@ class _Model:
 
     Attributes:
         stiffness: K, of everything but one-sided springs [n x m x m].
-        force: f, of everything but these [n x m].
+        force: f, of everything but these springs [n x m].
         lines: by which a unit of each motion stretches them [n x springs x m].
         loads: that they would carry if they carried both ways, positive where they carry [n x springs].
         springs: stiffness of them [n x springs].
@@ -152,7 +152,7 @@ class _Model:
     springs: Array
 
     def change(self, step: Array) -> Array:
-        """How much higher the model is after a step [n x m] than before it [n]."""
+        """Rise of the model by a step [n x m], negative where it falls [n]."""
         smooth = -(self.force * step).sum(axis=1) + 0.5 * np.einsum("ni,nij,nj->n", step, self.stiffness, step)
         before, after = (np.maximum(loads, 0.0) for loads in (self.loads, self.loads_after(step)))
         return np.asarray(smooth + (0.5 * (after - before) * (after + before) / self.springs).sum(axis=1))
@@ -200,7 +200,7 @@ def _model(equations: Balance, part: Admissible) -> _Model:
 
 
 def least_within(stiffness: Array, force: Array, radius: Array) -> Array:
-    """Where -f y + y K y / 2 is least among all y within a radius [n x m].
+    """Find the least value of -f y + y K y / 2 within a radius; return its place y [n x m].
 
     That is (K + s) y = f with the least shift s that leaves no negative eigenvalue and no longer y. Where the force is
     at right angles to a direction in which the potential falls to both sides, y does not choose one.

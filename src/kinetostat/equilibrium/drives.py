@@ -1,4 +1,4 @@
-"""What drives and joints add to the coordinates of a leg: inertia of rotors through their transmission, and friction.
+"""Inertia of rotors through their transmission, and friction of joints: what coordinates of a leg have beside springs.
 
 A rotor turns against the spring of its actuator, which stands for drive and transmission: while the machine vibrates,
 the deflection of that spring is the rotor's motion. A linear actuator with the lead l turns its rotor by 2 pi / l per
@@ -24,7 +24,7 @@ def with_drives(leg: ElasticLeg, units: Units, drives: Any, damping: Any) -> Ela
     """Add what rotors and friction do to the coordinates of a leg.
 
     Args:
-        leg: without it.
+        leg: the leg without drives.
         units: in which it is counted.
         drives, damping: the tables of these names.
 

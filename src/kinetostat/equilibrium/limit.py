@@ -1,4 +1,4 @@
-"""Up to which share of its loads a mechanism stands: the last stable state of rest while they grow from nothing.
+"""Load factor of a mechanism up to its loads: the last stable state of rest while these grow from nothing.
 
 Preloads are there from the beginning. The state is followed in steps, each from the one before. It is lost where no
 other one is nearby, where it is not stable, or where the next one is a leap away: the mechanism has snapped over.
@@ -12,33 +12,33 @@ from kinetostat.arrays import Array, Mask
 from kinetostat.equilibrium.balance import Balance, State, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.solving import at_rest, states_near, with_share
-from kinetostat.equilibrium.stability import Stability, stabilities, stability
+from kinetostat.equilibrium.tangent import Stability, stabilities, stability
 from kinetostat.numerics.motions import logarithm
 from kinetostat.tolerances import AT_REST, ZERO_PIVOT
 
-RATIO, CANDIDATES, FEW = 2.0, 14, 4
+STEP_RATIO, CANDIDATES, FEW_CANDIDATES = 2.0, 14, 4
 """Steps of the loads that are tried together: all that is left of them, and each time by this ratio less; few of them
 where the machine may stand under all."""
-MOST_STEPS = 14
+MOST_LOAD_STEPS = 14
 """Of the loads: a machine that moves very far before it is lost is not followed to the end, which takes seconds."""
-FINE = 1e-3
-"""Share of what it stands by which the last step is allowed to be wrong."""
-MOST_ITERATIONS = 8
+ACCURACY_OF_SHARE = 1e-3
+"""Relative accuracy of the load factor."""
+MOST_NEWTON_STEPS = 8
 """Of Newton's method in a step: where it needs more, the step is too long."""
-BENT = 0.5
+MISSED_BY_TANGENTS = 0.5
 """Share of its motion by which a step may miss what the tangents at its ends foresee: where it misses more, the state
 has snapped over, or the step is too long."""
-LONGEST = 0.3
+LONGEST_PLATFORM_STEP = 0.3
 """Motion of the platform in a step, rad or in units of the machine's length."""
 
 
 @dataclass(frozen=True)
-class Limit:
-    """The last stable state.
+class LoadLimit:
+    """The last stable state of rest while the loads grow.
 
     Attributes:
-        share: of the loads there.
-        balance: the equations there.
+        share: share of the loads there.
+        balance: equations there.
         judged: how it gives way.
         least: whether the machine was not followed to its end: it stands by this share or more.
     """
@@ -49,7 +49,7 @@ class Limit:
     least: bool = False
 
 
-def limit_of(mechanism: Mechanism) -> Limit | None:
+def limit_of(mechanism: Mechanism) -> LoadLimit | None:
     """Follow a mechanism at one pose under growing loads.
 
     Args:
@@ -66,27 +66,27 @@ def limit_of(mechanism: Mechanism) -> Limit | None:
     # Springs that only pull may hold nothing until a load tensions them: then it stands from some share on.
     if not any(leg.sign.any() for leg in mechanism.legs):
         return reached
-    shares = _shares(0.0, FEW)
-    solution = at_rest(with_share(mechanism.at(np.zeros(FEW, dtype=np.int64)), shares, preload=1.0))
+    shares = _shares(0.0, FEW_CANDIDATES)
+    solution = at_rest(with_share(mechanism.at(np.zeros(FEW_CANDIDATES, dtype=np.int64)), shares, preload=1.0))
     stands = np.flatnonzero(solution.settled & stabilities(solution.balance).stable)
     if not len(stands):
         return reached
     equations = solution.at(stands[:1])
-    return _limit_from(mechanism, Limit(float(shares[stands[0]]), equations, stability(equations)))
+    return _limit_from(mechanism, LoadLimit(float(shares[stands[0]]), equations, stability(equations)))
 
 
-def _limit_from(mechanism: Mechanism, last: Limit) -> Limit:
+def _limit_from(mechanism: Mechanism, last: LoadLimit) -> LoadLimit:
     """The last stable state while the loads grow from one under which the mechanism stands."""
-    whole = _standing(mechanism, _shares(last.share, FEW), last)  # as nearly every machine stands
+    whole = _standing(mechanism, _shares(last.share, FEW_CANDIDATES), last)  # as nearly every machine stands
     if whole is not None and whole.share == 1.0:
         return whole
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_LOAD_STEPS):
         if last.share == 1.0:
             return last
         there = _standing(mechanism, _shares(last.share, CANDIDATES), last)
         if there is None:
             return last
-        nearly = there.share - last.share < FINE * there.share
+        nearly = there.share - last.share < ACCURACY_OF_SHARE * there.share
         last = there
         if nearly:
             return last
@@ -94,12 +94,12 @@ def _limit_from(mechanism: Mechanism, last: Limit) -> Limit:
 
 
 def _shares(last: float, count: int) -> Array:
-    """So many shares of the loads beyond the last one, up to all of them."""
-    left = RATIO ** -np.arange(count - 1.0, 0.0, -1.0)
+    """Return so many shares of the loads beyond the last one, up to all of them."""
+    left = STEP_RATIO ** -np.arange(count - 1.0, 0.0, -1.0)
     return np.append(last + (1.0 - last) * left, 1.0)
 
 
-def _standing(mechanism: Mechanism, shares: Array, last: Limit | None) -> Limit | None:
+def _standing(mechanism: Mechanism, shares: Array, last: LoadLimit | None) -> LoadLimit | None:
     """The state under the greatest of some shares up to which all are stable and near the last one.
 
     Args:
@@ -110,7 +110,7 @@ def _standing(mechanism: Mechanism, shares: Array, last: Limit | None) -> Limit 
     rows = np.zeros(len(shares), dtype=np.int64)
     every, start = mechanism.at(rows), (free_state(mechanism) if last is None else last.balance.state).at(rows)
     loaded = with_share(every, shares, preload=1.0)
-    solution = states_near(loaded, start, MOST_ITERATIONS)
+    solution = states_near(loaded, start, MOST_NEWTON_STEPS)
     stands = solution.settled & stabilities(solution.balance).stable
     if last is not None:
         stands &= _near(with_share(every, last.share, preload=1.0), start, loaded, solution.state)
@@ -118,7 +118,7 @@ def _standing(mechanism: Mechanism, shares: Array, last: Limit | None) -> Limit 
     if not count:
         return None
     equations = solution.at(np.array([count - 1]))
-    return Limit(float(shares[count - 1]), equations, stability(equations))
+    return LoadLimit(float(shares[count - 1]), equations, stability(equations))
 
 
 def _near(before: Mechanism, start: State, after: Mechanism, end: State) -> Mask:
@@ -133,4 +133,4 @@ def _near(before: Mechanism, start: State, after: Mechanism, end: State) -> Mask
     share = ((moved - first) * across).sum(axis=1) / np.maximum((across * across).sum(axis=1), ZERO_PIVOT)
     foreseen = first + np.clip(share, 0.0, 1.0)[:, None] * across
     size, wrong = np.abs(moved).max(axis=1), np.abs(moved - foreseen).max(axis=1)
-    return np.asarray((size <= LONGEST) & (wrong <= BENT * size + AT_REST))
+    return np.asarray((size <= LONGEST_PLATFORM_STEP) & (wrong <= MISSED_BY_TANGENTS * size + AT_REST))

@@ -30,16 +30,16 @@ class Mechanism:
     """A machine at n poses, in units of its own.
 
     Attributes:
-        legs: of it.
+        legs: its legs.
         driven: the springs of the actuators that can be driven, in the order of the legs.
-        growth: by which links are longer because they are warmer, in units of length [n x links].
+        growth: elongation of each link that is warmer, in units of length [n x links].
         platform: masses of platform, tool and payload.
         wrench: the moment of all loads, and the force at the tool point, base axes [n x 6].
         pushed: points of the platform at which further forces act, in the free state [n x forces x 3].
-        forces: that act there, base axes [n x forces x 3].
-        gravity: [n x 3].
+        forces: forces that act there, base axes [n x forces x 3].
+        gravity: acceleration of free fall, base axes, m/s² [n x 3].
         ways: orthonormal twists that exist, as columns [6 x 6, or 6 x 3 of a planar machine].
-        length: m [n].
+        length: unit of length, m [n].
         force: unit of force, N [n].
         weighs: whether any mass is known.
     """
@@ -74,7 +74,7 @@ class Mechanism:
 
     @property
     def starts(self) -> list[int]:
-        """Where the coordinates and then the wrench of each leg begin among the unknowns, and where the last ones end.
+        """Places of the unknowns at which the coordinates and the wrench of each leg begin, and the end of the last.
 
         Before them stands the twist of the platform.
         """

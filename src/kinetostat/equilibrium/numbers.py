@@ -12,9 +12,8 @@ from kinetostat.algebra.scalar import Scalar, smaller, where
 from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.solving import at_rest
-from kinetostat.equilibrium.stability import Stabilities, stabilities
 from kinetostat.equilibrium.state import HELD_BY_LOADS, MachineState, actuator_loads_at_rest
-from kinetostat.equilibrium.tangent import compliance, inverse
+from kinetostat.equilibrium.tangent import Stabilities, compliance, inverse, stabilities
 from kinetostat.kinematics.limits import load_checks, within
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import LOADS_OF_ACTUATORS

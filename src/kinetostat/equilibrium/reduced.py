@@ -19,7 +19,7 @@ from kinetostat.algebra.symmetric import POSITIONS, greatest_eigenvalue
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import LegTerms, leg_terms, platform_load
-from kinetostat.equilibrium.cut import Cut, Rod, cut
+from kinetostat.equilibrium.cut import Cut, ElasticRod, cut
 from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.numbers import borne, greatest_loads
 from kinetostat.equilibrium.solving import LONGEST_STEP
@@ -36,18 +36,18 @@ LARGEST_TURN = 0.2
 """Sine of the turn of the platform up to which the series of the arc sine keeps all digits."""
 ARC_SINE = (1.0, 1 / 6, 3 / 40, 15 / 336, 105 / 3456, 945 / 42240, 10395 / 599040, 135135 / 9676800)
 """Coefficients of asin(s) / s in powers of s²."""
-SURE = 1e-9
+SURE_PIVOT = 1e-9
 """Share of a diagonal entry below which its pivot says too little about stability."""
 
 
 @dataclass(frozen=True)
 class _Pull:
-    """What a rod from a point b of the base to a point a of the platform does.
+    """Pull of a rod from a point b of the base to a point a of the platform.
 
     Attributes:
         near, at: b and a.
         moment: a x b.
-        length: of it.
+        length: length of the rod.
         tension: with which it pulls.
         density: its tension over its length, c: it pulls with c (b - a), and that is all but for its stretching.
         stretching, elastic: k - c and k over the square of its length, with its stiffness k.
@@ -70,7 +70,7 @@ class _Pull:
         return (*(-self.moment).components(), *(self.at - self.near).components())
 
 
-def _pull(rod: Rod, platform: Motions | None) -> _Pull:
+def _pull(rod: ElasticRod, platform: Motions | None) -> _Pull:
     """A rod at a place of the platform, or in the free state."""
     near, far = Vector(*rod.near[0]), Vector(*rod.far[0])
     at = far if platform is None else Vector(*platform.point(rod.far)[0])
@@ -89,7 +89,7 @@ def _pull(rod: Rod, platform: Motions | None) -> _Pull:
     return _Pull(near, at, at.cross(near), length, tension, density, stretching, elastic, slack)
 
 
-def _pulled(pulls: Sequence[_Pull]) -> tuple[Array, Array]:
+def _wrench_of_rods(pulls: Sequence[_Pull]) -> tuple[Array, Array]:
     """The wrench of all rods at the origin [1 x 6], and its decrease by a twist [1 x 6 x 6]."""
     pulled = [pull.at * pull.density for pull in pulls]
     ends = _sum(pulled)
@@ -100,7 +100,7 @@ def _pulled(pulls: Sequence[_Pull]) -> tuple[Array, Array]:
     ]
     moment = [turned[i][j] - turned[j][i] for i, j in ((1, 2), (2, 0), (0, 1))]
     trace, density = turned[0][0] + turned[1][1] + turned[2][2], total([pull.density for pull in pulls])
-    fall = _stretched(pulls, [pull.stretching for pull in pulls])[None]
+    fall = _sum_of_dyads(pulls, [pull.stretching for pull in pulls])[None]
     for i in range(3):
         for j in range(3):
             fall[0, i, j] = fall[0, i, j] + (trace if i == j else 0.0) - turned[i][j]
@@ -123,12 +123,12 @@ class Place:
     """The equations at some coordinates of the carrier.
 
     Attributes:
-        platform: where it is.
-        pulls: of the rods.
-        terms: of the carrier.
+        platform: displacement of the platform.
+        pulls: pulls of the rods.
+        terms: contribution of the carrier to the equations.
         rates: change of what is left, by the coordinates [coordinates x coordinates].
         elastic: the part of it that springs make.
-        slack: how many rods carry nothing.
+        slack: number of rods that carry nothing.
     """
 
     platform: Motions
@@ -149,16 +149,16 @@ def place_of(machine: Cut, coordinates: Row) -> Place:
     grows = any(number >= len(mechanism.actuators) for number in carrier.chain.given)
     free = not grows and all(is_zero(coordinate) for coordinate in coordinates)
     pulls = [_pull(rod, None if free else platform) for rod in machine.rods]
-    (load, change), (hold, fall) = platform_load(mechanism, platform), _pulled(pulls)
+    (load, change), (hold, fall) = platform_load(mechanism, platform), _wrench_of_rods(pulls)
     terms = leg_terms(carrier, moved, load + hold, amounts, mechanism.gravity, placed)
     twists = terms.rates[0]
     springs = terms.carrying[0][:, None] * np.eye(carrier.size)
     rates = springs + terms.geometric[0] + twists.T @ (fall - change)[0] @ twists
-    elastic = springs + twists.T @ _stretched(pulls, [pull.elastic for pull in pulls]) @ twists
+    elastic = springs + twists.T @ _sum_of_dyads(pulls, [pull.elastic for pull in pulls]) @ twists
     return Place(platform, tuple(pulls), terms, rates, elastic, total([pull.slack for pull in pulls]))
 
 
-def _stretched(pulls: Sequence[_Pull], weights: Row) -> Array:
+def _sum_of_dyads(pulls: Sequence[_Pull], weights: Row) -> Array:
     """The weighted sum of the dyads of all lines [6 x 6]."""
     result = np.zeros((6, 6), dtype=object)
     for i, j in POSITIONS:
@@ -197,7 +197,7 @@ class Reduced:
 
     @property
     def size(self) -> int:
-        """How many coordinates there are."""
+        """Number of coordinates."""
         return self.cut.carrier.size
 
     def start(self) -> Row:
@@ -257,7 +257,7 @@ def _square(step: Row) -> Scalar:
 
 
 class Tangent:
-    """How a machine resists at a place, and Newton's step from there."""
+    """Resistance of a machine at a place, and Newton's step from there."""
 
     def __init__(self, machine: Cut, place: Place) -> None:
         self.place, self.mechanism, self.carrier, self.rods = place, machine.mechanism, machine.carrier, machine.rods
@@ -312,7 +312,7 @@ class Tangent:
         else:
             left, right = rows, [self._factors.solve(row) for row in rows]
         whole = [[total([a * b for a, b in zip(row, column, strict=True)]) for column in right] for row in left]
-        return [[_resisted(0.5 * (whole[i][j] + whole[j][i])) for j in range(6)] for i in range(6)]
+        return [[_without_round_off(0.5 * (whole[i][j] + whole[j][i])) for j in range(6)] for i in range(6)]
 
     def factor(self) -> tuple[Scalar, Scalar]:
         """By which the load may grow until the state gives way, and whether springs alone hold the machine."""
@@ -323,7 +323,7 @@ class Tangent:
         return where(grows, 1.0 / where(grows, greatest, 1.0), math.inf), definite(half, elastic)
 
 
-def _resisted(compliance: Scalar) -> Scalar:
+def _without_round_off(compliance: Scalar) -> Scalar:
     return where(abs(compliance) < UNRESISTED, 0.0, compliance)
 
 
@@ -340,7 +340,7 @@ def definite(factors: Eliminated, rows: Array) -> Scalar:
     """Whether a symmetric matrix is surely positive definite, by the pivots of its elimination."""
     good: Scalar = True
     for k, pivot in enumerate(factors.pivots):
-        good = good & (pivot > SURE * abs(rows[k, k]))
+        good = good & (pivot > SURE_PIVOT * abs(rows[k, k]))
     return good
 
 

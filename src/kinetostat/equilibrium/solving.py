@@ -6,19 +6,17 @@ Source: theory section 12. Units, axes and origin are those of `mechanism`.
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property, partial
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.equilibrium.admissible import finite_solution, solve_over_admissible
 from kinetostat.equilibrium.balance import Balance, State, balance, free_state, motion_of, state_after
 from kinetostat.equilibrium.descent import descent_from
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.stability import stabilities
+from kinetostat.equilibrium.tangent import solve, stabilities
 from kinetostat.numerics.iteration import Steps, largest, newton
-from kinetostat.tolerances import AT_REST, STIFFEST_LEG
+from kinetostat.tolerances import AT_REST
 
 MOST_STEPS_OF_LOAD = 25
 """Of Newton's method for one step of the load."""
@@ -163,44 +161,3 @@ def states_near(mechanism: Mechanism, start: State, most_steps: int = MOST_STEPS
         size=partial(motion_of, mechanism),
     )
     return Equilibria(mechanism, end.value, end.converged)
-
-
-def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
-    """Solve the linear equations at a state for right sides [n x unknowns x k].
-
-    Each leg is eliminated by itself, so that it is a stiffness to the platform. A leg with rigid parts only has none,
-    and beside a leg that is much stiffer, what resists softly loses its digits. Such poses are solved over the motions
-    that keep all legs closed.
-
-    Args:
-        equations: at the state.
-        right: right sides.
-        loaded: with what loads and wrenches do by turning.
-    """
-    size, starts = equations.mechanism.ways.shape[1], equations.mechanism.starts
-    whole, total = equations.platform_rates(loaded), right[:, :size]
-    parts, stiffest = [], np.zeros(len(right))
-    for number, (start, end) in enumerate(pairwise(starts)):
-        pushed = np.zeros((len(right), end - start, size))
-        pushed[:, -size:] = np.eye(size)
-        try:
-            part = np.linalg.solve(
-                equations.leg_rates(number, loaded), np.concatenate([right[:, start:end], pushed], axis=2)
-            )
-        except np.linalg.LinAlgError:
-            return solve_over_admissible(equations, right, loaded)
-        stiffness = part[:, -size:, -size:]
-        if not (np.abs(stiffness) < STIFFEST_LEG).all():
-            return solve_over_admissible(equations, right, loaded)
-        parts.append(part)
-        stiffest = np.maximum(stiffest, np.abs(stiffness).max(axis=(1, 2)))
-        whole, total = whole + stiffness, total - part[:, -size:, :-size]
-    twist = finite_solution(whole, total)
-    result = np.concatenate([twist, *(part[:, :, :-size] + part[:, :, -size:] @ twist for part in parts)], axis=1)
-    sound = np.flatnonzero(np.isfinite(whole).all(axis=(1, 2)))
-    softest = np.linalg.svd(whole[sound], compute_uv=False)[:, -1]
-    rows = sound[stiffest[sound] > STIFFEST_LEG * softest]
-    if len(rows):
-        there = balance(equations.mechanism.at(rows), equations.state.at(rows))
-        result[rows] = solve_over_admissible(there, right[rows], loaded)
-    return result

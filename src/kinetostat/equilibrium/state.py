@@ -14,13 +14,13 @@ import numpy as np
 
 from kinetostat.algebra.scalar import total
 from kinetostat.arrays import Array, Integers, Mask
+from kinetostat.equilibrium.actuation import with_tensions
 from kinetostat.equilibrium.balance import Balance, balance, free_state
-from kinetostat.equilibrium.buckling import Strut, struts
-from kinetostat.equilibrium.limit import Limit, limit_of
+from kinetostat.equilibrium.limit import LoadLimit, limit_of
+from kinetostat.equilibrium.links import Strut, struts
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.solving import at_rest, with_share
-from kinetostat.equilibrium.stability import Stability, stability
-from kinetostat.equilibrium.tensions import tensioned
+from kinetostat.equilibrium.tangent import Stability, stability
 from kinetostat.kinematics.closure import Joints, solve_joints
 from kinetostat.kinematics.limits import load_checks, within
 from kinetostat.kinematics.mobility import Mobility
@@ -193,7 +193,7 @@ class MachineState(Immutable):
         return self.at_rest if self.stands else None
 
     @cached_property
-    def limit(self) -> Limit | None:
+    def limit(self) -> LoadLimit | None:
         """The state in which the machine stands last while its loads grow, up to all of them; None if it never does."""
         return limit_of(self.mechanism)
 
@@ -282,7 +282,7 @@ def _loaded_mechanism(
             f"{machine.name}: load.min_tension and load.max_tension bound what only pulls or only pushes, which no "
             'spring does; write acts = "pulls" at an actuator, or a leg of type = "cable".'
         )
-    return tensioned(mechanism, least / mechanism.force, most / mechanism.force)
+    return with_tensions(mechanism, least / mechanism.force, most / mechanism.force)
 
 
 def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:

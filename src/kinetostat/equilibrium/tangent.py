@@ -1,21 +1,74 @@
-"""How a mechanism resists further load at a state of rest: compliance and stiffness.
+"""Further loads at a state of rest: compliance, stiffness, and whether the state holds. No state is found here.
 
 At a state of rest the second derivative of the potential depends on no choice of coordinates: it is the tangent
 stiffness. Its elastic part is that of the springs at this place; the geometric part is what wrenches and weights do
 when their lines of action turn. The moment of the load keeps its axis, which no potential does, and only the symmetric
 part of what it adds is taken.
 
-Source: theory (39). M. Zefran and V. Kumar, "A geometrical approach to the study of the Cartesian stiffness
-matrix", J. Mechanical Design 124(1), 2002. Units are those of `mechanism`.
+Source: theory (39) and (40). M. Zefran and V. Kumar, "A geometrical approach to the study of the Cartesian stiffness
+matrix", J. Mechanical Design 124(1), 2002. Units, axes and origin are those of `mechanism`.
 """
+
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from kinetostat.arrays import Array, Mask
-from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.solving import solve
+from kinetostat.equilibrium.admissible import (
+    admissible,
+    finite_solution,
+    holds_all,
+    solve_over_admissible,
+    spring_factor,
+    starts_of,
+    tangent_matrices,
+    within,
+)
+from kinetostat.equilibrium.balance import Balance, balance
 from kinetostat.numerics.motions import skew_of
-from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, UNRESISTED
+from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE, STIFFEST_LEG, UNRESISTED
+
+
+def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
+    """Solve the linear equations at a state for right sides [n x unknowns x k].
+
+    Each leg is eliminated by itself, so that it is a stiffness to the platform. A leg with rigid parts only has none,
+    and beside a leg that is much stiffer, what resists softly loses its digits. Such poses are solved over the motions
+    that keep all legs closed.
+
+    Args:
+        equations: at the state.
+        right: right sides.
+        loaded: with what loads and wrenches do by turning.
+    """
+    size, starts = equations.mechanism.ways.shape[1], equations.mechanism.starts
+    whole, total = equations.platform_rates(loaded), right[:, :size]
+    parts, stiffest = [], np.zeros(len(right))
+    for number, (start, end) in enumerate(pairwise(starts)):
+        pushed = np.zeros((len(right), end - start, size))
+        pushed[:, -size:] = np.eye(size)
+        try:
+            part = np.linalg.solve(
+                equations.leg_rates(number, loaded), np.concatenate([right[:, start:end], pushed], axis=2)
+            )
+        except np.linalg.LinAlgError:
+            return solve_over_admissible(equations, right, loaded)
+        stiffness = part[:, -size:, -size:]
+        if not (np.abs(stiffness) < STIFFEST_LEG).all():
+            return solve_over_admissible(equations, right, loaded)
+        parts.append(part)
+        stiffest = np.maximum(stiffest, np.abs(stiffness).max(axis=(1, 2)))
+        whole, total = whole + stiffness, total - part[:, -size:, :-size]
+    twist = finite_solution(whole, total)
+    result = np.concatenate([twist, *(part[:, :, :-size] + part[:, :, -size:] @ twist for part in parts)], axis=1)
+    sound = np.flatnonzero(np.isfinite(whole).all(axis=(1, 2)))
+    softest = np.linalg.svd(whole[sound], compute_uv=False)[:, -1]
+    rows = sound[stiffest[sound] > STIFFEST_LEG * softest]
+    if len(rows):
+        there = balance(equations.mechanism.at(rows), equations.state.at(rows))
+        result[rows] = solve_over_admissible(there, right[rows], loaded)
+    return result
 
 
 def compliance(equations: Balance) -> Array:
@@ -87,3 +140,66 @@ def elastic_stiffness(equations: Balance, compliances: Array) -> Array:
     apart = np.isfinite(inverse(compliances[:, exists][:, :, exists])).any(axis=(1, 2))
     result = np.where((rigid & ~apart)[:, None, None], np.inf, whole)
     return _with_held(result, fixed & rigid[:, None])
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Whether a state of rest holds, and how much more of its load it could hold.
+
+    Attributes:
+        stable: whether every small disturbance comes back.
+        factor: by which the load may grow until one does not, if wrenches grow in proportion; infinite if none does,
+            NaN where springs alone hold nothing.
+        mode: twist of the platform in that disturbance, at the origin; its largest component is 1 [6].
+        legs: the largest motion of each leg's coordinates in it, of the same scale.
+    """
+
+    stable: bool
+    factor: float
+    mode: Array
+    legs: Array
+
+
+@dataclass(frozen=True)
+class Stabilities:
+    """Stability of n states of rest: arrays with the poses first."""
+
+    stable: Mask
+    factor: Array
+    mode: Array
+    legs: Array
+
+
+def stability(equations: Balance) -> Stability:
+    """Judge the state of rest at a single pose."""
+    every = stabilities(equations)
+    return Stability(bool(every.stable[0]), float(every.factor[0]), every.mode[0], every.legs[0])
+
+
+def stabilities(equations: Balance) -> Stabilities:
+    """Judge n states of rest; what is not finite is not stable."""
+    ways, starts = equations.mechanism.ways, starts_of(equations)
+    elastic, geometric, conditions = tangent_matrices(equations)
+    count, size = len(elastic), ways.shape[1]
+    sound = np.isfinite(elastic + geometric).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
+    stable: Mask = np.array(sound)
+    factors, modes = np.where(sound, np.inf, np.nan), np.zeros((count, starts[-1]))
+    for part in admissible(equations, conditions, np.flatnonzero(sound)):
+        here, allowed = part.rows, part.motions
+        if not allowed.size:  # nothing can move at all
+            continue
+        stiff, turning = (within(matrix[here], allowed) for matrix in (elastic, geometric))
+        springs = spring_factor(equations, part)
+        holds = holds_all(springs)
+        half = np.linalg.inv(np.where(holds[:, None, None], springs, np.eye(springs.shape[1])))
+        shares, turns = np.linalg.eigh(-np.swapaxes(half, 1, 2) @ turning @ half)
+        # Where springs hold every motion, those much softer than others would be lost in the sum of both matrices.
+        stable[here] = np.where(holds, shares[:, -1] < 1.0, np.linalg.eigvalsh(stiff + turning)[:, 0] > 0.0)
+        grows = holds & (shares[:, -1] > UNRESISTED)
+        factors[here] = np.where(grows, 1.0 / np.where(grows, shares[:, -1], 1.0), np.where(holds, np.inf, np.nan))
+        moved = (allowed @ half @ turns[:, :, -1:])[:, :, 0]
+        modes[here] = np.where(grows[:, None], moved / np.abs(moved).max(axis=1, keepdims=True), 0.0)
+    legs = [np.abs(modes[:, a:b]).max(axis=1, initial=0.0) for a, b in pairwise(starts)]
+    return Stabilities(
+        stable, factors, modes[:, :size] @ ways.T, np.stack(legs, axis=1) if legs else np.zeros((count, 0))
+    )

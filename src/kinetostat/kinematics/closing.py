@@ -69,7 +69,7 @@ def placement_of(pose: Mapping[str, Scalar]) -> Displacement:
 
 @dataclass(frozen=True)
 class LegEnd:
-    """Where a leg takes the platform.
+    """The place to which a leg takes the platform.
 
     Attributes:
         platform: placement of the platform, base frame.
@@ -120,14 +120,14 @@ def closing_equations(chains: Chains, coordinates: Sequence[Scalar]) -> list[Sca
 def _between_legs(ends: Sequence[LegEnd], length: Scalar) -> list[Scalar]:
     """Return the displacement of the platform from its placement by each other leg to that by the first leg."""
     first = ends[0].platform
-    return [gap for end in ends[1:] for gap in _apart(end.platform, first, length)]
+    return [gap for end in ends[1:] for gap in _gap(end.platform, first, length)]
 
 
-def _apart(start: Displacement, end: Displacement, length: Scalar) -> list[Scalar]:
-    return [*_turned(start.rotation, end.rotation, length), *(end.translation - start.translation).components()]
+def _gap(start: Displacement, end: Displacement, length: Scalar) -> list[Scalar]:
+    return [*_rotation_gap(start.rotation, end.rotation, length), *(end.translation - start.translation).components()]
 
 
-def _turned(start: Rotation, end: Rotation, length: Scalar) -> list[Scalar]:
+def _rotation_gap(start: Rotation, end: Rotation, length: Scalar) -> list[Scalar]:
     return list((rotation_between(start, end) * length).components())
 
 
@@ -144,7 +144,7 @@ def _off_pose(chains: Chains, end: Displacement) -> list[Scalar]:
     given = chains.pose
     gaps = [given[name] - getattr(end.translation, name) for name in POINT if name in given]
     if all(name in given for name in ANGLES):
-        return gaps + _turned(end.rotation, platform_placement(chains).rotation, chains.length)
+        return gaps + _rotation_gap(end.rotation, platform_placement(chains).rotation, chains.length)
     sides = _sides(end.rotation)
     return gaps + [
         chains.length * (sin(given[name]) * sides[name][0] - cos(given[name]) * sides[name][1])
@@ -171,7 +171,7 @@ def squared_distance(start: Displacement, end: Displacement, length: Scalar) -> 
 
 @dataclass(frozen=True)
 class Gaps:
-    """How far legs are from the first one, in rad and in units of the machine's length [n x rows].
+    """Gaps from the legs to the first one, in rad and in units of the machine's length [n x rows].
 
     Attributes:
         closure: the gaps between the legs.

@@ -16,8 +16,8 @@ from kinetostat.arrays import Array, Codes
 from kinetostat.kinematics.closing import clearance, leg_end, platform_placement, squared_distance
 from kinetostat.kinematics.following import follow
 from kinetostat.kinematics.leg_gaps import free_coordinates, goal_of, problems_of, some, undetermined
-from kinetostat.kinematics.leg_span import too_far_or_near
 from kinetostat.kinematics.status import Status
+from kinetostat.kinematics.ways import too_far_or_near
 from kinetostat.machine.column import column, stacked
 from kinetostat.machine.leg import Turn
 from kinetostat.machine.machine import Chains, Configuration, Machine
@@ -26,7 +26,7 @@ from kinetostat.tolerances import CLOSED
 
 @dataclass(frozen=True)
 class Joints:
-    """Where the joints are.
+    """Joint coordinates that have been solved for.
 
     Attributes:
         coordinates: one scalar per joint coordinate, leg by leg, rad or m from the home pose; closed forms over any
@@ -83,7 +83,7 @@ def task_of(machine: Machine) -> Task:
 
 
 def _batch(machine: Machine, chains: Chains) -> int:
-    """How many machines the tables describe at once."""
+    """Number of machines that the tables describe at once."""
     numbers = [number for table in machine.family_tables.values() for number in _numbers(table)]
     return max((np.size(number) for number in (*numbers, chains.length)), default=1)
 
@@ -119,7 +119,7 @@ class Newton:
     def __call__(self, task: Task) -> Joints:
         """The joints, all by iteration."""
         with np.errstate(all="ignore"):
-            return task.joints(*followed(task.chains, task.goal))
+            return task.joints(*joints_followed(task.chains, task.goal))
 
 
 class ClosedForms:
@@ -139,7 +139,7 @@ class ClosedForms:
             if left.all():
                 return NEWTON(task)
             # Out of reach a coordinate is NaN, which would spoil the linear algebra of the other poses.
-            status = self._checked(task, np.where(np.isnan(coordinates), 0.0, coordinates), status)
+            status = self._status_where_determined(task, np.where(np.isnan(coordinates), 0.0, coordinates), status)
             if left.any():
                 rest = NEWTON(task)
                 coordinates = np.where(left[:, None], stacked(rest.coordinates, count), coordinates)
@@ -147,7 +147,7 @@ class ClosedForms:
         return task.joints(coordinates, status)
 
     @staticmethod
-    def _checked(task: Task, coordinates: Array, status: Codes) -> Codes:
+    def _status_where_determined(task: Task, coordinates: Array, status: Codes) -> Codes:
         """The status with poses that do not determine where the platform is."""
         free = free_coordinates(task.chains)
         here = np.flatnonzero(status == Status.OK)
@@ -195,7 +195,7 @@ def _angle(amount: Scalar | Turn) -> Scalar:
     return np.arctan2(amount.sine, amount.cosine) if isinstance(amount, Turn) else amount
 
 
-def followed(chains: Chains, goal: Array) -> tuple[Array, Codes]:
+def joints_followed(chains: Chains, goal: Array) -> tuple[Array, Codes]:
     """Follow the joint coordinates of a machine from the home pose to its poses.
 
     Args:

@@ -21,26 +21,26 @@ from kinetostat.tolerances import CLOSED, DEPENDENT, LEAST_GAP_SETTLED, NEWTON_S
 
 MOST_TRIALS = 80
 """Steps that are tried on one way, accepted or not."""
-SHORTEST = 1e-4
+SHORTEST_STRIDE = 1e-4
 """Share of the way below which a step is too short to go on: the way is blocked."""
-FURTHEST = 1.5
+LONGEST_STRIDE = 1.5
 """Change of an unknown in one step, rad or in units of the machine's length, up to which it is tried."""
-CAREFUL = 0.1
-"""The same where a way has led to another assembly mode."""
-NEARBY = 0.1
+CAREFUL_STRIDE = 0.1
+"""Such a change where a way has led to another assembly mode."""
+MOST_TANGENT_ERROR = 0.1
 """Error of the tangent, in the same units, up to which a step is accepted: less than branches usually lie apart."""
-CONTRACTION = 0.55
+STEP_CONTRACTION = 0.55
 """Share of a correction that the next one may have. Newton's method has a half at the point where two branches meet,
 so that no step beyond it is accepted."""
-ROUND_OFF = 1e-7
+ROUND_OFF_OF_STEP = 1e-7
 """Size of a correction below which its contraction says nothing."""
-MOST_ITERATIONS = 60
+MOST_STEPS_AT_GOAL = 60
 """Of Newton's method at the goal, where each halves the gap at worst."""
 MOST_DESCENTS = 60
 """Steps towards the least gap, where no way leads to the goal."""
 STIFFENING = 1e-2
 """Added to the curvature at first, for unknowns that change nothing there."""
-DESCENT = 0.3
+LONGEST_DESCENT = 0.3
 """Change of an unknown in such a step, in the same units, so that it stays in the valley where it starts."""
 ASIDE = 1e-2
 """Displacement of the unknowns from which these steps start, rad or in units of the machine's length."""
@@ -85,11 +85,11 @@ def _by_way(problems: Problems, plan: Plan, goal: Coordinates) -> tuple[Array, M
 
     Where it ends there in another mode, a step was so long that it crossed to that, and shorter ones are taken.
     """
-    unknowns, solved, crossed = _strides(problems, plan(problems, goal), goal, FURTHEST)
+    unknowns, solved, crossed = _strides(problems, plan(problems, goal), goal, LONGEST_STRIDE)
     again = np.flatnonzero(crossed)
     if again.size:
         part, there = problems.take(again), some(goal, again)
-        unknowns[again], solved[again], _ = _strides(part, plan(part, there), there, CAREFUL)
+        unknowns[again], solved[again], _ = _strides(part, plan(part, there), there, CAREFUL_STRIDE)
     return unknowns, solved
 
 
@@ -106,7 +106,7 @@ def _strides(problems: Problems, way: Way, goal: Coordinates, furthest: float) -
             return largest(left), lambda going: least_norm(rates[going], left[going])
 
         # A gap that no longer becomes less has reached round-off, or cannot be closed.
-        steps, start = MOST_ITERATIONS, unknowns[here]
+        steps, start = MOST_STEPS_AT_GOAL, unknowns[here]
         end = newton(equations, start, len(here), most_steps=steps, closed=NEWTON_SETTLED, contraction=1.0)
         unknowns[here], closed, same = end.value, end.residual <= CLOSED, same_mode(part, end.value, there)
         solved[here], crossed[here] = closed & same, closed & ~same
@@ -118,11 +118,11 @@ def _along(problems: Problems, way: Way, furthest: float) -> tuple[Array, Mask]:
     count = len(problems.poses)
     unknowns, done, stride = np.zeros((count, problems.size)), np.zeros(count), np.ones(count)
     for _ in range(MOST_TRIALS):
-        items = np.flatnonzero((done < 1.0) & (stride >= SHORTEST))
+        items = np.flatnonzero((done < 1.0) & (stride >= SHORTEST_STRIDE))
         if not items.size:
             break
         next_share = np.minimum(done[items] + stride[items], 1.0)
-        next_share = np.where(next_share > 1.0 - SHORTEST, 1.0, next_share)
+        next_share = np.where(next_share > 1.0 - SHORTEST_STRIDE, 1.0, next_share)
         shares = np.ones(count)
         shares[items] = next_share
         part, target = problems.take(items), some(way(shares), items)
@@ -148,12 +148,12 @@ def _step(problems: Problems, unknowns: Array, target: Coordinates, furthest: fl
         part, start = problems.take(tried), unknowns[tried] + tangent[tried]
         correction = least_norm(*part.gaps(start, some(target, tried))[::-1])
         size = largest(correction)
-        close = (size <= CONTRACTION * first[tried]) | (size <= ROUND_OFF)
-        accepted[tried] = close & (size <= NEARBY)
+        close = (size <= STEP_CONTRACTION * first[tried]) | (size <= ROUND_OFF_OF_STEP)
+        accepted[tried] = close & (size <= MOST_TANGENT_ERROR)
         moved[tried] = start + correction
         # The error of the tangent grows as the square of the step, the contraction as the step itself.
-        allowed = np.sqrt(NEARBY / np.maximum(size, 1e-30))
-        steady = np.maximum(CONTRACTION * first[tried] / np.maximum(size, ROUND_OFF), 0.25)
+        allowed = np.sqrt(MOST_TANGENT_ERROR / np.maximum(size, 1e-30))
+        steady = np.maximum(STEP_CONTRACTION * first[tried] / np.maximum(size, ROUND_OFF_OF_STEP), 0.25)
         longer[tried] = np.minimum(np.minimum(allowed, longer[tried]), steady)
     return moved, np.where(np.isfinite(longer), longer, 0.0), accepted
 
@@ -169,7 +169,7 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
     # The slope vanishes where the gap is greatest too, as at the end of a crank's stroke: the descent starts beside.
     best, shown = unknowns + ASIDE * np.cos(np.arange(problems.size)), np.zeros(len(unknowns), dtype=bool)
     items, share = np.arange(len(unknowns)), np.ones(len(unknowns))
-    left, rates, distance = problems.measured(best, goal)
+    left, rates, distance = problems.gaps_and_distance(best, goal)
     slope = np.einsum("nrc,nr->nc", rates, left)
     inverse = np.linalg.inv(np.einsum("nrc,nrd->ncd", rates, rates) + STIFFENING * np.eye(problems.size))
     for _ in range(MOST_DESCENTS):
@@ -181,12 +181,12 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
         if not items.size:
             break
         step = np.einsum("ncd,nd->nc", inverse, slope)
-        step *= (share * np.minimum(1.0, DESCENT / np.maximum(largest(step), 1e-30)))[:, None]
+        step *= (share * np.minimum(1.0, LONGEST_DESCENT / np.maximum(largest(step), 1e-30)))[:, None]
         moved = best[items] + step
-        left, rates, distance_there = problems.take(items).measured(moved, some(goal, items))
+        left, rates, distance_there = problems.take(items).gaps_and_distance(moved, some(goal, items))
         slope_there = np.einsum("nrc,nr->nc", rates, left)
         better = distance_there < distance
-        inverse[better] = _curved(inverse[better], step[better], slope[better] - slope_there[better])
+        inverse[better] = _updated_inverse(inverse[better], step[better], slope[better] - slope_there[better])
         best[items[better]], slope[better], distance[better] = (
             moved[better],
             slope_there[better],
@@ -196,7 +196,7 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
     return best, shown
 
 
-def _curved(inverse: Array, step: Array, change: Array) -> Array:
+def _updated_inverse(inverse: Array, step: Array, change: Array) -> Array:
     """Correct inverse curvatures so that steps have the changes of slope that were met (BFGS).
 
     Args:

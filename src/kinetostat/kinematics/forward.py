@@ -27,13 +27,13 @@ from kinetostat.machine.parameters import POSE, parameters, values, with_values
 from kinetostat.numerics.iteration import least_squares
 from kinetostat.tolerances import CLOSED, NEWTON_SETTLED, ONE_PLACEMENT, UNDRIVEN
 
-MOST_ITERATIONS = 60
+MOST_DAMPED_STEPS = 60
 """Of damped least squares: a start that has not arrived by then is in no solution's reach."""
-FINEST = 1e-6
+DIFFERENCE_STEP = 1e-6
 """Step of central differences, rad or in units of the machine's length: the half of all digits that steps need."""
 STRIDE, MOST_STRIDES = 0.05, 400
-"""How far the actuators move at a time on the way from the pose of the machine, rad or in units of its length, and in
-how many steps at most."""
+"""Motion of the actuators at a time on the way from the pose of the machine, rad or in units of its length, and the
+number of steps at most."""
 LEAP = 0.5
 """Change of an unknown in one of these steps that shows a jump to another solution."""
 
@@ -69,8 +69,8 @@ class System(Protocol):
     here: Array
     actuators: Sequence[Actuator]
 
-    def left(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
-        """What is left of the equations [n x m], and how the unknowns reduce it [n x m x unknowns].
+    def residuals(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
+        """Residuals of the equations [n x m], and how the unknowns reduce them [n x m x unknowns].
 
         Args:
             unknowns: [n x unknowns].
@@ -78,28 +78,28 @@ class System(Protocol):
         """
 
     def placements(self, unknowns: Array, goal: Array, /) -> list[Displacement]:
-        """Where the platform is at unknowns [n x unknowns] and actuators [actuators]."""
+        """Placements of the platform at unknowns [n x unknowns] and actuators [actuators]."""
 
     def poses(self, unknowns: Array, goal: Array, /) -> dict[str, Array]:
-        """The coordinates of the machine's [pose], m and rad [n], at unknowns [n x unknowns]; goal as of `left`."""
+        """Coordinates of the machine's [pose], m and rad [n], at unknowns [n x unknowns]; goal as of `residuals`."""
 
     def mode(self, unknowns: Array, goal: Array) -> AssemblyMode:
-        """What the unknowns [unknowns] of one solution mean; goal [actuators]."""
+        """The assembly mode that the unknowns [unknowns] of one solution mean; goal [actuators]."""
 
     def by_pose(self, poses: Sequence[Mapping[str, float]], goal: Array, /) -> list[bool]:
         """Whether the machine at each of these poses has its actuators at their coordinates [actuators]."""
 
     def drift(self) -> Array:
-        """How the platform moves per unknown at the pose of the machine [6 x unknowns]."""
+        """Twists of the platform per unknown at the pose of the machine [6 x unknowns]."""
 
 
 class ByPose:
     """A family in closed form: unknown are the coordinates of its pose.
 
     Attributes:
-        length: of the machine, m.
+        length: length of the machine, m.
         here: the unknowns at its pose.
-        actuators: where they stand there.
+        actuators: coordinates of the actuators there.
     """
 
     def __init__(self, machine: Machine) -> None:
@@ -112,22 +112,22 @@ class ByPose:
         given = values(machine)
         self.here = np.array([float(given[path]) for path in self.kinds]) / self.units
 
-    def _placed(self, unknowns: Array) -> Machine:
+    def _with_unknowns(self, unknowns: Array) -> Machine:
         return with_values(self.machine, dict(zip(self.kinds, (unknowns * self.units).T, strict=True)))
 
     def _off(self, unknowns: Array, goal: Array) -> Array:
-        """What the actuators lack of their coordinates [n x actuators]; NaN where a leg does not reach."""
-        measured = actuators_of(self._placed(unknowns).configure())
+        """Coordinates that the actuators lack [n x actuators]; NaN where a leg does not reach."""
+        measured = actuators_of(self._with_unknowns(unknowns).configure())
         off = goal - stacked([actuator.coordinate for actuator in measured], len(unknowns))
         return np.where(self.slides, off / self.length, np.arctan2(np.sin(off), np.cos(off)))
 
-    def left(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
+    def residuals(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
         """See `System`; the rates [n x actuators x unknowns] are central differences, all of them in one batch."""
         count, size = unknowns.shape
-        ways = FINEST * np.concatenate([np.zeros((1, size)), np.eye(size), -np.eye(size)])
+        ways = DIFFERENCE_STEP * np.concatenate([np.zeros((1, size)), np.eye(size), -np.eye(size)])
         goals = np.repeat(np.broadcast_to(goal, (count, goal.shape[-1])), len(ways), axis=0)
         off = self._off((unknowns[:, None] + ways).reshape(-1, size), goals).reshape(count, len(ways), -1)
-        rates = (off[:, size + 1 :] - off[:, 1 : size + 1]) / (2.0 * FINEST)
+        rates = (off[:, size + 1 :] - off[:, 1 : size + 1]) / (2.0 * DIFFERENCE_STEP)
         return off[:, 0], np.swapaxes(rates, 1, 2)
 
     def placements(self, unknowns: Array, _goal: Array) -> list[Displacement]:
@@ -142,7 +142,7 @@ class ByPose:
         for path in (path.removeprefix(POSE) for path, kind in self.kinds.items() if kind == "angle"):
             result[path] = np.arctan2(np.sin(result[path]), np.cos(result[path]))
         if set(ANGLES) <= result.keys():
-            turned = pose_of(self._placed(unknowns).configure().platform)
+            turned = pose_of(self._with_unknowns(unknowns).configure().platform)
             result |= {name: np.broadcast_to(turned[name], (len(unknowns),)) for name in ANGLES}
         return result
 
@@ -165,9 +165,9 @@ class LegByLeg:
     """A machine written leg by leg: unknown are its passive joint coordinates.
 
     Attributes:
-        length: of the machine, m.
+        length: length of the machine, m.
         here: the unknowns at its pose, or at its home pose where the legs cannot close.
-        actuators: where they stand there.
+        actuators: coordinates of the actuators there.
     """
 
     def __init__(self, machine: Machine) -> None:
@@ -192,7 +192,7 @@ class LegByLeg:
             joints[:, actuator.place] = actuator.joint_coordinate(coordinates)
         return joints
 
-    def left(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
+    def residuals(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
         """See `System`; the rates [n x gaps x unknowns] are the twists of the passive joints."""
         gaps = gaps_at(self.chains, self._whole(unknowns, goal))
         return gaps.closure, gaps.closure_rates[:, :, self.free]
@@ -211,7 +211,7 @@ class LegByLeg:
         """See `System` [unknowns]."""
         joints, (placement,) = self._whole(unknowns[None], goal)[0], self.placements(unknowns[None], goal)
         pose = {name: float(entry[0]) for name, entry in self.poses(unknowns[None], goal).items()}
-        gap, _ = self.left(unknowns[None], goal)
+        gap, _ = self.residuals(unknowns[None], goal)
         residual = float(np.abs(gap).max(initial=0.0))
         at = Joints(tuple(joints.tolist()), int(Status.OK))
         return AssemblyMode(pose, placement, residual, at)
@@ -243,7 +243,7 @@ def system_of(machine: Machine) -> System:
 
 
 def stand(machine: Machine, joints: Joints | None = None) -> list[Actuator]:
-    """Where the actuators of a machine stand at its pose: the inverse of forward kinematics.
+    """Coordinates of the actuators of a machine at its pose: the inverse of forward kinematics.
 
     Args:
         machine: with its pose.
@@ -258,7 +258,7 @@ def stand(machine: Machine, joints: Joints | None = None) -> list[Actuator]:
 def undriven(system: System) -> bool:
     """Whether the platform can move at the pose of the machine while all actuators stand still."""
     goal = np.array([actuator.coordinate for actuator in system.actuators], dtype=float)
-    rates = system.left(system.here[None], goal)[1][0]
+    rates = system.residuals(system.here[None], goal)[1][0]
     size, full = rates.shape[1], np.isfinite(rates).all()
     if not full or size == 0:
         return False
@@ -282,7 +282,7 @@ def assembly_modes(system: System, goal: Array, starts: int, spread: float) -> l
     """
     around = np.random.default_rng(0).uniform(-spread, spread, (starts, system.here.size))
     with np.errstate(all="ignore"):
-        ends, arrived = _followed(system, goal[None])
+        ends, arrived = _ends_of_ways(system, goal[None])
         first = [*ends[arrived], system.here]
         unknowns, largest = _solutions(system, np.concatenate([first, system.here + around]), goal)
     sound = unknowns[largest < CLOSED]
@@ -316,7 +316,7 @@ def poses_at(system: System, goals: Array) -> tuple[dict[str, Array], Mask]:
         Coordinates of its [pose], m and rad [n], and where there is such a pose [n].
     """
     with np.errstate(all="ignore"):
-        unknowns, arrived = _followed(system, goals)
+        unknowns, arrived = _ends_of_ways(system, goals)
         lost = np.flatnonzero(~arrived)
         if lost.size:
             unknowns[lost], largest = _solutions(system, np.tile(system.here, (len(lost), 1)), goals[lost])
@@ -324,7 +324,7 @@ def poses_at(system: System, goals: Array) -> tuple[dict[str, Array], Mask]:
         return system.poses(unknowns, goals), arrived
 
 
-def _followed(system: System, goals: Array) -> tuple[Array, Mask]:
+def _ends_of_ways(system: System, goals: Array) -> tuple[Array, Mask]:
     """Follow a machine from its pose while all actuators move evenly to goals [n x actuators].
 
     Returns:
@@ -342,7 +342,7 @@ def _followed(system: System, goals: Array) -> tuple[Array, Mask]:
             break
         here = start + way[rows] * (step / steps)
         unknowns, largest = _solutions(system, at[rows], here, NEWTON_SETTLED if step == steps else CLOSED)
-        rates = system.left(unknowns, here)[1]
+        rates = system.residuals(unknowns, here)[1]
         turn = np.sign(np.linalg.det(rates)) if rates.shape[1] == rates.shape[2] else np.zeros(len(rows))
         leap = np.abs(unknowns - at[rows]).max(axis=1, initial=0.0)
         sound[rows] = (largest <= CLOSED) & (leap <= LEAP) & ~(turn * hand[rows] < 0.0)
@@ -358,7 +358,7 @@ def _solutions(system: System, starts: Array, goal: Array, settled: float = NEWT
     """
     goals = np.broadcast_to(goal, (len(starts), goal.shape[-1]))
     end = least_squares(
-        lambda unknowns, rows: system.left(unknowns, goals[rows]), starts, most_steps=MOST_ITERATIONS,
+        lambda unknowns, rows: system.residuals(unknowns, goals[rows]), starts, most_steps=MOST_DAMPED_STEPS,
         settled=settled, closed=CLOSED,
     )  # fmt: skip
     return end.value, end.residual

@@ -1,4 +1,4 @@
-"""How far legs are from where a pose puts the platform, for many legs at many poses at once, with rates of the joints.
+"""Gaps from legs to where a pose puts the platform, for many legs at many poses at once, with the rates of joints.
 
 Legs of one build, such as copies of one leg, are placed by one evaluation of the formulas of a leg. What is done with
 the gaps is elsewhere (`following`, `closure`).
@@ -35,9 +35,9 @@ class Build:
     """Legs with the same sorts of joints in a row.
 
     Attributes:
-        elements: what moves in them, at the home pose; scalars are floats, or arrays [poses or 1 x legs].
-        slides: which of their coordinates are lengths [elements].
-        places: of their coordinates among those of the machine [legs x elements].
+        elements: moving elements of the legs, at the home pose; scalars are floats, or arrays [poses or 1 x legs].
+        slides: whether each coordinate is a length [elements].
+        places: places of their coordinates among those of the machine [legs x elements].
     """
 
     elements: tuple[Any, ...]
@@ -54,7 +54,9 @@ class Build:
         def chosen(scalar: Scalar) -> Scalar:
             return scalar if isinstance(scalar, float) else column(scalar[poses if len(scalar) > 1 else 0, legs])
 
-        return tuple(Step(_merged([element], lambda scalars: chosen(scalars[0])), True) for element in self.elements)
+        return tuple(
+            Step(_element_of([element], lambda scalars: chosen(scalars[0])), True) for element in self.elements
+        )
 
 
 def builds_of(chains: Chains) -> list[Build]:
@@ -68,7 +70,7 @@ def builds_of(chains: Chains) -> list[Build]:
         first += len(elements)
     builds = []
     for legs in alike.values():
-        elements = [_merged(each, _row) for each in zip(*(elements for elements, _ in legs), strict=True)]
+        elements = [_element_of(each, _row) for each in zip(*(elements for elements, _ in legs), strict=True)]
         slides = np.array([element.mover.point is None for element in legs[0][0]], dtype=bool)
         builds.append(Build(tuple(elements), slides, np.stack([places for _, places in legs])))
     return builds
@@ -84,7 +86,7 @@ def _sort(element: Any) -> tuple[Any, ...]:
     return type(element), element.mover.point is None, is_zero(element.mover.pitch), kinds
 
 
-def _merged(elements: Sequence[Any], merge: Callable[[Sequence[Scalar]], Scalar]) -> Any:
+def _element_of(elements: Sequence[Any], merge: Callable[[Sequence[Scalar]], Scalar]) -> Any:
     """An element whose scalars are made of those of several."""
     changes: dict[str, Any] = {}
     for name in (field.name for field in fields(elements[0])):
@@ -106,13 +108,13 @@ def _row(scalars: Sequence[Scalar]) -> Scalar:
 
 
 @dataclass(frozen=True)
-class Part:
+class AlikeLegs:
     """Legs of one build in each of some problems.
 
     Attributes:
-        build: theirs.
-        legs: their numbers in the build [problems x legs].
-        columns: of their coordinates among the unknowns of a problem [legs x joints].
+        build: their build.
+        legs: numbers of the legs in their build [problems x legs].
+        columns: places of their coordinates among the unknowns of a problem [legs x joints].
     """
 
     build: Build
@@ -136,12 +138,12 @@ class Problems:
 
     chains: Chains
     poses: Integers
-    parts: tuple[Part, ...]
+    parts: tuple[AlikeLegs, ...]
     free: tuple[str, ...]
 
     @property
     def size(self) -> int:
-        """How many unknowns each problem has."""
+        """Number of unknowns of each problem."""
         return sum(part.columns.size for part in self.parts) + len(self.free)
 
     @property
@@ -161,7 +163,7 @@ class Problems:
         return point | dict.fromkeys(ANGLES, 0.0)
 
     def take(self, chosen: Integers) -> "Problems":
-        """Some of them, by number."""
+        """Return some of the problems, by number."""
         parts = tuple(replace(part, legs=part.legs[chosen]) for part in self.parts)
         return replace(self, poses=self.poses[chosen], parts=parts)
 
@@ -176,9 +178,9 @@ class Problems:
             Six numbers for each leg, a rotation vector and a displacement in units of the length
             [problems x rows], and their rates [problems x rows x unknowns].
         """
-        return self.measured(unknowns, goal)[:2]
+        return self.gaps_and_distance(unknowns, goal)[:2]
 
-    def measured(self, unknowns: Array, goal: Coordinates) -> tuple[Array, Array, Array]:
+    def gaps_and_distance(self, unknowns: Array, goal: Coordinates) -> tuple[Array, Array, Array]:
         """Return the gaps and their rates, and the squared distance of all ends from the goal [problems].
 
         The gap of a rotation is the sine of its angle a, which vanishes at half a turn as well. The distance has
@@ -195,7 +197,7 @@ class Problems:
         for part in self.parts:
             legs = part.legs.shape[1]
             ends, twists = self._ends(part, unknowns, lengths)
-            wanted = placement_of({name: column(_repeated(value, legs)) for name, value in goal.items()})
+            wanted = placement_of({name: column(_for_each_leg(value, legs)) for name, value in goal.items()})
             each = 1.0 / np.repeat(lengths, legs)
             turned = rotation_between(ends.rotation, wanted.rotation).components()
             apart = [plain(c) * each for c in (wanted.translation - ends.translation).components()]
@@ -205,8 +207,8 @@ class Problems:
             distance = distance + np.asarray(apart).reshape(-1, legs).sum(axis=1)
         return np.hstack(left), rates[0] if len(rates) == 1 else np.concatenate(rates, axis=1), distance
 
-    def _ends(self, part: Part, unknowns: Array, lengths: Array) -> tuple[Displacement, Array]:
-        """Where legs take the platform, and its twist per unit of each of their coordinates [legs x 6 x joints]."""
+    def _ends(self, part: AlikeLegs, unknowns: Array, lengths: Array) -> tuple[Displacement, Array]:
+        """Places to which legs take the platform, and its twist per unit of their coordinates [legs x 6 x joints]."""
         count = part.legs.shape[1]
         coordinates = unknowns[:, part.columns].reshape(-1, part.columns.shape[1])
         each = np.repeat(lengths, count)
@@ -224,7 +226,7 @@ class Problems:
                 twists[:, row, k] = plain(scalar) * scale
         return end.platform, twists
 
-    def _spread(self, part: Part, twists: Array, wanted: Displacement, count: int) -> Array:
+    def _spread(self, part: AlikeLegs, twists: Array, wanted: Displacement, count: int) -> Array:
         """The rates of some legs' gaps by all unknowns."""
         if not self.free and part.columns.shape[0] == 1 and len(self.parts) == 1:
             return twists
@@ -243,7 +245,7 @@ def _at(scalar: Scalar, poses: Integers) -> Scalar:
     return values[poses] if np.size(values) > 1 else float(np.ravel(values)[0])
 
 
-def _repeated(values: Scalar, times: int) -> Scalar:
+def _for_each_leg(values: Scalar, times: int) -> Scalar:
     return values if isinstance(values, float) or times == 1 else np.repeat(values, times)
 
 
@@ -273,14 +275,14 @@ def problems_of(chains: Chains, count: int, free: Sequence[str]) -> list[Problem
         parts, first = [], 0
         for build in builds:
             columns = np.arange(first, first + build.places.size).reshape(build.places.shape)
-            parts.append(Part(build, np.broadcast_to(np.arange(len(columns)), (count, len(columns))), columns))
+            parts.append(AlikeLegs(build, np.broadcast_to(np.arange(len(columns)), (count, len(columns))), columns))
             first += columns.size
         return [Problems(chains, np.arange(count), tuple(parts), tuple(free))]
     problems = []
     for build in builds:
         legs = len(build.places)
         numbers = np.tile(np.arange(legs), count)[:, None]
-        alone = Part(build, numbers, np.arange(build.places.shape[1])[None])
+        alone = AlikeLegs(build, numbers, np.arange(build.places.shape[1])[None])
         problems.append(Problems(chains, np.repeat(np.arange(count), legs), (alone,), ()))
     return problems
 
@@ -326,7 +328,7 @@ def undetermined(problems: Problems, unknowns: Array, goal: Coordinates) -> Mask
     square = np.swapaxes(rates, 1, 2) @ rates
     damping = LEAST_NORM_DAMPING * np.trace(square, axis1=1, axis2=2)
     moving = np.eye(problems.size)[:, problems.size - len(problems.free) :]
-    freedom = np.linalg.solve(damped(square), np.broadcast_to(moving, (len(rates), *moving.shape)))
+    freedom = np.linalg.solve(with_damping(square), np.broadcast_to(moving, (len(rates), *moving.shape)))
     return np.asarray((freedom * moving).sum(axis=(1, 2)) * damping > UNDETERMINED)
 
 
@@ -345,11 +347,11 @@ def least_norm(rates: Array, left: Array) -> Array:
         return steps
     across = np.swapaxes(rates, 1, 2)
     if rates.shape[2] >= rates.shape[1]:
-        return np.asarray((across @ np.linalg.solve(damped(rates @ across), left[:, :, None]))[:, :, 0])
-    return np.asarray(np.linalg.solve(damped(across @ rates), across @ left[:, :, None])[:, :, 0])
+        return np.asarray((across @ np.linalg.solve(with_damping(rates @ across), left[:, :, None]))[:, :, 0])
+    return np.asarray(np.linalg.solve(with_damping(across @ rates), across @ left[:, :, None])[:, :, 0])
 
 
-def damped(square: Array) -> Array:
+def with_damping(square: Array) -> Array:
     """Make squares of rates [n x n, each] regular by a trace of damping that only directions without effect feel."""
     trace = np.trace(square, axis1=1, axis2=2)[:, None, None]
     return np.asarray(square + LEAST_NORM_DAMPING * (trace + 1e-300) * np.eye(square.shape[1]))

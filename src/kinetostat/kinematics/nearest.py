@@ -18,14 +18,14 @@ MOST_STEPS, MOST_CORRECTIONS = 30, 8
 """Towards the nearest pose; and of Newton's method, which closes the legs again after each of them."""
 DAMPINGS: Array = 5.0 ** np.arange(-3.0, 6.0)
 """Dampings of a step that are tried in one batch, in units of the one that led nearest in the step before."""
-CONTRACTION = 0.25
+CLOSING_CONTRACTION = 0.25
 """Share of a gap that a correction may leave; a step from which it leaves more was too long."""
 BESIDE = 1e-6
 """Displacement of the unknowns, rad or in units of the machine's length, whose rates show how ways are curved."""
 NEARLY_CLOSED = 1e-3
 """Gap of the legs after a step, as a share of its square, that is left to the next step: what a step gains in distance
 falls with the same square."""
-LONG = 0.1
+LONG_STEP = 0.1
 """Size of a step, rad or in units of the machine's length, from which this gap grows no more."""
 
 
@@ -85,7 +85,7 @@ class _Search:
             tried = damping * DAMPINGS
             steps = slope / (stiff + tried[:, None]) @ along.T
             settled = slope @ (slope / stiff) <= NEAREST_GAIN * far * far
-            ends, gaps, rates_there = self._closed(best, steps[:1] if settled else steps)
+            ends, gaps, rates_there = self._closed_ends(best, steps[:1] if settled else steps)
             worth = self._half_squares(ends, gaps, loads)
             least = int(np.argmin(np.where(np.isfinite(worth), worth, np.inf)))
             if worth[least] < self._half_squares(best[None], gap[None], loads)[0]:
@@ -94,7 +94,7 @@ class _Search:
                 damping = float(tried[-1])
             if settled:
                 break
-        return self._closed(best, 0.0 * best[None])[0][0]
+        return self._closed_ends(best, 0.0 * best[None])[0][0]
 
     def _curvature(self, best: Array, rates: Array, ways: Array, loads: Array) -> Array:
         """The curvature of half the squared distance along the ways [ways x ways], those of the closed legs included.
@@ -114,7 +114,7 @@ class _Search:
         """Half the squared distances from the goal as they will be once the gaps that are left are closed [n]."""
         return np.asarray(0.5 * ((self.goal - ends[:, self.rows]) ** 2).sum(axis=1) - gaps @ loads)
 
-    def _closed(self, start: Array, steps: Array) -> tuple[Array, Array, Array]:
+    def _closed_ends(self, start: Array, steps: Array) -> tuple[Array, Array, Array]:
         """Close the legs again after steps, wherever that takes the platform.
 
         Args:
@@ -126,7 +126,7 @@ class _Search:
         """
         count = len(steps)
         problems = self.problems.take(np.zeros(count, dtype=int))
-        enough = np.maximum(CLOSED, NEARLY_CLOSED * np.minimum(np.abs(steps).max(axis=1), LONG) ** 2)
+        enough = np.maximum(CLOSED, NEARLY_CLOSED * np.minimum(np.abs(steps).max(axis=1), LONG_STEP) ** 2)
         left, rates = np.zeros((count, problems.rows)), np.zeros((count, problems.rows, problems.size))
 
         def equations(unknowns: Array, rows: Integers) -> tuple[Array, Steps]:
@@ -134,7 +134,7 @@ class _Search:
             return largest(left[rows]), lambda going: least_norm(rates[rows[going]], left[rows[going]])
 
         end = newton(
-            equations, start + steps, count, most_steps=MOST_CORRECTIONS, closed=enough, contraction=CONTRACTION
+            equations, start + steps, count, most_steps=MOST_CORRECTIONS, closed=enough, contraction=CLOSING_CONTRACTION
         )
         return np.where(end.converged[:, None], end.value, np.nan), left, rates
 

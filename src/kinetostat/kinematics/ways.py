@@ -1,25 +1,33 @@
-"""Ways of the platform from the home pose to a pose: straight, and detours that are tried where that is blocked.
+"""Ways of the platform from the home pose to a pose, and the span of links that shows at once that there is none.
 
-A leg by itself goes its own way, because all that counts is where it arrives. Solving along a way is elsewhere
-(`following`). Points are in the base frame, m.
+Ways are straight, and detours that are tried where that is blocked. A leg by itself goes its own way, because all that
+counts is where it arrives. Solving along a way is elsewhere (`following`).
+
+The span holds for legs of revolutes and parallelograms, which may begin with a slide. From one joint to the next, and
+from the near to the far side of a parallelogram, the distance stays; the second joint moves on a circle about the first
+one, or along the slide. Points are in the base frame, m.
 
 Source: theory section 6.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import reduce
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar
+from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array, Mask
 from kinetostat.kinematics.closing import ANGLES, POINT, placement_of
 from kinetostat.kinematics.leg_gaps import Coordinates, Problems
 from kinetostat.machine.column import column, plain
 from kinetostat.machine.leg import Joint
+from kinetostat.machine.link import Parallelogram
+from kinetostat.machine.machine import Step
+from kinetostat.tolerances import SURELY_APART
 
 Way = Callable[[Array], Coordinates]
 """From the share of the way that is done in each problem [problems] to coordinates of the platform there."""
@@ -63,7 +71,7 @@ def _part_of_a_turn(angle: Scalar) -> Scalar:
     return angle - 2.0 * math.pi * np.round(angle / (2.0 * math.pi))
 
 
-def _between(start: Coordinates, goal: Coordinates, moved: Array, turned: Array) -> Coordinates:
+def _on_the_way(start: Coordinates, goal: Coordinates, moved: Array, turned: Array) -> Coordinates:
     """Coordinates from start to goal, at one share of the way for the point and another for the angles."""
     shares = {name: moved if name in POINT else turned for name in goal}
     return {
@@ -75,7 +83,7 @@ def _between(start: Coordinates, goal: Coordinates, moved: Array, turned: Array)
 def the_long_way_round(problems: Problems, goal: Coordinates) -> Way:
     """All coordinates evenly, angles as they are given."""
     start = _start(problems, goal)
-    return lambda share: _between(start, goal, share, share)
+    return lambda share: _on_the_way(start, goal, share, share)
 
 
 def straight(problems: Problems, goal: Coordinates) -> Way:
@@ -90,13 +98,13 @@ def _short(goal: Coordinates) -> Coordinates:
 def turning_last(problems: Problems, goal: Coordinates) -> Way:
     """The point first, then the angles."""
     start, short = _start(problems, goal), _short(goal)
-    return lambda share: _between(start, short, np.minimum(2.0 * share, 1.0), np.maximum(2.0 * share - 1.0, 0.0))
+    return lambda share: _on_the_way(start, short, np.minimum(2.0 * share, 1.0), np.maximum(2.0 * share - 1.0, 0.0))
 
 
 def turning_first(problems: Problems, goal: Coordinates) -> Way:
     """The angles first, then the point."""
     start, short = _start(problems, goal), _short(goal)
-    return lambda share: _between(start, short, np.maximum(2.0 * share - 1.0, 0.0), np.minimum(2.0 * share, 1.0))
+    return lambda share: _on_the_way(start, short, np.maximum(2.0 * share - 1.0, 0.0), np.minimum(2.0 * share, 1.0))
 
 
 def around_the_base(problems: Problems, goal: Coordinates) -> Way:
@@ -159,7 +167,7 @@ class _LegEnds:
 
     def at(self, share: Array, arm: Array) -> Coordinates:
         """The platform's coordinates where the last joint is at an arm from the first one."""
-        turned = _between(self.start, self.goal, share, share)
+        turned = _on_the_way(self.start, self.goal, share, share)
         offset = rows_of(placement_of(columns_of(turned)).rotation.apply(vector_of(self.offset)), len(share))
         point = self.base + arm - offset
         given = {name: point[:, i] for i, name in enumerate(POINT) if not isinstance(self.goal[name], float)}
@@ -183,3 +191,60 @@ def vector_of(rows: Array) -> Vector:
 def rows_of(vector: Vector, count: int) -> Array:
     """The components of vectors [n x 3]."""
     return np.stack([np.broadcast_to(np.asarray(plain(c), dtype=float), (count,)) for c in vector.components()], axis=1)
+
+
+def too_far_or_near(problems: Problems, goal: Coordinates) -> Mask:
+    """Tell at which goals a leg of a problem cannot close, whatever its joints do; False where this shows nothing.
+
+    The end of the leg is compared with the circle or line on which its second joint moves: the links beyond that joint
+    have to bridge at least the least distance from it, and at most the greatest. Where the goal leaves angles open,
+    the end is the platform point, and the platform is one more link; where it leaves the point open, nothing is shown.
+    """
+    beyond = np.zeros(len(problems.poses), dtype=bool)
+    if not set(POINT) & set(problems.free):
+        for part in problems.parts:
+            for legs in part.legs.T:
+                beyond |= _leg_beyond(problems, part.build.steps(problems.poses, legs), goal)
+    return beyond
+
+
+def _leg_beyond(problems: Problems, steps: Sequence[Step], goal: Coordinates) -> Mask:
+    count = len(problems.poses)
+    first, centres = steps[0].element, [_centres(step) for step in steps[1:]]
+    if isinstance(first, Parallelogram) or not is_zero(first.mover.pitch) or not centres or not all(centres):
+        return np.zeros(count, dtype=bool)
+    points = [rows_of(point, count) for row in centres for point in row]
+    home = rows_of(placement_of(columns_of(problems.at_home())).translation, count)
+    points += [home] if problems.free else []
+    end = rows_of(placement_of(columns_of(goal)).apply(vector_of(points[-1] - home)), count)
+    near, far = _distances(first.mover, points[0], end)
+    links = np.stack([np.linalg.norm(b - a, axis=1) for a, b in pairwise(points)] or [0.0 * near])
+    longest = links.sum(axis=0)
+    shortest = np.maximum(2.0 * links.max(axis=0) - longest, 0.0)
+    margin = SURELY_APART * problems.lengths
+    return np.asarray((near > longest + margin) | (far < shortest - margin))
+
+
+def _centres(step: Step) -> tuple[Vector, ...]:
+    """The points of an element whose distance from those before it stays; none of slides and screws."""
+    if isinstance(step.element, Parallelogram):
+        return step.element.near, step.element.far
+    joint: Joint = step.element.mover
+    return (joint.point,) if joint.point is not None and is_zero(joint.pitch) else ()
+
+
+def _distances(joint: Joint, point: Array, end: Array) -> tuple[Array, Array]:
+    """The least and the greatest distance of ends from where a joint can take a point."""
+    axis = rows_of(joint.axis, len(end))
+    if joint.point is None:
+        return _about(axis, end - point)[0], np.full(len(end), np.inf)
+    centre = rows_of(joint.point, len(end))
+    radius, height = _about(axis, point - centre)
+    end_radius, end_height = _about(axis, end - centre)
+    return np.hypot(end_radius - radius, end_height - height), np.hypot(end_radius + radius, end_height - height)
+
+
+def _about(axis: Array, arms: Array) -> tuple[Array, Array]:
+    """Radius and height of points about an axis, from their arms to a point of it."""
+    height = (arms * axis).sum(axis=1)
+    return np.linalg.norm(arms - axis * height[:, None], axis=1), height

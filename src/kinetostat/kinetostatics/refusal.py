@@ -8,9 +8,8 @@ from collections.abc import Sequence
 
 from kinetostat.kinematics.closing import why_out_of_reach
 from kinetostat.kinematics.limits import why_beyond
-from kinetostat.kinematics.mobility import Kind, Mobility, mobility
+from kinetostat.kinematics.mobility import Mobility, SortOfPose, describe, mobility, why_singular
 from kinetostat.kinematics.nearest import nearest_pose
-from kinetostat.kinematics.singularity import describe, why_singular
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Spring
@@ -45,7 +44,7 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
         return _lacks_actuators(configuration, motion)
     names = [leg.name for leg in configuration.legs]
     reason = why_singular(names, response.legs, configuration.length, SINGULAR, response.guide)
-    kind = f" ({motion.kind})" if motion and motion.kind is not Kind.REGULAR else ""
+    kind = f" ({motion.kind})" if motion and motion.kind is not SortOfPose.REGULAR else ""
     return f"The pose is singular{kind}. {reason}"
 
 

@@ -26,8 +26,8 @@ DAMPING_CHANGE = 10.0
 """Factor by which damping becomes less after a step that has led nearer, and more after another one."""
 
 
-class Outcome(IntEnum):
-    """How an iteration has ended."""
+class Ending(IntEnum):
+    """End of an iteration."""
 
     CONVERGED = 0
     DIVERGED = 1
@@ -40,9 +40,9 @@ class Outcome(IntEnum):
 
 
 _SENTENCES = {
-    Outcome.CONVERGED: "The equations are solved, or further steps change nothing but round-off.",
-    Outcome.DIVERGED: "A step has not led nearer to a solution, or its numbers are not finite.",
-    Outcome.OUT_OF_STEPS: "The last step that was allowed still changed something.",
+    Ending.CONVERGED: "The equations are solved, or further steps change nothing but round-off.",
+    Ending.DIVERGED: "A step has not led nearer to a solution, or its numbers are not finite.",
+    Ending.OUT_OF_STEPS: "The last step that was allowed still changed something.",
 }
 
 
@@ -69,7 +69,7 @@ class Solution(Generic[Value]):
     Attributes:
         value: the unknowns that were reached; where a problem has diverged, those before the step that did not lead
             nearer.
-        outcome: `Outcome` codes [n].
+        outcome: `Ending` codes [n].
         residual: the largest residual of each problem where it was evaluated last [n].
         steps: number of steps that were taken [n].
     """
@@ -82,10 +82,10 @@ class Solution(Generic[Value]):
     @property
     def converged(self) -> Mask:
         """Whether each problem has converged [n]."""
-        return np.asarray(self.outcome == Outcome.CONVERGED)
+        return np.asarray(self.outcome == Ending.CONVERGED)
 
     def __repr__(self) -> str:
-        counts = [f"{int((self.outcome == end).sum())}: {end.sentence}" for end in Outcome if end in self.outcome]
+        counts = [f"{int((self.outcome == end).sum())}: {end.sentence}" for end in Ending if end in self.outcome]
         return (
             f"<Solution of {len(self.outcome)} problems in up to {self.steps.max(initial=0)} steps. {' '.join(counts)}>"
         )
@@ -140,13 +140,13 @@ def newton(
     """
     value, trial, rows = start, start, np.arange(count)
     limits = np.broadcast_to(closed, (count,))
-    outcome, steps = np.full(count, int(Outcome.OUT_OF_STEPS)), np.zeros(count, dtype=np.int64)
+    outcome, steps = np.full(count, int(Ending.OUT_OF_STEPS)), np.zeros(count, dtype=np.int64)
     residual, last = np.full((2, count), np.inf)
     for number in range(1, most_steps + 1):
         left, steps_of = equations(trial, rows)
         solved = left <= limits[rows]
         nearer = solved | (left < contraction * residual[rows])
-        outcome[rows[solved]], outcome[rows[~nearer]] = Outcome.CONVERGED, Outcome.DIVERGED
+        outcome[rows[solved]], outcome[rows[~nearer]] = Ending.CONVERGED, Ending.DIVERGED
         value, residual[rows[nearer]] = _with_part(value, rows, trial, nearer), left[nearer]
         going = np.flatnonzero(nearer & ~solved)
         if not going.size:
@@ -159,7 +159,7 @@ def newton(
             ratio = length / np.maximum(last[rows], 1e-300)
             enough = np.where(ratio < SHRINKING, length * ratio * ratio <= round_off, arrived)
             arrived = enough & (number > 1)
-        outcome[rows[arrived]], outcome[rows[~finite]] = Outcome.CONVERGED, Outcome.DIVERGED
+        outcome[rows[arrived]], outcome[rows[~finite]] = Ending.CONVERGED, Ending.DIVERGED
         last[rows], steps[rows] = length, number
         if (length > longest).any():
             step = step * np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
@@ -216,7 +216,7 @@ def least_squares(
     left, rates = equations(value, np.arange(count))
     damping, steps = np.full(count, FIRST_DAMPING), np.zeros(count, dtype=np.int64)
     going = np.asarray(np.isfinite(left).all(axis=1) & np.isfinite(rates).all(axis=(1, 2)))
-    outcome = np.where(going, int(Outcome.OUT_OF_STEPS), int(Outcome.DIVERGED))
+    outcome = np.where(going, int(Ending.OUT_OF_STEPS), int(Ending.DIVERGED))
     for _ in range(most_steps if value.shape[1] else 0):
         rows = np.flatnonzero(going)
         if not rows.size:
@@ -233,7 +233,7 @@ def least_squares(
         residual = largest(left[rows])
         solved = (residual <= settled) | (~nearer & (residual < closed))
         stuck = ~solved & ~(damping[rows] < MOST_DAMPING)
-        outcome[rows[solved]], outcome[rows[stuck]] = Outcome.CONVERGED, Outcome.DIVERGED
+        outcome[rows[solved]], outcome[rows[stuck]] = Ending.CONVERGED, Ending.DIVERGED
         going[rows] = ~solved & ~stuck
     return Solution(value, outcome, largest(left), steps)
 

@@ -41,11 +41,11 @@ class Motions:
         return Motions(self.rotation @ other.rotation, self.point(other.translation))
 
     def point(self, points: Array) -> Array:
-        """Where points [n x 3] go."""
+        """Return points [n x 3] after the displacements."""
         return np.asarray(np.einsum("nij,nj->ni", self.rotation, points) + self.translation)
 
     def twist(self, twists: Array) -> Array:
-        """Where screws fixed in the bodies [n x 6] go (the adjoint map)."""
+        """Return screws fixed in the bodies [n x 6] after the displacements (the adjoint map)."""
         turning = np.einsum("nij,nj->ni", self.rotation, twists[:, :3])
         moving = np.einsum("nij,nj->ni", self.rotation, twists[:, 3:])
         return np.concatenate([turning, moving + cross(self.translation, turning)], axis=1)
@@ -141,7 +141,7 @@ def each_about(twists: Array, amounts: Array) -> list[Motions]:
 
 
 def each_twist(motions: Sequence[Motions], twists: Array) -> Array:
-    """Where screws fixed in m bodies [n x m x 6] go, each with its own [n x m x 6]."""
+    """Return screws fixed in m bodies [n x m x 6] after the motions of these, each with its own [n x m x 6]."""
     if twists.dtype == object or any(motion.rotation.dtype == object for motion in motions):
         return np.stack([motion.twist(twists[:, k]) for k, motion in enumerate(motions)], axis=1)
     rotation = np.stack([motion.rotation for motion in motions], axis=1)

@@ -17,8 +17,14 @@ from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import IDENTITY, Rotation
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import MachineState, state_of
-from kinetostat.kinematics.mobility import Mobility
-from kinetostat.kinematics.singularity import actuator_jacobian, columns, conditioning, describe, independent
+from kinetostat.kinematics.mobility import (
+    Mobility,
+    actuator_jacobian,
+    columns,
+    conditioning,
+    count_independent,
+    describe,
+)
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.assembly import Statics, compliance_matrix, stiffness_matrix
 from kinetostat.kinetostatics.conditioning import twist_condition
@@ -304,7 +310,7 @@ def _rank(response: Response, statics: Statics, compliance_infinite: bool) -> in
     length = float(statics.length)
     if compliance_infinite:
         wrenches: list[Screw] = [wrench for wrench, k in statics.actions if k > 0.0]
-        return independent(wrenches, length, CLOSING_ROUND_OFF)
+        return count_independent(wrenches, length, CLOSING_ROUND_OFF)
     sizes = [math.sqrt(size) for leg in response.legs for size in leg.load_squares]
     greatest = np.linalg.norm(columns([twist for leg in statics.sharing for twist in leg], 1.0, 1.0 / length))
     springs = zip(statics.flexibility, statics.compliance, sizes, strict=True)

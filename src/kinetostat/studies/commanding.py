@@ -1,6 +1,6 @@
 """Commands: coordinates of the actuators that bring the tool of a loaded machine to its pose, at one pose or at many.
 
-Poses are solved in slabs, each as one array. The equations are in `equilibrium.commanding`; the command is `command`.
+Poses are solved in slabs, each as one array. The equations are in `equilibrium.actuation`; the command is `command`.
 """
 
 import math
@@ -14,9 +14,9 @@ import numpy as np
 from kinetostat.arrays import Array, Mask
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.engine.loaded import Way
-from kinetostat.equilibrium.commanding import commanded
-from kinetostat.equilibrium.stability import stabilities
+from kinetostat.equilibrium.actuation import commanded_state
 from kinetostat.equilibrium.state import SOUGHT_NO_REST, MachineState, states_at
+from kinetostat.equilibrium.tangent import stabilities
 from kinetostat.kinematics.closing import pose_of
 from kinetostat.kinematics.closure import Joints
 from kinetostat.kinematics.forward import leg_names
@@ -158,7 +158,7 @@ def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Arr
         return _empty_targets((), count)
     length = mechanism.length
     units = senses * np.where([actuator.slides for actuator in actuators], length[:, None], 1.0)
-    answer = commanded(mechanism)
+    answer = commanded_state(mechanism)
     equations = answer.solution.balance
     stable = answer.solution.settled & stabilities(equations).stable
     before, left = (np.linalg.norm(twists[:, 3:], axis=1) * length for twists in (answer.before, answer.off))

@@ -4,11 +4,11 @@ import math
 from collections.abc import Sequence
 
 from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.buckling import Strut
-from kinetostat.equilibrium.limit import Limit
-from kinetostat.equilibrium.stability import Stability
+from kinetostat.equilibrium.limit import LoadLimit
+from kinetostat.equilibrium.links import Strut
 from kinetostat.equilibrium.state import MachineState
-from kinetostat.kinematics.singularity import describe
+from kinetostat.equilibrium.tangent import Stability
+from kinetostat.kinematics.mobility import describe
 from kinetostat.machine.machine import Machine
 
 ADVICE = "Reduce the load, stiffen what moves, or preload what only pulls."
@@ -31,7 +31,7 @@ def about_rest(state: MachineState, judged: Stability, slack: Sequence[str]) -> 
     return " ".join(sentences) or "At rest and stable."
 
 
-def _about_stability(judged: Stability, limit: Limit | None) -> list[str]:
+def _about_stability(judged: Stability, limit: LoadLimit | None) -> list[str]:
     """That the machine is not stable, or has passed a state in which it was not, and how it gives way there."""
     if not judged.stable:
         stands = how_it_gives_way(limit)
@@ -51,7 +51,7 @@ def _bends_away(machine: Machine, strut: Strut, others: int) -> str:
     )
 
 
-def why_no_rest(machine: Machine, limit: Limit | None) -> str:
+def why_no_rest(machine: Machine, limit: LoadLimit | None) -> str:
     """Say that a machine comes to no rest under its loads, and under which share of them it stood last."""
     return f"{machine.name} comes to no rest under this load. {how_it_gives_way(limit)} {ADVICE}"
 
@@ -67,7 +67,7 @@ def why_no_tensions(machine: Machine) -> str:
     )
 
 
-def how_it_gives_way(limit: Limit | None) -> str:
+def how_it_gives_way(limit: LoadLimit | None) -> str:
     """Say up to which share of its loads a machine stands, by which motion it gives way, and what is slack then.
 
     Args:

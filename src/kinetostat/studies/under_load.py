@@ -15,13 +15,11 @@ from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import Balance, balance, free_state
-from kinetostat.equilibrium.buckling import Strut
+from kinetostat.equilibrium.links import Strut, loaded_links
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.shape import loaded_links
-from kinetostat.equilibrium.solving import Rest, at_rest, solve, with_share
-from kinetostat.equilibrium.stability import Stability
+from kinetostat.equilibrium.solving import Rest, at_rest, with_share
 from kinetostat.equilibrium.state import MachineState, state_of
-from kinetostat.equilibrium.tangent import compliance, elastic_stiffness, inverse
+from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, inverse, solve
 from kinetostat.kinematics.limits import Check, load_checks, why_beyond, within
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.deflected import DeflectedLink

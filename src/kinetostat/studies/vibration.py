@@ -15,7 +15,7 @@ from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array, Complex
 from kinetostat.equilibrium.admissible import starts_of
 from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.shape import loaded_links
+from kinetostat.equilibrium.links import loaded_links
 from kinetostat.equilibrium.state import SOUGHT_NO_REST, MachineState, state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.deflected import Deflection

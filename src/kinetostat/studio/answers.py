@@ -14,7 +14,7 @@ from kinetostat.arrays import Array
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.points import Axis, Grid
 from kinetostat.equilibrium.state import MachineState, state_of
-from kinetostat.kinematics.singularity import free_twist
+from kinetostat.kinematics.mobility import free_twist
 from kinetostat.kinematics.status import PLACELESS, Status
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import Response

@@ -17,7 +17,7 @@ from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.algebra.solve import Row, eliminated
 from kinetostat.algebra.symmetric import eigenvalues
 from kinetostat.arrays import Array
-from kinetostat.equilibrium.cut import Cut, Rod, cut
+from kinetostat.equilibrium.cut import Cut, ElasticRod, cut
 from kinetostat.equilibrium.mechanism import mechanism_of, platform_weights
 from kinetostat.equilibrium.reduced import place_of, relative
 from kinetostat.equilibrium.solving import with_share
@@ -175,7 +175,7 @@ def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list
     return in_order(eigenvalues(relative(eliminated(stiff.tolist()), mass), sloped))
 
 
-def _along(rod: Rod, far: Array) -> Array:
+def _along(rod: ElasticRod, far: Array) -> Array:
     """The dyad of a rod's unit line: the square of its rate of stretching by a twist of the platform [6 x 6]."""
     span = (far - rod.near)[0]
     size = sqrt(total([part * part for part in span]))

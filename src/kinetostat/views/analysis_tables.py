@@ -10,7 +10,7 @@ from rich.text import Text
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.display import ENGINEERING, Display, number
-from kinetostat.kinematics.mobility import Kind
+from kinetostat.kinematics.mobility import SortOfPose
 from kinetostat.kinetostatics.eigenscrews import Eigenscrew
 from kinetostat.kinetostatics.indices import PrincipalStiffness
 from kinetostat.studies.analysis import Analysis
@@ -278,8 +278,8 @@ def remarks(analysis: Analysis) -> list[str]:
     return lines
 
 
-def _sort_of_pose(kind: Kind) -> str:
-    return "Regular pose" if kind is Kind.REGULAR else f"Singular pose ({kind})"
+def _sort_of_pose(kind: SortOfPose) -> str:
+    return "Regular pose" if kind is SortOfPose.REGULAR else f"Singular pose ({kind})"
 
 
 def _decided(undecided: int) -> str:

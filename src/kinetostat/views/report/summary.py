@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from kinetostat.display import Display
-from kinetostat.kinematics.mobility import Kind, Mobility
+from kinetostat.kinematics.mobility import Mobility, SortOfPose
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.spec.fields import NO_LIMIT
 from kinetostat.spec.installation import adding
@@ -132,7 +132,7 @@ def _drawing(analysis: Analysis) -> Figure:
 
 def _pose_kind(analysis: Analysis, mobility: Mobility) -> str:
     """Say in a sentence or two what kind of pose it is, and how far it is from a singularity."""
-    kind = f"{mobility.kind} pose" if mobility.kind is Kind.REGULAR else mobility.kind
+    kind = f"{mobility.kind} pose" if mobility.kind is SortOfPose.REGULAR else mobility.kind
     return f"{_first_upper(kind)} {margins(analysis)}"
 
 

@@ -1,23 +1,67 @@
-"""Preloads that hold a redundant machine at its pose: of all internal loads, the one of least norm within bounds.
+"""Actuators of a loaded machine: coordinates that bring its tool to its pose, and preloads that hold it there.
 
-A cable machine has more cables than it needs, so that all of them can pull. Which tensions hold its load is a choice;
-here they are as small as their bounds allow. The free lengths of all springs follow: with them, the loaded machine is
-at its pose.
+Commands are found by Newton's method on the amounts by which the actuators are driven; the machine is at rest in every
+step, and the rates come from its equations of equilibrium. Preloads are the internal loads of least norm within bounds:
+a cable machine has more cables than it needs, so that all of them can pull, and which tensions hold its load is a
+choice. The free lengths of all springs follow: with them, the loaded machine is at its pose.
 
-Source: theory (42). Units, axes and origin are those of `mechanism`.
+Source: theory (41) and (42). Units, axes and origin are those of `mechanism`.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinetostat.arrays import Array, Mask
+from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.balance import Balance, balance, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.tolerances import BALANCED, UNRESISTED
+from kinetostat.equilibrium.solving import Equilibria, at_rest
+from kinetostat.equilibrium.tangent import solve
+from kinetostat.numerics.iteration import Steps, largest, newton
+from kinetostat.numerics.motions import logarithm
+from kinetostat.tolerances import BALANCED, COMMANDED, UNRESISTED
+
+MOST_CORRECTIONS = 12
 
 
-def tensioned(mechanism: Mechanism, least: Array, most: Array) -> tuple[Mechanism, Mask]:
+@dataclass(frozen=True)
+class CommandedState:
+    """The machine with the amounts that bring its loaded tool to its pose.
+
+    Attributes:
+        solution: the machine at rest with these amounts; they are in its state.
+        off: twist from the wanted to the reached pose, at the origin [n x 6]: what no actuator can change.
+        before: the same twist without a correction [n x 6].
+        rates: twist of the platform per unit of each amount, at the origin [n x 6 x actuators].
+    """
+
+    solution: Equilibria
+    off: Array
+    before: Array
+    rates: Array
+
+
+def commanded_state(mechanism: Mechanism) -> CommandedState:
+    """Find the amounts of least norm; a pose that actuators cannot reach exactly is reached as nearly as they can."""
+    ways, count = mechanism.ways, len(mechanism.length)
+    state, settled = free_state(mechanism), np.zeros(count, dtype=bool)
+    rates, before = np.zeros((count, ways.shape[1], len(mechanism.driven))), np.full((count, 6), np.nan)
+
+    def equations(amounts: Array, rows: Integers) -> tuple[Array, Steps]:
+        nonlocal state
+        rest = at_rest(mechanism.at(rows), replace(state.at(rows), amounts=amounts))
+        state, settled[rows] = state.with_part(rows, rest.state), rest.settled
+        off = logarithm(rest.state.platform)
+        before[rows] = np.where(np.isnan(before[rows]), off, before[rows])
+        rates[rows] = solve(rest.balance, -rest.balance.by_actuators())[:, : ways.shape[1]]
+        change = -np.einsum("nac,nc->na", np.linalg.pinv(rates[rows], rcond=UNRESISTED), off @ ways)
+        return np.where(rest.settled, largest(off), np.nan), lambda going: change[going]
+
+    newton(equations, state.amounts, count, most_steps=MOST_CORRECTIONS, settled=COMMANDED)
+    return CommandedState(Equilibria(mechanism, state, settled), logarithm(state.platform), before, ways @ rates)
+
+
+def with_tensions(mechanism: Mechanism, least: Array, most: Array) -> tuple[Mechanism, Mask]:
     """Choose the preloads of all springs so that the machine is at rest at its pose.
 
     Args:
@@ -29,7 +73,7 @@ def tensioned(mechanism: Mechanism, least: Array, most: Array) -> tuple[Mechanis
     """
     bare = replace(mechanism, legs=tuple(replace(leg, preload=leg.preload * leg.hinged) for leg in mechanism.legs))
     equations = balance(bare, free_state(bare))
-    chosen = [_chosen(equations, i, float(least[i]), float(most[i])) for i in range(len(least))]
+    chosen = [_tensions_at(equations, i, float(least[i]), float(most[i])) for i in range(len(least))]
     known = np.array([loads is not None for loads in chosen])
     size = sum(leg.size for leg in mechanism.legs)
     table = np.array([np.zeros(size) if loads is None else loads for loads in chosen])
@@ -39,7 +83,7 @@ def tensioned(mechanism: Mechanism, least: Array, most: Array) -> tuple[Mechanis
     return replace(bare, legs=tuple(legs)), known
 
 
-def _chosen(equations: Balance, pose: int, least: float, most: float) -> Array | None:
+def _tensions_at(equations: Balance, pose: int, least: float, most: float) -> Array | None:
     """Loads of all coordinates at one pose, 0 of passive ones; None where none within the bounds balance."""
     ways, legs = equations.mechanism.ways, equations.mechanism.legs
     size = ways.shape[1]

@@ -1,36 +1,67 @@
-"""When a strut that is pressed bends away: Euler's load, beside the load factor, which knows springs only.
+"""Links of a machine at rest under load: motions of their ends, and struts that bend away. Nothing is solved here.
 
 A strut is what carries forces along one line: the straight part of a leg between its only two passive joints, or a bar
-of a parallelogram. Both its ends are free to turn, so that it bends like a column between two hinges. A telescopic leg
-counts as if its weakest part were as long as the whole leg, which is on the safe side.
+of a parallelogram. Both its ends are free to turn, so that it bends like a column between two hinges, at Euler's load;
+the load factor knows springs only. A telescopic leg counts as if its weakest part were as long as the whole leg, which
+is on the safe side.
 
-Source: theory (43).
+Source: theory (35) and (43).
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import Balance
+from kinetostat.kinetostatics.deflected import DeflectedLink, leg_links
 from kinetostat.machine.leg import Leg, Line
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Member
 from kinetostat.machine.rods import rods
+from kinetostat.numerics.motions import Motions
+
+
+def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> tuple[DeflectedLink, ...]:
+    """All links of a machine at one pose, with the exact motions of their ends.
+
+    Args:
+        equations: at the state of rest of one pose.
+        legs: of the machine without loads.
+        origin: its tool point there, m.
+    """
+    mechanism, state = equations.mechanism, equations.state
+    length = float(mechanism.length[0])
+    links: list[DeflectedLink] = []
+    given = np.concatenate([state.amounts, mechanism.growth], axis=1)
+    for leg, elastic, coordinates in zip(legs, mechanism.legs, state.coordinates, strict=True):
+        placed = elastic.chain.placed(coordinates, given).before
+        bodies = [placed[number] for number in elastic.ends]
+        links += leg_links(leg, partial(_point_motion, bodies, origin, length))
+    return tuple(links)
+
+
+def _point_motion(bodies: Sequence[Motions], origin: Vector, length: float, body: int, point: Vector) -> Twist:
+    """Motion of a point (m) of one of the bodies, rad and m."""
+    at = np.array([(point - origin).components()], dtype=float) / length
+    turned = Vector(*bodies[body].amounts()[0, :3].tolist())
+    return Twist(turned, Vector(*(length * (bodies[body].point(at) - at))[0].tolist()))
 
 
 @dataclass(frozen=True)
 class Strut:
-    """What presses a strut, and what it can hold.
+    """A strut with its compression and the load at which it bends away.
 
     Attributes:
         name: of the link.
-        leg: that it belongs to.
-        length: between its hinges, m.
-        compression: N; negative where it is pulled.
+        leg: name of the leg that it belongs to.
+        length: distance of its hinges, m.
+        compression: force that presses it, N; negative where it is pulled.
         euler_load: at which it bends away, N.
     """
 
@@ -42,7 +73,7 @@ class Strut:
 
     @property
     def factor(self) -> float:
-        """By which its compression may grow until it bends away; infinite where it is pulled."""
+        """Factor by which its compression may grow until it bends away; infinite where it is pulled."""
         return self.euler_load / self.compression if self.compression > 0.0 else math.inf
 
     @property
@@ -68,7 +99,7 @@ def struts(legs: Sequence[Leg], members: Sequence[Member], reference: Vector, eq
         lines = _lines(leg, equations.mechanism.ways.shape[1])
         if not (links and lines):
             continue
-        pulls = _along(lines, wrench[0] * units, reference)
+        pulls = _pulls(lines, wrench[0] * units, reference)
         if len(lines) == 1:
             size = float(rods([leg])[0].length)
             weakest = min(float(link.bending) for link in links)
@@ -102,8 +133,8 @@ def _across_parallelogram(leg: Leg, link: Member) -> bool:
     return any(isinstance(element, Parallelogram) for element in leg.chain[first:last])
 
 
-def _along(lines: Sequence[Line], wrench: Array, reference: Vector) -> list[float]:
-    """What each line pulls with, so that together they come nearest to a wrench of the platform on their leg, N."""
+def _pulls(lines: Sequence[Line], wrench: Array, reference: Vector) -> list[float]:
+    """The pulls of lines that together come nearest to a wrench of the platform on their leg, N."""
     columns = np.array([line.wrench(reference).components() for line in lines], dtype=float).T
     return [float(pull) for pull in np.linalg.lstsq(columns, wrench, rcond=None)[0]]
 
