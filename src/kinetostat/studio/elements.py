@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import nicegui.elements.scene  # noqa: F401  (registers three.js, which NiceGUI brings with it)
+import nicegui.elements.echart
+import nicegui.elements.scene  # noqa: F401  (both register what NiceGUI brings with it: ECharts and three.js)
 from nicegui import ui
 from nicegui.element import Element
 

@@ -1,6 +1,6 @@
 // Colours for numbers, in bands that the eye can tell apart, and the bar that says which is which.
 import { colour } from "kinetostat-scene/theme.js";
-import { logTicks, niceTicks, short } from "kinetostat-studio/plot_axes.js";
+import { axis, frame } from "kinetostat-studio/plot.js";
 
 const VIRIDIS = [
   [68, 1, 84], [72, 36, 117], [65, 68, 135], [53, 95, 141], [42, 120, 142], [33, 145, 140],
@@ -38,35 +38,30 @@ export function colourScale(known, ends) {
   return {
     none: known.length === 0,
     share: (value) => (constant ? 0.5 : share(value)),
-    ticks: constant ? [[0.5, high]] : (log ? logTicks : niceTicks)(low, high, 5).map((value) => [share(value), value]),
+    log, constant, low, high,
     below: least < low - ALIKE * (high - low),
     above: greatest > high + ALIKE * (high - low),
   };
 }
 
-export function colourBar(pen, box, scale) {
-  const x = box.x + box.width + 12;
-  for (let band = 0; band < BANDS; band++) {
-    pen.fillStyle = css(bandColour(band));
-    pen.fillRect(x, box.y + box.height * (1 - (band + 1) / BANDS), 11, box.height / BANDS + 0.6);
-  }
-  for (const [beyond, foot, way, band] of [
-    [scale.above, box.y, -1, BANDS - 1],
-    [scale.below, box.y + box.height, 1, 0],
-  ]) {
-    if (!beyond) continue;
-    pen.fillStyle = css(bandColour(band));
-    pen.beginPath();
-    pen.moveTo(x, foot);
-    pen.lineTo(x + 11, foot);
-    pen.lineTo(x + 5.5, foot + 7 * way);
-    pen.fill();
-  }
-  pen.fillStyle = colour("ink-soft");
-  pen.textAlign = "left";
-  pen.textBaseline = "middle";
-  for (const [share, value] of scale.ticks) {
-    const at = Math.min(Math.max(box.y + box.height * (1 - share), box.y + 5), box.y + box.height - 5);
-    pen.fillText(short(value), x + 15, at);
-  }
+// What ECharts draws as the bar right of a plot: a second grid, filled with the colours, whose axis has the values.
+export function colourBar(box, scale) {
+  const bar = { left: box.left + box.width + 12, top: box.top, width: 11, height: box.height };
+  const stops = Array.from({ length: BANDS }, (_, band) => css(bandColour(band)));
+  const colorStops = stops.flatMap((color, band) => [{ offset: band / BANDS, color }, { offset: (band + 1) / BANDS, color }]);
+  const [low, high] = scale.constant ? [scale.high - 1, scale.high + 1] : [scale.low, scale.high];
+  const upright = axis([low, high], 5, { type: scale.log ? "log" : "value", position: "right", gridIndex: 1, axisTick: { show: false } });
+  if (scale.constant) upright.axisLabel.customValues = [scale.high];
+  Object.assign(upright.axisLabel, { margin: 4, verticalAlignMinLabel: "bottom", verticalAlignMaxLabel: "top" });
+  const arrow = (beyond, value, band, symbolRotate, shift) => ({
+    type: "scatter", xAxisIndex: 1, yAxisIndex: 1, silent: true, symbol: "triangle", symbolSize: [11, 7], symbolRotate,
+    symbolOffset: [0, shift], itemStyle: { color: css(bandColour(band)) }, clip: false, data: beyond ? [[0.5, value]] : [],
+  });
+  return {
+    grid: { ...frame(bar), borderWidth: 0, backgroundColor: { type: "linear", x: 0, y: 1, x2: 0, y2: 0, colorStops } },
+    xAxis: { show: false, type: "value", min: 0, max: 1, gridIndex: 1 },
+    yAxis: upright,
+    series: [arrow(scale.above, high, BANDS - 1, 0, -3.5), arrow(scale.below, low, 0, 180, 3.5)],
+    title: (text) => ({ type: "text", right: 2, top: 2, style: { text, fill: colour("ink-soft"), font: '11px Roboto, "Segoe UI", sans-serif' } }),
+  };
 }

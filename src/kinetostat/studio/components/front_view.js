@@ -2,132 +2,95 @@
 // Enter picks one.
 import { bandColour, bandOf, colourBar, colourScale, css } from "kinetostat-studio/colour_scale.js";
 import { colour } from "kinetostat-scene/theme.js";
-import { frame, niceTicks, plot, prepare, short } from "kinetostat-studio/plot_axes.js";
+import { axis, frame, message, plot, short } from "kinetostat-studio/plot.js";
 
 const NEAR = 18; // pixels within which a click means a point
+const AIR = 0.07; // share of the range around the points
 
 export default {
   mixins: [plot],
-  template: `<div class="plot"><canvas tabindex="0" role="img" :aria-label="label" @pointerdown="press"
-      @pointermove="hover" @pointerleave="leave" @keydown="step" @blur="leave"></canvas>
-      <div class="plot-tip" aria-hidden="true"></div></div>`,
+  template: `<div class="plot" tabindex="0" role="img" :aria-label="label" @pointerdown="press"
+      @pointermove="hover" @pointerleave="leave" @keydown="step" @blur="leave"></div>`,
   emits: ["pick"],
   methods: {
-    show(front) {
-      this.front = front;
-      this.near = null;
-      this.draw();
-      this.tell();
-      this.$el.dataset.points = front.points.length;
-    },
     range(k) {
-      const { points, initial } = this.front;
-      const known = [...points, ...(initial ? [initial] : [])].map((point) => point[this.front.axes[k]]);
+      const { points, initial, axes } = this.shown;
+      const known = [...points, ...(initial ? [initial] : [])].map((point) => point[axes[k]]);
       const [low, high] = [Math.min(...known), Math.max(...known)];
-      const margin = 0.07 * (high - low) || 0.05 * Math.abs(high) || 1;
-      return [low - margin, high + margin];
+      const air = AIR * (high - low) || 0.05 * Math.abs(high) || 1;
+      return [low - air, high + air];
     },
-    draw() {
-      if (!this.front) return;
-      const sheet = prepare(this.canvas, this.$el);
-      if (!sheet) return;
-      const { pen, width, height } = sheet;
-      const { points, knee, initial, chosen, axes, coloured, labels } = this.front;
+    option(width, height) {
+      const { points, knee, initial, chosen, axes, coloured, labels } = this.shown;
+      this.$el.dataset.points = points.length;
+      this.near = null;
+      if (!points.length) return message("no feasible design yet");
       const [top, right] = coloured === null ? [10, 14] : [24, 78];
-      const box = { left: 0, bottom: height, x: 66, y: top, width: width - 66 - right, height: height - top - 40 };
-      if (box.width < 20 || box.height < 20) return;
-      if (!points.length) {
-        pen.fillStyle = colour("ink-soft");
-        pen.fillText("no feasible design yet", box.x, box.y + 20);
-        return;
-      }
-      const [x, y] = [this.range(0), this.range(1)];
-      const toX = (value) => box.x + (box.width * (value - x[0])) / (x[1] - x[0]);
-      const toY = (value) => box.y + box.height * (1 - (value - y[0]) / (y[1] - y[0]));
-      this.place = (point) => [toX(point[axes[0]]), toY(point[axes[1]])];
-      const up = niceTicks(y[0], y[1], Math.max(2, box.height / 42));
-      pen.fillStyle = colour("line");
-      for (const tick of up) pen.fillRect(box.x, Math.round(toY(tick)), box.width, 1);
-      frame(pen, box, {
-        x: niceTicks(x[0], x[1], Math.max(2, box.width / 70)).map((t) => [toX(t), short(t)]),
-        y: up.map((t) => [toY(t), short(t)]),
-      }, { x: labels[axes[0]], y: labels[axes[1]] });
-      const fill = this.fills(pen, box);
-      points.forEach((point, n) => this.dot(pen, point, n === this.near ? 6 : 4, fill(point)));
-      this.named(pen, box, points[knee], "knee", coloured === null ? colour("series-2") : fill(points[knee]));
-      if (initial) this.named(pen, box, initial, "initial", colour("ink-soft"));
-      if (chosen !== null && points[chosen]) this.ring(pen, points[chosen]);
+      const box = { left: 66, top, width: width - 66 - right, height: height - top - 40 };
+      const scale = coloured === null ? null : colourScale(points.map((point) => point[coloured]));
+      const bar = scale && colourBar(box, scale);
+      const fill = (point) => (scale ? css(bandColour(bandOf(scale.share(point[coloured])))) : colour("series-1"));
+      const place = (point) => [point[axes[0]], point[axes[1]]];
+      const edge = { borderWidth: 1, borderColor: colour(scale ? "ink-soft" : "surface") };
+      const line = { show: true, lineStyle: { color: colour("line") } };
+      const x = this.range(0);
+      const named = (point, name, color) => ({
+        value: place(point), symbolSize: 12, itemStyle: { ...edge, color },
+        label: {
+          show: true, formatter: name, color: colour("ink"), distance: 3,
+          position: (place(point)[0] - x[0]) / (x[1] - x[0]) > 1 - 60 / box.width ? "left" : "right", offset: [0, -9],
+        },
+      });
+      const marked = [named(points[knee], "knee", scale ? fill(points[knee]) : colour("series-2"))];
+      if (initial) marked.push(named(initial, "initial", colour("ink-soft")));
+      const ring = { color: "transparent", borderColor: colour("accent"), borderWidth: 2 };
+      return {
+        grid: [frame(box), ...(bar ? [bar.grid] : [])],
+        xAxis: [axis(x, box.width / 70, { name: labels[axes[0]], nameGap: 24 }), ...(bar ? [bar.xAxis] : [])],
+        yAxis: [
+          axis(this.range(1), box.height / 42, { name: labels[axes[1]], nameGap: 50, splitLine: line }),
+          ...(bar ? [bar.yAxis] : []),
+        ],
+        graphic: bar ? [bar.title(`colour: ${labels[coloured]}`)] : [],
+        series: [
+          {
+            type: "scatter", symbolSize: 8, cursor: "inherit", emphasis: { scale: 1.5 },
+            data: points.map((point) => ({ value: place(point), itemStyle: { ...edge, color: fill(point) } })),
+          },
+          { type: "scatter", silent: true, data: marked },
+          { type: "scatter", silent: true, symbolSize: 18, itemStyle: ring, data: points[chosen] ? [place(points[chosen])] : [] },
+          ...(bar ? bar.series : []),
+        ],
+      };
     },
-    fills(pen, box) {
-      const { points, coloured, labels } = this.front;
-      if (coloured === null) return () => colour("series-1");
-      const scale = colourScale(points.map((point) => point[coloured]));
-      colourBar(pen, box, scale);
-      pen.fillStyle = colour("ink");
-      pen.textAlign = "right";
-      pen.textBaseline = "top";
-      pen.fillText(`colour: ${labels[coloured]}`, this.$el.clientWidth - 4, 4);
-      return (point) => css(bandColour(bandOf(scale.share(point[coloured]))));
-    },
-    dot(pen, point, size, fill) {
-      pen.beginPath();
-      pen.arc(...this.place(point), size, 0, 7);
-      pen.fillStyle = fill;
-      pen.fill();
-      pen.lineWidth = 1;
-      pen.strokeStyle = colour(this.front.coloured === null ? "surface" : "ink-soft");
-      pen.stroke();
-    },
-    named(pen, box, point, name, fill) {
-      this.dot(pen, point, 6, fill);
-      const [x, y] = this.place(point);
-      const right = x > box.x + box.width - 60;
-      pen.fillStyle = colour("ink");
-      pen.textAlign = right ? "right" : "left";
-      pen.textBaseline = "bottom";
-      pen.fillText(name, x + (right ? -9 : 9), y - 3);
-    },
-    ring(pen, point) {
-      pen.beginPath();
-      pen.arc(...this.place(point), 9, 0, 7);
-      pen.lineWidth = 2;
-      pen.strokeStyle = colour("accent");
-      pen.stroke();
+    place(n) {
+      const { points, axes } = this.shown;
+      return this.chart.convertToPixel({ gridIndex: 0 }, [points[n][axes[0]], points[n][axes[1]]]);
     },
     nearest(event) {
-      if (!this.front?.points.length || !this.place) return null;
-      const area = this.canvas.getBoundingClientRect();
-      const [x, y] = [event.clientX - area.left, event.clientY - area.top];
-      const away = this.front.points.map((point) => {
-        const [px, py] = this.place(point);
-        return Math.hypot(px - x, py - y);
-      });
+      if (!this.shown?.points.length || !this.chart) return null;
+      const [x, y] = this.at(event);
+      const away = this.shown.points.map((_, n) => Math.hypot(this.place(n)[0] - x, this.place(n)[1] - y));
       const best = away.indexOf(Math.min(...away));
       return away[best] < NEAR ? best : null;
     },
     aim(near) {
-      if (near === this.near) return;
+      if (near === this.near || !this.chart) return;
+      this.chart.dispatchAction({ type: "downplay", seriesIndex: 0 });
       this.near = near;
-      this.draw();
-      if (near === null) {
-        this.tip.style.display = "none";
-        return;
-      }
-      const point = this.front.points[near];
-      const [x, y] = this.place(point);
-      this.tip.textContent = point.map((value, k) => `${this.front.labels[k]}  ${short(value)}`).join("\n");
-      this.tip.style.display = "block";
-      this.tip.style.left = `${Math.max(Math.min(x + 12, this.$el.clientWidth - this.tip.offsetWidth - 4), 0)}px`;
-      this.tip.style.top = `${Math.max(y - this.tip.offsetHeight - 8, 0)}px`;
+      if (near === null) return this.chart.dispatchAction({ type: "hideTip" });
+      const { points, labels } = this.shown;
+      this.chart.dispatchAction({ type: "highlight", seriesIndex: 0, dataIndex: near });
+      this.tell(points[near].map((value, k) => `${labels[k]}  ${short(value)}`).join("\n"), this.place(near));
     },
     hover(event) {
       this.aim(this.nearest(event));
     },
     leave() {
-      if (this.front) this.aim(null);
+      this.aim(null);
     },
     pick(n) {
-      this.front.chosen = n;
+      this.shown.chosen = n;
       this.draw();
       this.$emit("pick", n);
     },
@@ -136,9 +99,9 @@ export default {
       if (event.button === 0 && near !== null) this.pick(near);
     },
     step(event) {
-      if (!this.front?.points.length) return;
-      const count = this.front.points.length;
-      const at = this.near ?? this.front.chosen ?? this.front.knee;
+      if (!this.shown?.points.length) return;
+      const count = this.shown.points.length;
+      const at = this.near ?? this.shown.chosen ?? this.shown.knee;
       const move = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
       if (move) this.aim(Math.min(Math.max(at + move, 0), count - 1));
       else if (event.key === "Enter") this.pick(at);
