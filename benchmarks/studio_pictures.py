@@ -112,6 +112,19 @@ def design(new_tab: Any) -> None:
         keep(page, "studio-design")
 
 
+def question(new_tab: Any) -> None:
+    """The vibrations of a hexapod, asked about as on the command line."""
+    with served("hexapod") as address:
+        page = new_tab()
+        page.open(f"{address}?machine=hexapod&tool.mass=12+kg&linear_density.legs=4+kg%2Fm")
+        page.tab.get_by_role("button", name="Ask", exact=True).first.click()
+        page.tab.get_by_label("lowest").fill("10 Hz")
+        page.tab.locator(".of-asking .design-foot").get_by_role("button", name="Ask", exact=True).click()
+        page.tab.locator(".answer figure").first.wait_for(state="attached")
+        page.tab.locator(".wordmark").click()
+        keep(page, "studio-ask")
+
+
 def gallery(new_tab: Any) -> None:
     """Other machines, the middle of the page."""
     for machine in ("hexapod", "delta", "tricept", "passive-leg-5dof-rus"):
@@ -129,6 +142,7 @@ def main() -> None:
         vibration(new_tab)
         tripteron(new_tab)
         design(new_tab)
+        question(new_tab)
         gallery(new_tab)
 
 

@@ -21,6 +21,7 @@ MARKERS = {
     "browser": ("test_studio_browser", "test_studio_reach", "test_studio_swing", "test_report_browser"),
     "workers": ("test_workers", "test_hash_seeds", "test_large_sweeps", "test_studio_runs", "test_studio_search"),
     "studio": (
+        "test_studio_ask",
         "test_studio_design",
         "test_studio_files",
         "test_studio_loads",

@@ -15,6 +15,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studio.address import address_of
 from kinetostat.studio.answers import Picture, PictureRequest, Report, ReportRequest, picture, report
+from kinetostat.studio.asking.tab import AskTab
 from kinetostat.studio.design.design_tab import DesignTab, Workshop
 from kinetostat.studio.elements import BrowserLink, icon_button, refuse, toggle, upload_field
 from kinetostat.studio.files_menu import FilesMenu
@@ -44,9 +45,9 @@ PANELS: tuple[type[Panel], ...] = (
 """The linked views, in the order of their tabs."""
 ACCENT = "#0b5ea8"
 """Colour of buttons and marks; style.css has it by name."""
-MODES = {"Explore": "studio", "Text": "studio texting", "Design": "studio designing"}
-"""What stands beside the machine: its numbers, the text of its file, or the design tab; and the page's classes."""
-EXPLORE, TEXT, DESIGN = MODES
+MODES = {"Explore": "studio", "Text": "studio texting", "Design": "studio designing", "Ask": "studio asking"}
+"""What stands beside the machine: its numbers, the text of its file, the design or the ask tab; the page's classes."""
+EXPLORE, TEXT, DESIGN, ASK = MODES
 OTHER = "own"
 """Key in the list of machines of one that is not bundled."""
 
@@ -88,6 +89,7 @@ class StudioPage:
                 with ui.element("div").classes("card views-card"):
                     self._views()
             self.design = DesignTab(self.session, workshop, self._take)
+            self.questions = AskTab(self.session)
         ui.context.client.on_delete(self._close)
         ui.on_exception(lambda error: refuse(f"Something could not be done or shown. {as_sentence(error)}"))
         self._loaded()
@@ -133,6 +135,7 @@ class StudioPage:
         else:
             self.parameters.refresh()
         self.text.refresh()
+        self.questions.changed()
         self._offer_history()
 
     def _loaded(self) -> None:
@@ -153,6 +156,7 @@ class StudioPage:
         self.text.renew()
         self.map.fill()
         self.design.renew()
+        self.questions.changed()
         self._offer_history()
         self.map.refresh()
         self._pictures.ask(PictureRequest(machine, self._sizes, self._axes, fit=True))
@@ -220,8 +224,8 @@ class StudioPage:
 
     def _show_front(self) -> None:
         panel = self.panels.get(str(self.tabs.value))
-        designing = self.mode.value == DESIGN
-        if self._latest is not None and panel is not None and panel.shows(self._latest) and not designing:
+        hidden = self.mode.value in (DESIGN, ASK)
+        if self._latest is not None and panel is not None and panel.shows(self._latest) and not hidden:
             self._front = panel
             panel.show(self._latest, self.session)
 
@@ -257,12 +261,13 @@ class StudioPage:
     def _to_front(self) -> None:
         mode = str(self.mode.value)
         self.main.classes(replace=MODES[mode])
-        if mode == DESIGN:
+        if mode in (DESIGN, ASK):
             self._leave_front()
         elif self._front is None:
             self._show_front()
         self.text.front(mode == TEXT)
         self.design.front(mode == DESIGN)
+        self.questions.front(mode == ASK)
 
     def _take(self, machine: Machine, typed: bool = False) -> None:
         """Make a design of a search, a favourite, or what was typed as text the machine of this page."""
@@ -288,7 +293,8 @@ class StudioPage:
         self.changed()
 
     def _close(self) -> None:
-        for part in (self._pictures, self._reports, self.handles, self.map, self.files, self.text, self.design):
+        lanes = (self._pictures, self._reports)
+        for part in (*lanes, self.handles, self.map, self.files, self.text, self.design, self.questions):
             part.close()
         for panel in self.panels.values():
             panel.close()

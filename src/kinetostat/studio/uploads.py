@@ -80,17 +80,17 @@ def read(kind: str, data: bytes, name: str) -> None:
         build(text, name)
 
 
-def _limit() -> None:
-    """Limit the time and the memory of this process, where the system can."""
+def limit_process(seconds: int, memory: int) -> None:
+    """Limit the processor time (s) and the memory (bytes) of this process, where the system can."""
     if sys.platform != "win32":
         import resource
 
-        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
 
 
 if __name__ == "__main__":
-    _limit()
+    limit_process(SECONDS, MEMORY)
     try:
         read(sys.argv[1], sys.stdin.buffer.read(), sys.argv[2])
     except InputError as refusal:

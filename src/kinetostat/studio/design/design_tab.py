@@ -48,9 +48,9 @@ class DesignTab:
             load: takes a machine into the session.
         """
         self._session, self._workshop = session, workshop
-        with ui.element("section").classes("design left").props('aria-label="study"'):
+        with ui.element("section").classes("design of-designing left").props('aria-label="study"'):
             self.form = StudyForm(session, self._start)
-        with ui.element("section").classes("design right").props('aria-label="search and result"'):
+        with ui.element("section").classes("design of-designing right").props('aria-label="search and result"'):
             with ui.element("div").classes("card run-card"):
                 self.runs = RunPanel(workshop.runs, load)
             with ui.element("div").classes("card answer-card"):

@@ -1,0 +1,147 @@
+"""A question that the studio asks in a process of its own, so that it can be stopped and its memory is limited.
+
+The process is `python -m kinetostat.studio.asking.process`, with a request as JSON on its standard input. It runs in
+a folder with the machine and the files that were sent, prints its progress as JSON, and writes its answer there.
+"""
+
+import argparse
+import base64
+import json
+import sys
+from collections.abc import Callable, Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from kinetostat.commands.asking import READERS
+from kinetostat.machine.loading import load
+from kinetostat.machine.parameters import doubts
+from kinetostat.spec.errors import InputError, choice, shorten
+from kinetostat.studies.storage import write_text
+from kinetostat.studio.uploads import REFUSED, limit_process
+from kinetostat.studio.wording import paragraph, table
+from kinetostat.views.answers import description_of, write_form
+from kinetostat.views.figures import as_svg
+from kinetostat.views.question import Description, Option, Question, late
+from kinetostat.views.questions import QUESTIONS
+from kinetostat.views.report.typesetting import printed
+
+WORKER = "kinetostat.studio.asking.process"
+SECONDS = 3600
+"""Processor time of a question."""
+MEMORY = 4 << 30
+"""Address space of the process, bytes."""
+SHOWN = "shown.html"
+"""The answer as the page shows it."""
+ANSWER = "answer"
+"""Stem of the names of the answer's other files."""
+MACHINE = "machine.toml"
+SENT = "sent"
+"""Folder of the files that were sent, within that of the process."""
+
+
+def label_of(option: Option) -> str:
+    """Return the name of an option as the page writes it."""
+    return option.name.replace("_", " ")
+
+
+def in_words_of_the_page(question: Question, text: str) -> str:
+    """Return a text in which options have their names on the page, not those of the command line or of Python."""
+    for option in sorted(question.options, key=lambda option: -len(option.flag)):
+        text = text.replace(option.flag, f'"{label_of(option)}"')
+        if text.startswith(f"{option.name} "):
+            text = label_of(option) + text.removeprefix(option.name)
+    return text
+
+
+def values_of(question: Question, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a question takes besides the machine, from what was given in the form.
+
+    Args:
+        question: whose options they are.
+        given: a text, a flag or a list of texts by the name of an option; one that is missing has its default.
+
+    Raises:
+        InputError: a text cannot be read, or something that is required is missing.
+    """
+    values = {}
+    for option in question.options:
+        text = given.get(option.name)
+        if text in (None, "", []):
+            if option.required:
+                raise InputError(f"{label_of(option)} is missing; it is {option.meaning}.")
+            values[option.name] = list(option.default or ()) if option.many else option.default
+        elif option.many:
+            values[option.name] = [_value(option, str(entry)) for entry in text]
+        else:
+            values[option.name] = bool(text) if option.kind == "flag" else _value(option, str(text))
+    return values
+
+
+def _value(option: Option, text: str) -> Any:
+    if option.choices:
+        return choice(text, option.choices, label_of(option))
+    if option.kind == "file":
+        return Path(SENT) / Path(text).name
+    reader: Callable[[str], Any] = READERS.get(option.kind, str)  # type: ignore[assignment]
+    try:
+        return reader(text)
+    except argparse.ArgumentTypeError as error:
+        raise InputError(f"{label_of(option)}: {error}.") from None
+    except ValueError:
+        raise InputError(f"{label_of(option)} is {shorten(text)}; it must be a number.") from None
+
+
+def answer_html(description: Description, answer: Any, full: bool) -> str:
+    """Return an answer as HTML: its sentences, its tables, and its figures with their captions."""
+    if not description.answered(answer):
+        return paragraph(str(answer.message), "lead")
+    parts = [
+        f'<p class="note"><b>{escape(head)}</b> {escape(sentence)}</p>' for head, sentence in description.lines(answer)
+    ]
+    parts += [paragraph(f"Note: {doubt}") for doubt in doubts(answer.machine)]
+    for shown in description.tables(answer, full):
+        title = str(shown.title or description.title)
+        rows = printed(shown, title)
+        parts.append(f"<h3>{escape(title)}</h3>" + table(title, rows.heads, rows.rows, "of-answer"))
+    for drawing in description.drawings(answer).values():
+        data = base64.b64encode(as_svg(drawing(title="")).encode()).decode()
+        image = f'<img alt="{escape(drawing.caption)}" src="data:image/svg+xml;base64,{data}">'
+        parts.append(f"<figure>{image}<figcaption>{escape(drawing.caption)}</figcaption></figure>")
+    return "".join(parts)
+
+
+def ask(request: Mapping[str, Any], tell: Callable[[int, int], None]) -> None:
+    """Ask a question about the machine in this folder, and write its answer there as a page and in every other form.
+
+    Args:
+        request: its `word`, the `options` that were given, and whether tables show every row (`full`).
+        tell: is called with how much is done, and of how much.
+
+    Raises:
+        InputError: what the question refuses.
+    """
+    question: Question = late(QUESTIONS[choice(request["word"], QUESTIONS, "the question")][1])
+    reports = {"progress": tell} if question.reports_progress else {}
+    try:
+        answer = question.answer(load(MACHINE), **values_of(question, request["options"]), **reports)
+    except InputError as error:
+        raise InputError(in_words_of_the_page(question, str(error))) from None
+    description = description_of(answer)
+    if description.answered(answer):
+        for form in description.forms:
+            write_form(description, answer, form, Path(f"{ANSWER}.{form}"))
+    write_text(Path(SHOWN), answer_html(description, answer, bool(request["full"])))
+
+
+def _tell(done: int, total: int) -> None:
+    print(json.dumps({"done": done, "total": total}), flush=True)
+
+
+if __name__ == "__main__":
+    limit_process(SECONDS, MEMORY)
+    try:
+        ask(json.load(sys.stdin), _tell)
+    except InputError as refusal:
+        print(json.dumps({"refused": str(refusal)}), flush=True)
+        sys.exit(REFUSED)

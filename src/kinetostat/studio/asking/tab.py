@@ -1,0 +1,316 @@
+"""The Ask tab: a choice of the question and its form on the left, its answer with its files on the right.
+
+Forms follow from the options of a question (`views.question`); what is computed happens in `process`.
+"""
+
+import asyncio
+import json
+import re
+import sys
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from nicegui import background_tasks, events, run, ui
+
+from kinetostat.machine.machine import Machine
+from kinetostat.spec.errors import InputError
+from kinetostat.studio.asking.process import (
+    ANSWER,
+    MACHINE,
+    MEMORY,
+    SECONDS,
+    SENT,
+    SHOWN,
+    WORKER,
+    in_words_of_the_page,
+    label_of,
+)
+from kinetostat.studio.elements import MAIN_BUTTON, choice, icon_button, upload_field
+from kinetostat.studio.lanes import Lane
+from kinetostat.studio.session import Session
+from kinetostat.studio.turns import Turns, make_modest
+from kinetostat.studio.uploads import REFUSED
+from kinetostat.studio.wording import paragraph
+from kinetostat.views.question import Option, Question, late
+from kinetostat.views.questions import QUESTIONS
+
+ASKING = Turns(2, "The question before is still being answered; stop it, then ask again.")
+"""Questions of all tabs that are answered at a time."""
+NOTHING = "Choose a question on the left and ask it; its answer is about the machine as it is then."
+CHANGED = "The machine has been changed since; ask again for its new answer."
+STOPPED = "The question was stopped."
+MOST_FILES = 8
+"""Files that an option takes at most."""
+LARGEST_ANSWER = 24 << 20
+"""Bytes of an answer that the page shows; a larger one is only downloaded."""
+FORMS = {"json": "JSON", "csv": "CSV", "nc": "NetCDF"}
+FULL = "full"
+"""Name of the switch for tables with every row, which is not an option of a question."""
+
+
+@dataclass
+class Form:
+    """What is filled in for one question: elements by the name of an option, and the files that were sent."""
+
+    question: Question
+    fields: dict[str, Any] = field(default_factory=dict)
+    files: dict[str, dict[str, bytes]] = field(default_factory=dict)
+
+    def given(self) -> dict[str, Any]:
+        """What was given: a text, a flag or a list of texts by the name of an option."""
+        texts = {}
+        for option in self.question.options:
+            if option.kind == "file":
+                names = list(self.files.get(option.name, ()))
+                texts[option.name] = names if option.many else (names or [""])[0]
+            elif option.many:
+                lines = str(self.fields[option.name].value or "").splitlines()
+                texts[option.name] = [line.strip() for line in lines if line.strip()]
+            else:
+                texts[option.name] = self.fields[option.name].value
+        return texts
+
+    @property
+    def full(self) -> bool:
+        """Whether tables show every row."""
+        return FULL in self.fields and bool(self.fields[FULL].value)
+
+
+class AskTab:
+    """The questions of one page; a page asks one at a time."""
+
+    def __init__(self, session: Session) -> None:
+        """Build the tab; questions are imported when it first comes to the front.
+
+        Args:
+            session: whose machine a question is about.
+        """
+        self._session = session
+        self._forms: dict[str, Form] = {}
+        self._asked: Machine | None = None
+        self._process: asyncio.subprocess.Process | None = None
+        self._folder: TemporaryDirectory[str] | None = None
+        self._stopped = self._busy = False
+        self._questions = Lane(_imported, self._offer)
+        with ui.element("section").classes("design of-asking left").props('aria-label="question"'):
+            with ui.element("div").classes("design-head"):
+                self.choice = choice({}, "question", self._fill, "question", searchable=True).classes("grow")
+            self._body = ui.element("div").classes("design-form")
+            with ui.element("div").classes("design-foot"):
+                self.problem = ui.label("").classes("form-problem").props('role="alert"').mark("question-problem")
+                self.stop = icon_button("stop", "Stop", self._stop, "question-stop")
+                self.button = ui.button("Ask", icon="play_arrow", on_click=self._ask).props(MAIN_BUTTON)
+                self.button.mark("question-ask")
+        with (
+            ui.element("section").classes("design of-asking right").props('aria-label="answer"'),
+            ui.element("div").classes("card answer-card question-card"),
+        ):
+            with ui.element("div").classes("design-head"):
+                self.line = ui.label("").classes("run-line grow").props('role="status"').mark("question-line")
+                self.files = {form: self._download(form, name) for form, name in FORMS.items()}
+            self.bar = ui.linear_progress(0.0, show_value=False, size="4px").props('aria-label="progress"')
+            self.answer = ui.html(paragraph(NOTHING), sanitize=False).classes("answer").mark("question-answer")
+            self.answer.props('tabindex="0" role="region" aria-label="answer"')
+        self._show_busy(False)
+
+    def front(self, on: bool) -> None:
+        """Offer the questions once the tab has come to the front."""
+        if on and not self._forms:
+            self._questions.ask(tuple(QUESTIONS))
+
+    def changed(self) -> None:
+        """Say that an answer is about the machine before its last change."""
+        if self._asked is not None and not self._busy:
+            self.line.set_text("" if self._asked is self._session.machine else CHANGED)
+
+    def close(self) -> None:
+        """Stop what is being computed, and forget the answer, because the page is gone."""
+        self._questions.close()
+        self._stop()
+        self._forget()
+
+    def _download(self, form: str, name: str) -> ui.button:
+        button = ui.button(name, icon="download", on_click=partial(self._send, form)).props("flat dense no-caps")
+        button.tooltip(f"download the answer as {name}").mark(f"question-{form}").set_visibility(False)
+        return button
+
+    def _offer(self, _words: tuple[str, ...], questions: dict[str, Question]) -> None:
+        self._forms = {word: Form(question) for word, question in questions.items()}
+        self.choice.set_options(
+            {word: f"{word}: {QUESTIONS[word][0]}" for word in questions}, value=next(iter(questions))
+        )
+
+    def _fill(self) -> None:
+        """Build the form of the question that is chosen; what was filled in before is kept."""
+        form = self._forms.get(str(self.choice.value))
+        if form is None:
+            return
+        kept = {name: element.value for name, element in form.fields.items()}
+        self._refuse("")
+        self._body.clear()
+        with self._body:
+            summary = QUESTIONS[str(self.choice.value)][0]
+            ui.label(f"{summary[0].upper()}{summary[1:]}.").classes("form-about").mark("question-about")
+            for option in form.question.options:
+                self._row(form, option)
+            if form.question.full:
+                form.fields[FULL] = ui.checkbox("every row").props("dense").tooltip(form.question.full)
+                form.fields[FULL].mark(f"option {FULL}")
+        for name, value in kept.items():
+            form.fields[name].set_value(value)
+
+    def _row(self, form: Form, option: Option) -> None:
+        """Build the field of an option."""
+        label, meaning = label_of(option), in_words_of_the_page(form.question, option.meaning)
+        if option.kind == "file":
+            self._file_row(form, option, meaning)
+            return
+        made: Any
+        if option.kind == "flag":
+            made = ui.checkbox(label, value=bool(option.default)).props("dense")
+        elif option.choices:
+            made = ui.select(list(option.choices), label=label, value=option.default, clearable=not option.required)
+        elif option.many:
+            made = ui.textarea(f"{label}, one in each line").props("autogrow")
+        else:
+            made = ui.input(label, value="" if option.default in (None, ()) else str(option.default))
+        if option.kind != "flag":
+            made.props("dense outlined").classes("field")
+        form.fields[option.name] = made.tooltip(meaning).mark(f"option {option.name}")
+
+    def _file_row(self, form: Form, option: Option, meaning: str) -> None:
+        """Build the field of an option that takes a file: the names of those that were sent, and a button for more."""
+        with ui.element("div").classes("form-row"):
+            ui.label(label_of(option)).classes("form-name").tooltip(meaning)
+            names = ui.label(", ".join(form.files.get(option.name, ()))).classes("form-fixed")
+            names.mark(f"sent {option.name}")
+            upload = upload_field(partial(self._take, form, option, names), self._refuse, f"upload {option.name}", "")
+            icon_button("upload_file", f"Send a file: {label_of(option)}", lambda: upload.run_method("pickFiles"), "")
+
+    async def _take(self, form: Form, option: Option, names: ui.label, event: events.UploadEventArguments) -> None:
+        """Keep a file that was sent until the question is asked; where there is no room, the first one goes."""
+        sent = form.files.setdefault(option.name, {})
+        if len(sent) == (MOST_FILES if option.many else 1):
+            sent.pop(next(iter(sent)))
+        sent[_safe(event.file.name)] = await event.file.read()
+        names.set_text(", ".join(sent))
+        if isinstance(event.sender, ui.upload):
+            event.sender.reset()
+
+    def _refuse(self, message: str) -> None:
+        self.problem.set_text(message)
+
+    def _ask(self) -> None:
+        form = self._forms.get(str(self.choice.value))
+        if form is None or self._busy:
+            return
+        self._refuse("")
+        self._asked, self._stopped = self._session.machine, False
+        request = {"word": str(self.choice.value), "options": form.given(), FULL: form.full}
+        sent = {name: data for files in form.files.values() for name, data in files.items()}
+        self._show_busy(True)
+        background_tasks.create(self._answer(request, sent), name="studio question")
+
+    async def _answer(self, request: dict[str, Any], sent: dict[str, bytes]) -> None:
+        """Ask in a process, and show its answer or why there is none."""
+        folder = TemporaryDirectory()
+        try:
+            place = Path(folder.name)
+            (place / SENT).mkdir()
+            (place / MACHINE).write_bytes(self._session.as_file()[1])
+            for name, data in sent.items():
+                (place / SENT / name).write_bytes(data)
+            async with ASKING.turn(self.button.client.id):
+                problem = await self._run(place, json.dumps(request).encode())
+            shown = "" if problem else await run.io_bound(_shown, place / SHOWN)
+        except InputError as error:
+            problem, shown = str(error), ""
+        finally:
+            self._process = None
+            self._show_busy(False)
+        if problem:
+            folder.cleanup()
+            self._refuse(problem)
+            self._asked = None
+            return
+        self._forget()
+        self._folder = folder
+        self.answer.set_content(str(shown))
+        for form, button in self.files.items():
+            button.set_visibility((place / f"{ANSWER}.{form}").exists())
+        self.changed()
+
+    async def _run(self, folder: Path, request: bytes) -> str:
+        """Run the process in its folder; return why there is no answer, empty if there is one."""
+        self._process = process = await asyncio.create_subprocess_exec(
+            sys.executable, "-m", WORKER, cwd=folder,
+            stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL,
+        )  # fmt: skip
+        if self._stopped:
+            process.kill()
+        make_modest(process.pid)
+        words, answers = process.stdin, process.stdout
+        if words is None or answers is None:
+            raise RuntimeError("the process has no pipes")
+        words.write(request)
+        words.write_eof()
+        refusal = ""
+        async for line in answers:
+            told = json.loads(line)
+            refusal = told.get("refused", "")
+            if told.get("total"):
+                self.bar.set_value(told["done"] / told["total"])
+        await process.wait()
+        if self._stopped:
+            return STOPPED
+        if process.returncode == REFUSED:
+            return str(refusal)
+        if process.returncode != 0:
+            return (
+                f"The question takes more than {SECONDS // 60} minutes or {MEMORY >> 30} GiB, or stops the program; "
+                "ask for less, or use the command on a larger computer."
+            )
+        return ""
+
+    def _stop(self) -> None:
+        self._stopped = True
+        if self._process is not None and self._process.returncode is None:
+            self._process.kill()
+
+    def _show_busy(self, busy: bool) -> None:
+        self._busy = busy
+        self.button.set_enabled(not busy)
+        self.stop.set_enabled(busy)
+        self.bar.set_value(0.0)
+        self.bar.set_visibility(busy)
+        self.line.set_text("computing ..." if busy else "")
+
+    def _forget(self) -> None:
+        if self._folder is not None:
+            self._folder.cleanup()
+        self._folder = None
+
+    def _send(self, form: str) -> None:
+        """Send the answer to the browser in one of its forms."""
+        if self._folder is not None:
+            ui.download.file(Path(self._folder.name) / f"{ANSWER}.{form}", f"{self.choice.value}.{form}")
+
+
+def _imported(words: tuple[str, ...]) -> dict[str, Question]:
+    """Import questions, in a thread: some bring large libraries."""
+    return {word: late(QUESTIONS[word][1]) for word in words}
+
+
+def _safe(name: str) -> str:
+    """Return the name of a file that was sent without anything that could lead out of its folder."""
+    return re.sub(r"[^\w.-]", "_", Path(name).name).lstrip(".-")[-80:] or "file"
+
+
+def _shown(path: Path) -> str:
+    """Read the answer as the page shows it, unless it is too large for that."""
+    if path.stat().st_size > LARGEST_ANSWER:
+        return paragraph(f"The answer has more than {LARGEST_ANSWER >> 20} MiB; download it instead.")
+    return path.read_text("utf-8")
