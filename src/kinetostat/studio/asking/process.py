@@ -24,7 +24,7 @@ from kinetostat.views.answers import description_of, write_form
 from kinetostat.views.figures import as_svg
 from kinetostat.views.question import Description, Option, Question, late
 from kinetostat.views.questions import QUESTIONS
-from kinetostat.views.report.typesetting import printed
+from kinetostat.views.report.typesetting import as_table
 
 WORKER = "kinetostat.studio.asking.process"
 SECONDS = 3600
@@ -102,7 +102,7 @@ def answer_html(description: Description, answer: Any, full: bool) -> str:
     parts += [paragraph(f"Note: {doubt}") for doubt in doubts(answer.machine)]
     for shown in description.tables(answer, full):
         title = str(shown.title or description.title)
-        rows = printed(shown, title)
+        rows = as_table(shown, title)
         parts.append(f"<h3>{escape(title)}</h3>" + table(title, rows.heads, rows.rows, "of-answer"))
     for drawing in description.drawings(answer).values():
         data = base64.b64encode(as_svg(drawing(title="")).encode()).decode()
