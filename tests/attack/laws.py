@@ -46,6 +46,8 @@ STEP = 1e-4
 """Of a pose for differences, rad or in units of the machine's length."""
 SMOOTH = 0.05
 """By how much two differences may differ, one over half of the step of the other."""
+SHORTER = 16.0
+"""Times that a step is longer than the one which confirms a jump."""
 NOTHING = 1e-6
 """Change of C, as a share, in which differences have lost their digits."""
 PUSH = 1e-4
@@ -279,8 +281,16 @@ def _poses(case: Case) -> tuple[str, float]:
 
 
 def neighbours(case: Case) -> str | None:
-    """C is smooth: what it changes over half of a step is half of what it changes over the whole."""
+    """C is smooth: what it changes over half of a step is half of what it changes over the whole.
+
+    Beside a singularity a step may be too long for that; a jump is one over a shorter step as well.
+    """
     path, step = _poses(case)
+    return _jump(case, path, step) and _jump(case, path, step / SHORTER)
+
+
+def _jump(case: Case, path: str, step: float) -> str | None:
+    """Say by how much C jumps beside the pose along a coordinate, if it does."""
     here = values(case.machine)[path]
     near = [response_of(with_values(case.machine, {path: here + s * step})) for s in (-1.0, -0.5, 0.5, 1.0)]
     if any(int(response.status) != Status.OK for response in near):

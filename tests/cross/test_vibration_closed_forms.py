@@ -1,5 +1,7 @@
 """Natural frequencies and shapes of machines whose equations fit on a few lines: chains, beams, cables, rotors."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,11 @@ from kinetostat.equilibrium.mechanism import mechanism_of
 from kinetostat.equilibrium.solving import at_rest, with_share
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import respond
+from kinetostat.validation.comparison import KNOWN, frequency_pairs
 from kinetostat.vibration.modes import modes
 from machines import STRETCH, cable, written
+
+IDLE_CARRIAGE = Path(__file__).parents[1] / "cases/idle-carriage.toml"
 
 
 def vibration(machine, loaded=False):
@@ -272,3 +277,11 @@ def test_one_softer_strut_parts_the_pairs():
     )
     assert apart.frequencies[1] / apart.frequencies[0] - 1.0 > 1e-4
     assert (apart.frequencies <= together.frequencies * (1.0 + 1e-12)).all(), "Rayleigh: softer is slower"
+
+
+def test_a_part_that_nothing_holds_along_its_way_stays_where_it_is():
+    """Carriage idle between base and table: the table vibrates alone, omega² = k/m, whatever the carriage weighs."""
+    machine = load(IDLE_CARRIAGE)
+    for mass in (3.0, 0.001, 300.0):
+        agree(vibration(changed(machine, {"legs.idle.carriage.mass": mass})), [2e6 / 5.0])
+    assert frequency_pairs(machine, KNOWN[0])[0] == pytest.approx([np.sqrt(2e6 / 5.0) / (2.0 * np.pi)] * 2, rel=1e-9)

@@ -341,13 +341,18 @@ def turn_rotors(model: Multibody, machine: Machine, configuration: Configuration
 def modal_frequencies(model: Multibody) -> Array:
     """Frequencies (Hz) of the engine's linearised equations about where its system is, ascending.
 
-    Motions that have no stiffness are idle here, and motions without mass have no frequency. So K is made a unit
-    matrix by its eigenvectors without the idle ones, and the eigenvalues of M in these coordinates are 1/omega².
+    Motions that have no stiffness are idle, of frequency 0, and the others have no momentum with them; motions without
+    mass have no frequency. So K is made a unit matrix by its eigenvectors without the idle ones, each with as much idle
+    motion as takes its momentum away, and the eigenvalues of M in these coordinates are 1/omega².
     """
     mass, stiffness, *_ = model.system.ComputeLinearizedSystem(settings_of(model), projectIntoConstraintNullspace=True)
     sizes, shapes = np.linalg.eigh(0.5 * (stiffness + np.transpose(stiffness)))
     stiff = sizes > IDLE_MOTION * np.max(sizes)
-    softened = shapes[:, stiff] / np.sqrt(sizes[stiff])
+    softened, idle = shapes[:, stiff] / np.sqrt(sizes[stiff]), shapes[:, ~stiff]
+    masses, turned = np.linalg.eigh(idle.T @ mass @ idle)
+    heavy = masses > MASSLESS_MODE * np.trace(mass)  # of the others round-off would decide
+    idle, masses = idle @ turned[:, heavy], masses[heavy]
+    softened -= idle @ (idle.T @ mass @ softened / masses[:, None])
     periods = np.linalg.eigvalsh(softened.T @ np.asarray(mass) @ softened)[::-1]
     felt = periods[periods > MASSLESS_MODE * np.max(periods, initial=0.0)]
     return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(felt)))

@@ -88,6 +88,18 @@ def mass_matrix(equations: Balance) -> Array:
     return result
 
 
+def stiffness_matrix(equations: Balance) -> tuple[Array, Array]:
+    """The stiffness over the same coordinates [n x coordinates x coordinates], and the conditions of closed legs.
+
+    States of rest are solved for with a spring along each idle motion, which nothing deflects; masses would.
+    """
+    elastic, geometric, conditions = tangent_matrices(equations)
+    stiff = elastic + geometric
+    for leg, (first, last) in zip(equations.mechanism.legs, pairwise(starts_of(equations)), strict=True):
+        stiff[:, first:last, first:last] -= leg.idle @ np.swapaxes(leg.idle, 1, 2)
+    return stiff, conditions
+
+
 def damping_matrix(equations: Balance) -> Array:
     """Viscous friction of joints and rotors over the same coordinates [n x coordinates x coordinates], s."""
     mechanism, starts = equations.mechanism, starts_of(equations)
@@ -123,9 +135,9 @@ def solved(equations: Balance, shaped: bool = True) -> Iterator[Solved]:
         equations: of the states.
         shaped: whether shapes are wanted; without them they are empty, and frequencies take half of the time.
     """
-    elastic, geometric, conditions = tangent_matrices(equations)
-    stiff, mass = elastic + geometric, mass_matrix(equations)
-    left_out, starts = motions_left_out(equations), starts_of(equations)
+    stiff, conditions = stiffness_matrix(equations)
+    mass = mass_matrix(equations)
+    left_out, starts = motions_left_out(equations, mass), starts_of(equations)
     sound = np.isfinite(stiff).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
     for rows, basis in _allowed(conditions, left_out, starts, np.flatnonzero(sound)):
         within_stiff, within_mass = (_within(part, rows, basis, starts) for part in (stiff, mass))
@@ -227,10 +239,16 @@ def _factors(stiff: Array) -> tuple[Mask, Array]:
     return holds, np.linalg.inv(np.linalg.cholesky(stiff[holds]))
 
 
-def motions_left_out(equations: Balance) -> Array:
-    """Conditions on motions that do not exist [n x conditions x coordinates].
+def motions_left_out(equations: Balance, mass: Array) -> Array:
+    """Conditions that leave out motions without a frequency [n x conditions x coordinates].
 
-    Links do not spin about their own axes, which moves nothing, and nothing leaves the plane of a planar machine.
+    Nothing leaves the plane of a planar machine. Motions of a leg that leave the platform where it is and deflect no
+    spring, such as a strut that spins about its own axis, have the frequency 0: all other modes have no momentum with
+    them.
+
+    Args:
+        equations: of the states.
+        mass: see `mass_matrix`.
     """
     starts, ways = starts_of(equations), equations.mechanism.ways
     blocks = np.zeros((len(equations.left), starts[-1] - starts[0], starts[-1]))
@@ -238,8 +256,24 @@ def motions_left_out(equations: Balance) -> Array:
     for leg, terms, (first, last) in pairs:
         inside, whole = (np.linalg.norm(part, axis=1) for part in (ways.T @ terms.rates, terms.rates))
         leaving = (inside <= UNRESISTED * whole)[:, :, None] * np.eye(leg.size)
-        blocks[:, first - starts[0] : last - starts[0], first:last] = np.swapaxes(leg.idle, 1, 2) + leaving
+        apart = _without_momentum(leg.idle, mass[:, first:last, first:last])
+        blocks[:, first - starts[0] : last - starts[0], first:last] = apart + leaving
     return blocks
+
+
+def _without_momentum(idle: Array, mass: Array) -> Array:
+    """Rows that are 0 for motions without momentum along idle motions U, U^T M y [n x c x c].
+
+    Along idle motions that have no mass there is no momentum; their rows leave out these motions themselves, U^T y.
+    Rows of momentum have unit length, as those of motions.
+    """
+    transposed = np.swapaxes(idle, 1, 2)
+    masses, turned = np.linalg.eigh(transposed @ mass @ idle)
+    motions = np.swapaxes(turned, 1, 2) @ transposed
+    heavy = masses > UNRESISTED * np.trace(mass, axis1=1, axis2=2)[:, None]
+    momenta = motions @ mass
+    sizes = np.where(heavy, np.linalg.norm(momenta, axis=2), 1.0)
+    return np.asarray(np.where(heavy[:, :, None], momenta / sizes[:, :, None], motions))
 
 
 def hertz(squares: Array) -> Array:

@@ -9,14 +9,11 @@ Source: theory (58) and what follows (63). Units are those of `equilibrium.mecha
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, total
-from kinetostat.arrays import Array, Integers, Mask
-from kinetostat.equilibrium.admissible import starts_of, tangent_matrices
-from kinetostat.equilibrium.balance import Balance
+from kinetostat.arrays import Array
 from kinetostat.equilibrium.chains import Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
 from kinetostat.equilibrium.solving import with_share
@@ -25,9 +22,9 @@ from kinetostat.kinematics.closure import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
 from kinetostat.numerics.motions import of_scalars, still
-from kinetostat.tolerances import CLOSING_ROUND_OFF, UNRESISTED
+from kinetostat.tolerances import CLOSING_ROUND_OFF
 from kinetostat.vibration.inertia import PartRates, energies, leg_rates, platform_rates
-from kinetostat.vibration.modes import mass_matrix, motions_left_out, solved
+from kinetostat.vibration.modes import mass_matrix, motions_left_out, solved, stiffness_matrix
 
 EQUALS = 5
 """Modes beyond the last one that is wanted, among which equal ones are looked for."""
@@ -43,14 +40,13 @@ def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
 
     Returns:
         The unit of force, then for each mode its 1 / omega², its motion of all coordinates, and the forces that close
-        the legs. NaN where springs do not hold the machine, or where a link has an inertia about an axis about which it
-        is free to spin.
+        the legs. NaN where springs do not hold the machine.
     """
     equations = MachineState(machine, count).relaxed
     mechanism = equations.mechanism
-    elastic, geometric, conditions = tangent_matrices(equations)
-    stiff, mass, closing = elastic + geometric, mass_matrix(equations), conditions.shape[1]
-    held_still = np.concatenate([conditions, motions_left_out(equations)], axis=1)
+    stiff, conditions = stiffness_matrix(equations)
+    mass, closing = mass_matrix(equations), conditions.shape[1]
+    held_still = np.concatenate([conditions, motions_left_out(equations, mass)], axis=1)
     columns = np.full((count, most, 1 + stiff.shape[1] + closing), np.nan)
     for part in solved(equations):
         shown = min(most, part.squares.shape[1])
@@ -60,16 +56,7 @@ def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
         rows = np.concatenate([squares[:, None], shapes, forces[:, :closing]], axis=1)
         columns[part.rows] = 0.0
         columns[part.rows, :shown] = np.swapaxes(rows, 1, 2)
-        columns[part.rows[_spins(equations, part.rows, left)]] = np.nan
     return [mechanism.force, *np.ascontiguousarray(columns.reshape(count, -1).T)]
-
-
-def _spins(equations: Balance, rows: Integers, forces: Array) -> Mask:
-    """Whether forces on the coordinates [k x coordinates x m] would turn links that are kept from spinning [k]."""
-    pairs = zip(equations.mechanism.legs, pairwise(starts_of(equations)), strict=True)
-    turning = [np.swapaxes(leg.idle[rows], 1, 2) @ forces[:, first:last] for leg, (first, last) in pairs]
-    sizes = np.max([np.abs(part).max(axis=(1, 2), initial=0.0) for part in turning], axis=0)
-    return np.asarray(sizes > UNRESISTED * np.abs(forces).max(axis=(1, 2)))
 
 
 @dataclass(frozen=True)
