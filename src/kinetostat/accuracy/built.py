@@ -108,11 +108,11 @@ def _configuration_near(
         for number, row in enumerate(rows.legs)
     ]
     every = zip(rows.legs, coordinates, links, strict=True)
-    gaps = [_gap(target, row.chain.placed(q, errors=e).end, rows.length) for row, q, e in every]
+    gaps = [_gap(target, row.chain.place(q, errors=e).end, rows.length) for row, q, e in every]
     platform = target
     if max(gaps) > REACHED:
         platform, coordinates = _driven_legs(model, values, links)
-    places = [row.chain.placed(q, errors=e) for row, q, e in zip(rows.legs, coordinates, links, strict=True)]
+    places = [row.chain.place(q, errors=e) for row, q, e in zip(rows.legs, coordinates, links, strict=True)]
     parts = zip(rows.configuration.legs, rows.legs, places, links, strict=True)
     legs = [_leg(leg, row, place, link) for leg, row, place, link in parts]
     softer = {e.path: 1.0 + v for e, v in zip(model.errors, values, strict=True) if e.group == "compliances"}

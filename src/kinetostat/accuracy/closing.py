@@ -45,7 +45,7 @@ def followed(row: Row, target: Motions, length: float, errors: Mapping[int, Arra
     """
     whole, chain, given = logarithm(target), row.chain, errors or {}
     units = np.where(row.slides, length, 1.0)
-    chosen = independent(scaled(chain.rates(chain.placed(places_of(row, length))), length, axis=1))
+    chosen = independent(scaled(chain.rates(chain.place(places_of(row, length))), length, axis=1))
     far = float(np.abs(scaled(whole, length)).max(initial=0.0, where=np.isfinite(whole)))
     stages = min(max(int(np.ceil(far / STAGE)), 1), STAGES)
     coordinates = np.zeros((len(whole), row.size))
@@ -53,7 +53,7 @@ def followed(row: Row, target: Motions, length: float, errors: Mapping[int, Arra
         goal, last = exponential(whole * (stage / stages)), stage == stages
 
         def equations(joints: Array, poses: Integers, goal: Motions = goal) -> tuple[Array, Steps]:
-            at = chain.placed(joints, errors=errors_at(given, poses))
+            at = chain.place(joints, errors=errors_at(given, poses))
             gap = scaled(closing_gap(goal.at(poses), at.end), length)
             rates = scaled(chain.rates(at), length, axis=1) * units
             return largest(gap), lambda going: Screws(rates, chosen).steps(gap)[going]
@@ -234,7 +234,7 @@ def closed(
 
     def equations(there: ClosedLegs, poses: Integers) -> tuple[Array, Steps]:
         given = [errors_at(error, poses) for error in errors]
-        places = [row.chain.placed(q, errors=e) for row, q, e in zip(legs, there.coordinates, given, strict=True)]
+        places = [row.chain.place(q, errors=e) for row, q, e in zip(legs, there.coordinates, given, strict=True)]
         tool = _tool_at(there.platform, tool_home)
         free = freed(rows, places, tool, chosen)
         hold = holding(rows, free, tool, [compliance[poses] for compliance in soft])

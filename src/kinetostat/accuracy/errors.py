@@ -97,7 +97,7 @@ def errors_of(rows: Rows) -> list[Source]:
 
 def effects(row: Row, rows: Rows, sources: Sequence[Source], coordinates: Array) -> Array:
     """The work of the leg's wrenches on its errors at random coordinates [samples * wrenches x errors]."""
-    at = row.chain.placed(coordinates)
+    at = row.chain.place(coordinates)
     tool = at.end.point(np.broadcast_to(rows.point, (len(coordinates), 3)))
     screws = free_screws(row, rows, at, tool)
     wrenches = Screws(screws, independent(screws)).wrenches

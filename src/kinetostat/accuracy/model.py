@@ -225,7 +225,7 @@ class ErrorModel:
             for i in insertions if wanted is None or number in wanted else ():
                 by_place.setdefault((i.leg, i.behind), []).append((number, i))
         with np.errstate(all="ignore"):
-            places = [row.chain.placed(q, errors=e) for row, q, e in zip(legs, state.coordinates, errors, strict=True)]
+            places = [row.chain.place(q, errors=e) for row, q, e in zip(legs, state.coordinates, errors, strict=True)]
             free = freed(self.rows, places, tool, self.independent)
             hold = holding(self.rows, free, tool, self.drawn.leg_compliances)
             result = np.zeros((len(self), 6, len(self.errors)))
@@ -339,7 +339,7 @@ def _mark_other_placements(rows: Rows, coordinates: Sequence[Array], actuators: 
 def _independent_screws(row: Row, rows: Rows) -> tuple[int, ...]:
     """Choose the free screws of a leg that are independent wherever it is; it carries six wrenches less these."""
     coordinates = places_of(row, rows.length)
-    return independent(free_screws(row, rows, row.chain.placed(coordinates), np.zeros((len(coordinates), 3))))
+    return independent(free_screws(row, rows, row.chain.place(coordinates), np.zeros((len(coordinates), 3))))
 
 
 def _leg_compliances(response: Response, rows: Rows, count: int) -> tuple[Array, ...]:

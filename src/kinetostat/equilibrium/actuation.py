@@ -65,7 +65,8 @@ def with_tensions(mechanism: Mechanism, least: Array, most: Array) -> tuple[Mech
     """Choose the preloads of all springs so that the machine is at rest at its pose.
 
     Args:
-        mechanism: with its loads; its own preloads are left out, but for flexure hinges, which carry what they do.
+        mechanism: the mechanism with its loads; its own preloads are left out, but for flexure hinges, which carry what
+            they do.
         least, most: bounds of what its one-sided springs pull (or push), in its units of force [n].
 
     Returns:

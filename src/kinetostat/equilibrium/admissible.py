@@ -56,7 +56,7 @@ class Admissible:
     """Poses at which as many closing conditions A are independent, and what keeps A x = 0.
 
     Attributes:
-        rows: of the poses [k].
+        rows: numbers of the poses [k].
         motions: a basis of the admissible motions, as columns [k x coordinates x m].
         inverse: A+, of the independent conditions [k x coordinates x conditions], with A A+ b = b for all gaps b that
             can be closed.
@@ -74,9 +74,9 @@ def admissible(equations: Balance, conditions: Array, rows: Integers | None = No
     the time. Elsewhere A = U diag(s) V^T gives an orthonormal one.
 
     Args:
-        equations: at the states.
+        equations: the equations at the states.
         conditions: A of them [n x conditions x coordinates].
-        rows: of the poses to be sorted; those at which the conditions are finite if None.
+        rows: numbers of the poses to be sorted; those at which the conditions are finite if None.
     """
     rows = np.flatnonzero(np.isfinite(conditions).all(axis=(1, 2))) if rows is None else rows
     following = _following(equations, conditions[rows], rows)
@@ -126,9 +126,9 @@ def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Arr
     the wrenches of legs that are not determined, those of least norm are taken. NaN where the equations are not finite.
 
     Args:
-        equations: at the state.
+        equations: the equations at the state.
         right: right sides, in the order of the unknowns.
-        loaded: with what loads and wrenches do by turning.
+        loaded: whether to count what loads and wrenches do by turning.
     """
     elastic, geometric, conditions = tangent_matrices(equations)
     geometric = geometric if loaded else np.zeros_like(geometric)

@@ -34,9 +34,9 @@ class State:
 
     Attributes:
         platform: displacement of the platform from the free state.
-        coordinates: of each leg [n x coordinates].
-        wrenches: that the platform exerts on each leg, at the origin [n x 6].
-        amounts: by which the actuators are driven from the free state [n x actuators].
+        coordinates: the coordinates of each leg [n x coordinates].
+        wrenches: the wrenches that the platform exerts on each leg, at the origin [n x 6].
+        amounts: the amounts by which the actuators are driven from the free state [n x actuators].
     """
 
     platform: Motions
@@ -82,7 +82,7 @@ class LegTerms:
         end: displacement of its end.
         rates: twist of its end per unit of each coordinate [n x 6 x coordinates].
         driven: the same per unit of each given amount [n x 6 x amounts].
-        loads: in its springs [n x coordinates], 0 of a passive coordinate.
+        loads: the loads in its springs [n x coordinates], 0 of a passive coordinate.
         holding: what is needed along each given amount to keep it, such as the load of an actuator [n x amounts].
         carrying: stiffness of each spring that carries, 0 of those that are slack [n x coordinates].
         left: what is left of the equilibrium of its coordinates [n x coordinates].
@@ -113,19 +113,19 @@ def leg_terms(
 
     Args:
         leg: the leg.
-        coordinates: of it [n x coordinates].
-        wrench: that the platform exerts on it, at the origin [n x 6].
-        amounts: that are given: of all actuators of the machine, then of its links that grow [n x amounts].
+        coordinates: the coordinates of the leg [n x coordinates].
+        wrench: the wrench that the platform exerts on the leg, at the origin [n x 6].
+        amounts: the amounts that are given: of all actuators of the machine, then of its links that grow [n x amounts].
         gravity: [n x 3].
         placed: where its parts are, if that is known.
     """
-    placed = placed or leg.chain.placed(coordinates, amounts)
+    placed = placed or leg.chain.place(coordinates, amounts)
     screws = placed.screws
     weight, change = _weight(leg, placed.before, screws, gravity)
     # A screw changes with the motions before it, so that the work of the wrench on it does.
     changing = np.einsum("nc,njkc->nkj", wrench, brackets(screws))
     change = change - np.tril(changing, -1)
-    follows, drives = leg.chain.follows, leg.chain.driven(amounts.shape[1])
+    follows, drives = leg.chain.follows, leg.chain.follows_given(amounts.shape[1])
     loads = leg.stiffness * coordinates + leg.preload
     stiffness = leg.stiffness
     if leg.sign.any():
@@ -207,7 +207,7 @@ def potential(mechanism: Mechanism, state: State, before: Motions) -> Array:
             energy = np.where(leg.sign == 0.0, energy, 0.5 * np.maximum(leg.sign * loads, 0.0) ** 2 / stiffness)
         result += energy.sum(axis=1)
         if leg.masses.carried:
-            placed = leg.chain.placed(coordinates, amounts).before
+            placed = leg.chain.place(coordinates, amounts).before
             for i, carried in enumerate(leg.masses.carried):
                 force, point = mechanism.gravity * leg.masses.mass[:, i, None], leg.masses.point[:, i]
                 result -= np.einsum("nc,nc->n", force, placed[carried].point(point) - point)
@@ -222,8 +222,8 @@ class Balance:
         state: where everything is.
         legs: what each adds.
         left: what is left of the equations [n x unknowns].
-        load: on the platform at the origin [n x 6].
-        load_change: of it by a twist of the platform [n x 6 x 6].
+        load: the load on the platform at the origin [n x 6].
+        load_change: change of this load by a twist of the platform [n x 6 x 6].
     """
 
     mechanism: Mechanism
@@ -237,7 +237,7 @@ class Balance:
         """Rates of the platform's equations by its twist [n x ways x ways].
 
         Args:
-            loaded: with what loads and wrenches do by turning; without it, springs alone resist.
+            loaded: whether to count what loads and wrenches do by turning; otherwise springs alone resist.
         """
         ways = self.mechanism.ways
         rates = -ways.T @ self.load_change @ ways

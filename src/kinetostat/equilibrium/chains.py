@@ -57,8 +57,8 @@ class Masses:
         carried: how many of the leg's screw motions carry each [m]; not used of the platform.
         pairs: which of them are both halves of a bar.
         point: where they are in the free state [n x m x 3].
-        mass: in units of force per m/s² [n x m].
-        uncoupled: that part of each whose kinetic energy is its own [n x m].
+        mass: the mass in units of force per m/s² [n x m].
+        uncoupled: the part of each mass whose kinetic energy is its own [n x m].
         inertia: about each point in the free state, in the same unit times the square of the machine's length
             [n x m x 6]: xx, yy, zz, xy, xz, yz.
     """
@@ -100,7 +100,7 @@ class ElasticLeg:
         chain: its motions in the free state; given amounts are those of the machine's actuators, then the growths of
             its links.
         springs: the spring of each coordinate [coordinates]; None of a passive one.
-        stiffness: of each coordinate, 0 of a passive one [n x coordinates].
+        stiffness: the stiffness of each coordinate, 0 of a passive one [n x coordinates].
         preload: load of each where it is zero [n x coordinates].
         sign: sign of the loads that each can carry, 0 for both [coordinates].
         idle: a basis of motions of the passive coordinates that move nothing [n x coordinates x coordinates], with
@@ -342,8 +342,8 @@ def elastic_leg(
     """Read a leg as a row of motions.
 
     Args:
-        leg: at the pose.
-        units: in which it is counted.
+        leg: the leg at the pose.
+        units: the units in which it is counted.
         amounts: given ones of the legs before; those of this leg are added.
         members: links that belong to it.
         travels: for each element, how far what moves there or last before it is from the home pose, rad or m [n]; empty

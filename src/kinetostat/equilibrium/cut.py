@@ -32,8 +32,9 @@ class ElasticRod:
     Attributes:
         near, far: its ends in the free state, on the base and on the platform [1 x 3].
         softness: sum of the compliances of its springs.
-        given: by how much longer they would be free to be: what their preloads have stretched, less the rod's growth.
-        sign: of the loads that it can carry, 0 for both.
+        given: elongation that they would have without a load: what their preloads have stretched, less the rod's
+            growth.
+        sign: the sign of the loads that it can carry, 0 for both.
         driven: its springs that are actuators.
         rotor: inertia that its drive adds along it, as `ElasticLeg.rotors`.
     """
@@ -52,9 +53,9 @@ class Cut:
     """A mechanism whose loops are cut at rods.
 
     Attributes:
-        mechanism: with the masses of rods on its platform.
+        mechanism: the mechanism with the masses of rods on its platform.
         carrier: the chain that carries the platform.
-        rods: that hold it.
+        rods: the rods that hold it.
     """
 
     mechanism: Mechanism

@@ -47,8 +47,8 @@ def descent_from(mechanism: Mechanism, start: State) -> State:
     """Descend to where the slope of the potential is nearly zero, or as far as the steps go.
 
     Args:
-        mechanism: with its load.
-        start: to begin with; its legs need not be closed.
+        mechanism: the mechanism with its load.
+        start: the state to begin with; its legs need not be closed.
 
     Returns:
         The states that were reached; Newton's method from there tells whether they are at rest.
@@ -101,7 +101,7 @@ class _Step:
 
     Attributes:
         equations: there, with wrenches that balance all but the admissible motions.
-        unknowns: by which it changes them [n x unknowns].
+        unknowns: the step of the unknowns [n x unknowns].
         size: size of the admissible motion; NaN where it is not known [n].
         fall: fall of the potential as the model foresees it [n].
     """
@@ -140,8 +140,8 @@ class _Model:
     Attributes:
         stiffness: K, of everything but one-sided springs [n x m x m].
         force: f, of everything but these springs [n x m].
-        lines: by which a unit of each motion stretches them [n x springs x m].
-        loads: that they would carry if they carried both ways, positive where they carry [n x springs].
+        lines: the stretching of each by a unit of each motion [n x springs x m].
+        loads: the loads that they would carry if they carried both ways, positive where they carry [n x springs].
         springs: stiffness of them [n x springs].
     """
 

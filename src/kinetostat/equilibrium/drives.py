@@ -25,7 +25,7 @@ def with_drives(leg: ElasticLeg, units: Units, drives: Any, damping: Any) -> Ela
 
     Args:
         leg: the leg without drives.
-        units: in which it is counted.
+        units: the units in which it is counted.
         drives, damping: the tables of these names.
 
     Raises:

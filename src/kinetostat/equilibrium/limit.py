@@ -23,7 +23,7 @@ MOST_LOAD_STEPS = 14
 """Of the loads: a machine that moves very far before it is lost is not followed to the end, which takes seconds."""
 ACCURACY_OF_SHARE = 1e-3
 """Relative accuracy of the load factor."""
-MOST_NEWTON_STEPS = 8
+MOST_STEPS_BETWEEN_LOADS = 8
 """Of Newton's method in a step: where it needs more, the step is too long."""
 MISSED_BY_TANGENTS = 0.5
 """Share of its motion by which a step may miss what the tangents at its ends foresee: where it misses more, the state
@@ -53,7 +53,7 @@ def limit_of(mechanism: Mechanism) -> LoadLimit | None:
     """Follow a mechanism at one pose under growing loads.
 
     Args:
-        mechanism: with all of its loads.
+        mechanism: the mechanism with all of its loads.
 
     Returns:
         Where it stands last, share 1 if it stands under all of them; None if no share was found under which it
@@ -103,14 +103,14 @@ def _standing(mechanism: Mechanism, shares: Array, last: LoadLimit | None) -> Lo
     """The state under the greatest of some shares up to which all are stable and near the last one.
 
     Args:
-        mechanism: with all of its loads.
-        shares: of the loads, from the least to the greatest.
+        mechanism: the mechanism with all of its loads.
+        shares: the shares of the loads, from the least to the greatest.
         last: the state from which each of them is sought; the free state if None.
     """
     rows = np.zeros(len(shares), dtype=np.int64)
     every, start = mechanism.at(rows), (free_state(mechanism) if last is None else last.balance.state).at(rows)
     loaded = with_share(every, shares, preload=1.0)
-    solution = states_near(loaded, start, MOST_NEWTON_STEPS)
+    solution = states_near(loaded, start, MOST_STEPS_BETWEEN_LOADS)
     stands = solution.settled & stabilities(solution.balance).stable
     if last is not None:
         stands &= _near(with_share(every, last.share, preload=1.0), start, loaded, solution.state)

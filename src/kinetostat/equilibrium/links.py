@@ -31,8 +31,8 @@ def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> t
     """All links of a machine at one pose, with the exact motions of their ends.
 
     Args:
-        equations: at the state of rest of one pose.
-        legs: of the machine without loads.
+        equations: the equations at the state of rest of one pose.
+        legs: the legs of the machine without loads.
         origin: its tool point there, m.
     """
     mechanism, state = equations.mechanism, equations.state
@@ -40,7 +40,7 @@ def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> t
     links: list[DeflectedLink] = []
     given = np.concatenate([state.amounts, mechanism.growth], axis=1)
     for leg, elastic, coordinates in zip(legs, mechanism.legs, state.coordinates, strict=True):
-        placed = elastic.chain.placed(coordinates, given).before
+        placed = elastic.chain.place(coordinates, given).before
         bodies = [placed[number] for number in elastic.ends]
         links += leg_links(leg, partial(_point_motion, bodies, origin, length))
     return tuple(links)
@@ -58,11 +58,11 @@ class Strut:
     """A strut with its compression and the load at which it bends away.
 
     Attributes:
-        name: of the link.
+        name: the name of the link.
         leg: name of the leg that it belongs to.
         length: distance of its hinges, m.
         compression: force that presses it, N; negative where it is pulled.
-        euler_load: at which it bends away, N.
+        euler_load: the compression at which it bends away, N.
     """
 
     name: str
@@ -86,10 +86,10 @@ def struts(legs: Sequence[Leg], members: Sequence[Member], reference: Vector, eq
     """Find the struts whose E I is known, and what presses them at a state of rest.
 
     Args:
-        legs: of the machine at its pose, base frame.
+        legs: the legs of the machine at its pose, base frame.
         members: its links.
         reference: the tool point, base frame, m.
-        equations: at the state of rest of one pose.
+        equations: the equations at the state of rest of one pose.
     """
     result = []
     force, length = float(equations.mechanism.force[0]), float(equations.mechanism.length[0])
@@ -116,7 +116,7 @@ def _lines(leg: Leg, ways: int) -> list[Line]:
     """The lines along which a leg carries forces and nothing else, each from base to platform; none of other legs.
 
     Args:
-        leg: at its pose.
+        leg: the leg at its pose.
         ways: how many freedoms a body has in the machine: 6, or 3 in a plane.
     """
     if len(leg.lines) > 1:

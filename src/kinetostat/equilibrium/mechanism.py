@@ -111,11 +111,11 @@ def mechanism_of(
     """The mechanism of a machine at its pose, or at n poses.
 
     Args:
-        machine: with its pose, or columns of n poses.
+        machine: the machine with its pose, or columns of n poses.
         configuration: where everything is.
         joints: coordinates that close its legs, if it is written leg by leg.
-        count: of poses, n; None for numbers of any kind as they are, traced ones for instance: its arrays then hold
-            them as objects, for one pose.
+        count: number of poses, n; None for numbers of any kind as they are, traced ones for instance: its arrays then
+            hold them as objects, for one pose.
     """
     origin = machine.reference_point(configuration)
     length = of_scalars([configuration.length], count)[:, 0]

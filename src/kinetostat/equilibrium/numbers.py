@@ -31,8 +31,8 @@ class States:
 
     Attributes:
         status: `Status` codes [n].
-        rows: of the points at which the machine is at rest and stable.
-        equations: at all states of rest, stable or not; None if no point has a place.
+        rows: numbers of the points at which the machine is at rest and stable.
+        equations: the equations at all states of rest, stable or not; None if no point has a place.
         judged: their stability; `rows` are those that are stable, in their order.
         loads: size of what each actuator carries, N or N·m [n]; NaN where the machine is not at rest.
     """
@@ -69,8 +69,8 @@ def borne(machine: Machine, response: Response, loads: Sequence[tuple[Spring, Sc
     """Return the status of a machine at rest; where it is meant so, limits bound what its actuators carry there.
 
     Args:
-        machine: with its limits.
-        response: of it, without loads.
+        machine: the machine with its limits.
+        response: its response without loads.
         loads: size of what each actuator carries at rest, N or N·m.
         status: `Status` code of the state without these limits.
     """
@@ -102,7 +102,7 @@ def loaded_numbers(
     """Find the numbers of the loaded states at n poses.
 
     Args:
-        state: of a machine with its loads.
+        state: the state of a machine with its loads.
         further: what else to compute of the states of rest, by name.
 
     Returns:

@@ -48,7 +48,7 @@ class _Pull:
         near, at: b and a.
         moment: a x b.
         length: length of the rod.
-        tension: with which it pulls.
+        tension: the tension with which it pulls.
         density: its tension over its length, c: it pulls with c (b - a), and that is all but for its stretching.
         stretching, elastic: k - c and k over the square of its length, with its stiffness k.
         slack: 1 where it carries nothing, else 0.
@@ -144,7 +144,7 @@ def place_of(machine: Cut, coordinates: Row) -> Place:
     mechanism, carrier = machine.mechanism, machine.carrier
     moved = of_scalars(coordinates)
     amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
-    placed = carrier.chain.placed(moved, amounts)
+    placed = carrier.chain.place(moved, amounts)
     platform = placed.end
     grows = any(number >= len(mechanism.actuators) for number in carrier.chain.given)
     free = not grows and all(is_zero(coordinate) for coordinate in coordinates)
@@ -171,8 +171,8 @@ def reduced_machine(machine: Machine, response: Response, joints: Joints | None)
     """The equations of a machine that `cut_machine` can cut, with numbers of any kind.
 
     Args:
-        machine: with its loads.
-        response: of it without them.
+        machine: the machine with its loads.
+        response: its response without them.
         joints: coordinates that close its legs, if it is written leg by leg.
     """
     machine_cut = cut(mechanism_of(machine, response.configuration, joints, None))
@@ -188,7 +188,7 @@ class Reduced:
     Attributes:
         machine: whose equations they are.
         cut: it, with its loops cut.
-        components: of twists that it has.
+        components: the components of twists that it has.
     """
 
     machine: Machine
@@ -215,9 +215,9 @@ class Reduced:
         """The numbers of the loaded state, see `numbers.loaded_numbers`.
 
         Args:
-            coordinates: of the state, up to a last step.
+            coordinates: the coordinates of the state, up to a last step.
             wanted: which of the numbers are needed.
-            response: of the pose without loads.
+            response: the response of the pose without loads.
 
         Returns:
             The numbers by name, and the status of the pose: NOT_CONVERGED where this is not surely a stable state of

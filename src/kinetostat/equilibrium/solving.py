@@ -46,7 +46,7 @@ class Equilibria:
     """States that were reached at n poses.
 
     Attributes:
-        mechanism: with its load.
+        mechanism: the mechanism with its load.
         state: those that were reached.
         settled: where these are at rest [n].
     """
@@ -79,7 +79,7 @@ def at_rest(mechanism: Mechanism, start: State | None = None) -> Equilibria:
     such springs, the load is applied in steps.
 
     Args:
-        mechanism: with its load.
+        mechanism: the mechanism with its load.
         start: a state nearby; the free state if None.
     """
     state = start or free_state(mechanism)
@@ -118,8 +118,8 @@ def with_share(mechanism: Mechanism, share: float | Array, preload: float | None
     """The mechanism with a share of its loads, or with one at each pose [n], and with one of its preloads.
 
     Args:
-        mechanism: with all of its loads.
-        share: of its loads.
+        mechanism: the mechanism with all of its loads.
+        share: the share of its loads.
         preload: share of its preloads; that of the loads if None.
     """
 
@@ -138,7 +138,7 @@ def states_near(mechanism: Mechanism, start: State, most_steps: int = MOST_STEPS
     """Find the states of rest near given ones by Newton's method, without steps of the load.
 
     Args:
-        mechanism: with its load.
+        mechanism: the mechanism with its load.
         start: states to begin with.
         most_steps: number of steps that are taken at most.
     """

@@ -43,7 +43,7 @@ HELD_BY_LOADS = (Status.OK, Status.SINGULAR)
 SOUGHT_NO_REST = (*PLACELESS, Status.UNDECIDED)
 """Statuses without loads at which nobody can look for a rest: no place, or no knowing what carries a load."""
 NEARBY = 0.03
-"""How far from the pose general mobility is looked for: share of the characteristic length; in angles, rad."""
+"""Distance from the pose at which general mobility is sought: share of the characteristic length; in angles, rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +54,8 @@ class MachineState(Immutable):
     or about limits and motions is known of both; what is at rest is solved for where somebody asks.
 
     Attributes:
-        machine: with its pose and its loads, or with columns of n poses.
-        count: of poses, n.
+        machine: the machine with its pose and its loads, or with columns of n poses.
+        count: number of poses, n.
     """
 
     machine: Machine
@@ -121,7 +121,7 @@ class MachineState(Immutable):
 
     @cached_property
     def mobility(self) -> Mobility | None:
-        """What can move, and what sort of pose it is; None where the joints have no place."""
+        """Motions that are free, and the sort of the pose; None where the joints have no place."""
         return known_mobility(self.free, self.nearby)
 
     @cached_property
@@ -133,7 +133,7 @@ class MachineState(Immutable):
 
     @cached_property
     def left_out(self) -> str:
-        """Which loads of the file do not count in the state that is meant, in a sentence; empty where all do."""
+        """A sentence on the loads of the file that do not count in the state that is meant; empty where all do."""
         return "" if self.machine.loaded else loads_left_out(self.machine, self.configuration)
 
     @cached_property
@@ -157,7 +157,7 @@ class MachineState(Immutable):
 
     @property
     def balanced(self) -> Mask:
-        """Where tensions within their bounds hold the loads; everywhere if none are to be chosen [n]."""
+        """Whether tensions within their bounds hold the loads; true if none are to be chosen [n]."""
         return self._loads[1]
 
     @cached_property
@@ -199,7 +199,7 @@ class MachineState(Immutable):
 
     @cached_property
     def struts(self) -> tuple[Strut, ...]:
-        """What presses each strut whose E I is known at rest; none without a rest."""
+        """The struts whose E I is known, with what presses them at rest; none without a rest."""
         if self.at_rest is None:
             return ()
         configuration, joints = self.configuration, None if self.joints is None else self.joints.coordinates
@@ -289,8 +289,8 @@ def check_loads(machine: Machine, count: int, weighs: bool = True) -> None:
     """Refuse loads at n poses that say too little.
 
     Args:
-        machine: with its loads.
-        count: of poses, n.
+        machine: the machine with its loads.
+        count: number of poses, n.
         weighs: whether any of its masses is known.
 
     Raises:

@@ -38,9 +38,9 @@ def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
     that keep all legs closed.
 
     Args:
-        equations: at the state.
+        equations: the equations at the state.
         right: right sides.
-        loaded: with what loads and wrenches do by turning.
+        loaded: whether to count what loads and wrenches do by turning.
     """
     size, starts = equations.mechanism.ways.shape[1], equations.mechanism.starts
     whole, total = equations.platform_rates(loaded), right[:, :size]
@@ -120,8 +120,8 @@ def elastic_stiffness(equations: Balance, compliances: Array) -> Array:
     components, the entries of the others are infinite; else all of them are.
 
     Args:
-        equations: at a state of rest.
-        compliances: of the platform there, to tell what is fixed [n x 6 x 6].
+        equations: the equations at a state of rest.
+        compliances: the compliances of the platform there, to tell what is fixed [n x 6 x 6].
     """
     ways = equations.mechanism.ways
     size = ways.shape[1]
@@ -148,8 +148,8 @@ class Stability:
 
     Attributes:
         stable: whether every small disturbance comes back.
-        factor: by which the load may grow until one does not, if wrenches grow in proportion; infinite if none does,
-            NaN where springs alone hold nothing.
+        factor: the factor by which the load may grow until one does not, if wrenches grow in proportion; infinite if
+            none does, NaN where springs alone hold nothing.
         mode: twist of the platform in that disturbance, at the origin; its largest component is 1 [6].
         legs: the largest motion of each leg's coordinates in it, of the same scale.
     """

@@ -24,7 +24,7 @@ class PlacedChain:
     Attributes:
         before: displacement of what each number of motions carries, before the errors there [motions + 1].
         end: displacement of the platform's end.
-        screws: of each motion in its place [n x motions x 6].
+        screws: the screws of each motion in its place [n x motions x 6].
     """
 
     before: tuple[Motions, ...]
@@ -54,7 +54,7 @@ class Chain:
         """1 where a motion follows a coordinate, else 0 [motions x coordinates]."""
         return _matches(self.coordinate, self.size)
 
-    def driven(self, count: int) -> Array:
+    def follows_given(self, count: int) -> Array:
         """Return 1 where a motion follows one of so many given amounts, else 0 [motions x count]."""
         return _matches(self.given, count)
 
@@ -62,13 +62,13 @@ class Chain:
         """Return the chain at some of its poses."""
         return replace(self, twists=self.twists[rows])
 
-    def placed(
+    def place(
         self, coordinates: Array, amounts: Array | None = None, errors: Mapping[int, Array] | None = None
     ) -> PlacedChain:
         """Move the chain, theory (35) and (45).
 
         Args:
-            coordinates: of its joints and springs [n x coordinates].
+            coordinates: the coordinates of its joints and springs [n x coordinates].
             amounts: all given amounts of the machine [n x amounts].
             errors: small screw motions [n x 6] or [1 x 6], by the number of motions behind which they stand.
         """

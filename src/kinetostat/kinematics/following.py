@@ -53,7 +53,7 @@ def follow(problems: Problems, goal: Coordinates) -> tuple[Array, Integers]:
     """Solve problems by following their solutions from the home pose, by one way after the other.
 
     Args:
-        problems: to solve.
+        problems: the problems to solve.
         goal: coordinates of the platform in each of them.
 
     Returns:
@@ -215,7 +215,7 @@ def same_mode(problems: Problems, unknowns: Array, goal: Coordinates) -> Mask:
     """Tell which solutions may be in the assembly mode of the home pose: all those whose sign does not differ.
 
     Args:
-        problems: that have been solved.
+        problems: the problems that have been solved.
         unknowns: their solutions [problems x unknowns].
         goal: coordinates of the platform in each of them.
     """

@@ -29,7 +29,7 @@ from kinetostat.tolerances import CLOSED, NEWTON_SETTLED, ONE_PLACEMENT, UNDRIVE
 
 MOST_DAMPED_STEPS = 60
 """Of damped least squares: a start that has not arrived by then is in no solution's reach."""
-DIFFERENCE_STEP = 1e-6
+CENTRAL_DIFFERENCE = 1e-6
 """Step of central differences, rad or in units of the machine's length: the half of all digits that steps need."""
 STRIDE, MOST_STRIDES = 0.05, 400
 """Motion of the actuators at a time on the way from the pose of the machine, rad or in units of its length, and the
@@ -44,7 +44,7 @@ class AssemblyMode:
 
     Attributes:
         pose: the coordinates of the machine's [pose], m and rad.
-        placement: of the platform, base frame.
+        placement: the placement of the platform, base frame.
         residual: the largest difference of an actuator from its coordinate, or gap of a leg, rad or in units of the
             machine's length.
         joints: its joint coordinates, of a machine written leg by leg: m and rad from the home pose.
@@ -124,10 +124,10 @@ class ByPose:
     def residuals(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
         """See `System`; the rates [n x actuators x unknowns] are central differences, all of them in one batch."""
         count, size = unknowns.shape
-        ways = DIFFERENCE_STEP * np.concatenate([np.zeros((1, size)), np.eye(size), -np.eye(size)])
+        ways = CENTRAL_DIFFERENCE * np.concatenate([np.zeros((1, size)), np.eye(size), -np.eye(size)])
         goals = np.repeat(np.broadcast_to(goal, (count, goal.shape[-1])), len(ways), axis=0)
         off = self._off((unknowns[:, None] + ways).reshape(-1, size), goals).reshape(count, len(ways), -1)
-        rates = (off[:, size + 1 :] - off[:, 1 : size + 1]) / (2.0 * DIFFERENCE_STEP)
+        rates = (off[:, size + 1 :] - off[:, 1 : size + 1]) / (2.0 * CENTRAL_DIFFERENCE)
         return off[:, 0], np.swapaxes(rates, 1, 2)
 
     def placements(self, unknowns: Array, _goal: Array) -> list[Displacement]:
@@ -246,7 +246,7 @@ def stand(machine: Machine, joints: Joints | None = None) -> list[Actuator]:
     """Coordinates of the actuators of a machine at its pose: the inverse of forward kinematics.
 
     Args:
-        machine: with its pose.
+        machine: the machine with its pose.
         joints: where its joints are, if it is written leg by leg and they are known.
     """
     if machine.family.chains is None:

@@ -308,7 +308,7 @@ def goal_of(problems: Problems, goal: Array) -> Coordinates:
     """Coordinates of the platform in each problem; those not given are those of the home pose.
 
     Args:
-        problems: at some poses.
+        problems: the problems at some poses.
         goal: coordinates of the poses, in the order of the chains' pose [poses x given], rad or m.
     """
     return problems.at_home() | {name: goal[problems.poses, i] for i, name in enumerate(problems.chains.pose)}
@@ -320,7 +320,7 @@ def undetermined(problems: Problems, unknowns: Array, goal: Coordinates) -> Mask
     The damped inverse of what determines it is then as large as the damping is small.
 
     Args:
-        problems: that have been solved.
+        problems: the problems that have been solved.
         unknowns: their solutions [problems x unknowns].
         goal: coordinates of the platform in each of them.
     """

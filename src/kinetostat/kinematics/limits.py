@@ -17,7 +17,7 @@ from kinetostat.machine.machine import Chains, Configuration, Machine
 from kinetostat.machine.rods import driven_slides
 from kinetostat.tolerances import LIMIT_SLACK
 
-DIGITS = 6
+DIGITS_OF_LIMIT = 6
 """Digits of a value and of its limit in a message: with fewer, a limit that is just passed would look kept."""
 
 
@@ -64,7 +64,7 @@ def geometric_checks(machine: Machine, configuration: Configuration, joints: Seq
     """Compare a pose with all limits that do not depend on loads.
 
     Args:
-        machine: with its limits.
+        machine: the machine with its limits.
         configuration: it, placed.
         joints: its coordinates from the home pose (m, rad) where it is written leg by leg.
     """
@@ -82,7 +82,7 @@ def load_checks(
     """Compare the loads of actuators with their limits.
 
     Args:
-        machine: with its limits.
+        machine: the machine with its limits.
         configuration: it, placed.
         actuators: each with the size of its load, N or N·m.
     """
@@ -147,7 +147,8 @@ def _sentence(passed: Sequence[Check], display: Display) -> str:
             f"cannot be judged; {limit.advice} or leave the limit out."
         )
     value, allowed = (
-        display.show(limit.shown(float(number)), limit.unit, digits=DIGITS) for number in (worst.measure, worst.bound)
+        display.show(limit.shown(float(number)), limit.unit, digits=DIGITS_OF_LIMIT)
+        for number in (worst.measure, worst.bound)
     )
     more = f" (and {len(passed) - 1} more pass it)" if len(passed) > 1 else ""
     return (

@@ -20,7 +20,7 @@ from kinetostat.machine.machine import Configuration
 from kinetostat.spec.renamed import former_names
 from kinetostat.tolerances import DEPENDENT, NEGLIGIBLE_COMPONENT, PURE_TRANSLATION
 
-SPATIAL = 6
+TWISTS_IN_SPACE = 6
 
 
 class SortOfPose(StrEnum):
@@ -60,7 +60,7 @@ class Mobility:
         here: ranks at the pose.
         full_cycle: freedoms of the platform at poses nearby, in general: those the machine has while it moves.
         actuators: how many there are; more than `full_cycle` is redundant actuation.
-        kind: of the pose.
+        kind: the kind of the pose.
         lost: names of legs that lose a freedom here.
         twists: what the platform gains, each [omega; v] at the reference point, base axes; of 1 rad, or 1 m.
         leg_least_singular_value, platform_least_singular_value: of the unit joint screws of any leg, and of the unit
@@ -82,7 +82,7 @@ def mobility(here: Configuration, nearby: Sequence[Configuration], reference: Ve
 
     Args:
         here: the machine at the pose.
-        nearby: at some poses around it, to tell what holds in general from what is special here.
+        nearby: the machine at some poses around it, to tell what holds in general from what is special here.
         reference: point of reference of twists, base frame, m.
     """
     ranks = freedoms(here, reference)
@@ -102,7 +102,9 @@ def mobility(here: Configuration, nearby: Sequence[Configuration], reference: Ve
     away = _twists_absent(here)
     legs = [_least(_leg_screws(here, leg, reference), rank + away) for leg, rank in zip(here.legs, usual, strict=True)]
     actuators = sum(len(_drives(leg)) for leg in here.legs)
-    return Mobility(ranks, full_cycle, actuators, kind, lost, twists, min(legs, default=1.0), _least(holding, SPATIAL))
+    return Mobility(
+        ranks, full_cycle, actuators, kind, lost, twists, min(legs, default=1.0), _least(holding, TWISTS_IN_SPACE)
+    )
 
 
 def _twists_absent(configuration: Configuration) -> int:
@@ -116,31 +118,33 @@ def freedoms(configuration: Configuration, reference: Vector) -> Freedoms:
     legs = [_rank(_leg_screws(configuration, leg, reference)) - away for leg in configuration.legs]
     constraints, holding = _platform_wrenches(configuration, reference)
     rank = _rank(constraints)
-    imposed = sum(SPATIAL - away - leg for leg in legs)
+    imposed = sum(TWISTS_IN_SPACE - away - leg for leg in legs)
     spins = sum(
         len(_drives(leg)) + len(_free(leg)) + sum(spring.hinge for spring in leg.springs) - has
         for leg, has in zip(configuration.legs, legs, strict=True)
         if not leg.lines
     )
-    return Freedoms(SPATIAL - rank, tuple(legs), spins, imposed - (rank - away), SPATIAL - _rank(holding))
+    return Freedoms(
+        TWISTS_IN_SPACE - rank, tuple(legs), spins, imposed - (rank - away), TWISTS_IN_SPACE - _rank(holding)
+    )
 
 
 def task_coordinates(configuration: Configuration, reference: Vector) -> tuple[int, ...]:
     """Choose coordinates that give the platform's freedoms, actuators free: the fewest, translations first.
 
     Args:
-        configuration: at the pose.
+        configuration: the configuration at the pose.
         reference: point of reference of twists, base frame, m.
 
     Returns:
         Numbers of x y z rx ry rz = 0 ... 5, ascending.
     """
     constraints, _ = _platform_wrenches(configuration, reference)
-    count = SPATIAL - _rank(constraints)
-    turned = np.linalg.svd(constraints)[0][:, SPATIAL - count :]
+    count = TWISTS_IN_SPACE - _rank(constraints)
+    turned = np.linalg.svd(constraints)[0][:, TWISTS_IN_SPACE - count :]
     free = np.vstack([turned[3:], turned[:3]])
     kept: list[int] = []
-    for number in range(SPATIAL):
+    for number in range(TWISTS_IN_SPACE):
         if _rank(free[[*kept, number]]) > len(kept):
             kept.append(number)
     return tuple(kept)
@@ -167,7 +171,7 @@ def _leg_screws(configuration: Configuration, leg: Leg, reference: Vector) -> Ar
 def _unit_screws(screws: Sequence[Screw], configuration: Configuration) -> Array:
     """Screws at unit size, without those that a degenerate placement leaves without direction [6 x n]."""
     if not screws:
-        return np.zeros((SPATIAL, 0))
+        return np.zeros((TWISTS_IN_SPACE, 0))
     matrix = columns(screws, 1.0, 1.0 / float(configuration.length))
     sizes = np.linalg.norm(matrix, axis=0)
     return matrix[:, sizes > 0.0] / sizes[sizes > 0.0]
@@ -212,7 +216,7 @@ def _least(matrix: Array, rank: int) -> float:
 def _free_twists(wrenches: Array, count: int, length: float) -> tuple[tuple[float, ...], ...]:
     """The twists that no wrench resists, each of 1 rad, or of 1 m where it does not turn."""
     left, _, _ = np.linalg.svd(wrenches)
-    twists = left[:, SPATIAL - count :] * np.repeat([1.0, length], 3)[:, None]
+    twists = left[:, TWISTS_IN_SPACE - count :] * np.repeat([1.0, length], 3)[:, None]
     scaled = []
     for twist in twists.T:
         turning, sliding = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])

@@ -101,7 +101,7 @@ class _Search:
 
         Args:
             best: unknowns that nearly close them [unknowns].
-            rates: of the gaps there [rows x unknowns].
+            rates: the rates of the gaps there [rows x unknowns].
             ways: along which they stay closed to first order [unknowns x ways].
             loads: Lagrange's multipliers: how strongly each gap keeps the unknowns from the goal [rows].
         """
@@ -119,7 +119,7 @@ class _Search:
 
         Args:
             start: unknowns that nearly close them [unknowns].
-            steps: from there [n x unknowns].
+            steps: the steps from there [n x unknowns].
 
         Returns:
             Unknowns that nearly close them, NaN where that fails; the gaps that are left there, and their rates.
@@ -143,7 +143,7 @@ def _ways(rates: Array) -> Array:
     """Directions in which the legs stay closed, to first order [unknowns x directions].
 
     Args:
-        rates: of the gaps [rows x unknowns].
+        rates: the rates of the gaps [rows x unknowns].
     """
     _, sizes, directions = np.linalg.svd(rates)
     rank = int((sizes > DEPENDENT * sizes.max(initial=0.0)).sum())

@@ -124,19 +124,19 @@ def newton(
     should, or where numbers are not finite. The step by which it is seen to have converged is taken as well.
 
     Args:
-        equations: from the unknowns of some problems, and their numbers, to their largest residuals and a function that
-            makes Newton's steps for some of these.
+        equations: function from the unknowns of some problems, and their numbers, to their largest residuals and a
+            function that makes Newton's steps for some of these.
         start: unknowns to begin with.
         count: number of problems, n.
         most_steps: number of steps that are taken at most.
-        move: from unknowns and a step to the unknowns after it.
+        move: function from unknowns and a step to the unknowns after it.
         closed: residual at which a problem has converged, one for all or each its own [n].
         contraction: share of the residual before it that a step may leave.
         settled: size of a step below which a problem has converged.
         round_off: if given, steps that still shrink fast are continued until the next one, which is foreseen from the
             last two as their quadratic convergence has it, would be as small as that.
         longest: size to which a step is shortened.
-        size: of steps [n x unknowns]; the largest number if not given.
+        size: function that measures steps [n x unknowns]; the largest number if not given.
     """
     value, trial, rows = start, start, np.arange(count)
     limits = np.broadcast_to(closed, (count,))
@@ -205,7 +205,7 @@ def least_squares(
     after another one.
 
     Args:
-        equations: from the unknowns of some problems [k x unknowns], and their numbers, to what is left of the
+        equations: function from the unknowns of some problems [k x unknowns], and their numbers, to what is left of the
             equations [k x m] and how the unknowns reduce it [k x m x unknowns].
         start: unknowns to begin with [n x unknowns].
         most_steps: number of steps that are tried at most.

@@ -81,7 +81,7 @@ def mass_matrix(equations: Balance) -> Array:
     for number, (leg, (first, last)) in enumerate(zip(mechanism.legs, pairwise(starts), strict=True)):
         moving = slice(first, last)
         if leg.masses.carried:
-            placed = leg.chain.placed(equations.state.coordinates[number], given)
+            placed = leg.chain.place(equations.state.coordinates[number], given)
             for _, matrix in energies(leg.masses, leg_rates(leg, placed), length):
                 result[:, moving, moving] += matrix
         result[:, moving, moving] += _diagonal(leg.rotors * length[:, None])

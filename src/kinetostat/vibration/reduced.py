@@ -161,7 +161,7 @@ def frequencies_at(machine: Cut, coordinates: Row, sloped: bool = False) -> list
     """
     place, mechanism = place_of(machine, coordinates), machine.mechanism
     amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
-    placed = machine.carrier.chain.placed(of_scalars(coordinates), amounts)
+    placed = machine.carrier.chain.place(of_scalars(coordinates), amounts)
     length, twists = mechanism.length, place.terms.rates[0]
     inertia = platform_inertia(mechanism.platform, place.platform, length)[0]
     for rod in machine.rods:

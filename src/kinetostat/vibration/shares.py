@@ -52,7 +52,7 @@ def kinetic_shares(equations: Balance, solution: Modes) -> dict[str, Array]:
     given = np.concatenate([equations.state.amounts, mechanism.growth], axis=1)
     pairs = zip(mechanism.legs, equations.state.coordinates, pairwise(starts), strict=True)
     for leg, coordinates, (first, last) in pairs:
-        placed = leg.chain.placed(coordinates, given)
+        placed = leg.chain.place(coordinates, given)
         for name, matrix in energies(leg.masses, leg_rates(leg, placed), length):
             add(name, matrix[0], shapes[first:last])
         for number, spring in enumerate(leg.springs):
@@ -74,7 +74,7 @@ def effective_masses(equations: Balance, solution: Modes) -> list[tuple[float, f
     given = np.concatenate([equations.state.amounts, mechanism.growth], axis=1)
     pairs = zip(mechanism.legs, equations.state.coordinates, pairwise(starts), strict=True)
     for leg, coordinates, (first, last) in pairs:
-        for mass, part in zip(leg.masses.mass[0], leg_rates(leg, leg.chain.placed(coordinates, given)), strict=True):
+        for mass, part in zip(leg.masses.mass[0], leg_rates(leg, leg.chain.place(coordinates, given)), strict=True):
             momentum, whole = momentum + mass * (part.moving[0] @ shapes[first:last]), whole + mass
     scaled = momentum**2 / np.sqrt(solution.squares[: solution.ringing]) ** 2 * float(mechanism.length[0])
     shares = scaled / whole if whole else scaled

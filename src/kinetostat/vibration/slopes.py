@@ -103,7 +103,7 @@ class Vibrating:
         strain, open_by = 0.0, 0.0
         amounts = np.zeros((1, len(mechanism.actuators) + mechanism.growth.shape[1]))
         for leg, motion, force in zip(mechanism.legs, moved, forces, strict=True):
-            placed = leg.chain.placed(np.zeros((1, leg.size)).astype(object), amounts.astype(object))
+            placed = leg.chain.place(np.zeros((1, leg.size)).astype(object), amounts.astype(object))
             kinetic = kinetic + _energy(leg.masses, leg_rates(leg, placed), motion, mechanism.length)
             kinetic = kinetic + mechanism.length[0] * total(list(leg.rotors[0] * motion * motion))
             strain = strain + total(list(leg.stiffness[0] * motion * motion))
