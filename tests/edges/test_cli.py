@@ -71,7 +71,7 @@ REFUSED = [
         ["map", MACHINE, "--over", "x=0:1:3", "--over", "z=0:1:3", "--quantity", "q"],
         [
             '"q" is not a quantity; choose a group (compliance, stiffness,',
-            "compliance_rx_z, or one of singularity_margin, ",
+            "compliance_rx_z, or one of ",
         ],
     ),
     (["sweep", MACHINE, "--vary", "x=0:1:3", "--quantity", "compliance_x_ry"], ["did you mean compliance_ry_x?"]),

@@ -14,17 +14,14 @@ from machines import load_without_limits
 LOAD = {"load.force.0": 10.0, "load.force.1": 20.0, "load.force.2": -500.0}
 SOFT = 1e-3
 """N/m or N·m/rad: nothing beside the other springs."""
-WRITTEN = {
-    "tripteron": ["legs.x.slide.stiffness", "legs.y.slide.stiffness", "legs.z.slide.stiffness"],
-    "hexapod-hardware": ["legs.leg.drive.stiffness.screw"],
-}
 
 
 def drives(name):
-    """Paths of the stiffness of all actuators of a bundled machine."""
-    if name in WRITTEN:
-        return WRITTEN[name]
-    return [p.path for p in parameters(load(name).family) if p.path == "stiffness.actuator"]
+    """Paths of the stiffness of all actuators of a bundled machine; of parts in a row, that of the first."""
+    family = load(name).family
+    paths = [p.path for p in parameters(family)]
+    driven = [f"{table}.stiffness" for table, words in family.literals.items() if words.get("actuated")]
+    return [next(path for path in paths if path.startswith(start)) for start in driven or ["stiffness.actuator"]]
 
 
 @pytest.mark.parametrize("name", bundled())

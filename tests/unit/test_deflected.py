@@ -20,7 +20,7 @@ def test_the_legs_follow_the_platform(case):
     wrench = PLANE_LOAD if response.configuration.plane else LOAD
     links = deflected_links(response, wrench)
     platform = deflection(response.statics, wrench)
-    for leg in response.configuration.legs:
+    for leg in (leg for leg in response.configuration.legs if len(leg.stations) > 1):
         last = [link for link in links if link.leg == leg.name][-1]
         expected = platform.moved(last.end - response.reference).translational.components()
         size = max(abs(c) for c in (*platform.rotational.components(), *platform.translational.components()))
@@ -31,7 +31,7 @@ def test_the_legs_follow_the_platform(case):
 def test_a_leg_stays_where_it_is_mounted(case):
     """Its first point moves only where a slide along a rail lies before it."""
     response = respond(case.machine)
-    for leg in response.configuration.legs:
+    for leg in (leg for leg in response.configuration.legs if len(leg.stations) > 1):
         first = next(link for link in deflected_links(response, LOAD) if link.leg == leg.name)
         if leg.chain[0].path or leg.chain[0].mover.point is not None:
             assert first.start_motion.translational.norm() < 1e-9 * first.end_motion.translational.norm()

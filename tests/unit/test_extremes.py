@@ -50,6 +50,8 @@ def test_free_stiffness_is_what_is_left_of_k_when_all_else_follows(case):
     response = respond(case.machine)
     there = SPATIAL if response.configuration.plane is None else PLANAR
     stiff = block(response.stiffness, there, range(6))
+    if not np.isfinite(stiff).all():  # a rigid machine has no second route
+        return
     scale = 1.0 / np.sqrt(np.diag(stiff))
     unit = stiff * np.outer(scale, scale)
     for k, i in enumerate(there):

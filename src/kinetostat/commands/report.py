@@ -30,7 +30,11 @@ if TYPE_CHECKING:
     from kinetostat.studies.optimisation.problem import Problem
     from kinetostat.studies.optimisation.result import Result
 
-FORMATS = "mjcf, mjcf-vibration, urdf, glb, step, csv, netcdf, mat, modes, state-space, nastran, abaqus or ansys"
+FORMATS = (
+    "mjcf", "mjcf-vibration", "urdf", "glb", "step", "csv", "netcdf", "mat", "modes", "state-space", "nastran",
+    "abaqus", "ansys",
+)  # fmt: skip
+"""Formats of `export`, which help names without loading what writes them."""
 PARTS = ("maps", "guidelines", "sensitivity", "validation")
 
 
@@ -54,7 +58,11 @@ def _add_export_command(commands: "Commands") -> None:
         "kinetostat export tripteron --to mjcf -o tripteron.xml",
     )  # fmt: skip
     takes_machine(command)
-    command.add_argument("--to", metavar="FORMAT", help=f"{FORMATS} (default: given by the suffix of the file)")
+    command.add_argument(
+        "--to",
+        metavar="FORMAT",
+        help=f"{' or '.join((', '.join(FORMATS[:-1]), FORMATS[-1]))} (default: given by the suffix of the file)",
+    )
     command.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="the file (default: the name of the machine)"
     )

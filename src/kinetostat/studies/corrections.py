@@ -24,8 +24,8 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.fields import positive
 from kinetostat.spec.immutable import Immutable
+from kinetostat.studies.axes import chosen_axes, grid_of
 from kinetostat.studies.commanding import ActuatorTargets, Command, actuator_targets, command_of, refuse_tensions
-from kinetostat.studies.grid import chosen_axes, grid_of
 from kinetostat.studies.poses import PoseColumns
 from kinetostat.tolerances import EXACT_LAW
 

@@ -34,7 +34,7 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.grid import chosen_axes, grid_of
+from kinetostat.studies.axes import chosen_axes, grid_of
 from kinetostat.studies.sensitivity import (
     Sensitivity,
     greatest_of,

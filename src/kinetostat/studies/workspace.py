@@ -26,7 +26,8 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, several
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.grid import IN_MEMORY, MOST_DIMENSIONS, GridQuestion, answer, field_of, grid_question
+from kinetostat.studies.axes import MOST_DIMENSIONS
+from kinetostat.studies.grid import IN_MEMORY, GridQuestion, answer, field_of, grid_question
 from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.workspace_borders import borders
 from kinetostat.studies.workspace_verdicts import INSIDE, Demand, Judge, PoseCondition, Poses, demands, parse_condition
