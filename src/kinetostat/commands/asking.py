@@ -120,10 +120,6 @@ def ask(question: Question, options: argparse.Namespace) -> int:
     Raises:
         InputError: what the question refuses, in the words of the command line.
     """
-    from kinetostat.views.answers import description_of, save
-    from kinetostat.views.data_forms import json_of
-    from kinetostat.views.terminal import tell
-
     output = getattr(options, "output", None)
     if output is not None and question.suffixes:
         choice(output.suffix.lower(), question.suffixes, f'the suffix of "{output}"')
@@ -137,12 +133,30 @@ def ask(question: Question, options: argparse.Namespace) -> int:
             answer = question.answer(machine, **given, **reports)
     except InputError as error:
         raise InputError(_in_words(question, str(error))) from None
-    description = description_of(answer)
+    return show_answer(options, answer, to_file=bool(question.suffixes))
+
+
+def show_answer(options: argparse.Namespace, answer: Any, to_file: bool = False) -> int:
+    """Write the files of an answer where the options name a place, and print it.
+
+    Args:
+        options: of the command.
+        answer: of a kind that has a description.
+        to_file: whether `--output` is a file instead of a folder.
+
+    Returns:
+        The exit code.
+    """
+    from kinetostat.views.answers import description_of, save
+    from kinetostat.views.data_forms import json_of
+    from kinetostat.views.terminal import tell
+
+    description, output = description_of(answer), getattr(options, "output", None)
     answered, full = description.answered(answer), getattr(options, "full", False)
     if output is None or not answered:
         written = []
     else:
-        written = [save(answer, output)] if question.suffixes else write_folder(options, description, answer)
+        written = [save(answer, output)] if to_file else write_folder(options, description, answer)
     return give(
         options,
         answered,

@@ -7,7 +7,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from kinetostat.commands.asking import show_answer
 from kinetostat.commands.common import (
+    NO_ANSWER,
     add_command,
     give,
     load_machine,
@@ -151,18 +153,10 @@ def _check_words(options: argparse.Namespace) -> None:
 
 def _validate_measured(options: argparse.Namespace, machine: "Machine") -> int:
     """Compare a machine with a measured stiffness."""
-    from kinetostat.studies.measured.comparison import as_json, validate_measured
-    from kinetostat.studies.storage import write_json
-    from kinetostat.views.measured_tables import print_measured
+    from kinetostat.studies.measured.comparison import validate_measured
 
     answer = validate_measured(
         machine, options.measured, fit=options.fit, sigma=options.sigma, sigma_angle=options.sigma_angle
     )
-    written = []
-    if options.output:
-        from kinetostat.views.measured_figure import measured_figures
-
-        written = [options.output / "measured.json"]
-        write_json(written[0], as_json(answer))
-        written += write_figures(options, measured_figures(answer))
-    return give(options, answer.agrees, lambda: as_json(answer), lambda show: print_measured(show, answer), written)
+    shown = show_answer(options, answer)
+    return shown if answer.agrees else NO_ANSWER

@@ -154,12 +154,7 @@ KINDS = (
         "views.comparison_figure.comparison_figures",
         "studies.comparison.as_json",
     ),
-    Kind(
-        "studies.measured.comparison.MeasuredComparison",
-        "views.measured_tables.print_measured",
-        "views.measured_figure.measured_figures",
-        "studies.measured.comparison.as_json",
-    ),
+    Kind("studies.measured.comparison.MeasuredComparison", description="views.measured.MEASURED"),
     Kind(
         "studies.optimisation.result.Result",
         "views.optimisation_tables.print_result",

@@ -11,14 +11,15 @@ from matplotlib.figure import Figure
 
 from kinetostat.studies.measured.comparison import COVERAGE_FACTOR, MeasuredComparison
 from kinetostat.studies.setting import setting_of
-from kinetostat.views.figures import COLOURS, STYLE, Drawings, fix_layout, note_setting, set_title
-from kinetostat.views.measured_tables import WORDS
+from kinetostat.views.figures import COLOURS, STYLE, fix_layout, note_setting, set_title
+from kinetostat.views.measured import WORDS
+from kinetostat.views.question import Drawing
 
 MOST_ROWS = 60
 """Measured numbers that have bars; of more, those with the largest differences."""
 
 
-def measured_figure(answer: MeasuredComparison) -> Figure:
+def measured_figure(answer: MeasuredComparison, title: str = "{}: measured and computed stiffness") -> Figure:
     """Draw differences in standard uncertainties, and the shares of computation, numbers and measurement in these."""
     size = np.array([row.error / row.u_val for row in answer.rows])
     order = np.sort(np.argsort(-np.abs(size), kind="stable")[:MOST_ROWS])
@@ -48,12 +49,13 @@ def measured_figure(answer: MeasuredComparison) -> Figure:
             panel.grid(visible=False, axis="y")
             panel.tick_params(axis="y", length=0)
         right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=6.5, borderaxespad=0.2)
-        set_title(figure, f"{answer.machine.name}: measured and computed stiffness")
+        set_title(figure, title.format(answer.machine.name))
         note_setting(figure, setting_of(answer.machine), "grey: explained by uncertainties")
         fix_layout(figure)
     return figure
 
 
-def measured_figures(answer: MeasuredComparison) -> Drawings:
+def measured_figures(answer: MeasuredComparison) -> dict[str, Drawing]:
     """Return the comparison with a measured stiffness as the one figure that it has."""
-    return {"measured": partial(measured_figure, answer)}
+    caption = "Differences of computed and measured numbers over their uncertainty, and what the variance is made of."
+    return {"measured": Drawing(caption, partial(measured_figure, answer))}

@@ -10,7 +10,6 @@ and Heat Transfer*, sections 1 and 6.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.special import chdtrc
@@ -30,7 +29,6 @@ from kinetostat.spec.tolerance_table import SIGMAS
 from kinetostat.studies.budget.tolerances import toleranced_parts
 from kinetostat.studies.identification.record import read_fit
 from kinetostat.studies.measured.stiffness_file import MeasuredEntry, MeasuredStiffness, read_stiffness
-from kinetostat.studies.plain_data import as_answer
 
 GROUPS_WITHOUT_COMPLIANCE = ("zeros", "gains", "clearances")
 """Groups of errors that leave the compliance of a machine at its pose as it is: they only move it."""
@@ -359,38 +357,3 @@ class _Entry:
             return np.asarray(-np.einsum("a,abp,b->p", self.stiffness[self.i], changes, self.stiffness[:, self.j]))
         entry = changes[self.i, self.j]
         return np.asarray(entry if self.matrix == "compliance" else -entry / self.compliance[self.i, self.i] ** 2)
-
-
-def as_json(answer: MeasuredComparison) -> dict[str, Any]:
-    """The comparison as plain data, SI."""
-    return as_answer(
-        {
-            "machine": answer.machine.name,
-            "data": answer.path,
-            "verdict": answer.message,
-            "agrees": answer.agrees,
-            "chi_square": answer.chi_square,
-            "probability": answer.probability,
-            "coverage_factor": COVERAGE_FACTOR,
-            "uncertainty_from": answer.source,
-            "left_out": list(answer.left_out),
-            "shares": answer.shares,
-            "entries": [
-                {
-                    "name": row.entry.name,
-                    "line": row.entry.line,
-                    "unit": row.entry.unit,
-                    "measured": row.entry.value,
-                    "predicted": row.predicted,
-                    "error": row.error,
-                    "u_num": row.u_num,
-                    "u_input": row.u_input,
-                    "u_data": row.u_data,
-                    "u_val": row.u_val,
-                    "explained": row.explained,
-                    "model_error_between": list(row.bounds),
-                }
-                for row in answer.rows
-            ],
-        }
-    )

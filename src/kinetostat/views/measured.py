@@ -1,23 +1,16 @@
-"""A measured stiffness beside the computed one, as a table and sentences on a terminal. Nothing is computed here."""
+"""A measured stiffness beside the computed one: the description of this answer. Nothing is computed here."""
 
-from rich.console import Console
+from collections.abc import Iterator
 
 from kinetostat.display import Display, Scale, number, number_and_uncertainty
 from kinetostat.studies.measured.comparison import COVERAGE_FACTOR, MeasuredComparison, MeasuredRow
 from kinetostat.views.fitted_table import FittedTable
+from kinetostat.views.question import Description, Field, Lines, Records
 from kinetostat.views.tables import text_table
 
 WORDS = {"numerics": "the computation", "inputs": "the numbers of the machine", "measurement": "the measurement"}
 EXACT = 1e-9
 """Share of a number below which its uncertainty is round-off."""
-
-
-def print_measured(console: Console, answer: MeasuredComparison) -> None:
-    """Print the verdict, every measured number beside the computed one, and what the uncertainty is made of."""
-    console.print(answer.message, highlight=False)
-    console.print(measured_table(answer))
-    for sentence in measured_notes(answer):
-        console.print(sentence, highlight=False)
 
 
 def measured_table(answer: MeasuredComparison) -> FittedTable:
@@ -72,21 +65,65 @@ def verdict_of(row: MeasuredRow, display: Display) -> str:
     return f"too {'stiff' if more else 'compliant'} by {ends}"
 
 
-def measured_notes(answer: MeasuredComparison) -> list[str]:
-    """What the uncertainty is made of, and what does not count in it."""
+def _lines(answer: MeasuredComparison) -> Lines:
+    yield "Verdict", answer.message
     parts = sorted(answer.shares.items(), key=lambda part: -part[1])
     text = ", ".join(f"{number(100.0 * share, digits=2)} % {WORDS[name]}" for name, share in parts if share > 5e-4)
-    notes = [f"The variance of the differences is made of: {text}."]
-    if not answer.source:
-        notes.append(
-            "The machine's numbers count as exact, because nothing says how sure they are: give --tolerance "
-            '"compliances=sigma 10 %", lines under [tolerances], or --fit fit.json.'
-        )
+    yield "Variance", f"The variance of the differences is made of: {text}."
+    if answer.source:
+        yield "Numbers", f"How sure the machine's numbers are is from {answer.source}."
     else:
-        notes.append(f"How sure the machine's numbers are is from {answer.source}.")
-    if answer.left_out:
-        notes.append(
-            f"{len(answer.left_out)} errors of geometry do not count: they do where the legs of a machine as built "
-            "close without being bent, and its springs are the same at all poses."
+        yield (
+            "Numbers",
+            "The machine's numbers count as exact, because nothing says how sure they are: give --tolerance "
+            '"compliances=sigma 10 %", lines under [tolerances], or --fit fit.json.',
         )
-    return notes
+    if answer.left_out:
+        yield (
+            "Left out",
+            f"{len(answer.left_out)} errors of geometry do not count: they do where the legs of a machine as built "
+            "close without being bent, and its springs are the same at all poses.",
+        )
+
+
+def _tables(answer: MeasuredComparison, _full: bool) -> Iterator[FittedTable]:
+    yield measured_table(answer)
+
+
+ENTRY = (
+    Field("name", "entry.name"),
+    Field("line", "entry.line"),
+    Field("unit", "entry.unit"),
+    Field("measured", "entry.value"),
+    Field("predicted"),
+    Field("error"),
+    Field("u_num"),
+    Field("u_input"),
+    Field("u_data"),
+    Field("u_val"),
+    Field("explained"),
+    Field("model_error_between", "bounds"),
+)
+
+MEASURED = Description(
+    type="studies.measured.comparison.MeasuredComparison",
+    title="Measured stiffness",
+    fields=(
+        Field("machine", "machine.name"),
+        Field("data", "path"),
+        Field("verdict", "message"),
+        Field("agrees"),
+        Field("chi_square"),
+        Field("probability"),
+        Field("coverage_factor", lambda _answer: COVERAGE_FACTOR),
+        Field("uncertainty_from", "source"),
+        Field("left_out"),
+        Field("shares"),
+        Records("entries", "entry", ENTRY, "rows", forms=("json",)),
+    ),
+    lines=_lines,
+    tables=_tables,
+    figures="views.measured_figure.measured_figures",
+    state=lambda answer: f"beside {answer.path}",
+    files={"measured.json": "json"},
+)
