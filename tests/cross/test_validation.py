@@ -4,6 +4,7 @@ import json
 import random
 import subprocess
 import sys
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from kinetostat.validation.answer import block_differences
 from kinetostat.validation.comparison import KNOWN, engines, validate
 from kinetostat.validation.pieces import StrutPiece, end_compliance, pieces
 from kinetostat.validation.pynite_machine import extrapolate
-from machines import CASES, is_regular
+from machines import CASES, is_regular, load_without_limits
 from refusals import refused
 
 REACHED = {"exudyn": 1e-9, "pynite": 1e-6}
@@ -29,10 +30,16 @@ each_engine = pytest.mark.parametrize("engine", REACHED)
 each_machine = pytest.mark.parametrize("case", CASES, ids=repr)
 
 
+@cache
+def bundled_validation(name, engine):
+    """The validation of a bundled machine, for all tests that read it."""
+    return validate(load_without_limits(name), engine)
+
+
 @each_engine
 @each_machine
 def test_a_bundled_machine_agrees_with_the_engine(case, engine):
-    validation = validate(case.machine, engine)
+    validation = bundled_validation(case.name, engine)
     assert validation.difference < REACHED[engine], validation.differences
     assert validation.uncertainty < 100 * REACHED[engine]
 
@@ -69,12 +76,12 @@ def test_the_engine_does_not_follow_our_mistakes(name, engine):
     right = load(name)
     soft = next(path for path in values(right) if "stiffness" in path)
     wrong = with_values(right, {soft: 1.01 * values(right)[soft]})
-    differences = block_differences(validate(wrong, engine).theirs, validate(right, engine).ours, 1.0)
+    differences = block_differences(validate(wrong, engine).theirs, bundled_validation(name, engine).ours, 1.0)
     assert max(differences.values()) > 1e-4
 
 
 def test_nonlinear_statics_converge_quadratically_to_our_c():
-    (_, finest), (_, fine), (_, coarse) = validate(load("hexapod"), "exudyn").trials
+    (_, finest), (_, fine), (_, coarse) = bundled_validation("hexapod", "exudyn").trials
     assert fine < coarse / 50
     assert finest < fine / 50
 

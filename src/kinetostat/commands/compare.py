@@ -111,8 +111,10 @@ def _validate(options: argparse.Namespace) -> int:
     from kinetostat.kinematics.status import Status
     from kinetostat.studies.analysis import analyze
     from kinetostat.tolerances import AGREED
-    from kinetostat.validation.comparison import as_json, validate
-    from kinetostat.views.comparison_tables import print_validation
+    from kinetostat.validation.comparison import validate
+    from kinetostat.views.data_forms import json_of
+    from kinetostat.views.terminal import tell
+    from kinetostat.views.validation import VALIDATION
 
     poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]
     lines = [f"tolerances.{line}" for line in options.tolerances]
@@ -128,10 +130,10 @@ def _validate(options: argparse.Namespace) -> int:
 
     def show(console: "Console") -> None:
         for validation in validations:
-            print_validation(console, validation)
+            tell(console, VALIDATION, validation, full=True)
 
     agreed = all(validation.difference <= AGREED for validation in validations)
-    return give(options, agreed, lambda: [as_json(validation) for validation in validations], show)
+    return give(options, agreed, lambda: [json_of(VALIDATION, one) for one in validations], show)
 
 
 def _check_words(options: argparse.Namespace) -> None:

@@ -14,19 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Configuration, Machine
-from kinetostat.machine.parameters import values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.installation import adding
-from kinetostat.studies.plain_data import as_answer
 from kinetostat.studies.rounding import clean_matrix
 from kinetostat.tolerances import AGREED, ROUND_OFF_OF_ENTRY
 from kinetostat.validation.answer import Answer, block_differences, difference
@@ -154,33 +151,6 @@ class Validation(Immutable):
     def frequency_difference(self) -> float:
         """The largest relative difference of the natural frequencies; infinite where only one of the two has a mode."""
         return max((frequency_difference(*pair) for pair in self.frequencies), default=0.0)
-
-
-def as_json(validation: Validation) -> dict[str, Any]:
-    """Return the validation as plain data for `--json`, SI."""
-    machine = validation.machine
-    pose = {path.removeprefix("pose."): value for path, value in values(machine).items() if path.startswith("pose.")}
-    return as_answer(
-        {
-            "name": machine.name,
-            "pose": pose,
-            "components": list(COMPONENTS),
-            "engine": validation.engine,
-            "version": validation.version,
-            "ours": validation.ours.tolist(),
-            "theirs": validation.theirs.tolist(),
-            "differences": validation.differences,
-            "difference": validation.difference,
-            "allowed": AGREED,
-            "uncertainty": validation.uncertainty,
-            "varied": validation.varied,
-            "trials": [{"scale": scale, "difference": apart} for scale, apart in validation.trials],
-            "frequencies": [
-                {"ours": ours, "theirs": theirs, "difference": frequency_difference(ours, theirs)}
-                for ours, theirs in validation.frequencies
-            ],
-        }
-    )
 
 
 def engines() -> dict[str, str]:

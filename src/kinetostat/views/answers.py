@@ -161,11 +161,7 @@ KINDS = (
         "views.optimisation_figures.pictures",
         "studies.optimisation.result.as_json",
     ),
-    Kind(
-        "validation.comparison.Validation",
-        "views.comparison_tables.print_validation",
-        plain="validation.comparison.as_json",
-    ),
+    Kind("validation.comparison.Validation", description="views.validation.VALIDATION"),
 )
 """All kinds of results that Python and notebooks show."""
 

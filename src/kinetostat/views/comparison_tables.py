@@ -1,28 +1,18 @@
-"""Tables of comparisons on a terminal: designs side by side, and a machine against an independent engine.
-
-Nothing is computed here but rounding.
-"""
+"""Designs side by side on a terminal. Nothing is computed here but rounding."""
 
 import string
 from collections.abc import Iterator, Sequence
 
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
-from kinetostat.display import Display, number
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.display import Display
 from kinetostat.studies.comparison import Better, Comparison, DesignRow, SoftDirection
-from kinetostat.tolerances import AGREED
-from kinetostat.validation.comparison import Validation, frequency_difference
-from kinetostat.views.analysis_tables import matrix_table
 from kinetostat.views.tables import numeric_table, readable, text_table
 
 NAMED, CELL = 27, 20
 """Widths, in characters, of the first column and of one design: what fits is printed side by side."""
 MOST_SHARES = 3
-DIGITS = 9
-"""Digits in which a machine is compared with an independent engine."""
 MISSING = "–"
 """Shown for a design that has no such field."""
 
@@ -126,65 +116,3 @@ def _contributions(attribution: SoftDirection | None) -> str:
         return "–"
     parts = [f"{name} {100 * share:.0f} %" for name, share in attribution.shares[:MOST_SHARES] if share >= 0.005]
     return f"{attribution.direction}: {', '.join(parts)}"
-
-
-def print_validation(console: Console, validation: Validation) -> None:
-    """Ours, theirs, the difference by block, and a verdict: it agrees where no block differs by more than `AGREED`."""
-    family = validation.machine.family
-    console.print(
-        Text.assemble(
-            (validation.machine.name, "bold"),
-            f" compared with an independent engine, {validation.engine} {validation.version}",
-        )
-    )
-    kept = list(family.components)
-    titles = {"kinetostat": validation.ours, validation.engine: validation.theirs}
-    for title, matrix in titles.items():
-        rows = matrix[kept][:, kept].tolist()
-        shown = f"Compliance C, {title}"
-        console.print(matrix_table(shown, "compliance", family.component_names, rows, validation.machine.display))
-    console.print(difference_table(validation))
-    console.print(trial_table(validation))
-    if validation.frequencies:
-        console.print(frequency_table(validation))
-    verdict = "agree" if validation.difference <= AGREED else "DIFFER"
-    largest = f"the largest relative difference is {validation.difference:.1e}, allowed is {AGREED:g}"
-    console.print(f"The two {verdict}: {largest}.", highlight=False)
-
-
-def frequency_table(validation: Validation) -> Table:
-    """The lowest natural frequencies, ours and theirs, and the relative difference of each pair."""
-    columns = ["kinetostat", validation.engine, "difference", "unit"]
-    table = numeric_table("Natural frequencies, unloaded", "mode", columns)
-    for order, pair in enumerate(validation.frequencies, 1):
-        cells = (number(value, digits=DIGITS) for value in pair)
-        table.add_row(str(order), *cells, f"{frequency_difference(*pair):.1e}", "Hz")
-    return table
-
-
-def diagonal_table(validation: Validation) -> Table:
-    """The diagonal of C, ours and theirs, and the relative difference of each entry."""
-    table = numeric_table("Diagonal of C", "direction", ["kinetostat", validation.engine, "difference", "unit"])
-    family = validation.machine.family
-    for i, name in zip(family.components, family.component_names, strict=True):
-        ours, theirs = float(validation.ours[i, i]), float(validation.theirs[i, i])
-        apart = f"{abs(theirs / ours - 1.0):.1e}" if ours else "–"
-        scale = validation.machine.display.scale(QUANTITIES[f"compliance_{name}"].unit)
-        cells = (number(value * scale.factor, digits=DIGITS) for value in (ours, theirs))
-        table.add_row(name, *cells, apart, scale.unit)
-    return table
-
-
-def difference_table(validation: Validation) -> Table:
-    """The relative difference of each block, and how far the engine may be trusted."""
-    table = numeric_table("Relative difference by block", "", [*validation.differences, "uncertainty of the engine"])
-    table.add_row("", *(f"{value:.1e}" for value in validation.differences.values()), f"{validation.uncertainty:.1e}")
-    return table
-
-
-def trial_table(validation: Validation) -> Table:
-    """How the engine's answer converges."""
-    table = numeric_table("Convergence of the engine", validation.varied, ["difference"])
-    for scale, apart in validation.trials:
-        table.add_row(f"{scale:.3g}", f"{apart:.1e}")
-    return table

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from kinetostat.views.fitted_table import FittedTable
+    from rich.table import Table
 
 Take = str | Callable[[Any], Any]
 """How a number is taken from an answer: the name of an attribute, with dots, or a function."""
@@ -147,7 +146,7 @@ class Description:
     title: str
     fields: tuple[Field | Records, ...]
     lines: Callable[[Any], Lines] = NO_PARTS
-    tables: "Callable[..., Iterable[FittedTable]]" = NO_PARTS
+    tables: "Callable[..., Iterable[Table]]" = NO_PARTS
     figures: Late | None = None
     axes: tuple[Axis, ...] = ()
     state: Callable[[Any], str] = lambda answer: answer.status.word

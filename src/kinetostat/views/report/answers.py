@@ -16,6 +16,7 @@ from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.result import Result, message
 from kinetostat.studies.report import Answers
 from kinetostat.studies.under_load import LoadedState
+from kinetostat.validation.comparison import Validation
 from kinetostat.views.answers import described, kind_of
 from kinetostat.views.figures import contour_maps, curves
 from kinetostat.views.identification import RECORDED_FIT
@@ -39,6 +40,7 @@ from kinetostat.views.question import Description
 from kinetostat.views.report.content import Block, Figure, Paragraph, Points, Section
 from kinetostat.views.report.pictures import figure_of
 from kinetostat.views.report.typesetting import as_table, typeset
+from kinetostat.views.validation import VALIDATION
 
 ANSWERS_WITH_SECTIONS = ("under_load", "vibration", "budget")
 """Answers of `studies.report.QUESTIONS` with a section, in the order of a report."""
@@ -145,6 +147,13 @@ def _fit_section(machine: Machine, record: FitRecord) -> Section:
         Figure(caption, record.pictures[name], 0.85) for name, caption in CAPTIONS.items() if name in record.pictures
     )
     return described_section(RECORDED_FIT, RecordedFit(machine, record), pictures)
+
+
+def validation_section(validation: Validation | str) -> Section:
+    """Write the section that compares both compliances, or gives the reason why none was made."""
+    if isinstance(validation, str):
+        return Section(VALIDATION.title, (Paragraph(validation),))
+    return described_section(VALIDATION, validation)
 
 
 METHOD_WORDS = {

@@ -1,4 +1,4 @@
-"""Sections on where the numbers come from: the independent engine, the theory, and how to make the report again.
+"""Sections on where the numbers come from: the theory, and how to make the report again.
 
 Nothing is computed here.
 """
@@ -9,11 +9,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 
 from kinetostat.studies.paper.printed import CITATION
-from kinetostat.tolerances import AGREED
-from kinetostat.validation.comparison import Validation
-from kinetostat.views.comparison_tables import diagonal_table, difference_table, frequency_table, trial_table
-from kinetostat.views.report.content import Block, Formula, Listing, Paragraph, Section, Table
-from kinetostat.views.report.typesetting import as_table, typeset
+from kinetostat.views.report.content import Formula, Listing, Paragraph, Section, Table
 
 LIBRARIES = ("kinetostat", "numpy", "scipy", "llvmlite", "pymoo", "matplotlib")
 THEORY = (
@@ -72,41 +68,6 @@ ASSEMBLY = Formula(
     "bold(K) = sum_i bold(W)_i bold(G)_i^(-1) bold(W)_i^T",
 )  # fmt: skip
 """How the stiffnesses of the legs add up."""
-
-
-def verdict(validation: Validation | str) -> str:
-    """Say in a sentence whether an independent engine agrees, or why none was used."""
-    if isinstance(validation, str):
-        return validation
-    agree = "agrees" if validation.difference <= AGREED else "DIFFERS"
-    worst = f"compliances differ by {max(validation.differences.values()):.1e} (relative, worst block)"
-    if validation.frequencies:
-        worst += f", natural frequencies by {validation.frequency_difference:.1e}"
-    return (
-        f"{validation.engine.capitalize()} {validation.version}, an independent engine, {agree}: {worst}; "
-        f"{AGREED:g} is allowed."
-    )
-
-
-def validation_section(validation: Validation | str) -> Section:
-    """Write the section that compares both compliances, or gives the reason why none was made."""
-    title = "Validation"
-    if isinstance(validation, str):
-        return Section(title, (Paragraph(validation),))
-    about = (
-        "The machine was rebuilt in an independent engine from its geometry, cross-sections and springs alone; no "
-        f"Jacobian of kinetostat is used there. {verdict(validation)}"
-    )
-    blocks: list[Block] = [
-        Paragraph(typeset(about)),
-        as_table(diagonal_table(validation), "The diagonal of the compliance, side by side."),
-        as_table(difference_table(validation), "Relative difference by block, and how exact the engine itself is."),
-    ]
-    if validation.frequencies:
-        blocks.append(as_table(frequency_table(validation), "Natural frequencies without loads, side by side."))
-    if len(validation.trials) > 1:
-        blocks.append(as_table(trial_table(validation), "How the engine converges to its result."))
-    return Section(title, tuple(blocks))
 
 
 def method_section() -> Section:

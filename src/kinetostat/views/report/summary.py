@@ -23,10 +23,10 @@ from kinetostat.views.first_lines import first_lines, margins
 from kinetostat.views.report.answers import gains, verdict_of
 from kinetostat.views.report.content import Block, Figure, Paragraph, Points, Section, Table
 from kinetostat.views.report.pictures import NO_RENDERER, PICTURE_WIDTH, MachinePictures, can_be_live, figure_of
-from kinetostat.views.report.provenance import verdict
 from kinetostat.views.report.typesetting import as_table, typeset
 from kinetostat.views.requirement_lines import headline, requirement_lines
 from kinetostat.views.tables import machine_table
+from kinetostat.views.validation import verdict
 
 MOST_PARTS_NAMED = 2
 """Number of parts that are named in each direction, at most."""
@@ -61,7 +61,7 @@ def _findings(answers: Answers, validation: Validation | str) -> Iterator[str]:
     advice = answers.of("guidelines")
     if advice is not None:
         yield from (statement.text for statement in statements(advice) if statement.topic == "weakest")
-    yield verdict(validation)
+    yield validation if isinstance(validation, str) else verdict(validation)
 
 
 def _directions(answers: Answers) -> Table:

@@ -24,13 +24,13 @@ from kinetostat.studies.setting import pose_of
 from kinetostat.studies.storage import place_of, write_bytes
 from kinetostat.validation.comparison import Validation, choose, validate
 from kinetostat.views.answers import plain_of
-from kinetostat.views.report.answers import ANSWERS_WITH_SECTIONS, answer_sections, study_section
+from kinetostat.views.report.answers import ANSWERS_WITH_SECTIONS, answer_sections, study_section, validation_section
 from kinetostat.views.report.content import Report
 from kinetostat.views.report.design import guideline_section, sensitivity_section
 from kinetostat.views.report.html_page import html_page
 from kinetostat.views.report.pdf import check_typst, pdf_bytes
 from kinetostat.views.report.pictures import machine_pictures
-from kinetostat.views.report.provenance import Origin, method_section, record_section, validation_section
+from kinetostat.views.report.provenance import Origin, method_section, record_section
 from kinetostat.views.report.stiffness import load_section, stiffness_section, workspace_section
 from kinetostat.views.report.summary import data_section, machine_section, portrait, summary_section
 from kinetostat.views.report.typesetting import typeset

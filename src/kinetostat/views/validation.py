@@ -1,0 +1,128 @@
+"""A machine beside an independent engine: the description of the answer of `validate`. Nothing is computed here."""
+
+from collections.abc import Iterator
+
+from rich.table import Table
+
+from kinetostat.algebra.screw import COMPONENTS
+from kinetostat.display import number
+from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.machine.parameters import values
+from kinetostat.tolerances import AGREED
+from kinetostat.validation.comparison import Validation, frequency_difference
+from kinetostat.views.analysis_tables import matrix_table
+from kinetostat.views.question import Axis, Description, Field, Lines, Records
+from kinetostat.views.tables import numeric_table
+
+COMPARED_DIGITS = 9
+"""Digits in which a machine is compared with an independent engine."""
+REBUILT = (
+    "The machine was rebuilt in the engine from its geometry, cross-sections and springs alone; no Jacobian of "
+    "kinetostat is used there."
+)
+
+
+def verdict(validation: Validation) -> str:
+    """Say in a sentence whether the engine agrees: no block of C and no frequency differs by more than `AGREED`."""
+    agree = "agrees" if validation.difference <= AGREED else "DIFFERS"
+    worst = f"compliances differ by {max(validation.differences.values()):.1e} (relative, worst block)"
+    if validation.frequencies:
+        worst += f", natural frequencies by {validation.frequency_difference:.1e}"
+    engine = f"{validation.engine.capitalize()} {validation.version}"
+    return f"{engine}, an independent engine, {agree}: {worst}; {AGREED:g} is allowed."
+
+
+def _lines(validation: Validation) -> Lines:
+    return [("Verdict", verdict(validation)), ("Engine", REBUILT)]
+
+
+def _tables(validation: Validation, full: bool) -> Iterator[Table]:
+    """The diagonals of C side by side and how far they differ; with `full` both matrices, last."""
+    yield _diagonal_table(validation)
+    differences = [*validation.differences, "uncertainty of the engine"]
+    table = numeric_table("Relative difference by block, and how exact the engine itself is", "", differences)
+    table.add_row("", *(f"{value:.1e}" for value in (*validation.differences.values(), validation.uncertainty)))
+    yield table
+    if validation.frequencies:
+        yield _frequency_table(validation)
+    if len(validation.trials) > 1:
+        table = numeric_table("Convergence of the engine to its result", validation.varied, ["difference"])
+        for scale, difference in validation.trials:
+            table.add_row(f"{scale:.3g}", f"{difference:.1e}")
+        yield table
+    if full:
+        family, display = validation.machine.family, validation.machine.display
+        kept = list(family.components)
+        for title, matrix in {"kinetostat": validation.ours, validation.engine: validation.theirs}.items():
+            rows = matrix[kept][:, kept].tolist()
+            yield matrix_table(f"Compliance C, {title}", "compliance", family.component_names, rows, display)
+
+
+def _diagonal_table(validation: Validation) -> Table:
+    columns = ["kinetostat", validation.engine, "difference", "unit"]
+    table = numeric_table("Diagonal of the compliance, side by side", "direction", columns)
+    family = validation.machine.family
+    for i, name in zip(family.components, family.component_names, strict=True):
+        ours, theirs = float(validation.ours[i, i]), float(validation.theirs[i, i])
+        difference = f"{abs(theirs / ours - 1.0):.1e}" if ours else "–"
+        scale = validation.machine.display.scale(QUANTITIES[f"compliance_{name}"].unit)
+        cells = (number(value * scale.factor, digits=COMPARED_DIGITS) for value in (ours, theirs))
+        table.add_row(name, *cells, difference, scale.unit)
+    return table
+
+
+def _frequency_table(validation: Validation) -> Table:
+    columns = ["kinetostat", validation.engine, "difference", "unit"]
+    table = numeric_table("Natural frequencies without loads, side by side", "mode", columns)
+    for order, pair in enumerate(validation.frequencies, 1):
+        cells = (number(value, digits=COMPARED_DIGITS) for value in pair)
+        table.add_row(str(order), *cells, f"{frequency_difference(*pair):.1e}", "Hz")
+    return table
+
+
+def _pose(validation: Validation) -> dict[str, float]:
+    numbers = values(validation.machine)
+    return {path.removeprefix("pose."): value for path, value in numbers.items() if path.startswith("pose.")}
+
+
+C_ABOUT = "compliance, rad/(N·m), rad/N and m/N"
+MATRIX = ("moved", "loaded")
+
+VALIDATION = Description(
+    type="validation.comparison.Validation",
+    title="Validation",
+    fields=(
+        Field("name", "machine.name"),
+        Field("pose", _pose),
+        Field("components", lambda _: list(COMPONENTS)),
+        Field("engine"),
+        Field("version"),
+        Field("ours", long_name=f"{C_ABOUT}, by kinetostat", axes=MATRIX),
+        Field("theirs", long_name=f"{C_ABOUT}, by the engine", axes=MATRIX),
+        Field("differences"),
+        Field("difference"),
+        Field("allowed", lambda _: AGREED),
+        Field("uncertainty"),
+        Field("varied"),
+        Records(
+            "trials",
+            "trial",
+            (Field("scale", lambda trial: trial[0]), Field("difference", lambda trial: trial[1])),
+            forms=("json",),
+        ),
+        Records(
+            "frequencies",
+            "mode",
+            (
+                Field("ours", lambda pair: pair[0]),
+                Field("theirs", lambda pair: pair[1]),
+                Field("difference", lambda pair: frequency_difference(*pair)),
+            ),
+            forms=("json",),
+        ),
+    ),
+    lines=_lines,
+    tables=_tables,
+    axes=(Axis("moved", lambda _: list(COMPONENTS)), Axis("loaded", lambda _: list(COMPONENTS))),
+    state=lambda validation: f"compared with an independent engine, {validation.engine} {validation.version}",
+)
